@@ -1,0 +1,1 @@
+"""Forces and impact laws, one file each."""

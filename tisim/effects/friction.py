@@ -1,0 +1,25 @@
+"""Coulomb friction at impact (Z04 Eq. 4.17)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim._taichi import ti
+from tisim.effect import parameter
+from tisim.effects.impact import Impact, ImpactLaw
+
+
+class Friction(ImpactLaw):
+    """Tangential impulse mu |I_n| dtau against the slip, at most what stops it.
+
+    coefficient : mu. Grains do not rotate (Z04 section 2). Z04 prints no bound at sticking, without which
+    friction could reverse the slip.
+    """
+
+    requires: ClassVar = (Impact,)
+
+    coefficient: float = parameter("", ge=0)
+
+    @ti.func
+    def limit(self, w, impulse):
+        return self.coefficient(w) * impulse

@@ -1,0 +1,33 @@
+"""Thermal softening: hardness falls with temperature (Z04 section 6)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim._taichi import ti
+from tisim.effect import parameter
+from tisim.effects.heating import Heating
+from tisim.effects.impact import ImpactLaw
+
+GAS_CONSTANT = 8.31446261815324
+"""J/(mol K), exact in SI."""
+LARGEST_EXPONENT = 80.0
+"""exp of it still fits f32; hardness is then 1e34 times H_0, and nothing bonds."""
+
+
+class Softening(ImpactLaw):
+    """Hardness H = H_0 exp(Q / (R T)).
+
+    activation_energy : Q. Source: Z04 section 6, text after Eq. (6.2). H_0 is the limit at high
+    temperature (the paper calls it the hardness at absolute zero, where its formula is infinite).
+    """
+
+    needs = ("temperature",)
+    requires: ClassVar = (Heating,)
+
+    activation_energy: float = parameter("J/mol", ge=0)
+
+    @ti.func
+    def hardness_factor(self, w, temperature):
+        coldest = self.activation_energy(w) / (GAS_CONSTANT * LARGEST_EXPONENT) + 1e-30
+        return ti.exp(self.activation_energy(w) / (GAS_CONSTANT * ti.max(temperature, coldest)))

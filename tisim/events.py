@@ -1,0 +1,223 @@
+"""Sudden events between pairs, such as impacts, many at once: in parallel, deterministic, conservative.
+
+A step that has moved the particles is surveyed for pairs in contact, which go into a list with the time
+since their event fell due. They are then resolved in rounds. In a round every waiting pair bids for both
+its particles, and a pair that holds the highest bid at both is resolved. The bid is the time since the
+event fell due, so earlier events go first. Why this is right:
+
+- Exclusive: a particle has one highest bid, so pairs of one round share no particle, and each is a binary
+  event as the laws define it. Momentum and mass are conserved pair by pair, hence in all.
+- Complete: the waiting pair with the highest bid of all always wins, so every round settles at least one
+  pair, and each pair is settled once; the rounds end.
+- Ordered: a pair waits until every earlier pair of either of its particles is settled, and then sees what
+  those have done to velocity, size and temperature. The outcome is that of resolving the whole list one
+  after another, earliest first.
+- Deterministic: bids are integers, compared by atomic maxima, which do not depend on order. Two pairs that
+  share a particle never bid the same, as the sum of their indices breaks ties.
+"""
+
+from __future__ import annotations
+
+from tisim._taichi import ti
+from tisim.domain import Domain
+from tisim.effect import PairEvent
+from tisim.neighbours import Neighbours
+from tisim.program import PerParticle, Phase, Repeat
+from tisim.state import CROWDED, FULL, State
+from tisim.steppers.controller import Controller
+
+CONTACTS_PER_PARTICLE = 8
+
+
+@ti.data_oriented
+class Contacts:
+    """The pairs of this step in which something falls due."""
+
+    def __init__(self, s: State, domain: Domain, events: tuple[PairEvent, ...]) -> None:
+        self.s, self.domain, self.events = s, domain, events
+        self.capacity = CONTACTS_PER_PARTICLE * s.capacity
+        builder = ti.FieldsBuilder()
+        self.first, self.second = ti.field(ti.i32), ti.field(ti.i32)
+        self.bid, self.best = ti.field(ti.i64), ti.field(ti.i64)
+        self.size, self.waiting = ti.field(ti.i32), ti.field(ti.i32)
+        for column in (self.first, self.second, self.bid):
+            builder.dense(ti.i, s.worlds).dense(ti.j, self.capacity).place(column)
+        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.best)
+        for column in (self.size, self.waiting):
+            builder.dense(ti.i, s.worlds).place(column)
+        self._tree = builder.finalize()
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        return self.s.worlds * (16 * self.capacity + 8 * self.s.capacity + 8)
+
+    def destroy(self) -> None:
+        """Give the memory back."""
+        self._tree.destroy()
+
+    @ti.func
+    def add(self, w, i, j, due):
+        """Enter a pair whose event fell due ``due`` seconds ago (>= 0)."""
+        c = ti.atomic_add(self.size[w], 1)
+        if c < self.capacity:
+            self.first[w, c], self.second[w, c] = i, j
+            # The bits of a positive f32 are ordered as its value; the low half breaks ties.
+            order = ti.cast(ti.bit_cast(ti.cast(due, ti.f32), ti.i32), ti.i64)
+            self.bid[w, c] = ((order + 1) << 31) + i + j
+            self.waiting[w] += 1
+        else:
+            self.s.fail(w, CROWDED, i)
+
+
+class Survey(PerParticle):
+    """Look at every near pair: enter those in contact, and ask the controller about the others."""
+
+    def __init__(self, near: Neighbours, contacts: Contacts, controller: Controller) -> None:
+        super().__init__(near.s)
+        self.near, self.contacts, self.controller = near, contacts, controller
+
+    @ti.func
+    def enter(self, w, i, j, separation, distance):
+        due = ti.cast(-1.0, self.s.real)
+        for event in ti.static(self.contacts.events):
+            due = ti.max(due, event.contact(self.s, w, i, j, separation, distance))
+        if due >= 0.0:
+            self.contacts.add(w, i, j, due)
+
+    @ti.func
+    def run(self, w, i):
+        soonest = ti.cast(ti.math.inf, ti.f64)
+        for k in range(self.near.size(w, i)):
+            j = self.near.candidate(w, i, k)
+            if j != i:
+                d = self.near.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
+                distance = d.norm()
+                self.enter(w, i, j, d, distance)
+                soonest = ti.min(soonest, self.controller.pair(self.s, w, i, j, d, distance))
+        self.controller.note(self.s, w, i, soonest)
+
+
+class SurveyAgain(Survey):
+    """After events have changed velocities and sizes: ask the controller once more."""
+
+    conditional = True
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]
+
+    @ti.func
+    def enter(self, w, i, j, separation, distance):
+        pass
+
+
+class PerContact(Phase):
+    """A loop over the contacts of this step."""
+
+    def __init__(self, contacts: Contacts) -> None:
+        self.c, self.s, self.extent = contacts, contacts.s, contacts.capacity
+
+    @ti.func
+    def size(self, w):
+        return self.c.size[w]
+
+
+class Open(PerContact):
+    """Forget earlier bids."""
+
+    @ti.func
+    def run(self, w, k):
+        self.c.best[w, self.c.first[w, k]] = 0
+        self.c.best[w, self.c.second[w, k]] = 0
+
+
+class Bid(PerContact):
+    """Every waiting pair bids for both its particles."""
+
+    @ti.func
+    def run(self, w, k):
+        bid = self.c.bid[w, k]
+        if bid > 0:
+            ti.atomic_max(self.c.best[w, self.c.first[w, k]], bid)
+            ti.atomic_max(self.c.best[w, self.c.second[w, k]], bid)
+
+
+class Resolve(PerContact):
+    """A pair that holds both its particles is resolved, if its event is still due."""
+
+    @ti.func
+    def run(self, w, k):
+        c, s = self.c, self.s
+        i, j, bid = c.first[w, k], c.second[w, k], c.bid[w, k]
+        if bid > 0 and c.best[w, i] == bid and c.best[w, j] == bid:
+            c.bid[w, k] = 0
+            ti.atomic_sub(c.waiting[w], 1)
+            if s.mass[w, i] > 0.0 and s.mass[w, j] > 0.0:
+                d = c.domain.separation(w, s.position[w, i], s.position[w, j])
+                distance = d.norm()
+                for event in ti.static(c.events):
+                    if event.contact(s, w, i, j, d, distance) >= 0.0:
+                        event.resolve(s, w, i, j, d, distance)
+                        ti.atomic_max(s.events[w], 1)
+
+
+class Rounds(Repeat):
+    """Rounds of bidding until no pair waits."""
+
+    def __init__(self, contacts: Contacts) -> None:
+        super().__init__((Open(contacts), Bid(contacts), Resolve(contacts)))
+        self.c = contacts
+
+    @ti.func
+    def pending(self, w):
+        return self.c.waiting[w]
+
+
+class Close(Phase):
+    """Empty the list."""
+
+    def __init__(self, contacts: Contacts) -> None:
+        self.c = contacts
+
+    @ti.func
+    def run(self, w, _k):
+        self.c.size[w] = 0
+        self.c.waiting[w] = 0
+
+
+class Rearrange(Phase):
+    """Fill the slots of removed particles from the end, and let operators act on the world as a whole."""
+
+    conditional = True
+
+    def __init__(self, s: State, operators: tuple, near: Neighbours | None) -> None:
+        self.s, self.operators, self.near, self.lists = s, operators, near, near is not None
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w] + self.s.changed[w]
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.events[w] = 1
+        # What the first survey told the controller is no longer true.
+        s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
+        for operator in ti.static(self.operators):
+            operator.world(s, w)
+        if s.changed[w] > 0:
+            i = 0
+            while i < s.count[w]:
+                if s.mass[w, i] > 0.0:
+                    i += 1
+                else:
+                    last = s.count[w] - 1
+                    if i < last:
+                        s.copy(w, last, i)
+                    s.count[w] = last
+            s.changed[w] = 0
+            if ti.static(self.lists):
+                self.near.stale[w] = 1
+
+
+__all__ = ["FULL", "Close", "Contacts", "Rearrange", "Rounds", "Survey", "SurveyAgain"]

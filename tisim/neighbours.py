@@ -1,0 +1,219 @@
+"""Pairs whose surfaces are near: all pairs for small worlds, a cell list with a skin for larger ones.
+
+Each pair is listed once, by its larger member (of equals, the lower index). A particle then searches only
+as far as twice its own radius, so a few large grains among many small ones cost no more than their volume.
+A list is made anew when particles have moved, relative to the world's own frame, so far that a pair it
+lacks could matter. What is done with a pair depends on its true distance, never on whether the list was
+due: results do not depend on when lists were made, and a restarted run keeps its bits.
+"""
+
+from __future__ import annotations
+
+from tisim._taichi import ti
+from tisim.domain import Domain
+from tisim.program import PerParticle, Phase
+from tisim.state import State
+
+SMALL = 48
+"""Worlds of at most this many particles look at all pairs."""
+LISTED = 24
+"""Neighbours a particle can list; one with more looks at all particles."""
+SKIN = 0.6
+"""Skin in units of the mean distance between particles, the cube root of volume per particle."""
+HORIZON = 0.25
+"""Part of the skin within which every pair is sure to be listed."""
+CELLS_PER_PARTICLE = 2
+
+
+@ti.data_oriented
+class Neighbours:
+    """The pair list of every world."""
+
+    def __init__(self, s: State, domain: Domain) -> None:
+        self.s, self.domain, self.joined = s, domain, domain.joined()
+        worlds, capacity = s.worlds, s.capacity
+        self.small = SMALL
+        self.max_cells = CELLS_PER_PARTICLE * capacity + 8
+        builder = ti.FieldsBuilder()
+        self.cell_start, self.cell_of, self.order, self.listed = (ti.field(ti.i32) for _ in range(4))
+        self.other = ti.field(ti.i32)
+        self.dims = ti.Vector.field(3, ti.i32)
+        self.corner, self.cell = ti.Vector.field(3, s.real), ti.Vector.field(3, s.real)
+        self.skin = ti.field(s.real)
+        self.stale = ti.field(ti.i32)
+        builder.dense(ti.i, worlds).dense(ti.j, self.max_cells + 1).place(self.cell_start)
+        for column in (self.cell_of, self.order, self.listed):
+            builder.dense(ti.i, worlds).dense(ti.j, capacity).place(column)
+        builder.dense(ti.i, worlds).dense(ti.j, capacity).dense(ti.k, LISTED).place(self.other)
+        for column in (self.dims, self.corner, self.cell, self.skin, self.stale):
+            builder.dense(ti.i, worlds).place(column)
+        self._tree = builder.finalize()
+
+    def phases(self) -> tuple[Phase, ...]:
+        """Bring the list up to date where it is due."""
+        return (Bin(self), Search(self), Listed(self))
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        per_world = self.max_cells + 1 + self.s.capacity * (3 + LISTED) + 12
+        return 4 * self.s.worlds * per_world
+
+    def destroy(self) -> None:
+        """Give the memory back."""
+        self._tree.destroy()
+
+    @ti.func
+    def owns(self, w, i, j):
+        """Whether the pair is i's to list."""
+        a, b = self.s.radius[w, i], self.s.radius[w, j]
+        return a > b or (a == b and i < j)
+
+    @ti.func
+    def size(self, w, i):
+        """How many candidates ``candidate`` offers particle i."""
+        n = self.s.count[w]
+        if n > SMALL and self.listed[w, i] >= 0:
+            n = self.listed[w, i]
+        return n
+
+    @ti.func
+    def candidate(self, w, i, k):
+        """The k-th particle that may be a neighbour owned by i; i itself where there is none."""
+        j = k
+        if self.s.count[w] > SMALL and self.listed[w, i] >= 0:
+            j = self.other[w, i, k]
+        elif not self.owns(w, i, k):
+            j = i
+        return j
+
+    @ti.func
+    def spacing(self, w):
+        """Mean distance between particles: the cube root of the volume at the start for each. m."""
+        return ti.cast(ti.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
+
+    @ti.func
+    def horizon(self, w):
+        """Gap between surfaces (m) within which every pair is sure to be offered."""
+        return HORIZON * SKIN * self.spacing(w)
+
+    @ti.func
+    def moved(self, w, distance):
+        """Note that particles have moved by at most this much relative to the frame. m."""
+        self.s.travel[w] += distance
+        if 2.0 * self.s.travel[w] > self.skin[w] - self.horizon(w):
+            self.stale[w] = 1
+
+    @ti.func
+    def place(self, w, r):
+        """Index of the cell along each axis."""
+        c = ti.floor((r - self.corner[w]) / self.cell[w], ti.i32)
+        return ti.max(0, ti.min(c, self.dims[w] - 1))
+
+
+class Bin(Phase):
+    """Sort the particles of a world into cells, serially, so that the order in a cell is that of indices."""
+
+    conditional = True
+
+    def __init__(self, neighbours: Neighbours) -> None:
+        self.n = neighbours
+
+    @ti.func
+    def when(self, w):
+        return self.n.stale[w] > 0 and self.n.s.count[w] > SMALL
+
+    @ti.func
+    def run(self, w, _k):
+        n, s = self.n, self.n.s
+        count = s.count[w]
+        low, high, least = s.position[w, 0], s.position[w, 0], s.radius[w, 0]
+        for i in range(count):
+            low, high = ti.min(low, s.position[w, i]), ti.max(high, s.position[w, i])
+            least = ti.min(least, s.radius[w, i])
+        if ti.static(n.joined):
+            low = n.domain.origin(w)
+            high = low + n.domain.side(w)
+        extent = ti.max(high - low, 1e-3 * least)
+        spacing = ti.pow(extent[0] * extent[1] * extent[2] / count, 1.0 / 3.0)
+        n.skin[w] = SKIN * ti.max(spacing, n.spacing(w))
+        width = ti.max(spacing, 2.0 * least + n.skin[w])
+        n.dims[w] = ti.max(1, ti.floor(ti.min(extent / width, 1e4), ti.i32))
+        while n.dims[w][0] * n.dims[w][1] * n.dims[w][2] > n.max_cells:
+            n.dims[w] = (n.dims[w] + 1) // 2
+        n.corner[w], n.cell[w] = low, extent / n.dims[w]
+        dims = n.dims[w]
+        cells = dims[0] * dims[1] * dims[2]
+        for c in range(cells + 1):
+            n.cell_start[w, c] = 0
+        for i in range(count):
+            c = n.place(w, s.position[w, i])
+            flat = (c[2] * dims[1] + c[1]) * dims[0] + c[0]
+            n.cell_of[w, i] = flat
+            n.cell_start[w, flat] += 1
+        total = 0
+        for c in range(cells + 1):
+            total += n.cell_start[w, c]
+            n.cell_start[w, c] = total
+        for back in range(count):
+            i = count - 1 - back
+            c = n.cell_of[w, i]
+            n.cell_start[w, c] -= 1
+            n.order[w, n.cell_start[w, c]] = i
+
+
+class Search(PerParticle):
+    """Let each particle list the smaller ones near it."""
+
+    conditional = True
+
+    def __init__(self, neighbours: Neighbours) -> None:
+        super().__init__(neighbours.s)
+        self.n = neighbours
+
+    @ti.func
+    def when(self, w):
+        return self.n.stale[w]
+
+    @ti.func
+    def run(self, w, i):
+        n, s = self.n, self.s
+        if i == 0:
+            s.travel[w] = 0.0
+        if s.count[w] > SMALL:
+            r, radius, skin, dims = s.position[w, i], s.radius[w, i], n.skin[w], n.dims[w]
+            reach = 2.0 * radius + skin
+            first = ti.floor((r - reach - n.corner[w]) / n.cell[w], ti.i32)
+            last = ti.floor((r + reach - n.corner[w]) / n.cell[w], ti.i32)
+            for k in ti.static(range(3)):
+                if ti.static(n.joined):
+                    if last[k] - first[k] >= dims[k]:
+                        first[k], last[k] = 0, dims[k] - 1
+                else:
+                    first[k], last[k] = ti.max(first[k], 0), ti.min(last[k], dims[k] - 1)
+            found = 0
+            for z in range(first[2], last[2] + 1):
+                for y in range(first[1], last[1] + 1):
+                    row = ((z + dims[2]) % dims[2] * dims[1] + (y + dims[1]) % dims[1]) * dims[0]
+                    for x in range(first[0], last[0] + 1):
+                        c = row + (x + dims[0]) % dims[0]
+                        for m in range(n.cell_start[w, c], n.cell_start[w, c + 1]):
+                            j = n.order[w, m]
+                            if n.owns(w, i, j):
+                                limit = radius + s.radius[w, j] + skin
+                                d = n.domain.nearest(w, r, s.position[w, j])
+                                if d.norm_sqr() <= limit * limit:
+                                    if found < LISTED:
+                                        n.other[w, i, found] = j
+                                    found += 1
+            n.listed[w, i] = found if found <= LISTED else -1
+
+
+class Listed(Phase):
+    """Declare the list fresh, once every particle has searched."""
+
+    def __init__(self, neighbours: Neighbours) -> None:
+        self.n = neighbours
+
+    @ti.func
+    def run(self, w, _k):
+        self.n.stale[w] = 0

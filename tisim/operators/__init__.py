@@ -1,0 +1,1 @@
+"""Changes of state between steps, one file each."""

@@ -1,0 +1,102 @@
+"""Fragmentation of agglomerates that absorb too much kinetic energy (Z04 section 5)."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from tisim._taichi import ti
+from tisim.effect import Operator, parameter
+from tisim.effects.heating import Heating
+from tisim.effects.impact import Impact, ImpactLaw
+from tisim.particles import Arrays
+from tisim.state import FULL, Field
+
+
+class Fragmentation(ImpactLaw, Operator):
+    """A grain whose absorbed kinetic energy dK would shrink its pieces below a threshold breaks.
+
+    The radius of pieces whose surface costs dK is b = b_0 / (dK / (4 pi gamma b_0^2) + 1) (5.2). When
+    b / b_0 is below ``threshold`` it breaks into n = b_0^3 / b^3 equal pieces, rounded down and none lighter
+    than ``grain_mass``, which move on together as a touching cluster about the same centre of mass. Mass,
+    momentum and kinetic energy are conserved; the new surface takes dZ = gamma (n 4 pi b^2 - 4 pi b_0^2)
+    from the grain's heat (6.8). A grain that breaks does not bond in that impact.
+
+    surface_energy : gamma. grain_mass : mass of an original grain, the smallest piece.
+    threshold : b / b_0 below which it breaks; 2^(-1/3), two pieces, by default. Z04 remark 5.1 uses 1/2.
+    Source: Z04 Eqs (5.1)-(5.3).
+    """
+
+    needs = (
+        "radius",
+        "mass",
+        Field("pieces", "", 1, "keep", integer=True),
+        Field("fracture_energy", "J", 1, "sum"),
+    )
+    counts = ("fractures",)
+    requires: ClassVar = (Impact,)
+
+    surface_energy: float = parameter("J/m^2", gt=0)
+    grain_mass: float = parameter("kg", gt=0)
+    threshold: float = parameter("", 2.0 ** (-1.0 / 3.0), gt=0, lt=1)
+
+    def capacity(self, arrays: Arrays) -> int:
+        return max(len(arrays["mass"]), int(arrays["mass"].sum() / self.grain_mass * (1 + 1e-9)))
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {"heating": tuple(peer for peer in peers if isinstance(peer, Heating))}
+
+    @ti.func
+    def fracture(self, s, w, i, absorbed):
+        radius = s.radius[w, i]
+        surface = 4.0 * ti.math.pi * self.surface_energy(w) * radius * radius
+        shrink = absorbed / surface + 1.0
+        # Rounding must not cost a grain of the sum its last piece.
+        most = ti.cast(s.mass[w, i] / self.grain_mass(w) * (1.0 + 1e-6), ti.i32)
+        pieces = ti.cast(ti.min(shrink**3 * (1.0 + 1e-12), ti.cast(most, s.real)), ti.i32)
+        # A grain that an earlier impact of this step has broken does not break again, and bonds no more.
+        broke = ti.cast(s.pieces[w, i] >= 2, ti.i32)
+        if shrink * self.threshold(w) > 1.0 and pieces >= 2 and broke == 0:
+            energy = surface * (ti.pow(ti.cast(pieces, s.real), 1.0 / 3.0) - 1.0)
+            s.pieces[w, i] = pieces
+            s.fracture_energy[w, i] += energy
+            for law in ti.static(self.heating):
+                s.temperature[w, i] = law.temperature(s, w, i, -energy)
+            ti.atomic_add(s.fractures[w], 1)
+            broke = 1
+        return broke
+
+    @ti.func
+    def world(self, s, w):
+        whole = s.count[w]
+        for i in range(whole):
+            n = s.pieces[w, i]
+            if n >= 2:
+                s.pieces[w, i] = 0
+                if n - 1 > s.room(w):
+                    s.fail(w, FULL, i)
+                else:
+                    self.split(s, w, i, n)
+
+    @ti.func
+    def split(self, s, w, i, n):
+        """n equal pieces at the first n sites of a cubic block of touching spheres, about the old centre."""
+        edge = 1
+        while edge * edge * edge < n:
+            edge += 1
+        middle = 0.0 * s.position[w, i]
+        for k in range(n):
+            middle += self.site(k, edge) / n
+        centre = s.position[w, i]
+        for field in ti.static(s.sums):
+            field[w, i] /= n
+        s.radius[w, i] *= ti.pow(ti.cast(n, s.real), -1.0 / 3.0)
+        for k in range(n):
+            piece = i
+            if k > 0:
+                piece = s.append(w, i)
+            s.position[w, piece] = centre + 2.0 * s.radius[w, i] * (self.site(k, edge) - middle)
+
+    @ti.func
+    def site(self, k, edge):
+        """k-th site of a cubic block, in diameters."""
+        return ti.Vector([k % edge, k // edge % edge, k // (edge * edge)])

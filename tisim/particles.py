@@ -1,0 +1,124 @@
+"""What a scene starts with: particles given one by one, or a random cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import ConfigDict, Field, field_validator
+
+from tisim.domain import Domain
+from tisim.errors import InputError, must
+from tisim.packing.sequential import sequential_addition
+from tisim.spec import Spec, Vector, parameter
+
+Arrays = dict[str, np.ndarray]
+"""Particle quantities by field name: shape (n,) or (n, 3), SI."""
+
+
+class Start(Spec):
+    """A starting configuration."""
+
+    def count(self) -> int:
+        """How many particles it has."""
+        raise NotImplementedError(f"{type(self).__name__} must define count")
+
+    def arrays(self, domain: Domain, seed: int) -> Arrays:
+        """position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
+        raise NotImplementedError(f"{type(self).__name__} must define arrays")
+
+
+def _array(value: Any) -> tuple[Any, ...]:
+    return tuple(tuple(row) if np.ndim(row) else row for row in np.asarray(value, dtype=float).tolist())
+
+
+class Particles(Start):
+    """Particles given one by one.
+
+    position, velocity : m and m/s, shape (n, 3).
+    radius : m, > 0; mass : kg, > 0; one number for all, or n of them. Give mass or density (kg/m^3).
+    quantities : any further field by name, such as temperature (K); one number, or n, or (n, 3).
+    """
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    position: tuple[Vector, ...] = parameter("m", min_length=1)
+    velocity: tuple[Vector, ...] = parameter("m/s", min_length=1)
+    radius: tuple[float, ...] = parameter("m")
+    mass: tuple[float, ...] | None = parameter("kg", None)
+    density: float | None = parameter("kg/m^3", None, gt=0)
+    quantities: Mapping[str, Any] = Field(default_factory=dict)
+
+    @field_validator("position", "velocity", "radius", "mass", mode="before")
+    @classmethod
+    def _from_array(cls, value: Any) -> Any:
+        return _array(np.atleast_1d(value)) if isinstance(value, np.ndarray | float | int) else value
+
+    def count(self) -> int:
+        return len(self.position)
+
+    def _column(self, name: str, value: Any, n: int) -> np.ndarray:
+        column = np.asarray(value, dtype=float)
+        if column.ndim == 0 or column.shape == (1,):
+            column = np.full(n, float(column.reshape(-1)[0]))
+        must(len(column) == n, f"particles.{name}", f"one value or {n} of them", column.shape)
+        must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", _worst(column))
+        return column
+
+    def arrays(self, domain: Domain, seed: int) -> Arrays:
+        n = self.count()
+        arrays = {
+            name: self._column(name, getattr(self, name), n) for name in ("position", "velocity", "radius")
+        }
+        must((self.mass is None) != (self.density is None), "particles", "given mass or density, one of the two",
+             "both" if self.mass is not None else "neither")  # fmt: skip
+        volume = 4 / 3 * np.pi * arrays["radius"] ** 3
+        arrays["mass"] = (
+            volume * self.density if self.density is not None else self._column("mass", self.mass, n)
+        )
+        for name in ("radius", "mass"):
+            must(bool((arrays[name] > 0).all()), f"particles.{name}", "greater than 0", arrays[name].min())
+        for name, value in self.quantities.items():
+            arrays[name] = self._column(name, value, n)
+        return arrays
+
+    def structure(self) -> tuple[Any, ...]:
+        return (type(self),)
+
+
+def _worst(column: np.ndarray) -> float:
+    return float(column[~np.isfinite(column)].flat[0]) if not np.isfinite(column).all() else 0.0
+
+
+class Cloud(Start):
+    """Equal spheres at random places that do not overlap, with random velocities about a mean.
+
+    Velocity: ``mean_velocity + deviation * lambda`` with lambda uniform in -1..1 for each particle and
+    component (Z04 section 7). The same seed gives the same lambdas whatever the other parameters.
+    """
+
+    number: int = Field(gt=0)
+    radius: float = parameter("m", gt=0)
+    density: float = parameter("kg/m^3", gt=0)
+    mean_velocity: Vector = parameter("m/s", (0.0, 0.0, 0.0))
+    deviation: Vector = parameter("m/s", (0.0, 0.0, 0.0))
+    temperature: float = parameter("K", 300.0, gt=0)
+
+    def count(self) -> int:
+        return self.number
+
+    def arrays(self, domain: Domain, seed: int) -> Arrays:
+        low, high = domain.bounds()
+        if low is None or high is None:
+            raise InputError("domain must be bounded to hold a random cloud; received an open one")
+        draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (self.number, 3))
+        return {
+            "position": sequential_addition(self.number, self.radius, low, high, seed),
+            "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
+            "radius": np.full(self.number, self.radius),
+            "mass": np.full(self.number, self.density * 4 / 3 * np.pi * self.radius**3),
+            "temperature": np.full(self.number, self.temperature),
+        }
+
+    def structure(self) -> tuple[Any, ...]:
+        return (type(self),)

@@ -1,0 +1,103 @@
+"""The one place that starts Taichi: device, precision and threads. Nothing starts it at import."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from tisim._taichi import BACKEND, ti
+from tisim.errors import InputError, must
+
+DEVICES = ("cpu", "cuda")
+PRECISIONS = ("f64", "f32")
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """Where and how kernels run.
+
+    device : "cpu" or "cuda".
+    precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
+        Time is f64 whatever the precision.
+    threads : CPU threads, >= 1.
+
+    Floating point is strict (no fast-math): a NaN stays visible, and the same scene gives the same bits.
+    """
+
+    device: str = "cpu"
+    precision: str = "f64"
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
+        must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
+        must(self.threads >= 0, "threads", "at least 1 (0 for all cores)", self.threads)
+
+    @property
+    def real(self) -> Any:
+        """The Taichi type of a particle quantity."""
+        return ti.f64 if self.precision == "f64" else ti.f32
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """What decides the last bits of a result beside the scene: precision and kind of device."""
+        return {"precision": self.precision, "device": self.device}
+
+
+_current: Runtime | None = None
+_generation = 0
+
+
+def cores() -> int:
+    """CPU cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
+    """Start Taichi with these settings, or keep it as it is when they have not changed.
+
+    threads : CPU threads; 0 for all cores.
+    Raises InputError when a setting is unknown or the device is absent. A change of settings
+    invalidates every Simulation made before; those say so when used.
+    """
+    global _current, _generation
+    wanted = Runtime(device, precision, threads or cores())
+    if wanted == _current:
+        return wanted
+    try:
+        # Taichi announces the device on standard output, where results go.
+        with contextlib.redirect_stdout(io.StringIO()):
+            ti.init(
+                arch=ti.cuda if wanted.device == "cuda" else ti.cpu,
+                default_fp=wanted.real,
+                cpu_max_num_threads=wanted.threads,
+                fast_math=False,
+                enable_fallback=False,
+                # With it, Quadrants 1.3.3 reads stale flags after nested loops, and compiling takes three times
+                # as long under Taichi 1.7.4; LLVM optimises the same code afterwards.
+                cfg_optimization=False,
+            )
+    except RuntimeError as failure:
+        raise InputError(
+            f"device must be present on this machine; received {device!r} ({failure})"
+        ) from failure
+    _current, _generation = wanted, _generation + 1
+    return wanted
+
+
+def current() -> Runtime:
+    """The running settings; starts the defaults (cpu, f64, all cores) on first use."""
+    return _current or start()
+
+
+def generation() -> int:
+    """Counts the starts: compiled objects of an earlier generation must not be touched."""
+    return _generation
+
+
+def backend() -> str:
+    """Name and version of the kernel compiler."""
+    return f"{BACKEND} {'.'.join(str(part) for part in ti.__version__[:3])}"

@@ -1,0 +1,135 @@
+"""A scene: what the user asks for, as plain validated data. TOML in and out; no Taichi."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from tisim import effects, kinds, operators
+from tisim.domain import Box, Domain, Open
+from tisim.effect import Effect
+from tisim.errors import InputError, must
+from tisim.particles import Start
+from tisim.spec import Spec
+from tisim.steppers.verlet import Verlet
+
+PHYSICS_VERSION = 1
+"""Raised whenever a change of code changes the result of a scene; part of its digest."""
+
+__all__ = ["Box", "Open", "Scene"]
+
+
+class Scene(Spec):
+    """Particles, the effects they are subject to, and for how long.
+
+    particles : the start, ``Particles`` or ``Cloud``.
+    effects : what acts, in this order; a scene pays only for what it calls for.
+    domain : ``Open()`` or ``Box(low, high)``, m.
+    stepper : how time advances; tolerances and limits are stated here.
+    duration : s, > 0. seed : of all that is random in the scene, 0..2^63-1.
+
+    Raises InputError ("X must be Y; received Z") when made from anything that cannot be run.
+    """
+
+    name: str = "scene"
+    particles: Start
+    effects: tuple[Effect, ...] = ()
+    domain: Domain = Open()
+    stepper: Verlet = Verlet()
+    duration: float = Field(gt=0)
+    seed: int = Field(0, ge=0, lt=2**63)
+
+    @field_validator("effects", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        present = [type(effect) for effect in self.effects]
+        for kind in present:
+            must(present.count(kind) == 1, f"effects.{kind.kind()}", "given once", present.count(kind))
+            for needed in kind.requires:
+                must(
+                    any(issubclass(other, needed) for other in present),
+                    f"effects.{kind.kind()}",
+                    f"used together with effects.{needed.kind()}",
+                    ", ".join(other.kind() for other in present),
+                )
+        return self
+
+    def structure(self) -> tuple[Any, ...]:
+        """What is compiled in; scenes that agree in it can run as one batch."""
+        parts = (*self.effects, self.domain, self.stepper)
+        return tuple(part.structure() for part in parts)
+
+    def digest(self) -> str:
+        """Hex hash of everything that decides the result: physics version, every parameter, the seed."""
+        text = json.dumps([PHYSICS_VERSION, self.to_dict()], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as in a TOML file; ``from_dict`` is its inverse."""
+        return {
+            "name": self.name,
+            "duration": self.duration,
+            "seed": self.seed,
+            "particles": kinds.to_dict(self.particles),
+            "domain": kinds.to_dict(self.domain),
+            "stepper": {"control": kinds.to_dict(self.stepper.control)},
+            "effects": {effect.kind(): kinds.to_dict(effect, named=False) for effect in self.effects},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Scene:
+        """A scene from plain data; InputError names the key that is wrong."""
+        rest = dict(data)
+        must("particles" in rest, "scene.particles", "given", "nothing")
+        made: dict[str, Any] = {"particles": kinds.from_dict(Start, rest.pop("particles"), "particles")}
+        if "domain" in rest:
+            made["domain"] = kinds.from_dict(Domain, rest.pop("domain"), "domain")
+        if "stepper" in rest:
+            made["stepper"] = kinds.stepper(rest.pop("stepper"))
+        listed = rest.pop("effects", {})
+        must(isinstance(listed, Mapping), "scene.effects", "a table of effects", listed)
+        kinds.load(effects)
+        kinds.load(operators)
+        made["effects"] = tuple(
+            kinds.from_dict(Effect, {"kind": kind, **values}, f"effects.{kind}")
+            for kind, values in listed.items()
+        )
+        return cls(**made, **rest)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Scene:
+        """A scene from a TOML file; InputError when it is not one."""
+        try:
+            with Path(path).open("rb") as file:
+                return cls.from_dict(tomllib.load(file))
+        except FileNotFoundError:
+            raise InputError(f"scene file must exist; received {str(path)!r}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+            raise InputError(f"scene file must be TOML; received {str(path)!r} ({fault})") from None
+
+    def to_toml(self) -> str:
+        """The scene as TOML text; ``from_toml`` gives it back."""
+        return kinds.toml(self.to_dict())
+
+    def replace(self, settings: Mapping[str, Any]) -> Scene:
+        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``."""
+        data = self.to_dict()
+        for key, value in settings.items():
+            *path, last = key.split(".")
+            place: Any = data
+            for step in path:
+                must(isinstance(place, dict) and step in place, key, "a setting of this scene", step)
+                place = place[step]
+            must(isinstance(place, dict), key, "a setting of this scene", last)
+            place[last] = value
+        return type(self).from_dict(data)

@@ -1,0 +1,320 @@
+"""Compile once, load many, run: a batch of worlds of one structure."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tisim import runtime
+from tisim.binding import Table, connect
+from tisim.effect import Effect, Force, Operator, PairEvent, PairForce
+from tisim.errors import InputError, must
+from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
+from tisim.forces import FORCE, SumForces
+from tisim.neighbours import Neighbours
+from tisim.particles import Arrays
+from tisim.program import Phase, Program, Repeat
+from tisim.scene import Scene
+from tisim.state import BOOKS, CLOCK, CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, State, resolve_fields
+from tisim.steppers.verlet import Advance, Clock, Finish, Kick, Move
+
+CHUNK_SECONDS = 0.25
+"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite."""
+
+REASONS = {
+    RUNNING: "running",
+    ENDED: "reached its end",
+    NOT_FINITE: "a quantity is not finite",
+    FULL: "more fragments than there is room for",
+    CROWDED: "more simultaneous contacts than there is room for",
+}
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a world ended. ``ok`` when it reached its end; else ``reason`` says when, where and what."""
+
+    ok: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """A world read back.
+
+    state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, the
+        last good state. start : the same at the start.
+    time : s. work : counts (steps, particle_steps, and what the effects count). wall_s : wall seconds of
+        the batch that this world was part of, per world; set-up and compilation are not in it.
+    """
+
+    scene: Scene
+    state: Arrays
+    start: Arrays
+    time: float
+    work: dict[str, int]
+    status: Status
+    wall_s: float
+    settings: dict[str, str] = field(default_factory=dict)
+
+
+class Simulation:
+    """Compiled for the structure of a scene, a number of worlds and a capacity of particles.
+
+    scene : any scene of the structure; its values do not matter here.
+    schedule : "world" or "particle" (see program.py), or None to choose by device and size.
+    Loading and running other scenes of the same structure compiles nothing.
+    """
+
+    def __init__(
+        self, scene: Scene, worlds: int = 1, capacity: int | None = None, schedule: str | None = None
+    ) -> None:
+        must(worlds >= 1, "worlds", "at least 1", worlds)
+        began = time.perf_counter()
+        self.runtime, self.worlds = runtime.current(), worlds
+        self.structure = scene.structure()
+        if capacity is None:
+            arrays = scene.particles.arrays(scene.domain, scene.seed)
+            capacity = (
+                max(e.capacity(arrays) for e in scene.effects) if scene.effects else len(arrays["mass"])
+            )
+        self.schedule = schedule or self._choose(capacity)
+        must(self.schedule in ("world", "particle"), "schedule", "world or particle", schedule)
+        forces = any(isinstance(e, Force | PairForce) for e in scene.effects)
+        fields = resolve_fields((*(n for e in scene.effects for n in e.needs), *((FORCE,) if forces else ())))
+        counters = tuple(dict.fromkeys(name for e in scene.effects for name in e.counts))
+        self.s = State(worlds, capacity, fields, counters)
+        parts = self._parts(scene)
+        self.table = Table(parts, worlds, self.runtime.real)
+        *effects, domain, control = (self.table.bind(part) for part in parts)
+        connect(effects)
+        self.near: Neighbours | None = None
+        self.contacts: Contacts | None = None
+        self._compose(tuple(effects), domain, control, forces)
+        self.scenes: list[Scene] = []
+        self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
+
+    @staticmethod
+    def _parts(scene: Scene) -> list[Any]:
+        return [*scene.effects, scene.domain, scene.stepper.control]
+
+    def _choose(self, capacity: int) -> str:
+        # A world per thread needs as many worlds as threads; one small world is faster without launches.
+        small = capacity * self.worlds <= 20_000
+        many = self.worlds >= self.runtime.threads
+        return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
+
+    def _compose(self, effects: tuple[Effect, ...], domain: Any, control: Any, forces: bool) -> None:
+        """The phases of a step, and those that prepare the first one."""
+        s = self.s
+        events = tuple(e for e in effects if isinstance(e, PairEvent))
+        operators = tuple(e for e in effects if isinstance(e, Operator))
+        if events or control.watches_pairs:
+            self.near = Neighbours(s, domain)
+            self.contacts = Contacts(s, domain, events)
+        near, contacts = self.near, self.contacts
+        summed = SumForces(
+            s, domain,
+            tuple(e for e in effects if isinstance(e, Force)),
+            tuple(e for e in effects if isinstance(e, PairForce)),
+        )  # fmt: skip
+        step: list[Phase | Repeat] = [
+            Clock(s, control, near),
+            Move(s, domain, operators, forces),
+            Advance(s, near),
+        ]
+        first: list[Phase | Repeat] = []
+        if forces:
+            step += [summed, Kick(s)]
+            first += [summed]
+        if near is not None and contacts is not None:
+            survey = Survey(near, contacts, control)
+            step += [*near.phases(), survey]
+            first += [*near.phases(), survey, Close(contacts)]
+            if events:
+                step += [Rounds(contacts)]
+        if events or operators:
+            step += [Rearrange(s, operators, near)]
+        if near is not None and contacts is not None:
+            if control.watches_pairs:
+                step += [*near.phases(), SurveyAgain(near, contacts, control)]
+            step += [Close(contacts)]
+        self.program = Program(s, (*step, Finish(s)), self.schedule)
+        self.first = Program(s, tuple(first), self.schedule)
+
+    def load(self, scenes: Sequence[Scene]) -> None:
+        """Put one scene in each of the first worlds; the others stay empty. No compilation.
+
+        Raises InputError when a scene is of another structure, or larger than the capacity.
+        """
+        self.s.check()
+        must(0 < len(scenes) <= self.worlds, "number of scenes", f"1 to {self.worlds}", len(scenes))
+        starts = []
+        for scene in scenes:
+            must(scene.structure() == self.structure, "scene", "of the structure compiled", scene.name)
+            starts.append(self._start(scene))
+        columns = {f.name: self._blank(f) for f in self.s.fields}
+        for w, start in enumerate(starts):
+            for name, column in columns.items():
+                n = len(start["mass"])
+                column[w, :n] = np.arange(n) if name == "id" else start.get(name, 0)
+        for name, column in columns.items():
+            self.s.write(name, column)
+        counts = np.array([len(start["mass"]) for start in starts] + [0] * (self.worlds - len(starts)))
+        self._reset(scenes, starts, counts)
+        self.table.write([self._parts(scene) for scene in scenes])
+        self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
+        if self.near is not None:
+            self.near.stale.fill(1)
+        if self.first.items:
+            self.first.advance(1)
+        self._keep()
+
+    def _blank(self, f: Any) -> np.ndarray:
+        shape = (self.worlds, self.s.capacity) + ((3,) if f.components == 3 else ())
+        real = np.float64 if self.runtime.precision == "f64" else np.float32
+        return np.ones(shape, dtype=np.int32 if f.integer else real) * (f.name in ("mass", "radius"))
+
+    def _start(self, scene: Scene) -> Arrays:
+        arrays = scene.particles.arrays(scene.domain, scene.seed)
+        room = max([len(arrays["mass"]), *(e.capacity(arrays) for e in scene.effects)])
+        must(
+            room <= self.s.capacity, f"particles of scene {scene.name!r}", f"at most {self.s.capacity}", room
+        )
+        low, high = scene.domain.bounds()
+        if low is not None:
+            inside = ((arrays["position"] >= low) & (arrays["position"] < high)).all()
+            must(bool(inside), "particles.position", "inside the domain", "a particle outside")
+        missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - arrays.keys()
+        if missing:
+            names = ", ".join(sorted(missing))
+            raise InputError(
+                f"particles must be given {names}, which effects of the scene need; received none"
+            )
+        return arrays
+
+    def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
+        for name in (*CLOCK, *BOOKS, *self.s.counters):
+            getattr(self.s, name).fill(0)
+        empty = self.worlds - len(scenes)
+        real = np.float64 if self.runtime.precision == "f64" else np.float32
+        frame = [np.average(a["velocity"], axis=0, weights=a["mass"]) for a in starts]
+        self.s.write("frame", np.array(frame + [np.zeros(3)] * empty).astype(real))
+        self.s.write("count", counts.astype(np.int32))
+        self.s.write("next_id", counts.astype(np.int32))
+        self.s.write("status", np.array([RUNNING] * len(scenes) + [ENDED] * empty, dtype=np.int32))
+        self.s.write("end", np.array([scene.duration for scene in scenes] + [0.0] * empty))
+        self.s.write(
+            "volume", np.array([_volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty)
+        )
+        self.s.approach_time.fill(np.inf)
+        self.s.culprit.fill(2**31 - 1)
+
+    def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:
+        """Run every world to its end, or for at most ``steps`` more steps each.
+
+        progress : called about four times a second with the fraction done, 0..1.
+        KeyboardInterrupt leaves a state between two steps, from which ``run`` goes on.
+        """
+        self.s.check()
+        done, chunk = 0, 8
+        while (self.s.read("status") == RUNNING).any() and (steps is None or done < steps):
+            n = chunk if steps is None else min(chunk, steps - done)
+            began = time.perf_counter()
+            self.program.advance(n)
+            self._verify()
+            taken = time.perf_counter() - began
+            self.wall_s += taken
+            done += n
+            if taken < CHUNK_SECONDS / 2:
+                chunk = min(2 * chunk, 100_000)
+            elif taken > 2 * CHUNK_SECONDS:
+                chunk = max(chunk // 2, 1)
+            if progress:
+                progress(self.fraction())
+
+    def fraction(self) -> float:
+        """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
+        n = len(self.scenes)
+        ended = self.s.read("status")[:n] != RUNNING
+        return float(np.where(ended, 1.0, self.s.read("time")[:n] / self.s.read("end")[:n]).mean())
+
+    def _snapshot(self) -> dict[str, np.ndarray]:
+        return {name: self.s.read(name) for name in (*(f.name for f in self.s.fields), "time", "count")}
+
+    def _keep(self) -> None:
+        self._good = self._snapshot()
+        self._bad: dict[int, tuple[float, str]] = {}
+
+    def _verify(self) -> None:
+        """Find quantities that are not finite; where a world is sound, keep its state as the last good one."""
+        now = self._snapshot()
+        status = self.s.read("status")
+        live = np.arange(self.s.capacity) < now["count"][:, None]
+        sound = np.ones(self.worlds, bool)
+        for f in self.s.fields:
+            values = now[f.name].reshape(self.worlds, self.s.capacity, -1)
+            bad = live & ~np.isfinite(values).all(axis=2)
+            for w in np.flatnonzero(bad.any(axis=1)):
+                who = int(now["id"][w][bad[w]].min())
+                self._bad.setdefault(
+                    int(w), (float(now["time"][w]), f"{f.name} of particle {who} is not finite")
+                )
+                sound[w] = False
+        failed = (status != RUNNING) & (status != ENDED)
+        for w in np.flatnonzero(failed):
+            who = int(self.s.read("culprit")[w])
+            self._bad.setdefault(
+                int(w), (float(now["time"][w]), f"{REASONS[int(status[w])]}, at particle {who}")
+            )
+            sound[w] = False
+        for name, values in now.items():
+            self._good[name][sound] = values[sound]
+        if not sound.all():
+            status[~sound & (status == RUNNING)] = NOT_FINITE
+            self.s.write("status", status)
+
+    def results(self) -> list[Result]:
+        """Every loaded world read back, in order."""
+        tallies = {name: self.s.read(name) for name in self.s.counters}
+        status = self.s.read("status")
+        found = []
+        for w, scene in enumerate(self.scenes):
+            n = int(self._good["count"][w])
+            state = {f.name: self._good[f.name][w, :n].copy() for f in self.s.fields}
+            if w in self._bad:
+                when, why = self._bad[w]
+                ended = Status(False, f"at t = {when:.6g} s: {why}; kept t = {self._good['time'][w]:.6g} s")
+            else:
+                ended = Status(int(status[w]) == ENDED, REASONS[int(status[w])])
+            found.append(
+                Result(
+                    scene,
+                    state,
+                    self.starts[w],
+                    float(self._good["time"][w]),
+                    {name: int(tally[w]) for name, tally in tallies.items()},
+                    ended,
+                    self.wall_s / len(self.scenes),
+                    self.runtime.settings,
+                )  # fmt: skip
+            )
+        return found
+
+    def close(self) -> None:
+        """Give the device memory back."""
+        for part in (self.s, self.table, self.near, self.contacts):
+            if part is not None:
+                part.destroy()
+
+
+def _volume(scene: Scene, start: Arrays) -> float:
+    low, high = scene.domain.bounds()
+    if low is None or high is None:
+        reach = start["radius"].max()
+        low, high = start["position"].min(axis=0) - reach, start["position"].max(axis=0) + reach
+    return float(np.prod(high - low))

@@ -1,0 +1,142 @@
+"""Validated plain data: the parts of a scene, their units, and their names in files.
+
+A ``Spec`` is a frozen pydantic model. Its name in a file is its class name in snake_case
+(``StokesDrag`` is ``stokes_drag``), found by walking subclasses: nothing is registered anywhere.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
+
+from tisim._taichi import DEVICE_FUNCTION
+from tisim.errors import InputError, must
+
+Vector = tuple[float, float, float]
+"""Three Cartesian components."""
+
+
+class Spec(BaseModel):
+    """A part of a scene: frozen, unknown keys refused, NaN and infinity refused."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        ignored_types=(DEVICE_FUNCTION,),
+    )
+
+    def __init__(self, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as invalid:
+            raise InputError(explain_invalid(invalid, self.kind())) from None
+
+    @classmethod
+    def kind(cls) -> str:
+        """The name of this class in files: snake_case."""
+        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+
+    @classmethod
+    def named(cls, kind: str, where: str) -> type[Self]:
+        """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
+        known = {sub.kind(): sub for sub in _descendants(cls)}
+        must(kind in known, where, f"one of {', '.join(sorted(known))}", kind)
+        return known[kind]
+
+    @classmethod
+    def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
+        """Name, declaration and number of components of each parameter that may differ per world."""
+        for name, info in cls.model_fields.items():
+            if info.annotation is float:
+                yield name, info, 1
+            elif info.annotation == Vector:
+                yield name, info, 3
+
+    def values(self) -> list[float]:
+        """The parameters of ``parameters()`` in order, vectors spread out; SI units."""
+        spread: list[float] = []
+        for name, _, size in self.parameters():
+            value = getattr(self, name)
+            spread.extend(value if size == 3 else (value,))
+        return spread
+
+    def structure(self) -> tuple[Any, ...]:
+        """What is compiled in: the class and every option that is not a per-world parameter."""
+        varying = {name for name, _, _ in self.parameters()}
+        fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
+        return (type(self), *fixed)
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        """Attributes to set on the bound copy, chosen among the bound effects of the scene."""
+        return {}
+
+    requires: ClassVar[tuple[type[Spec], ...]] = ()
+    """Effects without which this one means nothing."""
+
+
+def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
+    for sub in cls.__subclasses__():
+        yield sub
+        yield from _descendants(sub)
+
+
+def parameter(unit: str, default: Any = ..., **rules: Any) -> Any:
+    """Declare a physical parameter: its unit, and pydantic rules such as ``gt=0``.
+
+    A float or ``Vector`` parameter may differ in every world of a batch. A kernel reads it as
+    ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile.
+    """
+    return Field(default, json_schema_extra={"unit": unit}, **rules)
+
+
+def unit_of(info: FieldInfo) -> str:
+    """The unit declared by ``parameter``, or an empty string."""
+    extra = info.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+_RULES = {
+    "greater_than": "greater than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "finite_number": "a finite number",
+    "float_parsing": "a number",
+    "float_type": "a number",
+    "int_parsing": "a whole number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "bool_parsing": "true or false",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "missing": "given",
+    "literal_error": "{expected}",
+    "tuple_type": "a list",
+    "too_short": "a list of {min_length}",
+    "too_long": "a list of {max_length}",
+}
+
+
+def explain_invalid(invalid: ValidationError, where: str) -> str:
+    """One line per fault of a pydantic report: "X must be Y; received Z"."""
+    lines = []
+    for fault in invalid.errors():
+        name = ".".join([where, *(str(part) for part in fault["loc"])])
+        context: Mapping[str, Any] = fault.get("ctx", {})
+        if isinstance(context.get("error"), InputError):
+            lines.append(str(context["error"]))
+            continue
+        if fault["type"] == "extra_forbidden":
+            lines.append(f"{name} must be a known key; received {fault['input']!r}")
+            continue
+        if fault["type"] == "missing":
+            lines.append(f"{name} must be given; received nothing")
+            continue
+        rule = _RULES.get(fault["type"], fault["msg"]).format(**context)
+        lines.append(f"{name} must be {rule}; received {fault['input']!r}")
+    return "\n".join(lines)

@@ -1,0 +1,161 @@
+"""The particle fields of a batch of worlds: a core, plus the union of what the scene's effects need.
+
+Every field has a leading world axis. Vectors are stored as separate components (structure of arrays),
+which the compiler can vectorise over particles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from tisim import runtime
+from tisim._taichi import ti
+from tisim.errors import RunError
+
+
+@dataclass(frozen=True)
+class Field:
+    """A quantity that particles carry.
+
+    merge : what becomes of it when two particles become one: "mean" by mass, "sum", "volume" (a radius),
+        or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
+    """
+
+    name: str
+    unit: str
+    components: Literal[1, 3] = 1
+    merge: Literal["mean", "sum", "volume", "keep"] = "mean"
+    integer: bool = False
+
+
+CORE = (
+    Field("position", "m", 3, "keep"),
+    Field("velocity", "m/s", 3),
+    Field("mass", "kg", 1, "sum"),
+    Field("radius", "m", 1, "volume"),
+    Field("id", "", 1, "keep", integer=True),
+)
+SHARED = {field.name: field for field in (*CORE, Field("temperature", "K"))}
+"""Fields that several effects share by name."""
+
+RUNNING, ENDED, NOT_FINITE, FULL, CROWDED = range(5)
+"""Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow."""
+
+CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "stride", "travel", "volume")
+BOOKS = ("count", "status", "culprit", "changed", "events", "next_id")
+TALLIES = ("steps", "particle_steps")
+
+
+def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
+    """The core and everything needed, each once, in a fixed order."""
+    wanted = {field.name: field for field in CORE}
+    for need in needs:
+        field = SHARED[need] if isinstance(need, str) else need
+        wanted.setdefault(field.name, field)
+    return tuple(wanted.values())
+
+
+@ti.data_oriented
+class State:
+    """Device memory of ``worlds`` worlds of at most ``capacity`` particles.
+
+    Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
+    ``time``, ``dt``, ``end`` (s, f64), ``status``, and the counters the effects declare.
+    """
+
+    def __init__(
+        self, worlds: int, capacity: int, fields: tuple[Field, ...], counters: tuple[str, ...]
+    ) -> None:
+        self.worlds, self.capacity = worlds, capacity
+        self.fields, self.counters = fields, (*TALLIES, *counters)
+        self.real = runtime.current().real
+        self._generation = runtime.generation()
+        builder = ti.FieldsBuilder()
+        for field in fields:
+            setattr(self, field.name, self._place(builder, field))
+        for names, dtype in ((CLOCK, ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
+            for name in names:
+                column = ti.field(dtype)
+                builder.dense(ti.i, worlds).place(column)
+                setattr(self, name, column)
+        self.frame = ti.Vector.field(3, self.real)
+        builder.dense(ti.i, worlds).place(self.frame)
+        self._tree = builder.finalize()
+        everything = tuple(getattr(self, field.name) for field in fields)
+        self.all_fields = everything
+        self.means = self._ruled("mean")
+        self.sums = self._ruled("sum")
+
+    def _place(self, builder: Any, field: Field) -> Any:
+        dtype = ti.i32 if field.integer else self.real
+        column = ti.field(dtype) if field.components == 1 else ti.Vector.field(field.components, dtype)
+        parts = [column] if field.components == 1 else [column.get_scalar_field(k) for k in range(3)]
+        for part in parts:
+            builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).place(part)
+        return column
+
+    def _ruled(self, rule: str) -> tuple[Any, ...]:
+        return tuple(getattr(self, field.name) for field in self.fields if field.merge == rule)
+
+    def bytes(self) -> dict[str, int]:
+        """Bytes of each particle field, all worlds together."""
+        size = 8 if self.real == ti.f64 else 4
+        return {
+            f.name: self.worlds * self.capacity * f.components * (4 if f.integer else size)
+            for f in self.fields
+        }
+
+    def write(self, name: str, values: np.ndarray) -> None:
+        """Set a field from an array of its full shape."""
+        getattr(self, name).from_numpy(np.ascontiguousarray(values))
+
+    def read(self, name: str) -> np.ndarray:
+        """A field as an array of its full shape."""
+        return np.asarray(getattr(self, name).to_numpy())
+
+    def destroy(self) -> None:
+        """Give the memory back."""
+        self._tree.destroy()
+
+    def check(self) -> None:
+        """RunError when Taichi has been started anew since."""
+        if self._generation != runtime.generation():
+            raise RunError("a Simulation must be used with the settings it was made under; start it anew")
+
+    @ti.func
+    def copy(self, w, source, target):
+        """Copy every field of one slot to another."""
+        for field in ti.static(self.all_fields):
+            field[w, target] = field[w, source]
+
+    @ti.func
+    def remove(self, w, i):
+        """Mark a particle as gone; its slot is reused after the events of this step."""
+        self.mass[w, i] = 0.0
+        ti.atomic_max(self.changed[w], 1)
+
+    @ti.func
+    def append(self, w, i):
+        """A copy of particle i in a new slot, whose index is returned. The caller has checked ``room``."""
+        k = self.count[w]
+        self.copy(w, i, k)
+        self.id[w, k] = self.next_id[w]
+        self.next_id[w] += 1
+        self.count[w] = k + 1
+        self.changed[w] = 1
+        return k
+
+    @ti.func
+    def room(self, w):
+        """Free slots."""
+        return self.capacity - self.count[w]
+
+    @ti.func
+    def fail(self, w, status, i):
+        """Stop a world. ``i`` is the particle at fault; of several, the lowest id is recorded."""
+        ti.atomic_max(self.status[w], status)
+        ti.atomic_min(self.culprit[w], self.id[w, i])

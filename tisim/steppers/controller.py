@@ -1,0 +1,87 @@
+"""How long the next step may be: fixed, or from the time until surfaces meet."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from tisim._taichi import ti
+from tisim.errors import must
+from tisim.spec import Spec, parameter
+
+
+class Controller(Spec):
+    """The contract of step control: ``pair`` sees every near pair, ``note`` every particle, ``next`` decides.
+
+    ``watches_pairs`` says whether it needs to see pairs at all.
+    """
+
+    watches_pairs: ClassVar[bool] = False
+
+    @ti.func
+    def pair(self, s, w, i, j, separation, distance):
+        """Time (s, f64) that this pair allows."""
+        return ti.cast(ti.math.inf, ti.f64)
+
+    @ti.func
+    def note(self, s, w, i, soonest):
+        """Note for a particle the least time that its pairs allow. s, f64."""
+
+    @ti.func
+    def next(self, s, w, horizon):
+        """Length of the next step. s, f64. ``horizon``: gap (m) within which every pair has been seen."""
+        return ti.cast(0.0, ti.f64)
+
+
+class FixedStep(Controller):
+    """Steps of one length; the last one is cut to end on time."""
+
+    dt: float = parameter("s", gt=0)
+
+    @ti.func
+    def next(self, s, w, horizon):
+        return ti.cast(self.dt(w), ti.f64)
+
+
+class ApproachTime(Controller):
+    """The least time until two surfaces meet, gap over approach speed (Z04 Eq. 6.14), within limits.
+
+    Z04 asks each particle's nearest neighbour only; here every approaching pair is asked, as the nearest
+    is not always the first to be met. Limits of Z04 section 8: 1e-6 s and 1e-3 s.
+    """
+
+    shortest: float = parameter("s", 1e-6, gt=0)
+    longest: float = parameter("s", 1e-3, gt=0)
+    watches_pairs: ClassVar[bool] = True
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        must(self.longest >= self.shortest, "approach_time.longest", "at least shortest", self.longest)
+        return self
+
+    @ti.func
+    def pair(self, s, w, i, j, separation, distance):
+        gap = distance - s.radius[w, i] - s.radius[w, j]
+        # (v_i - v_j).n, with n from i to j.
+        closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
+        time = ti.cast(ti.math.inf, ti.f64)
+        if gap > 0.0 and closing > 0.0:
+            time = ti.cast(gap * distance / closing, ti.f64)
+        return time
+
+    @ti.func
+    def note(self, s, w, i, soonest):
+        if soonest < s.approach_time[w]:
+            ti.atomic_min(s.approach_time[w], soonest)
+        speed = ti.cast((s.velocity[w, i] - s.frame[w]).norm(), ti.f64)
+        if speed > s.fastest[w]:
+            ti.atomic_max(s.fastest[w], speed)
+
+    @ti.func
+    def next(self, s, w, horizon):
+        dt = s.approach_time[w]
+        if horizon > 0.0:
+            # Pairs that were not seen are farther apart than this, and close no faster than twice the fastest.
+            dt = ti.min(dt, ti.cast(horizon, ti.f64) / (2.0 * s.fastest[w] + 1e-300))
+        return ti.max(ti.cast(self.shortest(w), ti.f64), ti.min(dt, ti.cast(self.longest(w), ti.f64)))
