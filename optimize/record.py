@@ -1,0 +1,66 @@
+"""One finished evaluation, and the key it is found by."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+REASON_LENGTH = 500  # HDF5 rows have one length per column; a stack trace in one row would widen them all
+
+
+def canonical(value: Any) -> bytes:
+    """ASCII JSON with sorted keys: equal values, equal bytes. NumPy scalars become Python numbers."""
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=lambda scalar: scalar.item())
+    return text.encode("ascii")
+
+
+def evaluation_key(scene_digest: str, settings: Mapping[str, Any], problem: str, version: int) -> str:
+    """SHA-256 (hex) of all that decides a fitness: the scene's digest (physics, parameters, seed), the
+    evaluator's settings (precision, device kind) and the objective (the problem's name and version)."""
+    return hashlib.sha256(canonical([scene_digest, dict(settings), problem, version])).hexdigest()
+
+
+@dataclass(frozen=True)
+class Record:
+    """One evaluation of one design from one random start.
+
+    key : see evaluation_key; problem : its name.
+    fitness : the objective, NaN if the evaluation failed; ok, reason : how it ended.
+    seed : of the start; design : gene -> value in its unit; work : counts of the run.
+    wall_s : seconds it took; created : seconds since 1970 (UTC).
+    """
+
+    key: str
+    problem: str
+    fitness: float
+    ok: bool
+    reason: str
+    seed: int
+    design: Mapping[str, float]
+    work: Mapping[str, Any]
+    wall_s: float
+    created: float
+
+    def __post_init__(self) -> None:
+        plain = self.reason.encode("ascii", "backslashreplace").decode().replace("\0", " ")
+        object.__setattr__(self, "reason", plain[:REASON_LENGTH])
+        object.__setattr__(self, "design", dict(self.design))
+        object.__setattr__(self, "work", dict(self.work))
+
+    def payload(self) -> bytes:
+        """The record as canonical JSON; NaN is written as null, which every JSON reader knows."""
+        fields = dict(vars(self))
+        fields["fitness"] = self.fitness if math.isfinite(self.fitness) else None
+        return canonical(fields)
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Record:
+        """The record that payload() wrote. ValueError or TypeError if it is none."""
+        fields = json.loads(payload)
+        if fields["fitness"] is None:
+            fields["fitness"] = math.nan
+        return cls(**fields)

@@ -1,0 +1,100 @@
+"""What a finished search shows: a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from rich.table import Table
+
+from optimize.outcome import Outcome
+from optimize.tables import best_columns, logbook_columns
+
+_BEST, _MEAN, _MARK = "#0b5394", "#8a8a8a", "#c9c9c9"
+
+
+def best_table(outcome: Outcome) -> Table:
+    """The best designs for the terminal: a column per design, genes in their units, fitness with its 95 %
+    interval, derived values. (Z04 splits its ten genes over two tables; ranks as columns fit one screen.)
+    """
+    problem = outcome.problem
+    table = Table(title=problem.title or problem.name)
+    for index, (heading, values) in enumerate(best_columns(problem, outcome.hall).items()):
+        if index == 0:
+            table.add_column(heading)
+            for rank in values:
+                table.add_column(str(rank), justify="right")
+        else:
+            table.add_row(heading, *map(_text, values))
+    return table
+
+
+def write_csv(outcome: Outcome, path: str | Path) -> None:
+    """The best designs as CSV, all digits, one column per heading of best_columns."""
+    columns = best_columns(outcome.problem, outcome.hall)
+    with Path(path).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def convergence_figure(outcome: Outcome) -> Figure:
+    """Best and mean fitness against generation, and below it the problem's first derived value of the best.
+
+    Dotted lines mark the generations after which the search box was re-centred.
+    """
+    problem = outcome.problem
+    log = logbook_columns(problem, outcome.logbook)
+    derived = next(iter(problem.derived), None)
+    panels = 2 if derived else 1
+    figure = Figure(figsize=(5.6, 2.7 * panels), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
+    if log:
+        generation = np.array(log["gen"])
+        best, mean = _plottable(log["best"]), _plottable(log["mean"])
+        axes[0].plot(generation, mean, color=_MEAN, marker="o", ms=2.5, lw=1, label="mean of the population")
+        axes[0].plot(generation, best, color=_BEST, marker="o", ms=3.5, lw=1.6, label="best")
+        if derived:
+            axes[1].plot(generation, _plottable(log[derived]), color=_BEST, marker="o", ms=3.5, lw=1.6)
+        for axis in axes:
+            for count, at in enumerate(generation[np.array(log["recentred"], dtype=bool)]):
+                label = "search box re-centred" if count == 0 else None
+                axis.axvline(at, color=_MARK, ls=":", lw=1.2, zorder=0, label=label)
+        axes[0].legend(framealpha=1, edgecolor="none", fontsize=8)
+    axes[0].set_ylabel(problem.symbol)
+    if derived:
+        axes[1].set_ylabel(f"{derived} of the best")
+    axes[-1].set_xlabel("generation")
+    axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(direction="in")
+    return figure
+
+
+def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
+    """Write best.csv, convergence.png and convergence.pdf into a folder (made if missing); name -> path."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = {name: folder / name for name in ("best.csv", "convergence.png", "convergence.pdf")}
+    write_csv(outcome, paths["best.csv"])
+    figure = convergence_figure(outcome)
+    figure.savefig(paths["convergence.png"], dpi=200)
+    figure.savefig(paths["convergence.pdf"])
+    return paths
+
+
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _plottable(values: list[float]) -> np.ndarray:
+    """Generations without a successful design leave a gap."""
+    array = np.array(values, dtype=float)
+    return np.where(np.isfinite(array), array, np.nan)

@@ -1,0 +1,208 @@
+"""The genetic search: generations, their log, stopping rules, and what is left in the cache file.
+
+A search is a function of its problem, settings and evaluator settings. Resuming is therefore running it again
+on the same cache file: every finished evaluation comes from there, the rest follows as if never stopped.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import platform
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from deap import tools
+
+from optimize.breeding import Breeder, Individual
+from optimize.cache import Cache
+from optimize.ensemble import Ensemble, Evaluator
+from optimize.outcome import Outcome, Progress, Stopped
+from optimize.problem import Problem
+from optimize.settings import Settings, search_name
+from optimize.tables import best_columns, logbook_columns
+
+
+class _OutOfTime(Exception):
+    """The wall-clock budget is spent in the middle of a generation."""
+
+
+def search(
+    problem: Problem,
+    evaluator: Evaluator,
+    cache: Cache,
+    settings: Settings | None = None,
+    *,
+    on_generation: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Outcome:
+    """Minimise the problem's fitness over its genome (Z04 sections 7 and 8).
+
+    on_generation is called after each generation, on_progress as evaluations finish. After each generation
+    settings, versions, logbook and hall of fame are in the cache file, below Outcome.name.
+    KeyboardInterrupt ends the search cleanly and is reported in Outcome.stopped.
+    Raises InputError for operators that cannot work on the genome, RunError if the disk is full.
+    """
+    return _Search(problem, evaluator, cache, settings or Settings(), on_generation, on_progress).run()
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the installed packages that a result depends on."""
+    found = {"python": platform.python_version()}
+    for package in ("tisim", "taichi", "quadrants", "numpy", "deap", "h5py"):
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def _successful(function: Callable[[Any], Any], otherwise: float) -> Callable[[Any], float]:
+    """The statistic over the designs that did not fail."""
+
+    def statistic(values: Any) -> float:
+        finite = [value for value in values if math.isfinite(value)]
+        return float(function(finite)) if finite else otherwise
+
+    return statistic
+
+
+class _Search:
+    def __init__(
+        self,
+        problem: Problem,
+        evaluator: Evaluator,
+        cache: Cache,
+        settings: Settings,
+        on_generation: Callable[[Progress], None] | None,
+        on_progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self.problem, self.cache, self.settings, self.evaluator = problem, cache, settings, evaluator
+        self.on_generation, self.on_progress = on_generation, on_progress
+        self.ensemble = Ensemble(problem, evaluator, cache, settings.ensemble, settings.seed)
+        self.breeder = Breeder(len(problem.genome), settings, settings.seed)
+        self.hall = tools.HallOfFame(settings.hall_of_fame)
+        self.statistics = tools.Statistics(lambda string: string.fitness.values[0])
+        self.statistics.register("best", _successful(np.min, math.inf))
+        self.statistics.register("mean", _successful(np.mean, math.nan))
+        self.statistics.register("std", _successful(np.std, math.nan))
+        self.outcome = Outcome(problem, settings, search_name(problem, settings, evaluator.settings))
+        self.outcome.logbook.header = [
+            "gen",
+            "designs",
+            "starts",
+            "failed",
+            "best",
+            "mean",
+            "std",
+            "box",
+            "recentred",
+        ]
+        self.began = time.monotonic()
+
+    def run(self) -> Outcome:
+        try:
+            self._generations()
+        except KeyboardInterrupt:
+            self.outcome.stopped = "interrupted"
+        except _OutOfTime:
+            self.outcome.stopped = "wall clock"
+        self._store()
+        return self.outcome
+
+    def _generations(self) -> None:
+        population = self.breeder.first()
+        for generation in range(self.settings.generations + 1):
+            box = float(self.breeder.box.width.mean())
+            asked = self.ensemble.evaluations + self.ensemble.hits
+            fresh = self._estimate(population, generation)
+            self.hall.update([string for string in population if string.fitness.values[0] < math.inf])
+            every = self.settings.recentre_every
+            recentred = bool(every and generation and generation % every == 0 and self.hall)
+            if recentred:
+                self.breeder.recentre(self.hall[0])
+            self.outcome.logbook.record(
+                gen=generation,
+                designs=fresh,
+                starts=self.ensemble.evaluations + self.ensemble.hits - asked,
+                failed=sum(string.fitness.values[0] == math.inf for string in population),
+                box=box,
+                recentred=recentred,
+                **self.statistics.compile(population),
+            )
+            self._store()
+            if self.on_generation is not None:
+                self.on_generation(self._progress(generation, 1.0))
+            self.outcome.stopped = self._stop(generation)
+            if self.outcome.stopped:
+                return
+            population = self.breeder.following(population)
+
+    def _estimate(self, population: list[Individual], generation: int) -> int:
+        """Estimate the strings whose fitness is not known yet; return how many they were."""
+
+        def report(fraction: float) -> None:
+            if self.on_progress is not None:
+                self.on_progress(self._progress(generation, fraction))
+            if self._out_of_time():
+                raise _OutOfTime
+
+        fresh = [string for string in population if not string.fitness.valid]
+        designs = [self.problem.genome.decode(string) for string in fresh]
+        for string, estimate in zip(fresh, self.ensemble.estimate(designs, report), strict=True):
+            string.estimate = estimate
+            string.fitness.values = (estimate.mean,)
+        return len(fresh)
+
+    def _stop(self, generation: int) -> Stopped:
+        best = self.outcome.logbook.select("best")
+        wish = self.settings
+        if wish.target is not None and best[-1] <= wish.target:
+            return "target"
+        if wish.patience is not None and generation - best.index(min(best)) >= wish.patience:
+            return "patience"
+        asked = self.ensemble.evaluations + self.ensemble.hits
+        if wish.max_evaluations is not None and asked >= wish.max_evaluations:
+            return "evaluations"
+        if generation == wish.generations:
+            return "generations"
+        return "wall clock" if self._out_of_time() else ""
+
+    def _out_of_time(self) -> bool:
+        budget = self.settings.wall_clock_s
+        return budget is not None and time.monotonic() - self.began >= budget
+
+    def _progress(self, generation: int, fraction: float) -> Progress:
+        best = self.hall[0] if self.hall else None
+        return Progress(
+            generation=generation,
+            generations=self.settings.generations,
+            fraction=fraction,
+            best_fitness=best.fitness.values[0] if best else math.inf,
+            best_design=self.problem.genome.decode(best) if best else None,
+            evaluations=self.ensemble.evaluations,
+            hits=self.ensemble.hits,
+            elapsed_s=time.monotonic() - self.began,
+        )
+
+    def _store(self) -> None:
+        """Bring the outcome up to date and put it into the cache file."""
+        out, name = self.outcome, self.outcome.name
+        out.hall = list(self.hall)
+        out.evaluations, out.hits = self.ensemble.evaluations, self.ensemble.hits
+        out.elapsed_s = time.monotonic() - self.began
+        about = {
+            "problem": self.problem.name,
+            "problem_version": self.problem.version,
+            "settings": self.settings.model_dump_json(),
+            "evaluator": json.dumps(self.evaluator.settings, sort_keys=True),
+            "versions": json.dumps(versions()),
+            "stopped": out.stopped,
+        }
+        self.cache.put_table(name, {}, about)
+        self.cache.put_table(f"{name}/hall_of_fame", best_columns(self.problem, out.hall))
+        self.cache.put_table(f"{name}/logbook", logbook_columns(self.problem, out.logbook))
+        self.cache.fold()

@@ -1,0 +1,205 @@
+"""The HDF5 file of a cache: one row per evaluation in /evaluations, and any number of named tables.
+
+The file is always built whole, in memory, and then written by ordinary system calls: a full disk is met by
+write(), not inside the HDF5 library. Strings have one fixed length per column, so damage to a byte is damage
+to a row and not to the column.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from optimize.record import Record, canonical
+from optimize.seal import intact, sealed
+from tisim.errors import InputError, must
+
+FORMAT = "tisim evaluations 1"
+ROWS = "evaluations"
+
+_COLUMNS: dict[str, Any] = {
+    "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
+    "design": bytes, "work": bytes, "wall_s": np.float64, "created": np.float64, "crc": np.uint32,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Table:
+    """Named columns of equal length (numbers or strings) and attributes (numbers or strings).
+
+    Raises InputError if the columns differ in length.
+    """
+
+    columns: Mapping[str, Sequence[Any]]
+    attrs: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        lengths = {name: len(column) for name, column in self.columns.items()}
+        must(len(set(lengths.values())) <= 1, "table columns", "all of one length", lengths)
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[h5py.File]:
+    """The file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache."""
+    rule = "a whole HDF5 file written by a cache"
+    if path.exists():
+        must(intact(path.read_bytes()), str(path), rule, "a damaged structure")
+    try:
+        # the caller's lock guards the file; HDF5's own fails on some network file systems
+        file = h5py.File(path, "r", locking=False)
+    except OSError as error:
+        size = path.stat().st_size if path.exists() else "no"
+        raise InputError(f"{path} must be {rule}; received {size} bytes ({error})") from error
+    with file:
+        must(file.attrs.get("format") == FORMAT and ROWS in file, str(path), rule, list(file))
+        try:
+            yield file
+        except InputError:
+            raise
+        except (OSError, KeyError, RuntimeError, ValueError) as error:
+            raise InputError(f"{path} must be undamaged; received {error}") from error
+
+
+def image(old: Path | None, records: Sequence[Record], tables: Mapping[str, Table]) -> bytes:
+    """The bytes of a new file: these records, the tables of the file old, and tables (which win)."""
+    with h5py.File("image", "w", driver="core", backing_store=False) as new:
+        new.attrs["format"] = FORMAT
+        if old is not None:
+            with opened(old) as file:
+                for name in set(file) - {ROWS}:
+                    file.copy(file[name], new, name)
+        for name, table in tables.items():
+            _write_table(new.require_group(name), table)
+        _write_rows(new.create_group(ROWS), records)
+        new.flush()
+        data: list[tuple[int, int]] = []
+        new.visititems(lambda _, item: data.append(_place(item)) if isinstance(item, h5py.Dataset) else None)
+        return sealed(bytes(new.id.get_file_image()), data)
+
+
+def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
+    """The whole evaluations in order, and a description of each row whose checksum fails."""
+    columns = {name: file[ROWS][name][...] for name in _COLUMNS}
+    lengths = {name: len(column) for name, column in columns.items()}
+    must(len(set(lengths.values())) == 1, f"columns of {file.filename}", "all of one length", lengths)
+    records, damaged = [], []
+    for row in range(lengths["key"]):
+        cells = {name: column[row] for name, column in columns.items()}
+        crc = int(cells.pop("crc"))
+        try:
+            record = _record(cells)
+            whole = zlib.crc32(record.payload()) == crc
+        except (ValueError, TypeError):
+            whole = False
+        if whole:
+            records.append(record)
+        else:
+            damaged.append(f"row {row}: its checksum does not fit")
+    return records, damaged
+
+
+def read_table(file: h5py.File, name: str) -> Table:
+    """One table. InputError if there is none of that name."""
+    must(name in tables(file), "table name", f"one of {tables(file)}", name)
+    return _read_table(file[name])
+
+
+def tables(file: h5py.File) -> list[str]:
+    """Names of the tables in the file."""
+    found: list[str] = []
+    file.visititems(lambda name, item: found.append(name) if "crc32" in item.attrs else None)
+    return found
+
+
+def damaged_tables(file: h5py.File) -> list[str]:
+    """A description of each table whose checksum fails."""
+    bad = []
+    for name in tables(file):
+        try:
+            whole = _crc(_read_table(file[name])) == int(file[name].attrs["crc32"])
+        except (OSError, KeyError, RuntimeError, ValueError, TypeError):
+            whole = False
+        if not whole:
+            bad.append(f"table {name}: its checksum does not fit")
+    return bad
+
+
+def _record(cells: Mapping[str, Any]) -> Record:
+    text = {name: bytes(value).decode("ascii") for name, value in cells.items() if _COLUMNS[name] is bytes}
+    return Record(
+        key=text["key"],
+        problem=text["problem"],
+        fitness=float(cells["fitness"]),
+        ok=bool(cells["ok"]),
+        reason=text["reason"],
+        seed=int(cells["seed"]),
+        design=json.loads(text["design"]),
+        work=json.loads(text["work"]),
+        wall_s=float(cells["wall_s"]),
+        created=float(cells["created"]),
+    )
+
+
+def _write_rows(group: h5py.Group, records: Sequence[Record]) -> None:
+    for name, kind in _COLUMNS.items():
+        if name == "crc":
+            group[name] = np.array([zlib.crc32(record.payload()) for record in records], dtype=kind)
+        elif name in ("design", "work"):
+            group[name] = _strings([canonical(dict(getattr(record, name))) for record in records])
+        elif kind is bytes:
+            group[name] = _strings([getattr(record, name).encode() for record in records])
+        else:
+            group[name] = np.array([getattr(record, name) for record in records], dtype=kind)
+
+
+def _strings(values: Sequence[bytes]) -> np.ndarray:
+    longest = max([1, *map(len, values)])
+    return np.array(values, dtype=h5py.string_dtype("utf-8", longest))
+
+
+def _write_table(group: h5py.Group, table: Table) -> None:
+    for name in [name for name, item in group.items() if isinstance(item, h5py.Dataset)]:
+        del group[name]
+    for name in list(group.attrs):
+        del group.attrs[name]
+    for name, column in table.columns.items():
+        text = any(isinstance(value, str) for value in column)
+        data = _strings([str(value).encode() for value in column]) if text else np.asarray(column)
+        group[_dataset(name)] = data
+    for name, value in table.attrs.items():
+        group.attrs[name] = value
+    group.attrs["columns"] = json.dumps(list(table.columns))
+    group.attrs["crc32"] = _crc(_read_table(group))
+
+
+def _read_table(group: h5py.Group) -> Table:
+    columns = {}
+    for name in json.loads(group.attrs["columns"]):
+        values = group[_dataset(name)][...].tolist()
+        columns[name] = [value.decode() if isinstance(value, bytes) else value for value in values]
+    attrs = {
+        name: getattr(value, "tolist", lambda value=value: value)() for name, value in group.attrs.items()
+    }
+    return Table(columns, {name: value for name, value in attrs.items() if name not in ("columns", "crc32")})
+
+
+def _place(dataset: h5py.Dataset) -> tuple[int, int]:
+    """Offset and size in bytes of a dataset's raw data; an empty one has none."""
+    return dataset.id.get_offset() or 0, dataset.id.get_storage_size()
+
+
+def _dataset(heading: str) -> str:
+    """HDF5 takes "/" for a path; headings have units like m/s. U+2215 looks the same."""
+    return heading.replace("/", "\u2215")
+
+
+def _crc(table: Table) -> int:
+    return zlib.crc32(canonical([list(table.columns), dict(table.columns), dict(table.attrs)]))

@@ -1,0 +1,93 @@
+"""Run as a script by the cache tests: a process that writes, folds or searches until something stops it."""
+
+import os
+import resource
+import signal
+import sys
+from pathlib import Path
+
+from fake_runs import FakeEvaluator, fake_problem, fake_record
+
+from optimize.cache import Cache
+from tisim.errors import RunError
+
+
+def write(path, first):
+    """Store records for ever, naming each only when it is stored; fold often."""
+    cache = Cache(path)
+    number = int(first)
+    while True:
+        cache.put(fake_record(number, pad="x" * (number % 50)))
+        sys.stdout.write(f"{number}\n")
+        sys.stdout.flush()
+        number += 1
+        if number % 5 == 0:
+            cache.put_table("log", {"n": list(range(number))})
+            cache.fold()
+
+
+def stepwise(folder):
+    """In a fresh cache each, be killed at the first, second, ... system call that changes a file."""
+    calls = ("pwrite", "fsync", "ftruncate", "rename", "replace")
+    for kill_at in range(1, 100):
+        path = Path(folder) / f"{kill_at:02d}" / "cache.h5"
+        with Cache(path) as cache:
+            cache.put(fake_record(0))
+        child = os.fork()
+        if child == 0:
+            left = kill_at
+
+            def last_straw(call):
+                def counted(*arguments, **options):
+                    nonlocal left
+                    left -= 1
+                    if left == 0:
+                        if call.__name__ == "pwrite":  # half of it gets through
+                            call(arguments[0], bytes(arguments[1][: len(arguments[1]) // 2]), arguments[2])
+                        os.kill(os.getpid(), signal.SIGKILL)
+                    return call(*arguments, **options)
+
+                return counted
+
+            for name in calls:
+                setattr(os, name, last_straw(getattr(os, name)))
+            cache = Cache(path)
+            for number in (1, 2):
+                cache.put(fake_record(number))
+                os.write(1, f"{kill_at} {number}\n".encode())
+            cache.fold()
+            os._exit(0)
+        if os.waitpid(child, 0)[1] == 0:
+            return
+
+
+def limited(path, size):
+    """Store records, and fold, on a file system that lets no file grow beyond size bytes."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(size), int(size)))
+    cache = Cache(path)
+    stored = 0
+    try:
+        for number in range(1000, 2000):
+            cache.put(fake_record(number))
+            stored += 1
+    except RunError as error:
+        print(stored, "put", error)
+    try:
+        cache.fold()
+    except RunError as error:
+        print(len(cache), "fold", error)
+
+
+def search(path):
+    """A slow search."""
+    from optimize.search import search as run
+    from optimize.settings import Settings
+
+    with Cache(path) as cache:
+        print("began", flush=True)
+        run(fake_problem(3), FakeEvaluator(delay=0.004), cache, Settings(seed=2, generations=4))
+    print("done", flush=True)
+
+
+if __name__ == "__main__":
+    {"write": write, "stepwise": stepwise, "limited": limited, "search": search}[sys.argv[1]](*sys.argv[2:])

@@ -1,0 +1,74 @@
+"""Stand-ins for scenes and their evaluation that cost nothing and count everything."""
+
+import hashlib
+import json
+import math
+import time
+from types import SimpleNamespace
+
+import numpy as np
+
+from optimize.genome import Gene, Genome
+from optimize.problem import Problem
+from optimize.record import Record, evaluation_key
+
+
+class FakeScene:
+    def __init__(self, design, seed):
+        self.design, self.seed = dict(design), seed
+
+    def digest(self):
+        return hashlib.sha256(json.dumps([self.design, self.seed], sort_keys=True).encode()).hexdigest()
+
+
+def bowl(design, seed, noise=0.01):
+    """A bowl with its minimum 0.5 at x = 0.3 in the unit cube, and reproducible noise."""
+    x = np.array(list(design.values()))
+    return float(np.sum((x - 0.3) ** 2) + 0.5 + noise * np.random.default_rng(seed).normal())
+
+
+class FakeEvaluator:
+    """function(design, seed) -> fitness, or a string: the reason of a failed run.
+
+    Yields in reverse order, to catch whoever relies on the order; interrupt_after: KeyboardInterrupt then.
+    """
+
+    def __init__(self, function=bowl, interrupt_after=math.inf, delay=0.0):
+        self.settings = {"precision": "f64", "device": "cpu"}
+        self.function, self.interrupt_after, self.delay = function, interrupt_after, delay
+        self.calls, self.ran = [], []
+
+    def evaluate(self, scenes, progress):
+        self.calls.append(list(scenes))
+        for index in reversed(range(len(scenes))):
+            if len(self.ran) >= self.interrupt_after:
+                raise KeyboardInterrupt
+            time.sleep(self.delay)
+            scene = scenes[index]
+            self.ran.append(scene.digest())
+            value = self.function(scene.design, scene.seed)
+            failed = isinstance(value, str)
+            status = SimpleNamespace(ok=not failed, reason=value if failed else "")
+            yield index, SimpleNamespace(status=status, wall_s=0.25, work={"steps": np.int64(7)}, value=value)
+
+
+def fake_problem(genes=4, **changes):
+    genome = Genome(tuple(Gene(f"x{i}", "m", 0.0, 1.0) for i in range(genes)))
+    return Problem(
+        **{"name": "bowl", "genome": genome, "scene": FakeScene, "objective": lambda r: r.value, **changes}
+    )
+
+
+def fake_record(number, fitness=None, ok=True, pad=""):
+    return Record(
+        key=evaluation_key(f"scene {number}", {"precision": "f64"}, "bowl", 1),
+        problem="bowl",
+        fitness=number / 7 if fitness is None else fitness,
+        ok=ok,
+        reason="" if ok else "went wrong",
+        seed=number,
+        design={"x": number / 3, "pad" + pad: 1.0},
+        work={"steps": number},
+        wall_s=0.5,
+        created=1e9 + number,
+    )

@@ -1,0 +1,65 @@
+import random
+import subprocess
+
+import pytest
+from fake_runs import FakeEvaluator, fake_problem
+from test_cache_kill import worker
+
+from optimize.cache import Cache, verify
+from optimize.search import search
+from optimize.settings import Settings
+
+SETTINGS = Settings(seed=2, generations=4)
+
+
+def run(path, evaluator):
+    with Cache(path) as cache:
+        return search(fake_problem(3), evaluator, cache, SETTINGS)
+
+
+def found(outcome):
+    return repr(list(outcome.logbook)), [(list(s), repr(s.estimate)) for s in outcome.hall]
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("whole") / "cache.h5", FakeEvaluator())
+
+
+@pytest.mark.parametrize("after", [0, 1, 30, 200, 400])
+def test_resume_after_interrupt_equals_never_interrupted(tmp_path, uninterrupted, after):
+    path = tmp_path / "cache.h5"
+    first = FakeEvaluator(interrupt_after=after)
+    part = run(path, first)
+    assert (part.stopped, part.interrupted) == ("interrupted", True)
+    assert len(first.ran) == part.evaluations == after
+    assert list(part.logbook) == list(uninterrupted.logbook)[: len(part.logbook)]
+    assert Cache(path).table(part.name).attrs["stopped"] == "interrupted"
+    second = FakeEvaluator()
+    whole = run(path, second)
+    assert found(whole) == found(uninterrupted)
+    assert (whole.stopped, whole.interrupted) == ("generations", False)
+    assert not set(first.ran) & set(second.ran), "nothing is evaluated twice"
+    assert len(first.ran) + len(second.ran) == uninterrupted.evaluations
+
+
+def test_resume_after_sigkill_equals_never_interrupted(tmp_path, uninterrupted):
+    path = tmp_path / "cache.h5"
+    rng = random.Random(3)
+    stored = []
+    for _ in range(4):
+        with worker("search", path) as process:
+            assert process.stdout.readline() == "began\n"
+            with pytest.raises(subprocess.TimeoutExpired):
+                process.wait(rng.uniform(0.05, 0.4))
+            process.kill()
+            assert process.stdout.read() == ""
+        stored.append(len(Cache(path)))
+        assert verify(path).ok
+    assert stored == sorted(stored)
+    assert 0 < stored[-1] < uninterrupted.evaluations
+    evaluator = FakeEvaluator()
+    outcome = run(path, evaluator)
+    assert found(outcome) == found(uninterrupted)
+    assert len(evaluator.ran) == uninterrupted.evaluations - stored[-1]
+    assert verify(path).duplicates == 0

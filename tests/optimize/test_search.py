@@ -1,0 +1,220 @@
+import itertools
+import json
+import math
+import random
+
+import numpy as np
+import pytest
+from fake_runs import FakeEvaluator, bowl, fake_problem
+
+from optimize.breeding import Operator
+from optimize.cache import Cache, verify
+from optimize.ensemble import EnsembleSettings
+from optimize.search import search
+from optimize.settings import Settings
+from tisim.errors import InputError, RunError
+
+ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)  # a function without noise needs no averaging
+DEAP = {
+    "method": "deap",
+    "mate": Operator(name="cxSimulatedBinaryBounded", options={"eta": 10.0}),
+    "mutate": Operator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.3}),
+}
+
+
+def quiet_bowl(design, seed):
+    return bowl(design, seed, noise=0.0)
+
+
+def run(path, evaluator=None, genes=4, problem=None, callbacks=None, **settings):
+    evaluator = evaluator or FakeEvaluator(quiet_bowl)
+    values = {"seed": 1, "ensemble": ONE, **settings}
+    with Cache(path) as cache:
+        return search(
+            problem or fake_problem(genes), evaluator, cache, Settings(**values), **(callbacks or {})
+        )
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "search.h5"
+
+
+@pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
+def test_beats_random_search_at_equal_evaluations(tmp_path, settings):
+    """In 10 dimensions, three seeds: the median best lies far below that of as many random points."""
+    found, chance = [], []
+    for seed in range(3):
+        outcome = run(tmp_path / f"{seed}.h5", genes=10, seed=seed, **settings)
+        asked = sum(outcome.logbook.select("starts"))
+        assert asked == 20 + 25 * 14
+        points = np.random.default_rng(seed).random((asked, 10))
+        found.append(outcome.best.estimate.mean - 0.5)
+        chance.append(np.sum((points - 0.3) ** 2, axis=1).min())
+    assert np.median(found) < np.median(chance) / 5
+    assert max(found) < min(chance)
+
+
+@pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
+def test_log_of_a_search(path, settings):
+    outcome = run(path, generations=12, **settings)
+    log = outcome.logbook
+    assert (outcome.stopped, outcome.interrupted) == ("generations", False)
+    assert log.select("gen") == list(range(13))
+    assert log.select("designs") == [20] + [14] * 12  # parents are never estimated again
+    best = log.select("best")
+    assert all(later <= earlier for earlier, later in itertools.pairwise(best))
+    assert best[-1] < best[0]
+    assert [g for g, moved in zip(log.select("gen"), log.select("recentred"), strict=True) if moved] == [
+        4,
+        8,
+        12,
+    ]
+    np.testing.assert_allclose(log.select("box"), [1.0] * 5 + [0.5] * 4 + [0.25] * 4)
+    assert [s.fitness.values[0] for s in outcome.hall] == sorted(s.fitness.values[0] for s in outcome.hall)
+    assert outcome.best.estimate.mean == min(best) == outcome.hall[0].fitness.values[0]
+    assert len({tuple(s) for s in outcome.hall}) == 6
+
+
+@pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
+def test_seed_decides_everything_and_nothing_global_does(tmp_path, settings):
+    def result(file, seed):
+        outcome = run(tmp_path / file, generations=3, seed=seed, ensemble=EnsembleSettings(), **settings)
+        return repr(list(outcome.logbook)), [list(s) for s in outcome.hall]
+
+    random.seed(1)
+    state = random.getstate()
+    first = result("a.h5", 1)
+    assert random.getstate() == state
+    random.seed(2)
+    assert result("b.h5", 1) == first
+    assert result("c.h5", 2) != first
+
+
+def test_stopping_rules(tmp_path):
+    full = run(tmp_path / "full.h5", generations=20)
+    best = full.logbook.select("best")
+    target = best[7]
+    outcome = run(tmp_path / "t.h5", generations=20, target=target)
+    assert outcome.stopped == "target"
+    assert outcome.logbook.select("best") == best[: best.index(target) + 1]
+    outcome = run(tmp_path / "e.h5", generations=20, max_evaluations=60)
+    assert (outcome.stopped, outcome.evaluations) == ("evaluations", 20 + 14 * 3)
+    again = run(tmp_path / "e.h5", generations=20, max_evaluations=60)
+    assert (again.stopped, again.evaluations, again.hits) == ("evaluations", 0, 62)
+    outcome = run(tmp_path / "p.h5", FakeEvaluator(lambda design, seed: 1.0), generations=20, patience=3)
+    assert (outcome.stopped, len(outcome.logbook)) == ("patience", 4)
+    assert run(tmp_path / "g.h5", generations=0).logbook.select("designs") == [20]
+
+
+def test_wall_clock_stops_in_the_middle_of_a_generation(path):
+    evaluator = FakeEvaluator(quiet_bowl, delay=0.02)
+    outcome = run(path, evaluator, wall_clock_s=0.3, ensemble=EnsembleSettings(min_starts=6))
+    assert outcome.stopped == "wall clock"
+    assert outcome.elapsed_s >= 0.3
+    assert len(outcome.logbook) == 0
+    assert outcome.best is None
+    assert 0 < len(evaluator.ran) <= 16 < 20 * 6
+    assert len(evaluator.ran) == len(Cache(path)) == outcome.evaluations
+
+
+def test_wall_clock_stops_between_generations(path):
+    outcome = run(path, generations=10_000, wall_clock_s=1.0)
+    assert outcome.stopped == "wall clock"
+    assert 0 < len(outcome.logbook) < 10_000
+    assert outcome.best.estimate.mean == min(outcome.logbook.select("best"))
+
+
+def test_failures_never_win(path):
+    def function(design, seed):
+        if design["x0"] < 0.35:  # the optimum lies here
+            return ("collapsed", math.nan, -math.inf)[seed % 3]
+        return quiet_bowl(design, seed)
+
+    outcome = run(path, FakeEvaluator(function), generations=8)
+    assert min(outcome.logbook.select("failed")) >= 0
+    assert max(outcome.logbook.select("failed")) > 0
+    assert outcome.best.estimate.ok
+    assert all(math.isfinite(s.estimate.mean) and s[0] >= 0.35 for s in outcome.hall)
+    assert np.all(np.isfinite(outcome.logbook.select("mean")))
+
+
+def test_all_failed_is_an_outcome_without_a_best(path):
+    outcome = run(path, FakeEvaluator(lambda design, seed: "broken"), generations=5)
+    assert outcome.best is None
+    assert outcome.logbook.select("failed") == [20] * 6
+    assert outcome.logbook.select("recentred") == [False] * 6
+    assert outcome.logbook.select("best") == [math.inf] * 6
+
+
+def test_callbacks_tell_where_the_search_is(path):
+    generations, steps = [], []
+    callbacks = {"on_generation": generations.append, "on_progress": steps.append}
+    outcome = run(path, callbacks=callbacks, generations=3)
+    assert [p.generation for p in generations] == [0, 1, 2, 3]
+    assert [p.best_fitness for p in generations] == outcome.logbook.select("best")
+    assert [p.evaluations for p in generations] == [20, 34, 48, 62]
+    assert generations[-1].best_design == outcome.problem.genome.decode(outcome.best)
+    assert generations[-1].fraction == 1.0
+    for number in range(4):
+        fractions = [p.fraction for p in steps if p.generation == number]
+        assert fractions == sorted(fractions)
+        assert fractions[-1] == 1.0
+        assert len(set(fractions)) >= 14
+    assert steps[0].best_design is None
+    again = []
+    run(path, callbacks={"on_generation": again.append}, generations=3)
+    assert [(p.evaluations, p.hits) for p in again] == [(0, 20), (0, 34), (0, 48), (0, 62)]
+
+
+def test_file_holds_what_is_needed_to_redo_the_search(path):
+    outcome = run(path, generations=4, **DEAP)
+    cache = Cache(path)
+    about = cache.table(outcome.name).attrs
+    settings = Settings.model_validate_json(about["settings"])
+    assert settings == outcome.settings
+    assert json.loads(about["evaluator"]) == {"precision": "f64", "device": "cpu"}
+    assert {"python", "numpy", "deap", "h5py"} <= set(json.loads(about["versions"]))
+    assert (about["problem"], about["problem_version"], about["stopped"]) == ("bowl", 1, "generations")
+    assert cache.table(f"{outcome.name}/logbook").columns["best"] == outcome.logbook.select("best")
+    hall = cache.table(f"{outcome.name}/hall_of_fame").columns
+    assert hall["fitness"] == [s.estimate.mean for s in outcome.hall]
+    assert hall["x0 (m)"] == [s[0] for s in outcome.hall]
+    with Cache(path) as cache:
+        redone = search(fake_problem(), FakeEvaluator(quiet_bowl), cache, settings)
+    assert (redone.evaluations, list(redone.logbook), redone.name) == (0, list(outcome.logbook), outcome.name)
+    assert verify(path).ok
+
+
+def test_longer_search_continues_a_shorter_one(path):
+    short = run(path, generations=3)
+    longer = run(path, generations=6)
+    assert longer.name == short.name
+    assert list(longer.logbook)[:4] == list(short.logbook)
+    assert longer.evaluations == 3 * 14
+    assert run(path, generations=6, seed=2).name != short.name
+
+
+def test_unfit_operators_stop_it_before_anything_runs(path):
+    evaluator = FakeEvaluator()
+    with pytest.raises(InputError, match="fit for real-valued strings"):
+        run(path, evaluator, method="deap", mate=Operator(name="cxOrdered"))
+    assert evaluator.ran == []
+
+
+def test_full_disk_ends_the_search_clearly(path, monkeypatch):
+    class Filling(FakeEvaluator):
+        def evaluate(self, scenes, progress):
+            for number, pair in enumerate(super().evaluate(scenes, progress)):
+                if number == 5:
+                    monkeypatch.setattr("optimize.durable.os.pwrite", _full)
+                yield pair
+
+    with pytest.raises(RunError, match="could not be written: No space left on device"):
+        run(path, Filling(quiet_bowl))
+    monkeypatch.undo()
+    assert len(Cache(path)) == 5
+
+
+def _full(handle, data, offset):
+    raise OSError(28, "No space left on device")
