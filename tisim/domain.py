@@ -101,8 +101,10 @@ class Box(Domain):
     def nearest(self, w, a, b):
         side = self.side(w)
         d = b - a
+        # Both places lie in the box, so one turn is enough.
         for k in ti.static(range(3)):
-            d[k] -= side[k] * ti.round(d[k] / side[k])
+            d[k] -= ti.select(d[k] > 0.5 * side[k], side[k], 0.0)
+            d[k] += ti.select(d[k] < -0.5 * side[k], side[k], 0.0)
         return d
 
     @ti.func

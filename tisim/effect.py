@@ -82,10 +82,13 @@ class PairEvent(Effect):
     """Something sudden between two particles, such as an impact."""
 
     @ti.func
-    def contact(self, s, w, i, j, separation, distance):
-        """How long ago (s) the event between i and j fell due; negative when it has not."""
+    def contact(self, s, w, i, j, separation):
+        """How long ago (s) the event between i and j fell due; negative when it has not.
+
+        ``separation`` is r_j - r_i (m). Called for every near pair in every step.
+        """
         return -1.0
 
     @ti.func
-    def resolve(self, s, w, i, j, separation, distance):
+    def resolve(self, s, w, i, j, separation):
         """Change i and j; both are exclusively the caller's."""

@@ -23,7 +23,7 @@ from tisim.domain import Domain
 from tisim.effect import PairEvent
 from tisim.neighbours import Neighbours
 from tisim.program import PerParticle, Phase, Repeat
-from tisim.state import CROWDED, FULL, State
+from tisim.state import CROWDED, State
 from tisim.steppers.controller import Controller
 
 CONTACTS_PER_PARTICLE = 8
@@ -70,17 +70,17 @@ class Contacts:
 
 
 class Survey(PerParticle):
-    """Look at every near pair: enter those in contact, and ask the controller about the others."""
+    """Look at every near pair: enter those in contact, and ask the controller about all."""
 
     def __init__(self, near: Neighbours, contacts: Contacts, controller: Controller) -> None:
         super().__init__(near.s)
         self.near, self.contacts, self.controller = near, contacts, controller
 
     @ti.func
-    def enter(self, w, i, j, separation, distance):
+    def enter(self, w, i, j, separation):
         due = ti.cast(-1.0, self.s.real)
         for event in ti.static(self.contacts.events):
-            due = ti.max(due, event.contact(self.s, w, i, j, separation, distance))
+            due = ti.max(due, event.contact(self.s, w, i, j, separation))
         if due >= 0.0:
             self.contacts.add(w, i, j, due)
 
@@ -91,14 +91,13 @@ class Survey(PerParticle):
             j = self.near.candidate(w, i, k)
             if j != i:
                 d = self.near.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
-                distance = d.norm()
-                self.enter(w, i, j, d, distance)
-                soonest = ti.min(soonest, self.controller.pair(self.s, w, i, j, d, distance))
+                self.enter(w, i, j, d)
+                soonest = ti.min(soonest, self.controller.pair(self.s, w, i, j, d))
         self.controller.note(self.s, w, i, soonest)
 
 
 class SurveyAgain(Survey):
-    """After events have changed velocities and sizes: ask the controller once more."""
+    """After events: look at every near pair once more, for the controller only."""
 
     conditional = True
 
@@ -107,7 +106,7 @@ class SurveyAgain(Survey):
         return self.s.events[w]
 
     @ti.func
-    def enter(self, w, i, j, separation, distance):
+    def enter(self, w, i, j, separation):
         pass
 
 
@@ -119,7 +118,7 @@ class PerContact(Phase):
 
     @ti.func
     def size(self, w):
-        return self.c.size[w]
+        return ti.min(self.c.size[w], self.c.capacity)
 
 
 class Open(PerContact):
@@ -154,10 +153,9 @@ class Resolve(PerContact):
             ti.atomic_sub(c.waiting[w], 1)
             if s.mass[w, i] > 0.0 and s.mass[w, j] > 0.0:
                 d = c.domain.separation(w, s.position[w, i], s.position[w, j])
-                distance = d.norm()
                 for event in ti.static(c.events):
-                    if event.contact(s, w, i, j, d, distance) >= 0.0:
-                        event.resolve(s, w, i, j, d, distance)
+                    if event.contact(s, w, i, j, d) >= 0.0:
+                        event.resolve(s, w, i, j, d)
                         ti.atomic_max(s.events[w], 1)
 
 
@@ -201,7 +199,7 @@ class Rearrange(Phase):
     def run(self, w, _k):
         s = self.s
         s.events[w] = 1
-        # What the first survey told the controller is no longer true.
+        # What the survey told the controller is no longer true.
         s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
         for operator in ti.static(self.operators):
             operator.world(s, w)
@@ -219,5 +217,3 @@ class Rearrange(Phase):
             if ti.static(self.lists):
                 self.near.stale[w] = 1
 
-
-__all__ = ["FULL", "Close", "Contacts", "Rearrange", "Rounds", "Survey", "SurveyAgain"]

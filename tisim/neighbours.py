@@ -18,10 +18,10 @@ SMALL = 48
 """Worlds of at most this many particles look at all pairs."""
 LISTED = 24
 """Neighbours a particle can list; one with more looks at all particles."""
-SKIN = 0.6
-"""Skin in units of the mean distance between particles, the cube root of volume per particle."""
-HORIZON = 0.25
-"""Part of the skin within which every pair is sure to be listed."""
+HORIZON = 0.15
+"""Gap within which every pair is sure to be offered, in mean distances between particles."""
+AHEAD = 2.0
+"""Steps that a list is meant to last: its skin along each axis is what particles move in them."""
 CELLS_PER_PARTICLE = 2
 
 
@@ -39,13 +39,15 @@ class Neighbours:
         self.other = ti.field(ti.i32)
         self.dims = ti.Vector.field(3, ti.i32)
         self.corner, self.cell = ti.Vector.field(3, s.real), ti.Vector.field(3, s.real)
-        self.skin = ti.field(s.real)
+        self.sorted_position, self.sorted_radius = ti.Vector.field(3, s.real), ti.field(s.real)
+        self.skin = ti.Vector.field(3, s.real)
+        self.gap = ti.field(s.real)
         self.stale = ti.field(ti.i32)
         builder.dense(ti.i, worlds).dense(ti.j, self.max_cells + 1).place(self.cell_start)
-        for column in (self.cell_of, self.order, self.listed):
+        for column in (self.cell_of, self.order, self.listed, self.sorted_position, self.sorted_radius):
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(column)
         builder.dense(ti.i, worlds).dense(ti.j, capacity).dense(ti.k, LISTED).place(self.other)
-        for column in (self.dims, self.corner, self.cell, self.skin, self.stale):
+        for column in (self.dims, self.corner, self.cell, self.skin, self.gap, self.stale):
             builder.dense(ti.i, worlds).place(column)
         self._tree = builder.finalize()
 
@@ -94,20 +96,26 @@ class Neighbours:
     @ti.func
     def horizon(self, w):
         """Gap between surfaces (m) within which every pair is sure to be offered."""
-        return HORIZON * SKIN * self.spacing(w)
+        return HORIZON * self.spacing(w)
 
     @ti.func
-    def moved(self, w, distance):
-        """Note that particles have moved by at most this much relative to the frame. m."""
-        self.s.travel[w] += distance
-        if 2.0 * self.s.travel[w] > self.skin[w] - self.horizon(w):
-            self.stale[w] = 1
+    def moved(self, w):
+        """Note that particles have moved by at most ``stride`` relative to the frame, along each axis."""
+        for k in ti.static(range(3)):
+            self.s.travel[w, k] += self.s.stride[w, k]
+            if 2.0 * self.s.travel[w, k] > self.skin[w][k]:
+                self.stale[w] = 1
 
     @ti.func
     def place(self, w, r):
         """Index of the cell along each axis."""
         c = ti.floor((r - self.corner[w]) / self.cell[w], ti.i32)
         return ti.max(0, ti.min(c, self.dims[w] - 1))
+
+    @ti.func
+    def around(self, c, cells):
+        """Index of a cell that may lie across a joined face, by less than one turn."""
+        return c + ti.select(c < 0, cells, 0) - ti.select(c >= cells, cells, 0)
 
 
 class Bin(Phase):
@@ -135,8 +143,9 @@ class Bin(Phase):
             high = low + n.domain.side(w)
         extent = ti.max(high - low, 1e-3 * least)
         spacing = ti.pow(extent[0] * extent[1] * extent[2] / count, 1.0 / 3.0)
-        n.skin[w] = SKIN * ti.max(spacing, n.spacing(w))
-        width = ti.max(spacing, 2.0 * least + n.skin[w])
+        n.skin[w] = ti.min(2.0 * AHEAD * ti.cast(s.axes(s.stride, w), s.real), spacing)
+        n.gap[w] = n.horizon(w)
+        width = ti.max(spacing, 2.0 * least + n.gap[w])
         n.dims[w] = ti.max(1, ti.floor(ti.min(extent / width, 1e4), ti.i32))
         while n.dims[w][0] * n.dims[w][1] * n.dims[w][2] > n.max_cells:
             n.dims[w] = (n.dims[w] + 1) // 2
@@ -158,7 +167,9 @@ class Bin(Phase):
             i = count - 1 - back
             c = n.cell_of[w, i]
             n.cell_start[w, c] -= 1
-            n.order[w, n.cell_start[w, c]] = i
+            m = n.cell_start[w, c]
+            n.order[w, m] = i
+            n.sorted_position[w, m], n.sorted_radius[w, m] = s.position[w, i], s.radius[w, i]
 
 
 class Search(PerParticle):
@@ -177,43 +188,60 @@ class Search(PerParticle):
     @ti.func
     def run(self, w, i):
         n, s = self.n, self.s
-        if i == 0:
-            s.travel[w] = 0.0
         if s.count[w] > SMALL:
-            r, radius, skin, dims = s.position[w, i], s.radius[w, i], n.skin[w], n.dims[w]
-            reach = 2.0 * radius + skin
+            # Copies: the compiler cannot know that writing a list does not change what it reads.
+            r, radius, dims, skin = s.position[w, i], s.radius[w, i], n.dims[w], n.skin[w]
+            side = n.domain.side(w)
+            near = radius + n.gap[w]
+            reach = near + radius + skin
             first = ti.floor((r - reach - n.corner[w]) / n.cell[w], ti.i32)
             last = ti.floor((r + reach - n.corner[w]) / n.cell[w], ti.i32)
-            for k in ti.static(range(3)):
-                if ti.static(n.joined):
-                    if last[k] - first[k] >= dims[k]:
-                        first[k], last[k] = 0, dims[k] - 1
-                else:
-                    first[k], last[k] = ti.max(first[k], 0), ti.min(last[k], dims[k] - 1)
             found = 0
-            for z in range(first[2], last[2] + 1):
+            if ti.static(n.joined):
+                # What reaches around the box may meet one image or another: it looks at all.
+                found = ti.select((last - first >= dims).any(), LISTED + 1, 0)
+            else:
+                first, last = ti.max(first, 0), ti.min(last, dims - 1)
+            z = first[2]
+            while z <= last[2] and found <= LISTED:
                 for y in range(first[1], last[1] + 1):
-                    row = ((z + dims[2]) % dims[2] * dims[1] + (y + dims[1]) % dims[1]) * dims[0]
-                    for x in range(first[0], last[0] + 1):
-                        c = row + (x + dims[0]) % dims[0]
-                        for m in range(n.cell_start[w, c], n.cell_start[w, c + 1]):
-                            j = n.order[w, m]
-                            if n.owns(w, i, j):
-                                limit = radius + s.radius[w, j] + skin
-                                d = n.domain.nearest(w, r, s.position[w, j])
-                                if d.norm_sqr() <= limit * limit:
+                    row = (n.around(z, dims[2]) * dims[1] + n.around(y, dims[1])) * dims[0]
+                    # Cells of a row follow each other in memory; across a joined face it is two stretches.
+                    x = first[0]
+                    while x <= last[0]:
+                        begin = n.around(x, dims[0])
+                        end = ti.min(begin + last[0] - x, dims[0] - 1)
+                        turns = (ti.Vector([x, y, z]) - ti.Vector([begin, n.around(y, dims[1]), n.around(z, dims[2])])) / dims
+                        here = r - turns * side
+                        for m in range(n.cell_start[w, row + begin], n.cell_start[w, row + end + 1]):
+                            d = ti.max(ti.abs(n.sorted_position[w, m] - here) - skin, 0.0)
+                            limit = near + n.sorted_radius[w, m]
+                            if d.norm_sqr() <= limit * limit:
+                                j = n.order[w, m]
+                                if n.owns(w, i, j):
                                     if found < LISTED:
                                         n.other[w, i, found] = j
                                     found += 1
+                        x += end - begin + 1
+                z += 1
             n.listed[w, i] = found if found <= LISTED else -1
 
 
 class Listed(Phase):
     """Declare the list fresh, once every particle has searched."""
 
+    conditional = True
+
     def __init__(self, neighbours: Neighbours) -> None:
         self.n = neighbours
 
     @ti.func
+    def when(self, w):
+        return self.n.stale[w]
+
+    @ti.func
     def run(self, w, _k):
         self.n.stale[w] = 0
+        for k in ti.static(range(3)):
+            self.n.s.travel[w, k] = 0.0
+

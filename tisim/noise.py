@@ -56,7 +56,9 @@ def uniform(words):
     first = ti.cast(words[0] >> ti.u32(5), ti.f64) * 67108864.0 + ti.cast(words[1] >> ti.u32(6), ti.f64)
     second = ti.cast(words[2] >> ti.u32(5), ti.f64) * 67108864.0 + ti.cast(words[3] >> ti.u32(6), ti.f64)
     scale = ti.cast(1.0 / 9007199254740992.0, ti.f64)
-    return ti.Vector([(first + 0.5) * scale, (second + 0.5) * scale], dt=ti.f64)
+    # Half a unit more than the largest rounds up to 1.
+    most = ti.cast(9007199254740992.0, ti.f64) - 1.0
+    return ti.Vector([ti.min(first + 0.5, most) * scale, ti.min(second + 0.5, most) * scale], dt=ti.f64)
 
 
 @ti.func

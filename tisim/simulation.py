@@ -19,7 +19,7 @@ from tisim.neighbours import Neighbours
 from tisim.particles import Arrays
 from tisim.program import Phase, Program, Repeat
 from tisim.scene import Scene
-from tisim.state import BOOKS, CLOCK, CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, State, resolve_fields
+from tisim.state import BOOKS, CLOCK, CROWDED, ENDED, FULL, MOTION, NOT_FINITE, RUNNING, State, resolve_fields
 from tisim.steppers.verlet import Advance, Clock, Finish, Kick, Move
 
 CHUNK_SECONDS = 0.25
@@ -140,7 +140,7 @@ class Simulation:
         if events or operators:
             step += [Rearrange(s, operators, near)]
         if near is not None and contacts is not None:
-            if control.watches_pairs:
+            if events and control.watches_pairs:
                 step += [*near.phases(), SurveyAgain(near, contacts, control)]
             step += [Close(contacts)]
         self.program = Program(s, (*step, Finish(s)), self.schedule)
@@ -173,6 +173,8 @@ class Simulation:
         if self.first.items:
             self.first.advance(1)
         self._keep()
+        # A start can fail already: more contacts than there is room for, an infinite force.
+        self._verify()
 
     def _blank(self, f: Any) -> np.ndarray:
         shape = (self.worlds, self.s.capacity) + ((3,) if f.components == 3 else ())
@@ -201,9 +203,10 @@ class Simulation:
         for name in (*CLOCK, *BOOKS, *self.s.counters):
             getattr(self.s, name).fill(0)
         empty = self.worlds - len(scenes)
-        real = np.float64 if self.runtime.precision == "f64" else np.float32
+        for name in MOTION:
+            getattr(self.s, name).fill(0)
         frame = [np.average(a["velocity"], axis=0, weights=a["mass"]) for a in starts]
-        self.s.write("frame", np.array(frame + [np.zeros(3)] * empty).astype(real))
+        self.s.write("frame", np.array(frame + [np.zeros(3)] * empty))
         self.s.write("count", counts.astype(np.int32))
         self.s.write("next_id", counts.astype(np.int32))
         self.s.write("status", np.array([RUNNING] * len(scenes) + [ENDED] * empty, dtype=np.int32))

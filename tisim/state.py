@@ -4,8 +4,6 @@ Every field has a leading world axis. Vectors are stored as separate components 
 which the compiler can vectorise over particles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -45,8 +43,9 @@ SHARED = {field.name: field for field in (*CORE, Field("temperature", "K"))}
 RUNNING, ENDED, NOT_FINITE, FULL, CROWDED = range(5)
 """Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow."""
 
-CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "stride", "travel", "volume")
+CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
 BOOKS = ("count", "status", "culprit", "changed", "events", "next_id")
+MOTION = ("frame", "stride", "travel")
 TALLIES = ("steps", "particle_steps")
 
 
@@ -82,8 +81,11 @@ class State:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
                 setattr(self, name, column)
-        self.frame = ti.Vector.field(3, self.real)
-        builder.dense(ti.i, worlds).place(self.frame)
+        for name in MOTION:
+            # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
+            column = ti.field(ti.f64)
+            builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
+            setattr(self, name, column)
         self._tree = builder.finalize()
         everything = tuple(getattr(self, field.name) for field in fields)
         self.all_fields = everything
@@ -125,6 +127,11 @@ class State:
         """RunError when Taichi has been started anew since."""
         if self._generation != runtime.generation():
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
+
+    @ti.func
+    def axes(self, column: ti.template(), w):
+        """The three components of a world quantity."""
+        return ti.Vector([column[w, 0], column[w, 1], column[w, 2]])
 
     @ti.func
     def copy(self, w, source, target):

@@ -118,13 +118,14 @@ class Impact(PairEvent):
         return {hook: tuple(law for law in laws if type(law).offers(hook)) for hook in HOOKS}
 
     @ti.func
-    def contact(self, s, w, i, j, separation, distance):
+    def contact(self, s, w, i, j, separation):
         """Time since the surfaces met (s): overlap over approach speed; negative unless both are positive."""
-        overlap = s.radius[w, i] + s.radius[w, j] - distance
         closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
+        reach = s.radius[w, i] + s.radius[w, j]
         due = ti.cast(-1.0, s.real)
-        if overlap >= 0.0 and closing > 0.0:
-            due = overlap * distance / closing
+        if closing > 0.0 and separation.norm_sqr() <= reach * reach:
+            distance = separation.norm()
+            due = (reach - distance) * distance / closing
         return due
 
     @ti.func
@@ -198,11 +199,11 @@ class Impact(PairEvent):
         return x
 
     @ti.func
-    def resolve(self, s, w, i, j, separation, distance):
+    def resolve(self, s, w, i, j, separation):
         m_i, m_j = s.mass[w, i], s.mass[w, j]
         reduced = m_i * m_j / (m_i + m_j)
         smaller = ti.min(s.radius[w, i], s.radius[w, j])
-        n = separation / distance
+        n = separation.normalized()
         slip = s.velocity[w, i] - s.velocity[w, j]
         v_n = slip.dot(n)
         slip -= v_n * n

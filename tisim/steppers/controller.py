@@ -20,7 +20,7 @@ class Controller(Spec):
     watches_pairs: ClassVar[bool] = False
 
     @ti.func
-    def pair(self, s, w, i, j, separation, distance):
+    def pair(self, s, w, i, j, separation):
         """Time (s, f64) that this pair allows."""
         return ti.cast(ti.math.inf, ti.f64)
 
@@ -61,20 +61,21 @@ class ApproachTime(Controller):
         return self
 
     @ti.func
-    def pair(self, s, w, i, j, separation, distance):
-        gap = distance - s.radius[w, i] - s.radius[w, j]
-        # (v_i - v_j).n, with n from i to j.
+    def pair(self, s, w, i, j, separation):
+        # Approach speed times distance: (v_i - v_j).(r_j - r_i).
         closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
+        reach = s.radius[w, i] + s.radius[w, j]
         time = ti.cast(ti.math.inf, ti.f64)
-        if gap > 0.0 and closing > 0.0:
-            time = ti.cast(gap * distance / closing, ti.f64)
+        if closing > 0.0 and separation.norm_sqr() > reach * reach:
+            distance = separation.norm()
+            time = ti.cast((distance - reach) * distance / closing, ti.f64)
         return time
 
     @ti.func
     def note(self, s, w, i, soonest):
         if soonest < s.approach_time[w]:
             ti.atomic_min(s.approach_time[w], soonest)
-        speed = ti.cast((s.velocity[w, i] - s.frame[w]).norm(), ti.f64)
+        speed = (ti.cast(s.velocity[w, i], ti.f64) - s.axes(s.frame, w)).norm()
         if speed > s.fastest[w]:
             ti.atomic_max(s.fastest[w], speed)
 

@@ -47,7 +47,8 @@ class Clock(Phase):
         s.fastest[w] = 0.0
         s.steps[w] += 1
         s.particle_steps[w] += s.count[w]
-        s.stride[w] = 0.0
+        for k in ti.static(range(3)):
+            s.stride[w, k] = 0.0
         s.events[w] = 0
 
 
@@ -65,13 +66,14 @@ class Move(PerParticle):
         if ti.static(self.forced):
             s.velocity[w, i] += 0.5 * dt / s.mass[w, i] * s.force[w, i]
         v = s.velocity[w, i]
-        stride = ti.cast(dt * (v - s.frame[w]).norm(), ti.f64)
+        stride = ti.abs(ti.cast(v, ti.f64) - s.axes(s.frame, w)) * s.dt[w]
         # Not below infinity: also true of NaN.
-        if not (stride < ti.math.inf):
+        if not (stride.sum() < ti.math.inf):
             s.fail(w, NOT_FINITE, i)
         else:
-            if stride > s.stride[w]:
-                ti.atomic_max(s.stride[w], stride)
+            for k in ti.static(range(3)):
+                if stride[k] > s.stride[w, k]:
+                    ti.atomic_max(s.stride[w, k], stride[k])
             s.position[w, i] = self.domain.wrap(w, s.position[w, i] + dt * v)
             for operator in ti.static(self.operators):
                 operator.particle(s, w, i, dt)
@@ -101,7 +103,7 @@ class Advance(Phase):
         s.time_carry[w] = (time - s.time[w]) - step
         s.time[w] = time
         if ti.static(self.lists):
-            self.near.moved(w, ti.cast(s.stride[w], s.real))
+            self.near.moved(w)
         if last:
             s.time[w], s.time_carry[w] = s.end[w], 0.0
 

@@ -1,0 +1,87 @@
+"""Save a simulation between two steps, and go on from there to the same bits.
+
+A checkpoint holds every particle field, the clock, the books and the counters of every world. Pair lists are
+not in it: they are made anew, and results do not depend on when that was.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tisim.errors import InputError, must
+from tisim.output import replace_file
+from tisim.simulation import Simulation
+from tisim.state import BOOKS, CLOCK
+
+FORMAT = "tisim checkpoint 1"
+
+
+def _columns(simulation: Simulation) -> tuple[str, ...]:
+    """All of the state that decides how a simulation goes on."""
+    s = simulation.s
+    return (*(field.name for field in s.fields), *CLOCK, *BOOKS, *s.counters, "frame")
+
+
+def _identity(simulation: Simulation) -> dict[str, Any]:
+    """What a checkpoint must have in common with the simulation it is restored to."""
+    return {
+        "scenes": json.dumps([scene.digest() for scene in simulation.scenes]),
+        "precision": simulation.runtime.precision,
+        "worlds": simulation.worlds,
+        "capacity": simulation.s.capacity,
+    }
+
+
+def save(simulation: Simulation, path: str | Path) -> None:
+    """Write a checkpoint of a loaded simulation that is between two steps.
+
+    path is, at every instant, what it was before or the whole new file. RunError when the disk is full.
+    """
+    simulation.s.check()
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
+        for name in _columns(simulation):
+            # Checksums: damage is found on reading, not in the result.
+            file.create_dataset(name, data=simulation.s.read(name), chunks=True, fletcher32=True)
+    replace_file(Path(path), image.getvalue())
+
+
+def restore(simulation: Simulation, path: str | Path) -> None:
+    """Bring a simulation, loaded with the same scenes, to where the checkpoint was saved.
+
+    InputError when the file is none, is cut short or damaged, or is of other scenes, another precision or
+    another capacity; the simulation is then as it was.
+    """
+    simulation.s.check()
+    path = Path(path)
+    must(path.is_file(), "checkpoint", "an existing file", str(path))
+    wanted, columns = _columns(simulation), {}
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            must(file.attrs.get("format") == FORMAT, "checkpoint", "written by tisim", str(path))
+            for name, value in _identity(simulation).items():
+                _agree(name, value, file.attrs[name])
+            wall_s = float(file.attrs["wall_s"])
+            for name in wanted:
+                columns[name] = np.asarray(file[name])
+    except (OSError, KeyError) as error:
+        raise InputError(f"checkpoint must be a whole file; received {str(path)!r} ({error})") from None
+    for name, values in columns.items():
+        simulation.s.write(name, values)
+    if simulation.near is not None:
+        simulation.near.stale.fill(1)
+    simulation.wall_s = wall_s
+    simulation._keep()
+
+
+def _agree(name: str, value: Any, received: Any) -> None:
+    if name == "scenes":
+        must(value == received, "checkpoint", "of the same scenes", "one of others")
+    must(value == received, f"checkpoint's {name}", str(value), received)

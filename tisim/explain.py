@@ -1,0 +1,217 @@
+"""What a scene is made of once compiled - effects, memory, phases of a step - and what it leaves out."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from tisim import effects, kinds, operators
+from tisim.effect import Effect
+from tisim.scene import Scene
+from tisim.simulation import Simulation
+from tisim.spec import Spec, unit_of
+from tisim.state import CORE
+
+
+@dataclass(frozen=True)
+class Part:
+    """An effect, the domain or the step control of a scene.
+
+    name : in files. summary : one line. source : where the law is from. parameters : (name, value, unit).
+    """
+
+    name: str
+    summary: str
+    source: str
+    parameters: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Something allocated for one world of the scene. bytes : its size. why : which parts need it."""
+
+    name: str
+    bytes: int
+    why: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A scene, as one world of it is compiled.
+
+    particles, capacity : at the start, and room for. memory : every allocation, fields first. phases : of a
+    step, in order; those with * are repeated until no pair waits. absent_effects : known, and left out.
+    absent_fields : (field, effects that would need it), not allocated.
+    """
+
+    name: str
+    particles: int
+    capacity: int
+    schedule: str
+    precision: str
+    effects: tuple[Part, ...]
+    others: tuple[Part, ...]
+    memory: tuple[Memory, ...]
+    phases: tuple[str, ...]
+    absent_effects: tuple[Part, ...]
+    absent_fields: tuple[tuple[str, str], ...]
+
+    @property
+    def bytes(self) -> int:
+        return sum(item.bytes for item in self.memory)
+
+
+def explain(scene: Scene) -> Explanation:
+    """Compose the scene under the running settings, look at it, and give its memory back. Runs nothing."""
+    simulation = Simulation(scene)
+    try:
+        memory = tuple(_memory(simulation, scene))
+        phases = tuple(simulation.program.names())
+        present = {field.name for field in simulation.s.fields}
+        capacity, schedule = simulation.s.capacity, simulation.schedule
+        precision = simulation.runtime.precision
+    finally:
+        simulation.close()
+    absent = [kind for kind in known_effects() if kind not in {type(e) for e in scene.effects}]
+    return Explanation(
+        name=scene.name,
+        particles=scene.particles.count(),
+        capacity=capacity,
+        schedule=schedule,
+        precision=precision,
+        effects=tuple(_part(effect) for effect in scene.effects),
+        others=(_part(scene.domain), _part(scene.stepper.control)),
+        memory=memory,
+        phases=phases,
+        absent_effects=tuple(Part(kind.kind(), _summary(kind), _source(kind), ()) for kind in absent),
+        absent_fields=tuple(_absent_fields(absent, present)),
+    )
+
+
+def known_effects() -> list[type[Effect]]:
+    """Every effect of the package, by name; classes that others are made from are contracts, not effects."""
+    kinds.load(effects)
+    kinds.load(operators)
+
+    def leaves(kind: type[Effect]) -> Iterator[type[Effect]]:
+        below = [k for k in kind.__subclasses__() if k.__module__.startswith("tisim.")]
+        for sub in below:
+            yield from leaves(sub)
+        if not below and kind.__module__.startswith((effects.__name__, operators.__name__)):
+            yield kind
+
+    return sorted(set(leaves(Effect)), key=lambda kind: kind.kind())
+
+
+def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
+    needed: dict[str, list[str]] = {}
+    core = {field.name for field in CORE}
+    for effect in scene.effects:
+        for name in _needs(type(effect)):
+            needed.setdefault(name, []).append(effect.kind())
+    for name, size in simulation.s.bytes().items():
+        why = "every scene" if name in core else ", ".join(needed.get(name, ("forces",)))
+        yield Memory(name, size, why)
+    real = 8 if simulation.runtime.precision == "f64" else 4
+    yield Memory("parameter table", simulation.worlds * simulation.table.slots * real, "effects' parameters")
+    if simulation.near is not None:
+        yield Memory("pair list", simulation.near.bytes(), "impacts, step control")
+    if simulation.contacts is not None:
+        yield Memory("contact list", simulation.contacts.bytes(), "impacts")
+
+
+def _needs(kind: type[Effect]) -> list[str]:
+    return [need if isinstance(need, str) else need.name for need in kind.needs]
+
+
+def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tuple[str, str]]:
+    lacking: dict[str, list[str]] = {}
+    for kind in absent:
+        for name in _needs(kind):
+            if name not in present:
+                lacking.setdefault(name, []).append(kind.kind())
+    for name, kinds_ in lacking.items():
+        yield name, ", ".join(kinds_)
+
+
+def _part(spec: Spec) -> Part:
+    values = []
+    for name, info in type(spec).model_fields.items():
+        value = getattr(spec, name)
+        if not isinstance(value, Spec):
+            values.append((name, _text(value), unit_of(info)))
+    return Part(spec.kind(), _summary(type(spec)), _source(type(spec)), tuple(values))
+
+
+def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return "(" + ", ".join(_text(item) for item in value) + ")"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _summary(kind: type) -> str:
+    """The first sentence of the docstring, without its source."""
+    return re.split(r"\s*\((?=[A-Z]\d\d)|\.\s|\.$", _paragraphs(kind)[0])[0]
+
+
+def _source(kind: type) -> str:
+    """What the docstring names as source; else the first work that it or its module cites in brackets."""
+    paragraphs = _paragraphs(kind)
+    # A full stop ends it unless it follows an initial or stands before a bracket, as in "Eq. (6.9)".
+    if found := re.search(r"Source: (.*?)(?<![A-Z])\.(?: [A-Z]|$)", " ".join(paragraphs)):
+        return found.group(1)
+    module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
+    for text in (paragraphs[0], module):
+        if found := re.search(r"\(([A-Z]\d\d[^()]*(?:\([^)]*\)[^()]*)*)\)", text):
+            return found.group(1)
+    return ""
+
+
+def _paragraphs(kind: type) -> list[str]:
+    return [" ".join(part.split()) for part in (inspect.getdoc(kind) or "").split("\n\n")]
+
+
+def render(found: Explanation) -> RenderableType:
+    """The explanation for a terminal."""
+    head = Text.assemble(
+        (found.name, "bold"),
+        f": {found.particles} particles, room for {found.capacity}; {found.precision}; "
+        f"schedule '{found.schedule}'; {_bytes(found.bytes)} per world",
+    )
+    what = _table("It has", "effect", "parameters", "what it is", "source")
+    for part in (*found.effects, *found.others):
+        values = "\n".join(f"{name} = {value} {unit}".rstrip() for name, value, unit in part.parameters)
+        what.add_row(part.name, values, part.summary, part.source)
+    memory = _table("It allocates", "", "bytes", "for")
+    memory.columns[1].justify = "right"
+    for item in found.memory:
+        memory.add_row(item.name, f"{item.bytes:,}", item.why)
+    phases = Text.assemble(("A step runs  ", "italic"), " > ".join(found.phases))
+    absent = _table("It leaves out (not compiled, nothing allocated)", "effect", "what it is", "source")
+    for part in found.absent_effects:
+        absent.add_row(part.name, part.summary, part.source)
+    fields = [f"{name} (of {kinds_})" for name, kinds_ in found.absent_fields]
+    lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
+    left_out = absent if found.absent_effects else Text("It leaves out no effect that tisim knows.")
+    return Group(head, "", what, "", memory, "", phases, "", left_out, lacking)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0), header_style="dim")
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def _bytes(size: int) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000  # type: ignore[assignment]
+    return f"{size:.3g} GB"

@@ -1,0 +1,134 @@
+"""What a run leaves in its folder: result.h5, scene.toml, versions.json and cloud.png.
+
+result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
+one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts; the attributes
+say how the run ended and under which settings, and hold the scene as TOML.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+import tisim
+from tisim import picture, runtime
+from tisim.errors import InputError, RunError, must
+from tisim.particles import Arrays
+from tisim.scene import Scene
+from tisim.simulation import Result
+from tisim.state import resolve_fields
+
+FORMAT = "tisim run 1"
+
+
+@dataclass(frozen=True)
+class Folder:
+    """Where a run goes."""
+
+    path: Path
+
+    @property
+    def result(self) -> Path:
+        return self.path / "result.h5"
+
+    @property
+    def checkpoint(self) -> Path:
+        return self.path / "checkpoint.h5"
+
+    def prepare(self, overwrite: bool = False, resume: bool = False) -> None:
+        """Make the folder; InputError when it cannot be written, or would lose what is not to be lost."""
+        what = "output folder"
+        if resume:
+            must(self.checkpoint.is_file(), what, "one that an interrupted run has left", str(self.path))
+        elif not overwrite:
+            finished, begun = self.result.exists(), self.checkpoint.exists()
+            must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
+            rule = "without an interrupted run (or give --resume or --overwrite)"
+            must(not begun, what, rule, str(self.path))
+        writable(self.path)
+
+
+def writable(folder: Path) -> None:
+    """Make a folder and see that files can be made in it; InputError otherwise."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"output folder must be writable; received {str(folder)!r} ({error.strerror})"
+        ) from None
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Put data in the place of path: at every instant it is the old file or the whole new one."""
+    unfinished = path.with_name(path.name + ".new")
+    try:
+        with unfinished.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise RunError(f"{path} could not be written: {error.strerror}; what was there is intact") from error
+
+
+def versions() -> dict[str, str]:
+    """What a result depends on beside its scene."""
+    return {
+        "tisim": tisim.__version__,
+        "backend": runtime.backend(),
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def write(result: Result, folder: Folder) -> list[Path]:
+    """Write all files of a run in place of any before; returns their paths. RunError when the disk is full."""
+    folder.result.unlink(missing_ok=True)
+    paths = {name: folder.path / name for name in ("scene.toml", "versions.json", "cloud.png")}
+    replace_file(paths["scene.toml"], result.scene.to_toml().encode())
+    replace_file(paths["versions.json"], (json.dumps(versions(), indent=2) + "\n").encode())
+    with tempfile.SpooledTemporaryFile() as image:
+        picture.cloud(result).savefig(image, dpi=150, format="png")
+        image.seek(0)
+        replace_file(paths["cloud.png"], image.read())
+    replace_file(folder.result, _image(result))
+    folder.checkpoint.unlink(missing_ok=True)
+    return [folder.result, *paths.values()]
+
+
+def _image(result: Result) -> bytes:
+    """The bytes of result.h5, built in memory: a full disk is met by an ordinary write."""
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        file.attrs.update({
+            "format": FORMAT, "scene": result.scene.to_toml(), "ok": result.status.ok,
+            "reason": result.status.reason, "time": result.time, "wall_s": result.wall_s,
+            "settings": json.dumps(result.settings), "versions": json.dumps(versions()),
+        })  # fmt: skip
+        units = _units(result.scene)
+        for name, arrays in (("start", result.start), ("end", result.state)):
+            _write_arrays(file.create_group(name), arrays, units)
+        file.create_group("work").attrs.update(result.work)
+        file.flush()
+        return bytes(file.id.get_file_image())
+
+
+def _units(scene: Scene) -> dict[str, str]:
+    fields = resolve_fields(need for effect in scene.effects for need in effect.needs)
+    return {field.name: field.unit for field in fields}
+
+
+def _write_arrays(group: h5py.Group, arrays: Arrays, units: dict[str, str]) -> None:
+    for name, values in arrays.items():
+        group.create_dataset(name, data=values).attrs["unit"] = units.get(name, "")

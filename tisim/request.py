@@ -1,0 +1,64 @@
+"""From the words of a command line to a scene: a case or a file, its size and seed, and --set key=value."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tisim.errors import InputError, must
+from tisim.scene import Scene
+
+
+def scene(
+    target: str, size: str | None = None, seed: int | None = None, changes: Sequence[str] = ()
+) -> tuple[str, Scene]:
+    """Name and scene of a case, or of a file that ends in .toml; InputError when there is none."""
+    if target.endswith(".toml"):
+        must(size is None, "--size", "given for a case only", size)
+        name, made = Path(target).stem, _from_file(Path(target))
+        if seed is not None:
+            made = made.replace({"seed": seed})
+    else:
+        from cases.case import find
+
+        case = find(target)
+        case.size(size or "default")
+        name, made = case.name, case.scene(size or "default", seed or 0)
+    return name, made.replace(assignments(changes)) if changes else made
+
+
+def _from_file(path: Path) -> Scene:
+    must(not path.is_dir(), "scene file", "a file", str(path))
+    try:
+        return Scene.from_toml(path)
+    except OSError as error:
+        raise InputError(f"scene file must be readable; received {str(path)!r} ({error.strerror})") from None
+
+
+def assignments(changes: Sequence[str]) -> dict[str, Any]:
+    """``key=value`` texts as a mapping. A value is read as TOML; what is not TOML is text."""
+    found = {}
+    for change in changes:
+        key, equals, text = change.partition("=")
+        must(bool(key.strip() and equals), "--set", "key=value", change)
+        try:
+            found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key.strip()] = text.strip()
+    return found
+
+
+def nested(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings with dotted keys changed; tables on the way are made where they are missing."""
+    result = dict(settings)
+    for dotted, value in changes.items():
+        first, _, rest = dotted.partition(".")
+        if rest:
+            inside = result.get(first, {})
+            must(isinstance(inside, Mapping), dotted, "a setting", rest)
+            result[first] = nested(inside, {rest: value})
+        else:
+            result[first] = value
+    return result
