@@ -66,6 +66,6 @@ class Table:
 
 
 def connect(bound: Sequence[Any]) -> None:
-    """Let each bound effect choose what it wants to know of the others."""
-    for effect in bound:
-        effect.__dict__.update(effect.connect(tuple(bound)))
+    """Let each bound effect know its index and choose what it wants to know of the others."""
+    for index, effect in enumerate(bound):
+        effect.__dict__.update(effect.connect(tuple(bound)), index=index)

@@ -8,32 +8,35 @@ from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from tisim import __version__, request, runtime
+from tisim import __version__, cli_search, request, runtime
 from tisim.errors import InputError, RunError
+from tisim.interrupt import Interrupt
+from tisim.options import (
+    CaseName,
+    Changes,
+    Device,
+    Out,
+    Overwrite,
+    Precision,
+    Resume,
+    Seed,
+    Size,
+    Target,
+    Threads,
+    err,
+    out,
+    plain_table,
+    progress_bar,
+    stopping,
+)  # fmt: skip
 from tisim.simulation import Result, Simulation
 
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
     no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None,
 )  # fmt: skip
-
-Target = Annotated[str, typer.Argument(metavar="CASE_OR_TOML", help="A case of 'tisim cases', or a scene file.")]
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case of 'tisim cases'.")]
-Changes = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a setting of the scene, such as effects.impact.hardness=3e5. Repeatable."),
-]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder to write to; out/NAME by default.")]
-Seed = Annotated[int | None, typer.Option(help="Of all that is random.")]
-Size = Annotated[str | None, typer.Option(help="Size of the case: small, default or paper.")]
-Device = Annotated[str, typer.Option(help="cpu or cuda.")]
-Precision = Annotated[str, typer.Option(help="f64 or f32.")]
-Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run has left.")]
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -51,53 +54,56 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     sys.exit(0)
 
 
-@app.callback(invoke_without_command=True)
-def _version(version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False) -> None:
-    if version:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         print(f"tisim {__version__} ({runtime.backend()})")
         raise typer.Exit
 
 
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
 @app.command()
 def run(
-    target: Target, set_: Changes = None, out: Out = None, seed: Seed = None, size: Size = None,
-    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from where Ctrl-C stopped the same run.")] = False,
+    target: Target, changes: Changes = None, folder: Out = None,
+    seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
+    threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim import checkpoint, output
 
     runtime.start(device, precision, threads)
-    name, scene = request.scene(target, size, seed, set_ or ())
-    folder = output.Folder(out or Path("out") / name)
-    folder.check(overwrite, resume)
+    name, scene = request.scene(target, size, seed, changes or ())
+    place = output.Folder(folder or Path("out") / name)
+    place.check(overwrite, resume)
     simulation = Simulation(scene)
     simulation.load([scene])
     if resume:
-        checkpoint.restore(simulation, folder.checkpoint)
-    output.writable(folder.path)
+        checkpoint.restore(simulation, place.checkpoint)
+    output.writable(place.path)
     if not _advance(simulation, name):
-        checkpoint.save(simulation, folder.checkpoint)
-        _stderr().print(
-            f"stopped at {simulation.fraction():.1%}; {folder.checkpoint} is written. "
+        checkpoint.save(simulation, place.checkpoint)
+        err().print(
+            f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
             "To go on, give the same command with --resume."
         )
         raise typer.Exit(130)
     result = simulation.results()[0]
-    paths = output.write(result, folder)
-    _stdout().print(_summary(result, paths))
+    paths = output.write(result, place)
+    out().print(_summary(result, paths))
     if not result.status.ok:
-        print(f"run failed {result.status.reason}", file=sys.stderr)
-        raise typer.Exit(1)
+        raise RunError(f"run failed {result.status.reason}")
 
 
 def _advance(simulation: Simulation, name: str) -> bool:
     """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps."""
-    from tisim.interrupt import Interrupt
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
-               TextColumn("left"), TimeRemainingColumn())  # fmt: skip
-    with Progress(*columns, console=_stderr()) as bar, Interrupt(_stopping) as ctrl_c:
+    with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
         def progress(fraction: float) -> None:
@@ -114,10 +120,11 @@ def _advance(simulation: Simulation, name: str) -> bool:
 
 
 def _summary(result: Result, paths: Sequence[Path]) -> Table:
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    counts = len(result.start["mass"]), len(result.state["mass"])
+    table = plain_table()
     table.add_row("status", "ok" if result.status.ok else "failed")
     table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s")
-    table.add_row("particles", f"{len(result.start['mass'])} at the start, {len(result.state['mass'])} at the end")
+    table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
     table.add_row("work", ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in result.work.items()))
     table.add_row("wall time", f"{result.wall_s:.2f} s")
     table.add_row("written", "\n".join(map(str, paths)))
@@ -129,42 +136,40 @@ def cases() -> None:
     """List the cases."""
     from cases.case import every
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for heading in ("case", "what it is", "sizes", "inverse problem", "source"):
-        table.add_column(heading, overflow="fold")
     for case in every().values():
-        sizes = "\n".join(f"{name}: {size.summary}" for name, size in case.sizes.items())
-        table.add_row(case.name, case.title, sizes, ", ".join(case.variants) or "none", case.source)
-    _stdout().print(table)
+        out().print(f"[bold]{case.name}[/]  {case.title}\n    {case.source}", highlight=False)
+        table = plain_table()
+        for name, size in case.sizes.items():
+            table.add_row(f"    --size {name}", size.summary)
+        for variant in case.variants:
+            table.add_row(f"    --variant {variant}", "inverse problem, for tisim optimize")
+        out().print(table)
 
 
 @app.command()
 def explain(
-    target: Target, set_: Changes = None, seed: Seed = None, size: Size = None,
+    target: Target, changes: Changes = None, seed: Seed = None, size: Size = None,
     device: Device = "cpu", precision: Precision = "f64",
 ) -> None:  # fmt: skip
     """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
     from tisim.explain import explain, render
 
     runtime.start(device, precision)
-    _, scene = request.scene(target, size, seed, set_ or ())
-    _stdout().print(render(explain(scene)))
+    _, scene = request.scene(target, size, seed, changes or ())
+    out().print(render(explain(scene)))
 
 
 @app.command()
-def check(
-    case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0
-) -> None:
+def check(case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0) -> None:
     """Run a case's own checks; exit code 1 when one fails."""
     from cases.case import find
 
+    checks = find(case).check()
     runtime.start(device, precision, threads)
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for heading in ("check", "measured", "expected", "off by", "allowed", ""):
-        table.add_column(heading, justify="left" if heading in ("check", "") else "right")
+    table = plain_table("check", "measured", "expected", "off by", "allowed", "")
     failed = 0
-    with _stderr().status("checking") as status:
-        for item in find(case).check():
+    with err().status("checking") as status:
+        for item in checks:
             failed += not item.ok
             table.add_row(
                 item.name, f"{item.measured:.10g}", f"{item.expected:.10g}",
@@ -172,10 +177,9 @@ def check(
                 "[green]pass" if item.ok else "[bold red]FAIL",
             )  # fmt: skip
             status.update(f"checked: {item.name}")
-    _stdout().print(table)
+    out().print(table)
     if failed:
-        print(f"{failed} of {table.row_count} checks failed", file=sys.stderr)
-        raise typer.Exit(1)
+        raise RunError(f"{failed} of {table.row_count} checks failed")
 
 
 @app.command()
@@ -183,39 +187,12 @@ def doctor() -> None:
     """Say what this machine is to tisim, and what the other backend would give."""
     from tisim.doctor import findings
 
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    with _stderr().status("measuring"):
+    table = plain_table()
+    with err().status("measuring"):
         for finding in findings():
             table.add_row(finding.name, finding.value, finding.note)
-    _stdout().print(table)
+    out().print(table)
 
 
-@app.command()
-def optimize(
-    case: CaseName, size: Size = None, out: Out = None, seed: Seed = None,
-    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case; its first by default.")] = None,
-    generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
-    population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
-    target: Annotated[float | None, typer.Option(help="Stop at a fitness this low.")] = None,
-    budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
-    budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume/--fresh", help="Go on with the folder's search, or begin a new one.")] = True,
-    overwrite: Overwrite = False,
-    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
-) -> None:  # fmt: skip
-    """Search for the best design of a case; all of it goes to search.h5, and running again goes on from there."""
-    from optimize.session import Wishes, session
-
-    runtime.start(device, precision, threads)
-    wishes = Wishes(
-        size=size or "default", variant=variant, fresh=not resume, overwrite=overwrite,
-        search={"seed": seed, "generations": generations, "population": population, "target": target,
-                "max_evaluations": budget_evaluations,
-                "wall_clock_s": None if budget_minutes is None else 60 * budget_minutes},
-        changes=request.assignments(set_ or ()),
-    )  # fmt: skip
-    raise typer.Exit(session(case, wishes, out, _stdout(), _stderr(), _stopping))
+app.command()(cli_search.optimize)
+app.command()(cli_search.cache)

@@ -86,8 +86,8 @@ def rate_of(backend: str) -> float | None:
 
 def llvm_version() -> str:
     """Of the LLVM inside the backend, or "unknown"."""
-    core = getattr(getattr(ti, "_lib", None), "core", None)
-    return str(core.get_llvm_target_support()) if hasattr(core, "get_llvm_target_support") else "unknown"
+    version = getattr(ti._lib.core, "get_llvm_target_support", None)
+    return str(version()) if version else "unknown"
 
 
 def processor() -> dict[str, str]:
@@ -151,9 +151,7 @@ def _advice(rates: dict[str, float | None]) -> Finding:
 
 def _cuda() -> bool:
     """Whether a driver is there that a kernel could run on."""
-    return any(Path(device).exists() for device in ("/dev/nvidia0", "/dev/dxg")) and (
-        bool(getattr(ti._lib.core, "with_cuda", lambda: False)())
-    )
+    return any(Path(device).exists() for device in ("/dev/nvidia0", "/dev/dxg")) and ti._lib.core.with_cuda()
 
 
 def _memory() -> str:

@@ -23,8 +23,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
 from tisim._taichi import ti
-from tisim.particles import Arrays
 from tisim.spec import Spec, parameter
 from tisim.state import Field
 
@@ -37,9 +38,9 @@ class Effect(Spec):
     needs: ClassVar[tuple[str | Field, ...]] = ()
     counts: ClassVar[tuple[str, ...]] = ()
 
-    def capacity(self, arrays: Arrays) -> int:
-        """Particles that may ever live at once, given the start; the count of the start by default."""
-        return len(arrays["mass"])
+    def capacity(self, masses: np.ndarray) -> int:
+        """Particles that may ever live at once, given those of the start (kg); their number by default."""
+        return len(masses)
 
 
 class Force(Effect):
@@ -54,11 +55,16 @@ class Force(Effect):
 class PairForce(Effect):
     """A force between two particles, along any direction; ``pair_force(i, j) = -pair_force(j, i)``.
 
-    ``short_ranged`` forces vanish beyond ``reach``, a gap between surfaces in m that must not exceed
-    the skin of the pair list; others act between all pairs.
+    A ``short_ranged`` force is zero where the gap between surfaces is wider than ``reach``, and is summed
+    over the pair list; any other is summed over all pairs.
     """
 
     short_ranged: ClassVar[bool] = False
+
+    @ti.func
+    def reach(self, w):
+        """Widest gap (m) at which a short-ranged force acts."""
+        return 0.0
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

@@ -156,6 +156,8 @@ class Resolve(PerContact):
                 for event in ti.static(c.events):
                     if event.contact(s, w, i, j, d) >= 0.0:
                         event.resolve(s, w, i, j, d)
+                        if not ((s.velocity[w, i] + s.velocity[w, j]).norm_sqr() < ti.math.inf):
+                            s.fault(w, i, event.index)
                         ti.atomic_max(s.events[w], 1)
 
 

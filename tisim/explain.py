@@ -81,7 +81,7 @@ def explain(scene: Scene) -> Explanation:
     absent = [kind for kind in known_effects() if kind not in {type(e) for e in scene.effects}]
     return Explanation(
         name=scene.name,
-        particles=scene.particles.count(),
+        particles=len(scene.particles.masses()),
         capacity=capacity,
         schedule=schedule,
         precision=precision,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from tisim._taichi import ti
 from tisim.domain import Domain
+from tisim.effect import PairForce
 from tisim.program import PerParticle, Phase
 from tisim.state import State
 
@@ -29,7 +30,8 @@ CELLS_PER_PARTICLE = 2
 class Neighbours:
     """The pair list of every world."""
 
-    def __init__(self, s: State, domain: Domain) -> None:
+    def __init__(self, s: State, domain: Domain, short_ranged: tuple[PairForce, ...] = ()) -> None:
+        self.short_ranged = short_ranged
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity
         self.small = SMALL
@@ -145,12 +147,13 @@ class Bin(Phase):
         spacing = ti.pow(extent[0] * extent[1] * extent[2] / count, 1.0 / 3.0)
         n.skin[w] = ti.min(2.0 * AHEAD * ti.cast(s.axes(s.stride, w), s.real), spacing)
         n.gap[w] = n.horizon(w)
+        for effect in ti.static(n.short_ranged):
+            n.gap[w] = ti.max(n.gap[w], effect.reach(w))
         width = ti.max(spacing, 2.0 * least + n.gap[w])
-        n.dims[w] = ti.max(1, ti.floor(ti.min(extent / width, 1e4), ti.i32))
-        while n.dims[w][0] * n.dims[w][1] * n.dims[w][2] > n.max_cells:
-            n.dims[w] = (n.dims[w] + 1) // 2
-        n.corner[w], n.cell[w] = low, extent / n.dims[w]
-        dims = n.dims[w]
+        dims = ti.max(1, ti.floor(ti.min(extent / width, 1e3), ti.i32))
+        while dims[0] * dims[1] * dims[2] > n.max_cells:
+            dims = (dims + 1) // 2
+        n.dims[w], n.corner[w], n.cell[w] = dims, low, extent / dims
         cells = dims[0] * dims[1] * dims[2]
         for c in range(cells + 1):
             n.cell_start[w, c] = 0

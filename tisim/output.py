@@ -42,17 +42,16 @@ class Folder:
     def checkpoint(self) -> Path:
         return self.path / "checkpoint.h5"
 
-    def prepare(self, overwrite: bool = False, resume: bool = False) -> None:
-        """Make the folder; InputError when it cannot be written, or would lose what is not to be lost."""
-        what = "output folder"
+    def check(self, overwrite: bool = False, resume: bool = False) -> None:
+        """InputError when writing here would lose what is not to be lost; touches nothing."""
+        what, begun = "output folder", self.checkpoint.exists()
         if resume:
-            must(self.checkpoint.is_file(), what, "one that an interrupted run has left", str(self.path))
+            must(begun, what, "one that an interrupted run has left", str(self.path))
         elif not overwrite:
-            finished, begun = self.result.exists(), self.checkpoint.exists()
+            finished = self.result.exists()
             must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
             rule = "without an interrupted run (or give --resume or --overwrite)"
             must(not begun, what, rule, str(self.path))
-        writable(self.path)
 
 
 def writable(folder: Path) -> None:
@@ -94,7 +93,7 @@ def versions() -> dict[str, str]:
 
 
 def write(result: Result, folder: Folder) -> list[Path]:
-    """Write all files of a run in place of any before; returns their paths. RunError when the disk is full."""
+    """Write all files of a run, in place of any before; returns their paths. RunError on a full disk."""
     folder.result.unlink(missing_ok=True)
     paths = {name: folder.path / name for name in ("scene.toml", "versions.json", "cloud.png")}
     replace_file(paths["scene.toml"], result.scene.to_toml().encode())

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, field_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from tisim.domain import Domain
 from tisim.errors import InputError, must
@@ -20,9 +20,9 @@ Arrays = dict[str, np.ndarray]
 class Start(Spec):
     """A starting configuration."""
 
-    def count(self) -> int:
-        """How many particles it has."""
-        raise NotImplementedError(f"{type(self).__name__} must define count")
+    def masses(self) -> np.ndarray:
+        """Mass of each particle, kg, shape (n,); known without placing them."""
+        raise NotImplementedError(f"{type(self).__name__} must define masses")
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         """position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
@@ -54,9 +54,6 @@ class Particles(Start):
     def _from_array(cls, value: Any) -> Any:
         return _array(np.atleast_1d(value)) if isinstance(value, np.ndarray | float | int) else value
 
-    def count(self) -> int:
-        return len(self.position)
-
     def _column(self, name: str, value: Any, n: int) -> np.ndarray:
         column = np.asarray(value, dtype=float)
         if column.ndim == 0 or column.shape == (1,):
@@ -65,8 +62,19 @@ class Particles(Start):
         must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", _worst(column))
         return column
 
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        self._arrays()
+        return self
+
+    def masses(self) -> np.ndarray:
+        return self._arrays()["mass"]
+
     def arrays(self, domain: Domain, seed: int) -> Arrays:
-        n = self.count()
+        return self._arrays()
+
+    def _arrays(self) -> Arrays:
+        n = len(self.position)
         arrays = {
             name: self._column(name, getattr(self, name), n) for name in ("position", "velocity", "radius")
         }
@@ -104,8 +112,8 @@ class Cloud(Start):
     deviation: Vector = parameter("m/s", (0.0, 0.0, 0.0))
     temperature: float = parameter("K", 300.0, gt=0)
 
-    def count(self) -> int:
-        return self.number
+    def masses(self) -> np.ndarray:
+        return np.full(self.number, self.density * 4 / 3 * np.pi * self.radius**3)
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         low, high = domain.bounds()
@@ -116,7 +124,7 @@ class Cloud(Start):
             "position": sequential_addition(self.number, self.radius, low, high, seed),
             "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
             "radius": np.full(self.number, self.radius),
-            "mass": np.full(self.number, self.density * 4 / 3 * np.pi * self.radius**3),
+            "mass": self.masses(),
             "temperature": np.full(self.number, self.temperature),
         }
 

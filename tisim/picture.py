@@ -58,7 +58,7 @@ def cloud(result: Result) -> Figure:
     if norm is not None:
         bar = figure.colorbar(ScalarMappable(norm, HEAT), ax=axes, shrink=0.72, pad=0.01)
         bar.set_label("temperature (K)")
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
     return figure
 
 

@@ -50,6 +50,13 @@ def assignments(changes: Sequence[str]) -> dict[str, Any]:
     return found
 
 
+def below(table: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Changes to the settings of one table, without its name; InputError for any other."""
+    for key in changes:
+        must(key.startswith(f"{table}."), "--set", f"of the form {table}.KEY=VALUE", key)
+    return {key.removeprefix(f"{table}."): value for key, value in changes.items()}
+
+
 def nested(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Settings with dotted keys changed; tables on the way are made where they are missing."""
     result = dict(settings)

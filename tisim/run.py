@@ -46,7 +46,7 @@ def run(scenes, progress=None):
 
 def simulation(scenes: Sequence[Scene]) -> Simulation:
     """A compiled Simulation that holds these scenes of one structure; the last few made are kept."""
-    capacity = max(_capacity(scene) for scene in scenes)
+    capacity = max(scene.capacity() for scene in scenes)
     key = (runtime.generation(), runtime.current(), scenes[0].structure(), len(scenes), capacity)
     if key not in _made:
         for old in [k for k in _made if k[0] != runtime.generation()]:
@@ -56,7 +56,3 @@ def simulation(scenes: Sequence[Scene]) -> Simulation:
         _made[key] = Simulation(scenes[0], len(scenes), capacity)
     return _made[key]
 
-
-def _capacity(scene: Scene) -> int:
-    arrays = scene.particles.arrays(scene.domain, scene.seed)
-    return max([len(arrays["mass"]), *(effect.capacity(arrays) for effect in scene.effects)])

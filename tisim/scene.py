@@ -69,6 +69,11 @@ class Scene(Spec):
         parts = (*self.effects, self.domain, self.stepper)
         return tuple(part.structure() for part in parts)
 
+    def capacity(self) -> int:
+        """Particles that may ever live at once."""
+        masses = self.particles.masses()
+        return max([len(masses), *(effect.capacity(masses) for effect in self.effects)])
+
     def digest(self) -> str:
         """Hex hash of everything that decides the result: physics version, every parameter, the seed."""
         text = json.dumps([PHYSICS_VERSION, self.to_dict()], sort_keys=True)

@@ -15,6 +15,7 @@ from tisim.effect import Effect, Force, Operator, PairEvent, PairForce
 from tisim.errors import InputError, must
 from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
 from tisim.forces import FORCE, SumForces
+from tisim.mutual import Mutual
 from tisim.neighbours import Neighbours
 from tisim.particles import Arrays
 from tisim.program import Phase, Program, Repeat
@@ -77,11 +78,7 @@ class Simulation:
         began = time.perf_counter()
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
-        if capacity is None:
-            arrays = scene.particles.arrays(scene.domain, scene.seed)
-            capacity = (
-                max(e.capacity(arrays) for e in scene.effects) if scene.effects else len(arrays["mass"])
-            )
+        capacity = capacity or scene.capacity()
         self.schedule = schedule or self._choose(capacity)
         must(self.schedule in ("world", "particle"), "schedule", "world or particle", schedule)
         forces = any(isinstance(e, Force | PairForce) for e in scene.effects)
@@ -92,9 +89,7 @@ class Simulation:
         self.table = Table(parts, worlds, self.runtime.real)
         *effects, domain, control = (self.table.bind(part) for part in parts)
         connect(effects)
-        self.near: Neighbours | None = None
-        self.contacts: Contacts | None = None
-        self._compose(tuple(effects), domain, control, forces)
+        self._compose(tuple(effects), domain, control)
         self.scenes: list[Scene] = []
         self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
 
@@ -108,55 +103,61 @@ class Simulation:
         many = self.worlds >= self.runtime.threads
         return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
 
-    def _compose(self, effects: tuple[Effect, ...], domain: Any, control: Any, forces: bool) -> None:
+    def _compose(self, effects: tuple[Effect, ...], domain: Any, control: Any) -> None:
         """The phases of a step, and those that prepare the first one."""
         s = self.s
         events = tuple(e for e in effects if isinstance(e, PairEvent))
         operators = tuple(e for e in effects if isinstance(e, Operator))
-        if events or control.watches_pairs:
-            self.near = Neighbours(s, domain)
-            self.contacts = Contacts(s, domain, events)
-        near, contacts = self.near, self.contacts
-        summed = SumForces(
-            s, domain,
-            tuple(e for e in effects if isinstance(e, Force)),
-            tuple(e for e in effects if isinstance(e, PairForce)),
-        )  # fmt: skip
-        step: list[Phase | Repeat] = [
-            Clock(s, control, near),
-            Move(s, domain, operators, forces),
-            Advance(s, near),
-        ]
+        forces = tuple(e for e in effects if isinstance(e, Force))
+        pair_forces = tuple(e for e in effects if isinstance(e, PairForce))
+        short_ranged = tuple(e for e in pair_forces if e.short_ranged)
+        surveyed = bool(events) or control.watches_pairs
+        near = Neighbours(s, domain, short_ranged) if surveyed or short_ranged else None
+        mutual = Mutual(near) if near and short_ranged else None
+        contacts = Contacts(s, domain, events) if surveyed else None
+        self.parts = [part for part in (s, self.table, near, mutual, contacts) if part is not None]
+        self.near, self.contacts = near, contacts
+
+        forced = bool(forces or pair_forces)
+        step: list[Phase | Repeat] = [Clock(s, control, near), Move(s, domain, operators, forced), Advance(s, near)]
         first: list[Phase | Repeat] = []
-        if forces:
+        listed = mutual.phases() if mutual else near.phases() if near else ()
+        step += listed
+        first += listed
+        if forced:
+            summed = SumForces(s, domain, forces, pair_forces, mutual)
             step += [summed, Kick(s)]
             first += [summed]
-        if near is not None and contacts is not None:
+        if near and contacts:
             survey = Survey(near, contacts, control)
-            step += [*near.phases(), survey]
-            first += [*near.phases(), survey, Close(contacts)]
-            if events:
-                step += [Rounds(contacts)]
+            step += [survey]
+            first += [survey, Close(contacts)]
+        if events and contacts:
+            step += [Rounds(contacts)]
         if events or operators:
             step += [Rearrange(s, operators, near)]
-        if near is not None and contacts is not None:
-            if events and control.watches_pairs:
-                step += [*near.phases(), SurveyAgain(near, contacts, control)]
+        if near and contacts and events and control.watches_pairs:
+            step += [*listed, SurveyAgain(near, contacts, control)]
+        if contacts:
             step += [Close(contacts)]
         self.program = Program(s, (*step, Finish(s)), self.schedule)
         self.first = Program(s, tuple(first), self.schedule)
 
-    def load(self, scenes: Sequence[Scene]) -> None:
+    def load(self, scenes: Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
         """Put one scene in each of the first worlds; the others stay empty. No compilation.
 
+        starts : ``particles.arrays`` of each scene, where the caller has made them already.
         Raises InputError when a scene is of another structure, or larger than the capacity.
         """
         self.s.check()
         must(0 < len(scenes) <= self.worlds, "number of scenes", f"1 to {self.worlds}", len(scenes))
-        starts = []
         for scene in scenes:
             must(scene.structure() == self.structure, "scene", "of the structure compiled", scene.name)
-            starts.append(self._start(scene))
+            room = scene.capacity()
+            must(room <= self.s.capacity, f"particles of scene {scene.name!r}", f"at most {self.s.capacity}", room)
+        starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
+        for scene, start in zip(scenes, starts, strict=True):
+            self._fits(scene, start)
         columns = {f.name: self._blank(f) for f in self.s.fields}
         for w, start in enumerate(starts):
             for name, column in columns.items():
@@ -181,23 +182,15 @@ class Simulation:
         real = np.float64 if self.runtime.precision == "f64" else np.float32
         return np.ones(shape, dtype=np.int32 if f.integer else real) * (f.name in ("mass", "radius"))
 
-    def _start(self, scene: Scene) -> Arrays:
-        arrays = scene.particles.arrays(scene.domain, scene.seed)
-        room = max([len(arrays["mass"]), *(e.capacity(arrays) for e in scene.effects)])
-        must(
-            room <= self.s.capacity, f"particles of scene {scene.name!r}", f"at most {self.s.capacity}", room
-        )
+    def _fits(self, scene: Scene, start: Arrays) -> None:
         low, high = scene.domain.bounds()
         if low is not None:
-            inside = ((arrays["position"] >= low) & (arrays["position"] < high)).all()
+            inside = ((start["position"] >= low) & (start["position"] < high)).all()
             must(bool(inside), "particles.position", "inside the domain", "a particle outside")
-        missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - arrays.keys()
+        missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - start.keys()
         if missing:
             names = ", ".join(sorted(missing))
-            raise InputError(
-                f"particles must be given {names}, which effects of the scene need; received none"
-            )
-        return arrays
+            raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
 
     def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
         for name in (*CLOCK, *BOOKS, *self.s.counters):
@@ -216,6 +209,7 @@ class Simulation:
         )
         self.s.approach_time.fill(np.inf)
         self.s.culprit.fill(2**31 - 1)
+        self.s.blame.fill(2**31 - 1)
 
     def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:
         """Run every world to its end, or for at most ``steps`` more steps each.
@@ -254,32 +248,32 @@ class Simulation:
         self._bad: dict[int, tuple[float, str]] = {}
 
     def _verify(self) -> None:
-        """Find quantities that are not finite; where a world is sound, keep its state as the last good one."""
+        """Find what is not finite; where a world is sound, keep its state as the last good one."""
         now = self._snapshot()
-        status = self.s.read("status")
-        live = np.arange(self.s.capacity) < now["count"][:, None]
-        sound = np.ones(self.worlds, bool)
+        status, live = self.s.read("status"), np.arange(self.s.capacity) < now["count"][:, None]
+        faults: dict[int, str] = {}
         for f in self.s.fields:
             values = now[f.name].reshape(self.worlds, self.s.capacity, -1)
             bad = live & ~np.isfinite(values).all(axis=2)
             for w in np.flatnonzero(bad.any(axis=1)):
-                who = int(now["id"][w][bad[w]].min())
-                self._bad.setdefault(
-                    int(w), (float(now["time"][w]), f"{f.name} of particle {who} is not finite")
-                )
-                sound[w] = False
-        failed = (status != RUNNING) & (status != ENDED)
-        for w in np.flatnonzero(failed):
-            who = int(self.s.read("culprit")[w])
-            self._bad.setdefault(
-                int(w), (float(now["time"][w]), f"{REASONS[int(status[w])]}, at particle {who}")
-            )
-            sound[w] = False
+                faults.setdefault(int(w), f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
+        for w in np.flatnonzero((status != RUNNING) & (status != ENDED)):
+            faults[int(w)] = self._fault(int(w), REASONS[int(status[w])])
+        for w, fault in faults.items():
+            self._bad.setdefault(w, (float(now["time"][w]), fault))
+        sound = np.array([w not in faults for w in range(self.worlds)])
         for name, values in now.items():
             self._good[name][sound] = values[sound]
-        if not sound.all():
+        if faults:
             status[~sound & (status == RUNNING)] = NOT_FINITE
             self.s.write("status", status)
+
+    def _fault(self, w: int, reason: str) -> str:
+        """What the kernels have recorded of a failure: reason, effect and particle."""
+        blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
+        effects = self.scenes[w].effects
+        by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
+        return f"{reason}{by}, at particle {who}"
 
     def results(self) -> list[Result]:
         """Every loaded world read back, in order."""
@@ -310,9 +304,8 @@ class Simulation:
 
     def close(self) -> None:
         """Give the device memory back."""
-        for part in (self.s, self.table, self.near, self.contacts):
-            if part is not None:
-                part.destroy()
+        for part in self.parts:
+            part.destroy()
 
 
 def _volume(scene: Scene, start: Arrays) -> float:

@@ -44,7 +44,7 @@ RUNNING, ENDED, NOT_FINITE, FULL, CROWDED = range(5)
 """Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow."""
 
 CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
-BOOKS = ("count", "status", "culprit", "changed", "events", "next_id")
+BOOKS = ("count", "status", "culprit", "blame", "changed", "events", "next_id")
 MOTION = ("frame", "stride", "travel")
 TALLIES = ("steps", "particle_steps")
 
@@ -166,3 +166,9 @@ class State:
         """Stop a world. ``i`` is the particle at fault; of several, the lowest id is recorded."""
         ti.atomic_max(self.status[w], status)
         ti.atomic_min(self.culprit[w], self.id[w, i])
+
+    @ti.func
+    def fault(self, w, i, effect):
+        """Stop a world in which an effect, by its index in the scene, has made something not finite."""
+        self.fail(w, NOT_FINITE, i)
+        ti.atomic_min(self.blame[w], effect)

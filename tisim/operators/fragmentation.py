@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tisim._taichi import ti
 from tisim.effect import Operator, parameter
 from tisim.effects.heating import Heating
 from tisim.effects.impact import Impact, ImpactLaw
-from tisim.particles import Arrays
 from tisim.state import FULL, Field
 
 
@@ -39,8 +40,8 @@ class Fragmentation(ImpactLaw, Operator):
     grain_mass: float = parameter("kg", gt=0)
     threshold: float = parameter("", 2.0 ** (-1.0 / 3.0), gt=0, lt=1)
 
-    def capacity(self, arrays: Arrays) -> int:
-        return max(len(arrays["mass"]), int(arrays["mass"].sum() / self.grain_mass * (1 + 1e-9)))
+    def capacity(self, masses: np.ndarray) -> int:
+        return max(len(masses), int(masses.sum() / self.grain_mass * (1 + 1e-9)))
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"heating": tuple(peer for peer in peers if isinstance(peer, Heating))}

@@ -1,0 +1,74 @@
+"""The contract of a case: a module of this package with a ``CASE``. Found by looking; registered nowhere."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import cases
+from optimize.problem import Problem
+from tisim.errors import must
+from tisim.scene import Scene
+
+
+@dataclass(frozen=True)
+class Check:
+    """A number that a case must reproduce: right when |measured - expected| <= bound."""
+
+    name: str
+    measured: float
+    expected: float
+    bound: float
+
+    @property
+    def ok(self) -> bool:
+        return abs(self.measured - self.expected) <= self.bound
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a case is run. summary : for people; scene, search : settings of the two that differ."""
+
+    summary: str
+    scene: Mapping[str, Any]
+    search: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A runnable scenario, and the inverse problem on it where there is one.
+
+    name : of the module. title, source : for people. sizes : by name; "default" is among them.
+    scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
+    problem : (size, variant) -> Problem; variants : its names, the first the default.
+    """
+
+    name: str
+    title: str
+    source: str
+    sizes: Mapping[str, Size]
+    scene: Callable[[str, int], Scene]
+    check: Callable[[], Iterator[Check]]
+    problem: Callable[[str, str], Problem] | None = None
+    variants: tuple[str, ...] = ()
+
+    def size(self, name: str) -> Size:
+        """A size by name; InputError when there is none of that name."""
+        must(name in self.sizes, "size", f"one of {', '.join(self.sizes)}", name)
+        return self.sizes[name]
+
+
+def every() -> dict[str, Case]:
+    """All cases by name."""
+    modules = (importlib.import_module(f"cases.{m.name}") for m in pkgutil.iter_modules(cases.__path__))
+    return {module.CASE.name: module.CASE for module in modules if hasattr(module, "CASE")}
+
+
+def find(name: str) -> Case:
+    """A case by name; InputError naming the known ones when there is none."""
+    known = every()
+    must(name in known, "case", f"one of {', '.join(known)}, or a scene file ending in .toml", name)
+    return known[name]

@@ -1,0 +1,54 @@
+"""What is in a cache file, in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+
+from optimize.cache import Cache, list_records
+from optimize.record import Record
+
+SHOWN = 5
+"""Reasons of failures that are spelled out."""
+
+
+def listing(path: str | Path) -> RenderableType:
+    """Evaluations by problem, searches, and why evaluations failed. InputError if there is no such file."""
+    records = list_records(path)
+    cache = Cache(path)
+    searches = _table("search", "generations", "best", "ended by")
+    for name in cache.tables():
+        about = cache.table(name).attrs
+        if "stopped" in about:
+            best = cache.table(f"{name}/logbook").columns.get("best", [])
+            last = f"{best[-1]:.6g}" if best else "none"
+            searches.add_row(name, str(max(0, len(best) - 1)), last, str(about["stopped"]) or "not ended")
+    return Group(_evaluations(records), "", searches, *_failures(records))
+
+
+def _evaluations(records: Sequence[Record]) -> Table:
+    table = _table("problem", "evaluations", "failed", "lowest", "run time")
+    for problem in dict.fromkeys(record.problem for record in records):
+        mine = [record for record in records if record.problem == problem]
+        good = [record.fitness for record in mine if record.ok]
+        lowest = f"{min(good):.6g}" if good else "none"
+        seconds = sum(record.wall_s for record in mine)
+        table.add_row(problem, str(len(mine)), str(len(mine) - len(good)), lowest, f"{seconds:.1f} s")
+    return table
+
+
+def _failures(records: Sequence[Record]) -> list[str]:
+    failed = [record for record in records if not record.ok]
+    lines = [f"seed {record.seed}: {record.reason}" for record in failed[:SHOWN]]
+    more = [f"and {len(failed) - SHOWN} more"] if len(failed) > SHOWN else []
+    return ["", "failed:", *lines, *more] if failed else []
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if number in (0, 3) and heading != "lowest" else "right")
+    return table

@@ -1,0 +1,69 @@
+"""Fitness functions do not change by accident."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tisim
+from tests.regression import fitness_record
+from tisim import runtime
+from tisim.scene import PHYSICS_VERSION
+
+STANDARD_ERRORS = 4.0
+"""Bound on the difference of two means: exceeded by chance once in 16,000 comparisons."""
+
+
+@pytest.fixture(scope="module")
+def values():
+    return fitness_record.measure()
+
+
+def test_the_record_is_of_this_physics():
+    assert fitness_record.stored()["physics"] == PHYSICS_VERSION
+
+
+def test_same_settings_give_the_same_fitness_to_the_last_bit(values):
+    """On the platform of the record; on another one, whose exp and pow round differently, in the mean."""
+    record = fitness_record.stored()
+    settings = runtime.current().settings
+    if record["fingerprint"] == fitness_record.fingerprint() and record["settings"] == settings:
+        assert values == record["values"]
+    else:
+        assert max(fitness_record.deviations(values, record).values()) < STANDARD_ERRORS
+
+
+def test_the_other_schedule_gives_the_same_fitness_to_the_last_bit(values):
+    from cases import agglomeration
+
+    design = fitness_record.DESIGNS["fragile"]
+    scenes = [agglomeration.scene(design, seed, grains=fitness_record.GRAINS) for seed in range(4)]
+    simulation = tisim.Simulation(scenes[0], worlds=4, schedule="particle")
+    simulation.load(scenes)
+    simulation.run()
+    assert [agglomeration.cost(result) for result in simulation.results()] == values["fragile"][:4]
+    simulation.close()
+
+
+def test_single_precision_gives_the_same_fitness_in_the_mean():
+    """In a process of its own: precision belongs to the runtime."""
+    command = [sys.executable, fitness_record.__file__, "--precision", "f32", "--json"]
+    root = Path(fitness_record.__file__).parents[2]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
+    deviations = fitness_record.deviations(json.loads(done.stdout.splitlines()[-1]), fitness_record.stored())
+    assert max(deviations.values()) < STANDARD_ERRORS
+
+
+def test_the_bound_would_notice_a_change_of_physics(values):
+    """A tenth more friction or a hundredth less restitution is too little to see; a fifth of hardness is not."""
+    from cases import agglomeration
+
+    design = {**fitness_record.BASE, "hardness": 1.5 * fitness_record.BASE["hardness"]}
+    scenes = [agglomeration.scene(design, seed, grains=fitness_record.GRAINS) for seed in range(fitness_record.STARTS)]
+    harder = [agglomeration.cost(result) for result in tisim.run(scenes)]
+    moved = fitness_record.deviations({"published": harder}, {"values": {"published": values["published"]}})
+    assert moved["published"] > STANDARD_ERRORS

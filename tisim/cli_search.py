@@ -1,0 +1,96 @@
+"""The commands of inverse design: ``tisim optimize`` and ``tisim cache``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tisim import request, runtime
+from tisim.errors import InputError, RunError
+from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads, err, out, stopping
+
+
+def optimize(
+    case: CaseName,
+    size: Size = None,
+    folder: Out = None,
+    seed: Seed = None,
+    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
+    population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
+    target: Annotated[float | None, typer.Option(help="Stop at a fitness this low.")] = None,
+    budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
+    budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
+    ] = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh/--resume", help="Begin anew; otherwise go on with the folder's search.")
+    ] = False,
+    overwrite: Overwrite = False,
+    device: Device = "cpu",
+    precision: Precision = "f64",
+    threads: Threads = 0,
+) -> None:
+    """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
+    from cases.case import find
+    from optimize.session import FILE, clear, session
+    from optimize.settings import Settings
+
+    found = find(case)
+    chosen = found.size(size or "default")
+    if found.problem is None:
+        raise InputError(f"case must be one with an inverse problem; received {case!r}")
+    problem = found.problem(size or "default", variant or found.variants[0])
+    wishes = {
+        "seed": seed,
+        "generations": generations,
+        "population": population,
+        "target": target,
+        "max_evaluations": budget_evaluations,
+        "wall_clock_s": None if budget_minutes is None else 60 * budget_minutes,
+        **request.below("search", request.assignments(changes or ())),
+    }
+    given = {key: value for key, value in wishes.items() if value is not None}
+    settings = Settings(**request.nested(chosen.search, given))
+    runtime.start(device, precision, threads)
+    place = folder or Path("out") / problem.name
+    if fresh:
+        clear(place, overwrite)
+    outcome = session(problem, settings, place, out(), err(), stopping)
+    if outcome.interrupted:
+        err().print(f"stopped; {place / FILE} has all that is done. To go on, give the same command again.")
+        raise typer.Exit(130)
+    if outcome.best is None:
+        raise RunError(f"no design has run to its end; 'tisim cache {place / FILE}' says why")
+
+
+def cache(
+    file: Annotated[Path, typer.Argument(help="The search.h5 of a search.")],
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Check every record; exit code 1 for damage.")
+    ] = False,
+    compact: Annotated[bool, typer.Option("--compact", help="Drop what is damaged or double.")] = False,
+) -> None:
+    """List the evaluations in a search's file; verify or compact it."""
+    from optimize import cache as store
+    from optimize.listing import listing
+
+    if compact:
+        print(f"{store.compact(file)} evaluations kept")
+    if verify:
+        found = store.verify(file)
+        print(
+            f"{found.rows} evaluations and {found.journal} in the journal; {len(found.damaged)} damaged, "
+            f"{len(found.conflicts)} in conflict, {found.duplicates} double, {found.torn} bytes unfinished"
+        )
+        for fault in (*found.damaged, *(f"in conflict: {key}" for key in found.conflicts)):
+            print(fault, file=sys.stderr)
+        if not found.ok:
+            raise typer.Exit(1)
+    if not (compact or verify):
+        out().print(listing(file))

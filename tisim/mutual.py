@@ -1,0 +1,116 @@
+"""The other half of the pair list: for each particle, the larger neighbours that have listed it.
+
+A pair is listed once, by its larger member, which suits events. A force has to reach both members; so that
+it can be gathered without atomics and in a fixed order, each list is turned around and both halves are
+sorted by index. A sum over neighbours then has the same order, and the same bits, whenever the list was made.
+"""
+
+from tisim._taichi import ti
+from tisim.neighbours import LISTED, SMALL, Neighbours
+from tisim.program import PerParticle, Phase
+
+
+@ti.data_oriented
+class Mutual:
+    """Both halves of the neighbours of every particle."""
+
+    def __init__(self, near: Neighbours) -> None:
+        self.near, self.s = near, near.s
+        self.larger, self.found = ti.field(ti.i32), ti.field(ti.i32)
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).place(self.found)
+        builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).dense(ti.k, LISTED).place(self.larger)
+        self._tree = builder.finalize()
+
+    def phases(self) -> tuple[Phase, ...]:
+        """Bring both halves up to date where it is due."""
+        first, *middle, last = self.near.phases()
+        return (first, *middle, Empty(self), Turn(self), Sort(self), last)
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        return 4 * self.s.worlds * self.s.capacity * (1 + LISTED)
+
+    def destroy(self) -> None:
+        """Give the memory back."""
+        self._tree.destroy()
+
+    @ti.func
+    def size(self, w, i):
+        """How many candidates ``candidate`` offers particle i."""
+        n = self.s.count[w]
+        if n > SMALL and self.found[w, i] >= 0:
+            n = self.found[w, i]
+        return n
+
+    @ti.func
+    def candidate(self, w, i, k):
+        """The k-th particle that may be a neighbour and own the pair; i itself where there is none."""
+        j = k
+        if self.s.count[w] > SMALL and self.found[w, i] >= 0:
+            j = self.larger[w, i, k]
+        elif k == i or not self.near.owns(w, k, i):
+            j = i
+        return j
+
+
+class Due(PerParticle):
+    """Work on the lists of a world when they are due."""
+
+    conditional = True
+
+    def __init__(self, mutual: Mutual) -> None:
+        super().__init__(mutual.s)
+        self.m = mutual
+
+    @ti.func
+    def when(self, w):
+        return self.m.near.stale[w] > 0 and self.s.count[w] > SMALL
+
+
+class Empty(Due):
+    """Nobody has been listed yet."""
+
+    @ti.func
+    def run(self, w, i):
+        self.m.found[w, i] = 0
+
+
+class Turn(Due):
+    """Tell each listed particle who has listed it; those that look at all do so too."""
+
+    @ti.func
+    def run(self, w, i):
+        n, m = self.m.near, self.m
+        for k in range(n.size(w, i)):
+            j = n.candidate(w, i, k)
+            if j != i:
+                slot = ti.atomic_add(m.found[w, j], 1)
+                if slot < LISTED:
+                    m.larger[w, j, slot] = i
+
+
+class Sort(Due):
+    """Order both halves by index; mark those that are too many."""
+
+    @ti.func
+    def run(self, w, i):
+        n, m = self.m.near, self.m
+        self.order(n.other, w, i, n.listed[w, i])
+        if m.found[w, i] > LISTED:
+            m.found[w, i] = -1
+        self.order(m.larger, w, i, m.found[w, i])
+
+    @ti.func
+    def order(self, column: ti.template(), w, i, size):
+        for a in range(1, size):
+            value, b = column[w, i, a], a - 1
+            while b >= 0:
+                if column[w, i, b] > value:
+                    column[w, i, b + 1] = column[w, i, b]
+                    b -= 1
+                else:
+                    break
+            column[w, i, b + 1] = value
+
+
