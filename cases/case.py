@@ -70,5 +70,5 @@ def every() -> dict[str, Case]:
 def find(name: str) -> Case:
     """A case by name; InputError naming the known ones when there is none."""
     known = every()
-    must(name in known, "case", f"one of {', '.join(known)}, or a scene file ending in .toml", name)
+    must(name in known, "case", f"one of {', '.join(known)}", name)
     return known[name]

@@ -23,8 +23,8 @@ from optimize.student import student_t
 from tisim.errors import InputError, RunError, must
 
 if TYPE_CHECKING:
+    from tisim.result import Result
     from tisim.scene import Scene
-    from tisim.simulation import Result
 
 
 class Evaluator(Protocol):

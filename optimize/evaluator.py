@@ -8,8 +8,9 @@ from typing import Any
 from tisim import runtime
 from tisim.errors import InputError, must
 from tisim.particles import Arrays
+from tisim.result import Result, Status
 from tisim.scene import Scene
-from tisim.simulation import Result, Simulation, Status
+from tisim.simulation import Simulation
 
 SLOTS = 300_000
 """Particles of all worlds of a batch together; keeps its memory to some hundred MB."""

@@ -12,8 +12,8 @@ from tisim.errors import must
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from tisim.result import Result
     from tisim.scene import Scene
-    from tisim.simulation import Result
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """tisim: clouds of interacting particles, simulated in batches of worlds."""
 
+from tisim.particles import Cloud, Particles
+from tisim.result import Result
 from tisim.run import run
 from tisim.scene import Box, Open, Scene
-from tisim.particles import Cloud, Particles
-from tisim.simulation import Result, Simulation
+from tisim.simulation import Simulation
 
 __version__ = "0.1.0"
 __all__ = ["Box", "Cloud", "Open", "Particles", "Result", "Scene", "Simulation", "__version__", "run"]

@@ -18,6 +18,7 @@ from tisim.errors import InputError, must
 from tisim.output import replace_file
 from tisim.simulation import Simulation
 from tisim.state import BOOKS, CLOCK
+from tisim.watch import Watch
 
 FORMAT = "tisim checkpoint 1"
 
@@ -78,7 +79,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     if simulation.near is not None:
         simulation.near.stale.fill(1)
     simulation.wall_s = wall_s
-    simulation._keep()
+    simulation.watch = Watch(simulation.s, simulation.scenes)
 
 
 def _agree(name: str, value: Any, received: Any) -> None:

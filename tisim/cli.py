@@ -31,7 +31,8 @@ from tisim.options import (
     progress_bar,
     stopping,
 )  # fmt: skip
-from tisim.simulation import Result, Simulation
+from tisim.result import Result
+from tisim.simulation import Simulation
 
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",

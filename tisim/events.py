@@ -218,4 +218,3 @@ class Rearrange(Phase):
             s.changed[w] = 0
             if ti.static(self.lists):
                 self.near.stale[w] = 1
-

@@ -49,7 +49,7 @@ class SumForces(PerParticle):
             self.find_fault(w, i)
 
     @ti.func
-    def pair(self, effects: ti.template(), w, i, j, t):
+    def pair(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
         """Sum of the pair forces of ``effects`` on i by j; none of itself."""
         s = self.s
         total = 0.0 * s.velocity[w, i]

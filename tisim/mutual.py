@@ -102,7 +102,7 @@ class Sort(Due):
         self.order(m.larger, w, i, m.found[w, i])
 
     @ti.func
-    def order(self, column: ti.template(), w, i, size):
+    def order(self, column: ti.template(), w, i, size):  # type: ignore[valid-type]
         for a in range(1, size):
             value, b = column[w, i, a], a - 1
             while b >= 0:
@@ -112,5 +112,3 @@ class Sort(Due):
                 else:
                     break
             column[w, i, b + 1] = value
-
-

@@ -34,7 +34,6 @@ class Neighbours:
         self.short_ranged = short_ranged
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity
-        self.small = SMALL
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
         builder = ti.FieldsBuilder()
         self.cell_start, self.cell_of, self.order, self.listed = (ti.field(ti.i32) for _ in range(4))
@@ -101,6 +100,11 @@ class Neighbours:
         return HORIZON * self.spacing(w)
 
     @ti.func
+    def sure(self, w):
+        """The same where only near pairs are offered; 0, for no limit, where all pairs are. m."""
+        return ti.select(self.s.count[w] > SMALL, self.horizon(w), 0.0)
+
+    @ti.func
     def moved(self, w):
         """Note that particles have moved by at most ``stride`` relative to the frame, along each axis."""
         for k in ti.static(range(3)):
@@ -118,6 +122,11 @@ class Neighbours:
     def around(self, c, cells):
         """Index of a cell that may lie across a joined face, by less than one turn."""
         return c + ti.select(c < 0, cells, 0) - ti.select(c >= cells, cells, 0)
+
+    @ti.func
+    def turns(self, c, cells):
+        """Which image of the box a cell lies in, along each axis: -1, 0 or 1."""
+        return ti.select(c >= cells, 1, 0) - ti.select(c < 0, 1, 0)
 
 
 class Bin(Phase):
@@ -214,8 +223,7 @@ class Search(PerParticle):
                     while x <= last[0]:
                         begin = n.around(x, dims[0])
                         end = ti.min(begin + last[0] - x, dims[0] - 1)
-                        turns = (ti.Vector([x, y, z]) - ti.Vector([begin, n.around(y, dims[1]), n.around(z, dims[2])])) / dims
-                        here = r - turns * side
+                        here = r - n.turns(ti.Vector([x, y, z]), dims) * side
                         for m in range(n.cell_start[w, row + begin], n.cell_start[w, row + end + 1]):
                             d = ti.max(ti.abs(n.sorted_position[w, m] - here) - skin, 0.0)
                             limit = near + n.sorted_radius[w, m]
@@ -247,4 +255,3 @@ class Listed(Phase):
         self.n.stale[w] = 0
         for k in ti.static(range(3)):
             self.n.s.travel[w, k] = 0.0
-

@@ -21,8 +21,8 @@ import tisim
 from tisim import picture, runtime
 from tisim.errors import InputError, RunError, must
 from tisim.particles import Arrays
+from tisim.result import Result
 from tisim.scene import Scene
-from tisim.simulation import Result
 from tisim.state import resolve_fields
 
 FORMAT = "tisim run 1"

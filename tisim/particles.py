@@ -62,6 +62,12 @@ class Particles(Start):
         must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", _worst(column))
         return column
 
+    @field_validator("quantities", mode="before")
+    @classmethod
+    def _plain(cls, value: Any) -> Any:
+        listed = isinstance(value, Mapping)
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in value.items()} if listed else value
+
     @model_validator(mode="after")
     def _sound(self) -> Self:
         self._arrays()
@@ -78,8 +84,8 @@ class Particles(Start):
         arrays = {
             name: self._column(name, getattr(self, name), n) for name in ("position", "velocity", "radius")
         }
-        must((self.mass is None) != (self.density is None), "particles", "given mass or density, one of the two",
-             "both" if self.mass is not None else "neither")  # fmt: skip
+        given = "both" if self.mass is not None else "neither"
+        must((self.mass is None) != (self.density is None), "particles", "given mass or density", given)
         volume = 4 / 3 * np.pi * arrays["radius"] ** 3
         arrays["mass"] = (
             volume * self.density if self.density is not None else self._column("mass", self.mass, n)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from tisim.particles import Arrays
-from tisim.simulation import Result
+from tisim.result import Result
 
 PIXELS = 1400
 """Width of a panel as it is drawn; half of it as it is shown, so that edges are smooth."""

@@ -112,7 +112,7 @@ class Program:
                 self._loop(item, w)
 
     @ti.func
-    def _loop(self, phase: ti.template(), w):
+    def _loop(self, phase: ti.template(), w):  # type: ignore[valid-type]
         if ti.static(phase.conditional):
             if phase.when(w) > 0:
                 for k in range(phase.size(w)):
@@ -122,13 +122,13 @@ class Program:
                 phase.run(w, k)
 
     @ti.kernel
-    def _sweep(self, phase: ti.template()):
+    def _sweep(self, phase: ti.template()):  # type: ignore[valid-type]
         for w, k in ti.ndrange(self.s.worlds, phase.extent):
             if self.s.status[w] == RUNNING and k < phase.size(w) and phase.when(w) > 0:
                 phase.run(w, k)
 
     @ti.kernel
-    def _sweep_pending(self, item: ti.template(), phase: ti.template()):
+    def _sweep_pending(self, item: ti.template(), phase: ti.template()):  # type: ignore[valid-type]
         for w, k in ti.ndrange(self.s.worlds, phase.extent):
             if self.s.status[w] == RUNNING and item.pending(w) > 0 and k < phase.size(w):
                 phase.run(w, k)
@@ -142,7 +142,7 @@ class Program:
         return n
 
     @ti.kernel
-    def _count_pending(self, item: ti.template()) -> ti.i32:
+    def _count_pending(self, item: ti.template()) -> ti.i32:  # type: ignore[valid-type]
         n = 0
         for w in range(self.s.worlds):
             if self.s.status[w] == RUNNING and item.pending(w) > 0:

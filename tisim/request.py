@@ -21,9 +21,11 @@ def scene(
         if seed is not None:
             made = made.replace({"seed": seed})
     else:
-        from cases.case import find
+        from cases.case import every
 
-        case = find(target)
+        known = every()
+        must(target in known, "case", f"one of {', '.join(known)}, or a scene file ending in .toml", target)
+        case = known[target]
         case.size(size or "default")
         name, made = case.name, case.scene(size or "default", seed or 0)
     return name, made.replace(assignments(changes)) if changes else made

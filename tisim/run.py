@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, overload
 
 from tisim import runtime
+from tisim.result import Result
 from tisim.scene import Scene
-from tisim.simulation import Result, Simulation
+from tisim.simulation import Simulation
 
 LARGEST_BATCH = 512
 
@@ -55,4 +56,3 @@ def simulation(scenes: Sequence[Scene]) -> Simulation:
             _made.pop(next(iter(_made))).close()
         _made[key] = Simulation(scenes[0], len(scenes), capacity)
     return _made[key]
-

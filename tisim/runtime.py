@@ -76,8 +76,8 @@ def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runt
                 cpu_max_num_threads=wanted.threads,
                 fast_math=False,
                 enable_fallback=False,
-                # With it, Quadrants 1.3.3 reads stale flags after nested loops, and compiling takes three times
-                # as long under Taichi 1.7.4; LLVM optimises the same code afterwards.
+                # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
+                # times as long to compile; LLVM optimises the same code afterwards.
                 cfg_optimization=False,
             )
     except RuntimeError as failure:

@@ -76,7 +76,8 @@ class Scene(Spec):
 
     def digest(self) -> str:
         """Hex hash of everything that decides the result: physics version, every parameter, the seed."""
-        text = json.dumps([PHYSICS_VERSION, self.to_dict()], sort_keys=True)
+        order = [effect.kind() for effect in self.effects]
+        text = json.dumps([PHYSICS_VERSION, order, self.to_dict()], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,48 +18,14 @@ from tisim.mutual import Mutual
 from tisim.neighbours import Neighbours
 from tisim.particles import Arrays
 from tisim.program import Phase, Program, Repeat
+from tisim.result import Result, Status
 from tisim.scene import Scene
-from tisim.state import BOOKS, CLOCK, CROWDED, ENDED, FULL, MOTION, NOT_FINITE, RUNNING, State, resolve_fields
+from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fields
 from tisim.steppers.verlet import Advance, Clock, Finish, Kick, Move
+from tisim.watch import REASONS, Watch
 
 CHUNK_SECONDS = 0.25
 """Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite."""
-
-REASONS = {
-    RUNNING: "running",
-    ENDED: "reached its end",
-    NOT_FINITE: "a quantity is not finite",
-    FULL: "more fragments than there is room for",
-    CROWDED: "more simultaneous contacts than there is room for",
-}
-
-
-@dataclass(frozen=True)
-class Status:
-    """How a world ended. ``ok`` when it reached its end; else ``reason`` says when, where and what."""
-
-    ok: bool
-    reason: str
-
-
-@dataclass(frozen=True)
-class Result:
-    """A world read back.
-
-    state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, the
-        last good state. start : the same at the start.
-    time : s. work : counts (steps, particle_steps, and what the effects count). wall_s : wall seconds of
-        the batch that this world was part of, per world; set-up and compilation are not in it.
-    """
-
-    scene: Scene
-    state: Arrays
-    start: Arrays
-    time: float
-    work: dict[str, int]
-    status: Status
-    wall_s: float
-    settings: dict[str, str] = field(default_factory=dict)
 
 
 class Simulation:
@@ -119,7 +84,11 @@ class Simulation:
         self.near, self.contacts = near, contacts
 
         forced = bool(forces or pair_forces)
-        step: list[Phase | Repeat] = [Clock(s, control, near), Move(s, domain, operators, forced), Advance(s, near)]
+        step: list[Phase | Repeat] = [
+            Clock(s, control, near),
+            Move(s, domain, operators, forced),
+            Advance(s, near),
+        ]
         first: list[Phase | Repeat] = []
         listed = mutual.phases() if mutual else near.phases() if near else ()
         step += listed
@@ -154,7 +123,12 @@ class Simulation:
         for scene in scenes:
             must(scene.structure() == self.structure, "scene", "of the structure compiled", scene.name)
             room = scene.capacity()
-            must(room <= self.s.capacity, f"particles of scene {scene.name!r}", f"at most {self.s.capacity}", room)
+            must(
+                room <= self.s.capacity,
+                f"particles of scene {scene.name!r}",
+                f"at most {self.s.capacity}",
+                room,
+            )
         starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
         for scene, start in zip(scenes, starts, strict=True):
             self._fits(scene, start)
@@ -173,9 +147,9 @@ class Simulation:
             self.near.stale.fill(1)
         if self.first.items:
             self.first.advance(1)
-        self._keep()
+        self.watch = Watch(self.s, self.scenes)
         # A start can fail already: more contacts than there is room for, an infinite force.
-        self._verify()
+        self.watch.look()
 
     def _blank(self, f: Any) -> np.ndarray:
         shape = (self.worlds, self.s.capacity) + ((3,) if f.components == 3 else ())
@@ -190,7 +164,9 @@ class Simulation:
         missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - start.keys()
         if missing:
             names = ", ".join(sorted(missing))
-            raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
+            raise InputError(
+                f"particles must be given {names}, which effects of the scene need; received none"
+            )
 
     def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
         for name in (*CLOCK, *BOOKS, *self.s.counters):
@@ -223,7 +199,7 @@ class Simulation:
             n = chunk if steps is None else min(chunk, steps - done)
             began = time.perf_counter()
             self.program.advance(n)
-            self._verify()
+            self.watch.look()
             taken = time.perf_counter() - began
             self.wall_s += taken
             done += n
@@ -240,52 +216,17 @@ class Simulation:
         ended = self.s.read("status")[:n] != RUNNING
         return float(np.where(ended, 1.0, self.s.read("time")[:n] / self.s.read("end")[:n]).mean())
 
-    def _snapshot(self) -> dict[str, np.ndarray]:
-        return {name: self.s.read(name) for name in (*(f.name for f in self.s.fields), "time", "count")}
-
-    def _keep(self) -> None:
-        self._good = self._snapshot()
-        self._bad: dict[int, tuple[float, str]] = {}
-
-    def _verify(self) -> None:
-        """Find what is not finite; where a world is sound, keep its state as the last good one."""
-        now = self._snapshot()
-        status, live = self.s.read("status"), np.arange(self.s.capacity) < now["count"][:, None]
-        faults: dict[int, str] = {}
-        for f in self.s.fields:
-            values = now[f.name].reshape(self.worlds, self.s.capacity, -1)
-            bad = live & ~np.isfinite(values).all(axis=2)
-            for w in np.flatnonzero(bad.any(axis=1)):
-                faults.setdefault(int(w), f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
-        for w in np.flatnonzero((status != RUNNING) & (status != ENDED)):
-            faults[int(w)] = self._fault(int(w), REASONS[int(status[w])])
-        for w, fault in faults.items():
-            self._bad.setdefault(w, (float(now["time"][w]), fault))
-        sound = np.array([w not in faults for w in range(self.worlds)])
-        for name, values in now.items():
-            self._good[name][sound] = values[sound]
-        if faults:
-            status[~sound & (status == RUNNING)] = NOT_FINITE
-            self.s.write("status", status)
-
-    def _fault(self, w: int, reason: str) -> str:
-        """What the kernels have recorded of a failure: reason, effect and particle."""
-        blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
-        effects = self.scenes[w].effects
-        by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
-        return f"{reason}{by}, at particle {who}"
-
     def results(self) -> list[Result]:
         """Every loaded world read back, in order."""
         tallies = {name: self.s.read(name) for name in self.s.counters}
         status = self.s.read("status")
-        found = []
+        good, found = self.watch.good, []
         for w, scene in enumerate(self.scenes):
-            n = int(self._good["count"][w])
-            state = {f.name: self._good[f.name][w, :n].copy() for f in self.s.fields}
-            if w in self._bad:
-                when, why = self._bad[w]
-                ended = Status(False, f"at t = {when:.6g} s: {why}; kept t = {self._good['time'][w]:.6g} s")
+            n = int(good["count"][w])
+            state = {f.name: good[f.name][w, :n].copy() for f in self.s.fields}
+            if w in self.watch.faults:
+                when, why = self.watch.faults[w]
+                ended = Status(False, f"at t = {when:.6g} s: {why}; kept t = {good['time'][w]:.6g} s")
             else:
                 ended = Status(int(status[w]) == ENDED, REASONS[int(status[w])])
             found.append(
@@ -293,12 +234,12 @@ class Simulation:
                     scene,
                     state,
                     self.starts[w],
-                    float(self._good["time"][w]),
+                    float(good["time"][w]),
                     {name: int(tally[w]) for name, tally in tallies.items()},
                     ended,
                     self.wall_s / len(self.scenes),
                     self.runtime.settings,
-                )  # fmt: skip
+                )
             )
         return found
 

@@ -6,7 +6,7 @@ which the compiler can vectorise over particles.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -92,6 +92,10 @@ class State:
         self.means = self._ruled("mean")
         self.sums = self._ruled("sum")
 
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
     def _place(self, builder: Any, field: Field) -> Any:
         dtype = ti.i32 if field.integer else self.real
         column = ti.field(dtype) if field.components == 1 else ti.Vector.field(field.components, dtype)
@@ -129,7 +133,7 @@ class State:
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
 
     @ti.func
-    def axes(self, column: ti.template(), w):
+    def axes(self, column: ti.template(), w):  # type: ignore[valid-type]
         """The three components of a world quantity."""
         return ti.Vector([column[w, 0], column[w, 1], column[w, 2]])
 

@@ -9,7 +9,7 @@ from tisim.effects.impact import Impact, ImpactLaw
 
 
 class Agglomeration(ImpactLaw):
-    """Bonded grains merge into a sphere with their mass, momentum, volume and energy, at their centre of mass.
+    """Bonded grains merge into a sphere of their mass, momentum, volume and heat, at their centre of mass.
 
     Each quantity follows its own rule (state.Field.merge): sums add, means are weighted by mass, the
     radius follows from the volume, b = (b_i^3 + b_j^3)^(1/3). Source: Z04 remark 2.1.

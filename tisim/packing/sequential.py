@@ -18,8 +18,8 @@ PER_CELL = 8
 
 @ti.kernel
 def _add(
-    centres: ti.types.ndarray(),
-    cells: ti.types.ndarray(),
+    centres: ti.types.ndarray(),  # type: ignore[valid-type]
+    cells: ti.types.ndarray(),  # type: ignore[valid-type]
     spheres: ti.i32,
     radius: ti.f64,
     seed: ti.u64,
@@ -100,7 +100,7 @@ def sequential_addition(
     if placed < count:
         fraction = count * 4 / 3 * np.pi * radius**3 / np.prod(side)
         raise InputError(
-            f"volume fraction of a random sequential start must be within reach (about 0.38 at most, of which "
-            f"{placed} of {count} spheres were placed); received {fraction:.3f}"
+            "volume fraction of a random sequential start must be within reach, about 0.38 at most "
+            f"({placed} of {count} spheres were placed); received {fraction:.3f}"
         )
     return centres

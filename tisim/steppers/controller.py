@@ -83,6 +83,6 @@ class ApproachTime(Controller):
     def next(self, s, w, horizon):
         dt = s.approach_time[w]
         if horizon > 0.0:
-            # Pairs that were not seen are farther apart than this, and close no faster than twice the fastest.
+            # Pairs not seen are farther apart than this, and close no faster than twice the fastest.
             dt = ti.min(dt, ti.cast(horizon, ti.f64) / (2.0 * s.fastest[w] + 1e-300))
         return ti.max(ti.cast(self.shortest(w), ti.f64), ti.min(dt, ti.cast(self.longest(w), ti.f64)))

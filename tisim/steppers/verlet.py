@@ -35,8 +35,7 @@ class Clock(Phase):
         s = self.s
         horizon = ti.cast(0.0, s.real)
         if ti.static(self.lists):
-            if s.count[w] > self.near.small:
-                horizon = self.near.horizon(w)
+            horizon = self.near.sure(w)
         dt = self.controller.next(s, w, horizon)
         left = s.end[w] - s.time[w]
         # A remainder that only rounding has left is not worth a step of its own.

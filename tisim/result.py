@@ -1,0 +1,36 @@
+"""What a run gives back: how each world ended, its state, and the counts of its work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from tisim.particles import Arrays
+from tisim.scene import Scene
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a world ended. ``ok`` when it reached its end; else ``reason`` says when, where and what."""
+
+    ok: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """A world read back.
+
+    state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, the
+        last good state. start : the same at the start.
+    time : s. work : counts (steps, particle_steps, and what the effects count). wall_s : wall seconds of
+        the batch that this world was part of, per world; set-up and compilation are not in it.
+    """
+
+    scene: Scene
+    state: Arrays
+    start: Arrays
+    time: float
+    work: dict[str, int]
+    status: Status
+    wall_s: float
+    settings: dict[str, str] = field(default_factory=dict)

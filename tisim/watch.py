@@ -1,0 +1,60 @@
+"""Look whether every quantity is finite, and keep the last good state of every world."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tisim.scene import Scene
+from tisim.state import CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, State
+
+REASONS = {
+    RUNNING: "running",
+    ENDED: "reached its end",
+    NOT_FINITE: "a quantity is not finite",
+    FULL: "more fragments than there is room for",
+    CROWDED: "more simultaneous contacts than there is room for",
+}
+
+
+class Watch:
+    """The last good state of a loaded batch, and what has gone wrong in it.
+
+    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds.
+    faults : world -> (time found, s; what is wrong).
+    """
+
+    def __init__(self, s: State, scenes: list[Scene]) -> None:
+        self.s, self.scenes = s, scenes
+        self.good = self._snapshot()
+        self.faults: dict[int, tuple[float, str]] = {}
+
+    def _snapshot(self) -> dict[str, np.ndarray]:
+        return {name: self.s.read(name) for name in (*(f.name for f in self.s.fields), "time", "count")}
+
+    def look(self) -> None:
+        """Stop worlds in which something is not finite; keep the others' state as the last good one."""
+        now, status = self._snapshot(), self.s.read("status")
+        worlds = len(status)
+        live = np.arange(self.s.capacity) < now["count"][:, None]
+        found: dict[int, str] = {}
+        for f in self.s.fields:
+            bad = live & ~np.isfinite(now[f.name].reshape(worlds, self.s.capacity, -1)).all(axis=2)
+            for w in map(int, np.flatnonzero(bad.any(axis=1))):
+                found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
+        for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
+            found[w] = self._fault(w, REASONS[int(status[w])])
+        for w, fault in found.items():
+            self.faults.setdefault(w, (float(now["time"][w]), fault))
+        sound = np.array([w not in found for w in range(worlds)])
+        for name, values in now.items():
+            self.good[name][sound] = values[sound]
+        if found:
+            status[~sound & (status == RUNNING)] = NOT_FINITE
+            self.s.write("status", status)
+
+    def _fault(self, w: int, reason: str) -> str:
+        """What the kernels have recorded of a failure: reason, effect and particle."""
+        blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
+        effects = self.scenes[w].effects
+        by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
+        return f"{reason}{by}, at particle {who}"
