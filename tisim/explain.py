@@ -77,6 +77,8 @@ def explain(scene: Scene) -> Explanation:
         capacity, schedule = simulation.s.capacity, simulation.schedule
         precision = simulation.runtime.precision
     finally:
+        # Taichi checks the shapes of vectors at the next launch, and of these it would find none.
+        simulation.s.read("count")
         simulation.close()
     absent = [kind for kind in known_effects() if kind not in {type(e) for e in scene.effects}]
     return Explanation(

@@ -125,11 +125,18 @@ class State:
 
     def destroy(self) -> None:
         """Give the memory back."""
+        # Fields that no kernel has ever seen must be known to Taichi before they go, or it stumbles over them later.
+        ti.sync()
         self._tree.destroy()
 
+    @property
+    def stale(self) -> bool:
+        """Whether Taichi has been started anew since; the memory is then gone."""
+        return self._generation != runtime.generation()
+
     def check(self) -> None:
-        """RunError when Taichi has been started anew since."""
-        if self._generation != runtime.generation():
+        """RunError when the memory is gone."""
+        if self.stale:
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
 
     @ti.func
