@@ -15,6 +15,7 @@ from pathlib import Path
 from rich.console import Console
 
 from optimize import report
+from optimize.breeding import Individual
 from optimize.cache import Cache
 from optimize.display import Display
 from optimize.ensemble import start_seed
@@ -68,21 +69,21 @@ def session(
             outcome = search(
                 problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step
             )
-        say.print(report.best_table(outcome))
-        paths = [folder / FILE, *report.write(outcome, folder).values()]
-        if outcome.best is not None and not outcome.interrupted:
-            paths += _show_best(outcome, evaluator, folder)
+        paths = [folder / FILE]
+        if outcome.best is not None:
+            say.print(report.best_table(outcome))
+            paths += report.write(outcome, folder).values()
+            if not outcome.interrupted:
+                paths += _show_best(outcome.best, outcome, evaluator, folder)
     finally:
         evaluator.close()
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False)
     return outcome
 
 
-def _show_best(outcome: Outcome, evaluator: Evaluator, folder: Path) -> list[Path]:
+def _show_best(best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path) -> list[Path]:
     """Run the best design once more, from the first start, for its picture."""
-    problem, best = outcome.problem, outcome.best
-    if best is None:
-        return []
+    problem = outcome.problem
     scene = problem.scene(problem.genome.decode(best), start_seed(outcome.settings.seed, 0))
     text = folder / "best_scene.toml"
     text.write_text(scene.to_toml(), encoding="utf-8")

@@ -203,8 +203,15 @@ class Rearrange(Phase):
         s.events[w] = 1
         # What the survey told the controller is no longer true.
         s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
+        # Before operators too: a slot that a merger has freed has room for a fragment.
+        self.fill(w)
         for operator in ti.static(self.operators):
             operator.world(s, w)
+        self.fill(w)
+
+    @ti.func
+    def fill(self, w):
+        s = self.s
         if s.changed[w] > 0:
             i = 0
             while i < s.count[w]:

@@ -55,7 +55,10 @@ class Particles(Start):
         return _array(np.atleast_1d(value)) if isinstance(value, np.ndarray | float | int) else value
 
     def _column(self, name: str, value: Any, n: int) -> np.ndarray:
-        column = np.asarray(value, dtype=float)
+        try:
+            column = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"particles.{name} must be numbers; received {value!r}") from None
         if column.ndim == 0 or column.shape == (1,):
             column = np.full(n, float(column.reshape(-1)[0]))
         must(len(column) == n, f"particles.{name}", f"one value or {n} of them", column.shape)
@@ -93,6 +96,7 @@ class Particles(Start):
         for name in ("radius", "mass"):
             must(bool((arrays[name] > 0).all()), f"particles.{name}", "greater than 0", arrays[name].min())
         for name, value in self.quantities.items():
+            must(name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value)
             arrays[name] = self._column(name, value, n)
         return arrays
 

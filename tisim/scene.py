@@ -106,6 +106,8 @@ class Scene(Spec):
         must(isinstance(listed, Mapping), "scene.effects", "a table of effects", listed)
         kinds.load(effects)
         kinds.load(operators)
+        for kind, values in listed.items():
+            must(isinstance(values, Mapping), f"effects.{kind}", "a table", values)
         made["effects"] = tuple(
             kinds.from_dict(Effect, {"kind": kind, **values}, f"effects.{kind}")
             for kind, values in listed.items()

@@ -11,6 +11,10 @@ from tisim.errors import must
 from tisim.spec import Spec, parameter
 
 
+TOUCH = 1.0 + 1e-6
+"""Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
+
+
 class Controller(Spec):
     """The contract of step control: ``pair`` sees every near pair, ``note`` every particle, ``next`` decides.
 
@@ -68,7 +72,7 @@ class ApproachTime(Controller):
         time = ti.cast(ti.math.inf, ti.f64)
         if closing > 0.0 and separation.norm_sqr() > reach * reach:
             distance = separation.norm()
-            time = ti.cast((distance - reach) * distance / closing, ti.f64)
+            time = ti.cast((distance - reach) * distance / closing, ti.f64) * TOUCH
         return time
 
     @ti.func

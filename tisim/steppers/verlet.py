@@ -38,8 +38,8 @@ class Clock(Phase):
             horizon = self.near.sure(w)
         dt = self.controller.next(s, w, horizon)
         left = s.end[w] - s.time[w]
-        # A remainder that only rounding has left is not worth a step of its own.
-        if dt >= left * (1.0 - 1e-12):
+        # A remainder as small as rounding leaves is not worth a step of its own.
+        if dt * (1.0 + 1e-6) >= left:
             dt = left
         s.dt[w] = dt
         s.approach_time[w] = ti.math.inf

@@ -1,0 +1,88 @@
+"""What the effects that a scene leaves out cost it: memory and time, with and without them in the package.
+
+    python tests/benchmarks/absent_effects.py [--repeats 5]
+
+A scene of impact and agglomeration alone is run in fresh processes, in turn in a package whose other effects
+cannot be imported and in the whole one. Prints the bytes of its fields and the time of its kernels in both,
+and then, for comparison, the same scene with all effects.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+OTHERS = ("effects.softening", "effects.reaction", "operators.cooling", "operators.fragmentation")
+
+WORKER = """
+import json, sys, time
+sys.path.insert(0, {root!r})
+absent = {absent!r}
+for name in absent:
+    sys.modules[name] = None  # importing it is an ImportError
+import tisim
+from tisim import runtime, Box, Cloud, Scene
+from tisim.effects.impact import Impact
+from tisim.operators.agglomeration import Agglomeration
+runtime.start(threads=1)
+effects = [Impact(hardness=1e6), Agglomeration()]
+if not absent:
+    from tisim import effects as laws, kinds, operators
+    kinds.load(laws)
+    kinds.load(operators)
+if {full!r}:
+    from cases import agglomeration
+    effects = agglomeration.scene({{**agglomeration.BEST, "hardness": 1e6}}, 0).effects
+scenes = [
+    Scene(
+        particles=Cloud(number=1000, radius=7e-4, density=5e3, deviation=(60.0, 60.0, 60.0)), effects=effects,
+        domain=Box(low=(-0.01,) * 3, high=(0.01,) * 3, images=False), duration=2e-3, seed=seed,
+    )
+    for seed in range(8)
+]
+simulation = tisim.Simulation(scenes[0], worlds=8, capacity=1000)
+simulation.load(scenes)
+simulation.run(steps=1)
+times = []
+for _ in range(3):
+    simulation.load(scenes)
+    began = time.process_time()
+    simulation.program.advance(10**6)
+    times.append(time.process_time() - began)
+print(json.dumps({{"bytes": simulation.s.bytes(), "seconds": min(times)}}))
+"""
+
+
+def measure(absent: bool, full: bool = False) -> dict:
+    """Bytes by field and CPU seconds of all steps, from a fresh process."""
+    names = [f"tisim.{name}" for name in OTHERS] if absent else []
+    source = WORKER.format(root=str(ROOT), absent=names, full=full)
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def main() -> None:
+    """Measure in turn and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5)
+    repeats = parser.parse_args().repeats
+    pairs = [(measure(absent=False), measure(absent=True)) for _ in range(repeats)]
+    whole, bare = pairs[0]
+    ratios = [a["seconds"] / b["seconds"] for a, b in pairs]
+    print(f"fields of the scene, bytes: {bare['bytes']}")
+    print(f"the same in the whole package: {whole['bytes'] == bare['bytes']}")
+    print(
+        f"time in the whole package over time without the other effects: "
+        f"median {statistics.median(ratios):.3f} of {repeats} ({min(ratios):.3f}..{max(ratios):.3f})"
+    )
+    full = measure(absent=False, full=True)
+    print(f"with all effects: {sum(full['bytes'].values()) / sum(bare['bytes'].values()):.2f} times the bytes")
+
+
+if __name__ == "__main__":
+    main()
