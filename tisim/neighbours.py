@@ -58,8 +58,9 @@ class Neighbours:
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
-        per_world = self.max_cells + 1 + self.s.capacity * (3 + LISTED) + 12
-        return 4 * self.s.worlds * per_world
+        real = 8 if self.s.real == ti.f64 else 4
+        per_world = 4 * (self.max_cells + 5 + self.s.capacity * (3 + LISTED))
+        return self.s.worlds * (per_world + real * (10 + 4 * self.s.capacity))
 
     def destroy(self) -> None:
         """Give the memory back."""

@@ -70,7 +70,6 @@ class Program:
 
     def __init__(self, s: State, items: tuple[Phase | Repeat, ...], schedule: str) -> None:
         self.s, self.items, self.schedule = s, items, schedule
-        self.loads = ti.field(ti.i32, shape=())
 
     def advance(self, steps: int) -> None:
         """At most ``steps`` steps of every running world."""
@@ -87,6 +86,18 @@ class Program:
                 while self._count_pending(item):
                     for phase in item.phases:
                         self._sweep_pending(item, phase)
+
+    def compile(self) -> None:
+        """Compile what ``advance`` runs, and run nothing: no world may be running."""
+        if self.schedule == "world":
+            self._advance_worlds(0)
+            return
+        self._count_running()
+        for item in self.items:
+            if isinstance(item, Repeat):
+                self._count_pending(item)
+            for phase in item.phases if isinstance(item, Repeat) else (item,):
+                self._sweep_pending(item, phase) if isinstance(item, Repeat) else self._sweep(phase)
 
     def names(self) -> list[str]:
         """What runs in a step, in order."""

@@ -55,6 +55,10 @@ class Simulation:
         *effects, domain, control = (self.table.bind(part) for part in parts)
         connect(effects)
         self._compose(tuple(effects), domain, control)
+        self.s.status.fill(ENDED)
+        self.program.compile()
+        if self.first.items:
+            self.first.compile()
         self.scenes: list[Scene] = []
         self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
 
