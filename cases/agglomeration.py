@@ -67,17 +67,22 @@ SIZES = {
     "small": Size(
         "60 grains; a look in seconds",
         {"grains": 60},
-        {"population": 10, "parents": 4, "generations": 3, "ensemble": {"tolerance": 5e-3, "max_starts": 12}},
+        {
+            "population": 10,
+            "parents": 4,
+            "generations": 3,
+            "ensemble": {"tolerance": 5e-3, "max_starts": 12, "confirm": 12},
+        },
     ),
     "default": Size(
         "250 grains, 8 generations of 20; about a minute on 2 cores",
         {"grains": 250},
-        {"generations": 8, "ensemble": {"tolerance": 1e-3}},
+        {"generations": 8, "ensemble": {"tolerance": 1e-3, "min_starts": 8, "block": 8, "confirm": 24}},
     ),
     "paper": Size(
         "1000 grains, 25 generations of 20, as Z04 section 8; about 15 minutes on 2 cores",
         {"grains": 1000},
-        {"generations": 25, "ensemble": {"tolerance": 5e-4}},
+        {"generations": 25, "ensemble": {"tolerance": 5e-4, "min_starts": 12, "block": 12, "confirm": 48}},
     ),
 }
 

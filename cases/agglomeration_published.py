@@ -90,7 +90,9 @@ def main() -> None:
     options = parser.parse_args()
     console = Console()
 
-    table = Table("rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published strings")
+    table = Table(
+        "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published strings"
+    )
     for rank, (design, published) in enumerate(zip(designs(), PUBLISHED, strict=True), start=1):
         mean, half = estimate([scene(design, seed, options.grains) for seed in range(options.starts)])
         table.add_row(

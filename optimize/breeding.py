@@ -40,6 +40,7 @@ class Individual(list[float]):
         super().__init__(float(x) for x in genes)
         self.fitness = FitnessMin()
         self.estimate: Estimate | None = None
+        self.confirmed: Estimate | None = None
 
 
 class Operator(Strict):

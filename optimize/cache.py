@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from optimize import store
-from optimize.durable import locked, replace_file
 from optimize.journal import Journal
 from optimize.record import Record
 from optimize.store import Table
+from tisim.durable import locked, replace_file
 from tisim.errors import must
 
 FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file

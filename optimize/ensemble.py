@@ -16,10 +16,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from optimize.cache import Cache
+from optimize.estimate import Estimate, settled_after
 from optimize.problem import Problem
 from optimize.record import Record, canonical, evaluation_key
 from optimize.strict import Strict
-from optimize.student import student_t
 from tisim.errors import InputError, RunError, must
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class EnsembleSettings(Strict):
     tolerance : TOL of Z04 Eq. 8.1. block : starts per evaluator call (the first block has min_starts if
     that is more). min_starts, max_starts : bounds of the number of starts. common_starts : start k is the
     same for every design, so that designs are compared on equal terms; False draws each design's own.
+    confirm : fresh starts from which the best designs are run again once the search has ended (0: not).
     """
 
     tolerance: float = Field(5e-4, gt=0, lt=1)
@@ -58,6 +59,7 @@ class EnsembleSettings(Strict):
     min_starts: int = Field(4, ge=1)
     max_starts: int = Field(48, ge=1)
     common_starts: bool = True
+    confirm: int = Field(0, ge=0)
 
     @model_validator(mode="after")
     def _ordered(self) -> EnsembleSettings:
@@ -68,46 +70,6 @@ class EnsembleSettings(Strict):
             self.min_starts,
         )
         return self
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Fitness of one design.
-
-    mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
-    half_width : of the 95 % confidence interval of the mean (Student t; the stopping rule's own effect on
-    coverage is not corrected for). settled : Eq. 8.1 was met. reason : "" or why the design failed.
-    std and half_width are NaN for fewer than two starts and for failed designs.
-    """
-
-    mean: float
-    std: float
-    half_width: float
-    starts: int
-    settled: bool
-    reason: str = ""
-
-    @property
-    def ok(self) -> bool:
-        return not self.reason
-
-    @property
-    def status(self) -> str:
-        """One word for tables, or the reason of a failure."""
-        return self.reason or ("settled" if self.settled else "not settled")
-
-
-def settled_after(values: Sequence[float], tolerance: float, min_starts: int) -> int | None:
-    """The least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04 Eq. 8.1).
-
-    Two equal means count as settled, also when both are zero. None if there is no such n in values.
-    """
-    means = np.cumsum(values) / np.arange(1, len(values) + 1)
-    for n in range(max(min_starts, 2), len(values) + 1):
-        change = abs(means[n - 1] - means[n - 2])
-        if change == 0 or change < tolerance * abs(means[n - 1]):
-            return n
-    return None
 
 
 def start_seed(seed: int, start: int, design: Mapping[str, float] | None = None) -> int:
@@ -169,6 +131,20 @@ class Ensemble:
         if progress is not None:
             progress(1.0)
         return [self._summary(sample) for sample in samples]
+
+    def confirm(
+        self, designs: Sequence[Mapping[str, float]], progress: Callable[[float], None] | None = None
+    ) -> list[Estimate]:
+        """Fitness of each design from `confirm` starts that no estimate has used.
+
+        A winner has won by being good and by being lucky in its starts; this is without the luck.
+        """
+        samples = [_Sample(design) for design in designs]
+        first = self.settings.max_starts
+        self._run(samples, range(first, first + self.settings.confirm), progress or (lambda fraction: None))
+        return [
+            self._summary(sample) if sample.reason else Estimate.of(sample.values, True) for sample in samples
+        ]
 
     def _run(self, running: Sequence[_Sample], starts: range, report: Callable[[float], None]) -> None:
         """Add the fitness of each start to each running sample; all that is not in the cache in one call."""
@@ -237,9 +213,4 @@ class Ensemble:
         if sample.reason:
             return Estimate(math.inf, math.nan, math.nan, len(sample.values), False, sample.reason)
         settled = settled_after(sample.values, self.settings.tolerance, self.settings.min_starts)
-        n = settled or len(sample.values)
-        values = np.array(sample.values[:n])
-        mean = float((np.cumsum(values) / np.arange(1, n + 1))[-1])
-        std = float(values.std(ddof=1)) if n > 1 else math.nan
-        half_width = student_t(n - 1) * std / math.sqrt(n) if n > 1 else math.nan
-        return Estimate(mean, std, half_width, n, settled is not None)
+        return Estimate.of(sample.values[:settled], settled is not None)

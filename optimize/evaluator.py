@@ -25,7 +25,7 @@ class Evaluator:
     def evaluate(
         self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None
     ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result) as batches finish; what has been yielded stands."""
+        """Yield (index into scenes, Result) as worlds end; what has been yielded stands."""
         return self.batches.run(scenes, progress, strict=False)
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from optimize.durable import append_at
+from tisim.durable import append_at
 
 MAGIC = b"\x89TJ1"
 _HEAD = struct.Struct("<4sII")

@@ -85,6 +85,7 @@ class _Search:
         self.ensemble = Ensemble(problem, evaluator, cache, settings.ensemble, settings.seed)
         self.breeder = Breeder(len(problem.genome), settings, settings.seed)
         self.hall = tools.HallOfFame(settings.hall_of_fame)
+        self.ranked: list[Individual] = []
         self.statistics = tools.Statistics(lambda string: string.fitness.values[0])
         self.statistics.register("best", _successful(np.min, math.inf))
         self.statistics.register("mean", _successful(np.mean, math.nan))
@@ -106,12 +107,26 @@ class _Search:
     def run(self) -> Outcome:
         try:
             self._generations()
+            self._confirm()
         except KeyboardInterrupt:
             self.outcome.stopped = "interrupted"
         except _OutOfTime:
             self.outcome.stopped = "wall clock"
         self._store()
         return self.outcome
+
+    def _confirm(self) -> None:
+        """Run the best designs again from fresh starts, and rank them by that."""
+        if not self.settings.ensemble.confirm or not self.hall:
+            return
+        ranked = list(self.hall)
+        last = len(self.outcome.logbook) - 1
+        designs = [self.problem.genome.decode(string) for string in ranked]
+        found = self.ensemble.confirm(designs, lambda fraction: self._report(last, fraction))
+        for string, estimate in zip(ranked, found, strict=True):
+            string.confirmed = estimate
+        order = sorted(range(len(ranked)), key=lambda k: found[k].mean)
+        self.ranked = [ranked[k] for k in order]
 
     def _generations(self) -> None:
         population = self.breeder.first()
@@ -144,18 +159,19 @@ class _Search:
     def _estimate(self, population: list[Individual], generation: int) -> int:
         """Estimate the strings whose fitness is not known yet; return how many they were."""
 
-        def report(fraction: float) -> None:
-            if self.on_progress is not None:
-                self.on_progress(self._progress(generation, fraction))
-            if self._out_of_time():
-                raise _OutOfTime
-
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
-        for string, estimate in zip(fresh, self.ensemble.estimate(designs, report), strict=True):
+        found = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
+        for string, estimate in zip(fresh, found, strict=True):
             string.estimate = estimate
             string.fitness.values = (estimate.mean,)
         return len(fresh)
+
+    def _report(self, generation: int, fraction: float) -> None:
+        if self.on_progress is not None:
+            self.on_progress(self._progress(generation, fraction))
+        if self._out_of_time():
+            raise _OutOfTime
 
     def _stop(self, generation: int) -> Stopped:
         best = self.outcome.logbook.select("best")
@@ -191,7 +207,7 @@ class _Search:
     def _store(self) -> None:
         """Bring the outcome up to date and put it into the cache file."""
         out, name = self.outcome, self.outcome.name
-        out.hall = list(self.hall)
+        out.hall = self.ranked or list(self.hall)
         out.evaluations, out.hits = self.ensemble.evaluations, self.ensemble.hits
         out.elapsed_s = time.monotonic() - self.began
         about = {

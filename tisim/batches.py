@@ -23,8 +23,8 @@ Progress = Callable[[float], None]
 class Batches:
     """Scenes to results. Scenes of one structure (effects, options, domain, stepper) run side by side.
 
-    limit : most worlds of a batch. A batch is yielded when it has ended, before the next starts, so that
-    whoever keeps results loses one batch at most.
+    limit : most worlds of a batch. A world is yielded when it has ended, while others go on, so that whoever
+    keeps results loses little when stopped.
     """
 
     def __init__(self, limit: int = 256) -> None:
@@ -35,7 +35,7 @@ class Batches:
     def run(
         self, scenes: Sequence[Scene], progress: Progress | None = None, strict: bool = True
     ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result), batch by batch.
+        """Yield (index into scenes, Result) as worlds end.
 
         progress : called with the finished fraction of this call, 0..1. strict : raise the InputError of a
         start that cannot be made; otherwise it becomes a failed Result.
@@ -58,8 +58,15 @@ class Batches:
             for begin in range(0, len(members), simulation.worlds):
                 batch = members[begin : begin + simulation.worlds]
                 simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
-                simulation.run(_part(progress, done / len(scenes), len(batch) / len(scenes)))
-                yield from zip(batch, simulation.results(), strict=True)
+                chunks = simulation.chunks()
+                given: set[int] = set()
+                while len(given) < len(batch):
+                    new = [w for w in simulation.ended() if w not in given]
+                    yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
+                    given.update(new)
+                    next(chunks, None)
+                    if progress:
+                        progress((done + len(batch) * simulation.fraction()) / len(scenes))
                 done += len(batch)
 
     def simulation(self, scenes: Sequence[Scene]) -> Simulation:
@@ -84,7 +91,3 @@ class Batches:
         for simulation in self._made.values():
             simulation.close()
         self._made.clear()
-
-
-def _part(progress: Progress | None, before: float, share: float) -> Progress | None:
-    return None if progress is None else lambda fraction: progress(before + share * fraction)

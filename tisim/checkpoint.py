@@ -14,8 +14,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from tisim.durable import replace_file
 from tisim.errors import InputError, must
-from tisim.output import replace_file
 from tisim.simulation import Simulation
 from tisim.state import BOOKS, CLOCK
 from tisim.watch import Watch
@@ -26,7 +26,7 @@ FORMAT = "tisim checkpoint 1"
 def _columns(simulation: Simulation) -> tuple[str, ...]:
     """All of the state that decides how a simulation goes on."""
     s = simulation.s
-    return (*(field.name for field in s.fields), *CLOCK, *BOOKS, *s.counters, "frame")
+    return (*(field.name for field in s.fields), *CLOCK, *BOOKS, *s.counters, "frame", "seed")
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:

@@ -71,3 +71,13 @@ class SumForces(PerParticle):
             for j in range(s.count[w]):
                 if not (self.pair((effect,), w, i, j, s.time[w]).norm_sqr() < ti.math.inf):
                     s.fault(w, i, effect.index)
+
+
+class SumForcesAgain(SumForces):
+    """After events have changed who is where: the forces that the next step begins with."""
+
+    conditional = True
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]

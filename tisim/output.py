@@ -8,7 +8,6 @@ say how the run ended and under which settings, and hold the scene as TOML.
 from __future__ import annotations
 
 import json
-import os
 import platform
 import tempfile
 from dataclasses import dataclass
@@ -19,7 +18,8 @@ import numpy as np
 
 import tisim
 from tisim import picture, runtime
-from tisim.errors import InputError, RunError, must
+from tisim.durable import replace_file
+from tisim.errors import InputError, must
 from tisim.particles import Arrays
 from tisim.result import Result
 from tisim.scene import Scene
@@ -64,20 +64,6 @@ def writable(folder: Path) -> None:
         raise InputError(
             f"output folder must be writable; received {str(folder)!r} ({error.strerror})"
         ) from None
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Put data in the place of path: at every instant it is the old file or the whole new one."""
-    unfinished = path.with_name(path.name + ".new")
-    try:
-        with unfinished.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise RunError(f"{path} could not be written: {error.strerror}; what was there is intact") from error
 
 
 def versions() -> dict[str, str]:

@@ -69,7 +69,9 @@ class Particles(Start):
     @classmethod
     def _plain(cls, value: Any) -> Any:
         listed = isinstance(value, Mapping)
-        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in value.items()} if listed else value
+        return (
+            {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in value.items()} if listed else value
+        )
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -96,7 +98,9 @@ class Particles(Start):
         for name in ("radius", "mass"):
             must(bool((arrays[name] > 0).all()), f"particles.{name}", "greater than 0", arrays[name].min())
         for name, value in self.quantities.items():
-            must(name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value)
+            must(
+                name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value
+            )
             arrays[name] = self._column(name, value, n)
         return arrays
 

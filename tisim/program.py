@@ -20,7 +20,8 @@ from tisim.state import RUNNING, State
 
 TASK = 512
 """Iterations that Taichi and Quadrants hand to a CPU thread at once, whatever block size is asked for
-(measured: a loop of 512 runs on one thread, one of 1024 on two). One world for each lets worlds share threads."""
+(measured: a loop of 512 runs on one thread, one of 1024 on two). With one world in each, worlds spread
+over all threads."""
 
 
 class Phase:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,16 +13,16 @@ from tisim.binding import Table, connect
 from tisim.effect import Effect, Force, Operator, PairEvent, PairForce
 from tisim.errors import InputError, must
 from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
-from tisim.forces import FORCE, SumForces
+from tisim.forces import FORCE, SumForces, SumForcesAgain
 from tisim.mutual import Mutual
 from tisim.neighbours import Neighbours
 from tisim.particles import Arrays
 from tisim.program import Phase, Program, Repeat
-from tisim.result import Result, Status
+from tisim.result import Result
 from tisim.scene import Scene
 from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fields
 from tisim.steppers.verlet import Advance, Clock, Finish, Kick, Move
-from tisim.watch import REASONS, Watch
+from tisim.watch import Watch
 
 CHUNK_SECONDS = 0.25
 """Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite."""
@@ -111,6 +111,8 @@ class Simulation:
             step += [Rearrange(s, operators, near)]
         if near and contacts and events and control.watches_pairs:
             step += [*listed, SurveyAgain(near, contacts, control)]
+        if forced and (events or operators):
+            step += [*listed, SumForcesAgain(s, domain, forces, pair_forces, mutual)]
         if contacts:
             step += [Close(contacts)]
         self.program = Program(s, (*step, Finish(s)), self.schedule)
@@ -165,6 +167,13 @@ class Simulation:
         if low is not None:
             inside = ((start["position"] >= low) & (start["position"] < high)).all()
             must(bool(inside), "particles.position", "inside the domain", "a particle outside")
+        known = {f.name for f in self.s.fields} | {"temperature"}
+        for name, values in start.items():
+            must(
+                name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name
+            )
+        cold = start.get("temperature", np.zeros(1)).min()
+        must(cold >= 0, "particles.temperature", "at least 0 K", float(cold))
         missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - start.keys()
         if missing:
             names = ", ".join(sorted(missing))
@@ -180,6 +189,7 @@ class Simulation:
             getattr(self.s, name).fill(0)
         frame = [np.average(a["velocity"], axis=0, weights=a["mass"]) for a in starts]
         self.s.write("frame", np.array(frame + [np.zeros(3)] * empty))
+        self.s.write("seed", np.array([scene.seed for scene in scenes] + [0] * empty))
         self.s.write("count", counts.astype(np.int32))
         self.s.write("next_id", counts.astype(np.int32))
         self.s.write("status", np.array([RUNNING] * len(scenes) + [ENDED] * empty, dtype=np.int32))
@@ -195,8 +205,14 @@ class Simulation:
         """Run every world to its end, or for at most ``steps`` more steps each.
 
         progress : called about four times a second with the fraction done, 0..1.
-        KeyboardInterrupt leaves a state between two steps, from which ``run`` goes on.
         """
+        for _ in self.chunks(steps):
+            if progress:
+                progress(self.fraction())
+
+    def chunks(self, steps: int | None = None) -> Iterator[None]:
+        """The same in stretches of some steps, about four a second: between them, whoever runs this may look
+        at the state, save a checkpoint, or stop for good or for a while."""
         self.s.check()
         done, chunk = 0, 8
         while (self.s.read("status") == RUNNING).any() and (steps is None or done < steps):
@@ -211,8 +227,7 @@ class Simulation:
                 chunk = min(2 * chunk, 100_000)
             elif taken > 2 * CHUNK_SECONDS:
                 chunk = max(chunk // 2, 1)
-            if progress:
-                progress(self.fraction())
+            yield
 
     def fraction(self) -> float:
         """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
@@ -220,29 +235,28 @@ class Simulation:
         ended = self.s.read("status")[:n] != RUNNING
         return float(np.where(ended, 1.0, self.s.read("time")[:n] / self.s.read("end")[:n]).mean())
 
-    def results(self) -> list[Result]:
-        """Every loaded world read back, in order."""
+    def ended(self) -> list[int]:
+        """The loaded worlds that run no more, for good or ill."""
+        status = self.s.read("status")[: len(self.scenes)]
+        return [int(w) for w in np.flatnonzero(status != RUNNING)]
+
+    def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
+        """Loaded worlds read back: those asked for, or all of them, in order."""
         tallies = {name: self.s.read(name) for name in self.s.counters}
-        status = self.s.read("status")
-        good, found = self.watch.good, []
-        for w, scene in enumerate(self.scenes):
+        status, good = self.s.read("status"), self.watch.good
+        found = []
+        for w in range(len(self.scenes)) if worlds is None else worlds:
             n = int(good["count"][w])
-            state = {f.name: good[f.name][w, :n].copy() for f in self.s.fields}
-            if w in self.watch.faults:
-                when, why = self.watch.faults[w]
-                ended = Status(False, f"at t = {when:.6g} s: {why}; kept t = {good['time'][w]:.6g} s")
-            else:
-                ended = Status(int(status[w]) == ENDED, REASONS[int(status[w])])
             found.append(
                 Result(
-                    scene,
-                    state,
-                    self.starts[w],
-                    float(good["time"][w]),
-                    {name: int(tally[w]) for name, tally in tallies.items()},
-                    ended,
-                    self.wall_s / len(self.scenes),
-                    self.runtime.settings,
+                    scene=self.scenes[w],
+                    state={f.name: good[f.name][w, :n].copy() for f in self.s.fields},
+                    start=self.starts[w],
+                    time=float(good["time"][w]),
+                    work={name: int(tally[w]) for name, tally in tallies.items()},
+                    status=self.watch.status(w, int(status[w])),
+                    wall_s=self.wall_s / len(self.scenes),
+                    settings=self.runtime.settings,
                 )
             )
         return found

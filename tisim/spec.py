@@ -44,7 +44,8 @@ class Spec(BaseModel):
     @classmethod
     def named(cls, kind: str, where: str) -> type[Self]:
         """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
-        known = {sub.kind(): sub for sub in _descendants(cls)}
+        # A class with subclasses is a contract, not something to ask for.
+        known = {sub.kind(): sub for sub in _descendants(cls) if not sub.__subclasses__()}
         must(kind in known, where, f"one of {', '.join(sorted(known))}", kind)
         return known[kind]
 

@@ -63,7 +63,8 @@ class State:
     """Device memory of ``worlds`` worlds of at most ``capacity`` particles.
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
-    ``time``, ``dt``, ``end`` (s, f64), ``status``, and the counters the effects declare.
+    ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters the
+    effects declare.
     """
 
     def __init__(
@@ -81,6 +82,8 @@ class State:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
                 setattr(self, name, column)
+        self.seed = ti.field(ti.i64)
+        builder.dense(ti.i, worlds).place(self.seed)
         for name in MOTION:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
             column = ti.field(ti.f64)
@@ -125,7 +128,7 @@ class State:
 
     def destroy(self) -> None:
         """Give the memory back."""
-        # Fields that no kernel has ever seen must be known to Taichi before they go, or it stumbles over them later.
+        # Taichi must have seen fields that no kernel has used before they go, or it stumbles over them later.
         ti.sync()
         self._tree.destroy()
 

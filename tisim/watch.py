@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tisim.result import Status
 from tisim.scene import Scene
 from tisim.state import CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, State
 
@@ -51,6 +52,13 @@ class Watch:
         if found:
             status[~sound & (status == RUNNING)] = NOT_FINITE
             self.s.write("status", status)
+
+    def status(self, w: int, code: int) -> Status:
+        """How a world whose status field holds ``code`` has ended, or that it runs."""
+        if w in self.faults:
+            when, why = self.faults[w]
+            return Status(False, f"at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
+        return Status(code == ENDED, REASONS[code])
 
     def _fault(self, w: int, reason: str) -> str:
         """What the kernels have recorded of a failure: reason, effect and particle."""

@@ -81,7 +81,9 @@ def main() -> None:
         f"median {statistics.median(ratios):.3f} of {repeats} ({min(ratios):.3f}..{max(ratios):.3f})"
     )
     full = measure(absent=False, full=True)
-    print(f"with all effects: {sum(full['bytes'].values()) / sum(bare['bytes'].values()):.2f} times the bytes")
+    print(
+        f"with all effects: {sum(full['bytes'].values()) / sum(bare['bytes'].values()):.2f} times the bytes"
+    )
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@ import h5py
 import pytest
 from fake_runs import fake_record
 
-from optimize import durable
 from optimize.cache import Cache, verify
-from optimize.durable import replace_file
 from optimize.store import image
+from tisim import durable
+from tisim.durable import replace_file
 from tisim.errors import RunError
 
 

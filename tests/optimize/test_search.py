@@ -207,7 +207,7 @@ def test_full_disk_ends_the_search_clearly(path, monkeypatch):
         def evaluate(self, scenes, progress):
             for number, pair in enumerate(super().evaluate(scenes, progress)):
                 if number == 5:
-                    monkeypatch.setattr("optimize.durable.os.pwrite", _full)
+                    monkeypatch.setattr("tisim.durable.os.pwrite", _full)
                 yield pair
 
     with pytest.raises(RunError, match="could not be written: No space left on device"):

@@ -1,7 +1,7 @@
 """Stored values of fitness functions: what they are made of, and the tool that makes them anew on purpose.
 
-    python tests/regression/fitness_record.py          compare this machine's values with the stored ones
-    python tests/regression/fitness_record.py --write  store this machine's values (after a change of physics)
+python tests/regression/fitness_record.py          compare this machine's values with the stored ones
+python tests/regression/fitness_record.py --write  store this machine's values (after a change of physics)
 """
 
 from __future__ import annotations
@@ -95,8 +95,14 @@ def main() -> int:
         return 0
     record = stored()
     for name, deviation in deviations(values, record).items():
-        same = "same bits" if values[name] == record["values"][name] else f"{deviation:.2f} standard errors apart"
-        print(f"{name:20s} {np.mean(values[name]):.6f} (stored {np.mean(record['values'][name]):.6f}): {same}")
+        same = (
+            "same bits"
+            if values[name] == record["values"][name]
+            else f"{deviation:.2f} standard errors apart"
+        )
+        print(
+            f"{name:20s} {np.mean(values[name]):.6f} (stored {np.mean(record['values'][name]):.6f}): {same}"
+        )
     return 0
 
 

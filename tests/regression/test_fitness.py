@@ -59,11 +59,14 @@ def test_single_precision_gives_the_same_fitness_in_the_mean():
 
 
 def test_the_bound_would_notice_a_change_of_physics(values):
-    """A tenth more friction or a hundredth less restitution is too little to see; a fifth of hardness is not."""
+    """Half as much hardness again is seen by far."""
     from cases import agglomeration
 
     design = {**fitness_record.BASE, "hardness": 1.5 * fitness_record.BASE["hardness"]}
-    scenes = [agglomeration.scene(design, seed, grains=fitness_record.GRAINS) for seed in range(fitness_record.STARTS)]
+    scenes = [
+        agglomeration.scene(design, seed, grains=fitness_record.GRAINS)
+        for seed in range(fitness_record.STARTS)
+    ]
     harder = [agglomeration.cost(result) for result in tisim.run(scenes)]
     moved = fitness_record.deviations({"published": harder}, {"values": {"published": values["published"]}})
     assert moved["published"] > STANDARD_ERRORS

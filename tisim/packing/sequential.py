@@ -95,7 +95,15 @@ def sequential_addition(
     cells = np.zeros((int(np.prod(dims)), 1 + min(count, members)), dtype=np.int32)
     centres = np.zeros((count, 3))
     placed = _add(
-        centres, cells, count, radius, seed, ATTEMPTS, *np.asarray(low, float).tolist(), *side.tolist(), *dims.tolist()
+        centres,
+        cells,
+        count,
+        radius,
+        seed,
+        ATTEMPTS,
+        *np.asarray(low, float).tolist(),
+        *side.tolist(),
+        *dims.tolist(),
     )
     if placed < count:
         fraction = count * 4 / 3 * np.pi * radius**3 / np.prod(side)

@@ -10,7 +10,6 @@ from tisim._taichi import ti
 from tisim.errors import must
 from tisim.spec import Spec, parameter
 
-
 TOUCH = 1.0 + 1e-6
 """Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
 

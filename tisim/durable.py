@@ -7,14 +7,12 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from tisim.errors import RunError
+from tisim.errors import InputError, RunError
 
 try:
     import fcntl
-except ImportError as error:
-    raise ImportError(
-        "the evaluation cache must have POSIX file locks (Linux, macOS); received a system without fcntl"
-    ) from error
+except ImportError:
+    fcntl = None  # type: ignore[assignment]
 
 
 @contextlib.contextmanager
@@ -23,6 +21,8 @@ def locked(path: Path, *, exclusive: bool) -> Iterator[None]:
 
     The lock file stays behind on purpose: removing it would let two processes lock two different files.
     """
+    if fcntl is None:
+        raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH)

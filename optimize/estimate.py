@@ -1,0 +1,60 @@
+"""Fitness averaged over random starts, and when the average has settled (Z04 Eq. 8.1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from optimize.student import student_t
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Fitness of one design.
+
+    mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
+    half_width : of the 95 % confidence interval of the mean (Student t; the stopping rule's own effect on
+    coverage is not corrected for). settled : Eq. 8.1 was met. reason : "" or why the design failed.
+    std and half_width are NaN for fewer than two starts and for failed designs.
+    """
+
+    mean: float
+    std: float
+    half_width: float
+    starts: int
+    settled: bool
+    reason: str = ""
+
+    @property
+    def ok(self) -> bool:
+        return not self.reason
+
+    @property
+    def status(self) -> str:
+        """One word for tables, or the reason of a failure."""
+        return self.reason or ("settled" if self.settled else "not settled")
+
+    @classmethod
+    def of(cls, values: Sequence[float], settled: bool) -> Estimate:
+        """From the fitness of each start; at least one."""
+        n = len(values)
+        mean = float((np.cumsum(values) / np.arange(1, n + 1))[-1])
+        std = float(np.std(values, ddof=1)) if n > 1 else math.nan
+        half_width = student_t(n - 1) * std / math.sqrt(n) if n > 1 else math.nan
+        return cls(mean, std, half_width, n, settled)
+
+
+def settled_after(values: Sequence[float], tolerance: float, min_starts: int) -> int | None:
+    """The least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04 Eq. 8.1).
+
+    Two equal means count as settled, also when both are zero. None if there is no such n in values.
+    """
+    means = np.cumsum(values) / np.arange(1, len(values) + 1)
+    for n in range(max(min_starts, 2), len(values) + 1):
+        change = abs(means[n - 1] - means[n - 2])
+        if change == 0 or change < tolerance * abs(means[n - 1]):
+            return n
+    return None

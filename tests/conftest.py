@@ -1,0 +1,60 @@
+"""One runtime for the whole suite: cpu, f64 unless TISIM_TEST_PRECISION says otherwise."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tisim import runtime
+
+
+@pytest.fixture(scope="session", autouse=True)
+def the_runtime():
+    """The settings that every test in this process runs under."""
+    return runtime.start(device="cpu", precision=os.environ.get("TISIM_TEST_PRECISION", "f64"))
+
+
+@pytest.fixture
+def rng():
+    """A generator that gives a test the same numbers in every run."""
+    return np.random.Generator(np.random.Philox(20040101))
+
+
+ELSEWHERE = """
+import sys
+import numpy as np
+from tests import scenes
+from tests.test_effects_contract import kicked
+from tests.test_schedules import WORLDS
+from tisim import runtime
+
+kept = {}
+
+def keep(name, result):
+    assert result.status.ok, result.status.reason
+    kept.update({f"{name}/{key}": values for key, values in result.state.items()})
+    kept.update({f"{name}/start/{key}": values for key, values in result.start.items()})
+    kept[f"{name}/work"] = np.array([result.work[key] for key in sorted(result.work)])
+
+runtime.start(threads=1)
+for w, result in enumerate(scenes.simulate(WORLDS, worlds=len(WORLDS), capacity=200)):
+    keep(f"one thread/{w}", result)
+keep("one thread/kicked", scenes.simulate([kicked()], worlds=1, capacity=32)[0])
+runtime.start(precision="f32", threads=2)
+for w, result in enumerate(scenes.simulate(WORLDS, worlds=len(WORLDS), capacity=200)):
+    keep(f"single precision/{w}", result)
+np.savez(sys.argv[1], **kept)
+"""
+
+
+@pytest.fixture(scope="session")
+def elsewhere(tmp_path_factory):
+    """Results of test_schedules.WORLDS in another process: with one thread, and in single precision."""
+    file = tmp_path_factory.mktemp("elsewhere") / "results.npz"
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    with np.load(file) as stored:
+        return dict(stored)

@@ -1,0 +1,230 @@
+"""Bad input: a message of the form "X must be Y; received Z" before anything is run, and no trace left."""
+
+import numpy as np
+import pytest
+
+import tisim
+from tests.scenes import flow
+from tisim import Box, Cloud, Particles, Scene, Simulation
+from tisim.effects.impact import Impact
+from tisim.errors import InputError
+from tisim.operators.cooling import Cooling
+from tisim.operators.fragmentation import Fragmentation
+from tisim.steppers.controller import ApproachTime, FixedStep
+from tisim.steppers.verlet import Verlet
+
+NAN, INF = float("nan"), float("inf")
+CLOUD = {"number": 3, "radius": 0.1, "density": 1.0}
+ONE = {"position": [[0, 0, 0]], "velocity": [[0, 0, 0]], "radius": 1.0, "mass": 1.0}
+
+
+def particles(**changes):
+    return Particles(**{**ONE, **changes})
+
+
+BAD = {
+    "no particles": (lambda: Cloud(**{**CLOUD, "number": 0}), "cloud.number must be greater than 0"),
+    "half a particle": (lambda: Cloud(**{**CLOUD, "number": 2.5}), "cloud.number must be a whole number"),
+    "negative radius": (lambda: Cloud(**{**CLOUD, "radius": -1}), "cloud.radius must be greater than 0"),
+    "radius nan": (lambda: Cloud(**{**CLOUD, "radius": NAN}), "cloud.radius must be a finite number"),
+    "absolute zero": (lambda: Cloud(**CLOUD, temperature=0), "cloud.temperature must be greater than 0"),
+    "unknown key": (lambda: Cloud(**CLOUD, colour="red"), "cloud.colour must be a known key; received 'red'"),
+    "unit in text": (
+        lambda: Cloud(**{**CLOUD, "radius": "1 mm"}),
+        "cloud.radius must be a number; received '1 mm'",
+    ),
+    "two components": (lambda: Cloud(**CLOUD, deviation=(1, 2)), "cloud.deviation"),
+    "none at all": (lambda: particles(position=[], velocity=[]), "particles.position must be a list of 1"),
+    "empty array": (
+        lambda: particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3))),
+        "particles.position",
+    ),
+    "mass zero": (lambda: particles(mass=0.0), "particles.mass must be greater than 0"),
+    "mass negative": (lambda: particles(mass=-1.0), "particles.mass must be greater than 0"),
+    "one radius negative": (lambda: particles(radius=[-1.0]), "particles.radius must be greater than 0"),
+    "mass and density": (lambda: particles(density=1.0), "particles must be given mass or density; received"),
+    "neither": (lambda: particles(mass=None), "particles must be given mass or density; received"),
+    "position nan": (lambda: particles(position=[[0, NAN, 0]]), "particles.position"),
+    "velocity inf": (lambda: particles(velocity=np.array([[0, 0, INF]])), "particles.velocity"),
+    "too many velocities": (
+        lambda: particles(velocity=np.zeros((2, 3))),
+        "particles.velocity must be one value or 1",
+    ),
+    "plane": (lambda: particles(position=[[0, 0]]), "particles.position"),
+    "temperature nan": (
+        lambda: particles(quantities={"temperature": NAN}),
+        "particles.temperature must be finite",
+    ),
+    "wrong shape": (
+        lambda: particles(quantities={"temperature": [1.0, 2.0]}),
+        "particles.temperature must be one value",
+    ),
+    "quantity is text": (
+        lambda: particles(quantities={"temperature": "hot"}),
+        "particles.temperature must be",
+    ),
+    "mass by the back door": (
+        lambda: particles(quantities={"mass": -1.0}),
+        "particles.quantities.mass must be given",
+    ),
+    "box inside out": (lambda: Box(low=(0, 0, 0), high=(1, 1, 0)), "box.high must be above box.low in every"),
+    "box infinite": (lambda: Box(low=(0, 0, 0), high=(1, 1, INF)), "box.high.2 must be a finite number"),
+    "step zero": (lambda: FixedStep(dt=0), "fixed_step.dt must be greater than 0"),
+    "limits crossed": (
+        lambda: ApproachTime(shortest=1e-2),
+        "approach_time.longest must be at least shortest",
+    ),
+    "areas crossed": (
+        lambda: Impact(hardness=1, initial_area=2),
+        "impact.final_area must be at least initial_area",
+    ),
+    "too bright": (lambda: Cooling(emissivity=1.1), "cooling.emissivity must be at most 1"),
+    "threshold of one": (
+        lambda: Fragmentation(surface_energy=1, grain_mass=1, threshold=1.0),
+        "fragmentation.threshold must be less than 1",
+    ),
+    "no duration": (
+        lambda: Scene(particles=Cloud(**CLOUD)),
+        "scene.duration must be given; received nothing",
+    ),
+    "duration zero": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=0),
+        "scene.duration must be greater than 0",
+    ),
+    "duration inf": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=INF),
+        "scene.duration must be a finite number",
+    ),
+    "seed negative": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=1, seed=-1),
+        "scene.seed must be at least 0",
+    ),
+    "seed huge": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=1, seed=2**63),
+        "scene.seed must be less than",
+    ),
+    "effect is text": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=1, effects="impact"),
+        "scene.effects",
+    ),
+    "stepper is text": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=1, stepper="verlet"),
+        "scene.stepper",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), BAD.values(), ids=BAD)
+def test_refused_when_made(make, message):
+    with pytest.raises(InputError) as fault:
+        make()
+    text = str(fault.value)
+    assert text.startswith(message), text
+    assert " must be " in text
+    assert "; received " in text
+    assert len(text) < 300, "says what was wrong, not everything that was given"
+
+
+def from_dict(**changes):
+    data = Scene(particles=Cloud(**CLOUD), duration=1.0, effects=(Impact(hardness=1.0),)).to_dict()
+    return Scene.from_dict({**data, **changes})
+
+
+BAD_DATA = {
+    "no particles": (lambda: Scene.from_dict({"duration": 1}), "scene.particles must be given; received"),
+    "particles of no kind": (lambda: from_dict(particles={"number": 3}), "particles.kind must be given"),
+    "particles of unknown kind": (
+        lambda: from_dict(particles={"kind": "swarm"}),
+        "particles.kind must be one of",
+    ),
+    "particles not a table": (
+        lambda: from_dict(particles=[1, 2]),
+        "particles must be a table; received [1, 2]",
+    ),
+    "unknown effect": (lambda: from_dict(effects={"impcat": {}}), "effects.impcat.kind must be one of"),
+    "effect not a table": (lambda: from_dict(effects={"impact": 3.0}), "effects.impact must be a table"),
+    "effects a list": (lambda: from_dict(effects=[1]), "scene.effects must be a table of effects"),
+    "unknown domain": (lambda: from_dict(domain={"kind": "torus"}), "domain.kind must be one of"),
+    "unknown control": (
+        lambda: from_dict(stepper={"control": {"kind": "guess"}}),
+        "stepper.control.kind must be one of",
+    ),
+    "stepper not a table": (lambda: from_dict(stepper=1e-3), "stepper must be a table; received 0.001"),
+    "unknown key": (lambda: from_dict(durration=2), "scene.durration must be a known key; received 2"),
+    "name is a number": (lambda: from_dict(name=3), "scene.name must be text; received 3"),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), BAD_DATA.values(), ids=BAD_DATA)
+def test_data_refused(make, message):
+    with pytest.raises(InputError) as fault:
+        make()
+    assert str(fault.value).startswith(message), str(fault.value)
+    assert "; received " in str(fault.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "scene file must exist; received"),
+        (b"", "scene.particles must be given; received"),
+        (b"name = ", "scene file must be TOML; received"),
+        (b"\xff\xfe\x00", "scene file must be TOML; received"),
+        (flow(grains=4).to_toml().encode()[:400], "scene"),
+    ],
+    ids=["missing", "empty", "cut in a line", "binary", "cut short"],
+)
+def test_file_refused(tmp_path, content, message):
+    file = tmp_path / "scene.toml"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(InputError) as fault:
+        Scene.from_toml(file)
+    assert str(fault.value).startswith(message), str(fault.value)
+    assert "; received " in str(fault.value)
+
+
+def test_every_cut_of_a_scene_file_is_refused_or_read(tmp_path):
+    """At whichever byte a file ends: InputError, or a valid scene; never anything else."""
+    whole = flow(grains=2).to_toml().encode()
+    file = tmp_path / "scene.toml"
+    refused = []
+    for end in range(0, len(whole), 7):
+        file.write_bytes(whole[:end])
+        try:
+            Scene.from_toml(file)
+        except InputError as fault:
+            refused.append(str(fault))
+    assert len(refused) > 20
+    assert all(" must " in text and "; received " in text for text in refused)
+
+
+def test_a_start_that_does_not_fit_is_refused():
+    """Too dense for random placing; a random cloud in open space; too many for the room."""
+    dense = Scene(
+        particles=Cloud(number=400, radius=0.1, density=1.0),
+        domain=Box(low=(0, 0, 0), high=(1, 1, 1)),
+        stepper=Verlet(control=FixedStep(dt=1.0)),
+        duration=1.0,
+    )
+    with pytest.raises(InputError, match=r"volume fraction .* must be within reach.*; received 1\.676"):
+        tisim.run(dense)
+    with pytest.raises(
+        InputError, match=r"domain must be bounded to hold a random cloud; received an open one"
+    ):
+        tisim.run(Scene(particles=Cloud(**CLOUD), duration=1.0))
+    still = Verlet(control=FixedStep(dt=1.0))
+    fits = Scene(particles=particles(), stepper=still, duration=1.0)
+    many = Scene(
+        particles=particles(position=np.zeros((5, 3)), velocity=np.zeros((5, 3))), stepper=still, duration=1.0
+    )
+    simulation = Simulation(fits, worlds=1)
+    with pytest.raises(InputError, match=r"particles of scene 'scene' must be at most 1; received 5"):
+        simulation.load([many])
+    with pytest.raises(InputError, match=r"number of scenes must be 1 to 1; received 2"):
+        simulation.load([fits, fits])
+    with pytest.raises(InputError, match=r"number of scenes must be 1 to 1; received 0"):
+        simulation.load([])
+    with pytest.raises(InputError, match=r"worlds must be at least 1; received 0"):
+        Simulation(fits, worlds=0)
+    simulation.close()

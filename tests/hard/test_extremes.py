@@ -1,0 +1,162 @@
+"""Extremes of place, size, speed and length: right, or a failure that says what and where."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from tests.scenes import DENSITY, RADIUS, by_id, compiled, energy, momentum, scene
+from tests.test_effects_contract import charges
+from tests.test_effects_contract import run as run_charges
+from tests.test_events import laws as merging
+from tests.test_events import run as run_merging
+
+
+def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):
+    """Two grains with centres a distance apart along a slanted line, closing in along it."""
+    n = np.array([2.0, -3.0, 6.0]) / 7
+    return scene(
+        [[0, 0, 0], gap * n], [approach * n, 0 * n], merging(hardness), radius=radius, dt=1e-30, **more
+    )
+
+
+@pytest.mark.parametrize("part", [0.0, 1e-300, 1e-12, 1e-6])
+def test_two_grains_in_one_place(part):
+    """In one point there is no line of centres, and nothing happens; at any distance, an impact."""
+    (result,) = run_merging([pair(part * RADIUS, 1.0)])
+    assert result.status.ok
+    assert all(np.isfinite(values).all() for values in result.state.values())
+    np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-14)
+    before, after = (
+        (s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum() for s in (result.start, result.state)
+    )
+    assert after <= before * (1 + 1e-14)
+    if part >= 1e-12:
+        assert result.work["impacts"] == 1
+
+
+def test_overlap_at_the_start_releases_no_energy():
+    """Ten per cent of overlap, at rest or parting: nothing; closing: an impact that takes energy."""
+    still, parting, closing = run_merging([pair(1.8 * RADIUS, v) for v in (0.0, -1.0, 1.0)])
+    for result in (still, parting):
+        np.testing.assert_array_equal(result.state["velocity"], result.start["velocity"])
+    speed = [(s["velocity"] ** 2).sum() for s in (closing.start, closing.state)]
+    assert speed[1] < speed[0]
+
+
+def test_touching_exactly_at_the_sum_of_radii():
+    """Surfaces that touch and close in have met; the next number beyond, they have not."""
+    radius = 0.25
+    for gap, impacts in ((0.5, 1), (np.nextafter(0.5, 1), 0)):
+        place = [[0, 0, 0], [gap, 0, 0]]
+        made = scene(place, [[1e-3, 0, 0], [1e-3, 0, 0]], merging(1e9), radius=radius, dt=1e-30)
+        slow = made.replace({"particles.velocity": [[1e-3, 0, 0], [0, 0, 0]]})
+        together, closing = run_merging([made, slow])
+        assert together.work["impacts"] == 0
+        assert closing.work["impacts"] == impacts
+
+
+@pytest.mark.parametrize("hardness", [1e12, 1e-3], ids=["rebound", "bond"])
+def test_mass_and_size_ratios(hardness):
+    """Radii 1 : 1000, masses 1 : 1e9 and worse: momentum and energy to rounding of the larger."""
+    for small, large, density in ((1e-6, 1e-3, DENSITY), (1e-6, 1e-3, [1.0, 1e4]), (1e-9, 1.0, DENSITY)):
+        mass = np.asarray(density) * 4 / 3 * np.pi * np.array([small, large]) ** 3
+        made = pair((small + large) * (1 - 1e-12), 10.0, hardness, radius=[small, large], mass=mass)
+        (result,) = run_merging([made])
+        assert result.work["impacts"] == 1
+        assert result.work["merges"] == (hardness < 1)
+        np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-14)
+        if hardness > 1:
+            # The light one bounces off as from a wall.
+            bounced = by_id(result)["velocity"][0]
+            np.testing.assert_allclose(bounced, -result.start["velocity"][0], rtol=1e-3)
+
+
+def test_impact_at_any_speed():
+    """From 1e-12 m/s to a thousand times the speed of sound in steel: energy is never gained."""
+    for speed in 10.0 ** np.arange(-12, 7.5, 1.0):
+        (result,) = run_merging([pair(2 * RADIUS * (1 - 1e-12), speed, hardness=1e6)])
+        before, after = (
+            (s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum() for s in (result.start, result.state)
+        )
+        assert result.work["impacts"] == 1
+        assert 0 < after < before * (1 + 1e-14)
+        np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-13)
+
+
+def test_two_charges_in_one_place_fail_clearly():
+    """1/0: the run does not begin; it names the force, the particle and the time, and keeps the start."""
+    bad, good = run_charges(
+        [
+            charges(
+                [[0, 0, 0], [1, 1, 1], [1, 1, 1]], np.zeros((3, 3)), [1e-6] * 3, {"stiffness": 0.0}, dt=1e-3
+            ),
+            charges(
+                [[0, 0, 0], [1, 1, 1], [2, 1, 1]], np.zeros((3, 3)), [1e-6] * 3, {"stiffness": 0.0}, dt=1e-3
+            ),
+        ]
+    )
+    assert not bad.status.ok
+    for word in ("at t = 0 s", "coulomb", "particle 1", "not finite"):
+        assert word in bad.status.reason
+    np.testing.assert_array_equal(bad.state["position"], bad.start["position"])
+    np.testing.assert_array_equal(bad.state["velocity"], bad.start["velocity"])
+    assert good.status.ok
+
+
+def test_like_charges_from_a_nanometre():
+    """Two like charges released from 1e-9 m: with steps short enough, the energy comes out as kinetic."""
+    q, gap = 1e-12, 1e-9
+    stored = 8.9875517873681764e9 * q * q / gap
+    tau = np.sqrt(gap**2 / (2 * stored))
+    made = charges(
+        [[0, 0, 0], [gap, 0, 0]], np.zeros((2, 3)), [q, q], {"stiffness": 0.0}, dt=tau / 200, steps=20_000
+    )
+    (result,) = run_charges([made])
+    state = result.state
+    kinetic = 0.5 * (state["velocity"] ** 2).sum()
+    left = stored * gap / np.linalg.norm(state["position"][1] - state["position"][0])
+    assert kinetic + left == pytest.approx(stored, rel=1e-4)
+    assert kinetic > 0.9 * stored
+    np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-14 * np.abs(state["velocity"]).max())
+
+
+def test_reversed_time_returns_to_the_start():
+    """Velocity Verlet is symmetric: half way round an eccentric orbit and back, to rounding."""
+    q = np.sqrt(4.0 / 8.9875517873681764e9)
+    there = charges(
+        [[1, 0, 0], [-1, 0, 0]], [[0, 0.7, 0], [0, -0.7, 0]], [q, -q], {"stiffness": 0.0}, dt=0.01, steps=300
+    )
+    (half,) = run_charges([there])
+    state = by_id(half)
+    back = charges(state["position"], -state["velocity"], [q, -q], {"stiffness": 0.0}, dt=0.01, steps=300)
+    (home,) = run_charges([back])
+    np.testing.assert_allclose(by_id(home)["position"], [[1, 0, 0], [-1, 0, 0]], rtol=0, atol=1e-11)
+
+
+def test_time_does_not_drift_over_a_million_steps():
+    """A step of 0.1, which binary numbers cannot hold: after 1e6 of them, time is right to its last bit."""
+    made = charges([[0, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 0.0}, dt=0.1, duration=1e6)
+    simulation = compiled(made, 40, 32)
+    simulation.load([made])
+    simulation.run(steps=10**6)
+    (result,) = simulation.results()
+    exact = 10**6 * Fraction(0.1)
+    assert result.work["steps"] == 10**6
+    assert abs(Fraction(result.time) - exact) <= Fraction(np.spacing(result.time))
+    naive = np.cumsum(np.full(10**6, 0.1))[-1]
+    assert abs(naive - float(exact)) > 1e-7, "plain summation would fail here"
+
+
+def test_energy_helper_counts_what_it_should():
+    """The books that other tests rely on: kinetic, heat, spent, given, each with its sign."""
+    state = {
+        "mass": np.array([2.0]),
+        "velocity": np.array([[3.0, 0, 0]]),
+        "temperature": np.array([10.0]),
+        "cooling_loss": np.array([5.0]),
+        "fracture_energy": np.array([7.0]),
+        "reaction_heat": np.array([11.0]),
+        "deformation_work": np.array([13.0]),
+    }
+    assert energy(state, heat_capacity=2.0) == 9 + 40 + 5 + 7 - 11 - 13

@@ -1,0 +1,137 @@
+"""Scenes that several tests use, and one compiled simulation for each structure of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tisim import Box, Particles, Scene, Simulation, runtime
+from tisim.effects.friction import Friction
+from tisim.effects.heating import DeformationWork, Heating
+from tisim.effects.impact import Impact
+from tisim.effects.reaction import Reaction
+from tisim.effects.softening import Softening
+from tisim.operators.agglomeration import Agglomeration
+from tisim.operators.cooling import Cooling
+from tisim.operators.fragmentation import Fragmentation
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.verlet import Verlet
+
+DENSITY = 2000.0
+RADIUS = 1e-3
+GRAIN = DENSITY * 4 / 3 * np.pi * RADIUS**3
+"""kg, of a grain of RADIUS and DENSITY."""
+HEAT_CAPACITY = 500.0
+
+_compiled: dict = {}
+
+
+def compiled(scene, worlds=1, capacity=64, schedule=None):
+    """A simulation of the structure of a scene; each is compiled once for all tests."""
+    key = (runtime.generation(), scene.structure(), worlds, capacity, schedule)
+    if key not in _compiled:
+        _compiled[key] = Simulation(scene, worlds, capacity, schedule)
+    return _compiled[key]
+
+
+def simulate(scenes, worlds=1, capacity=64, steps=None, schedule=None):
+    """Results of scenes of one structure, run side by side."""
+    simulation = compiled(scenes[0], worlds, capacity, schedule)
+    simulation.load(scenes)
+    simulation.run(steps=steps)
+    return simulation.results()
+
+
+def by_id(result):
+    """State of a result with its particles in the order of their ids."""
+    order = np.argsort(result.state["id"])
+    return {name: values[order] for name, values in result.state.items()}
+
+
+def fixed(dt):
+    """Steps of one length."""
+    return Verlet(control=FixedStep(dt=dt))
+
+
+def scene(
+    position, velocity, effects=(), radius=RADIUS, density=DENSITY, mass=None, dt=1e-9, steps=1, **more
+):
+    """Grains given one by one, for a number of equal steps."""
+    quantities = more.pop("quantities", {})
+    return Scene(
+        particles=Particles(
+            position=np.asarray(position, float),
+            velocity=np.asarray(velocity, float),
+            radius=radius,
+            density=None if mass is not None else density,
+            mass=mass,
+            quantities=quantities,
+        ),
+        effects=effects,
+        stepper=more.pop("stepper", fixed(dt)),
+        duration=more.pop("duration", dt * steps),
+        **more,
+    )
+
+
+def head_on(speed, effects, radius=RADIUS, **more):
+    """Two equal grains, just touching, each at ``speed`` (m/s) towards the other."""
+    reach = radius * (1 - 1e-12)
+    return scene(
+        [[-reach, 0, 0], [reach, 0, 0]], [[speed, 0, 0], [-speed, 0, 0]], effects, radius=radius, **more
+    )
+
+
+def flow(
+    seed=0,
+    grains=100,
+    hardness=3e5,
+    surface_energy=1e16,
+    grain_mass=GRAIN,
+    threshold=0.5,
+    duration=1e-3,
+    side=0.02,
+    images=False,
+    stepper=None,
+    sizes=1.0,
+):
+    """A random cloud under all of Z04's physics; ``sizes`` is the largest radius over the smallest."""
+    draw = np.random.Generator(np.random.Philox(seed))
+    radius = RADIUS * sizes ** -draw.uniform(0, 1, grains)
+    return Scene(
+        particles=Particles(
+            position=draw.uniform(-side / 2, side / 2, (grains, 3)),
+            velocity=np.array([100.0, 10, 10]) + draw.uniform(-1, 1, (grains, 3)) * [150.0, 15, 15],
+            radius=radius,
+            density=DENSITY,
+            quantities={"temperature": draw.uniform(200, 600, grains)},
+        ),
+        effects=(
+            Impact(hardness=hardness),
+            Friction(coefficient=0.1),
+            Heating(heat_capacity=HEAT_CAPACITY),
+            DeformationWork(),
+            Softening(activation_energy=300.0),
+            Reaction(energy_density=2e4),
+            Fragmentation(surface_energy=surface_energy, grain_mass=grain_mass, threshold=threshold),
+            Agglomeration(),
+            Cooling(),
+        ),
+        domain=Box(low=(-side / 2,) * 3, high=(side / 2,) * 3, images=images),
+        stepper=stepper or Verlet(),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def momentum(state):
+    """kg m/s."""
+    return (state["mass"][:, None] * state["velocity"]).sum(axis=0)
+
+
+def energy(state, heat_capacity=HEAT_CAPACITY):
+    """All that the books hold, J: kinetic, heat, lost by cooling and to new surface, less what was given."""
+    kinetic = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
+    heat = heat_capacity * (state["mass"] * state["temperature"]).sum()
+    spent = sum(state[name].sum() for name in ("cooling_loss", "fracture_energy") if name in state)
+    given = sum(state[name].sum() for name in ("reaction_heat", "deformation_work") if name in state)
+    return kinetic + heat + spent - given

@@ -1,0 +1,61 @@
+"""What explain says is what is compiled: nothing more is allocated, nothing less is listed."""
+
+import io
+
+from rich.console import Console
+
+from cases.agglomeration import BEST
+from cases.agglomeration import scene as agglomeration
+from tisim import Simulation
+from tisim.explain import explain, known_effects, render
+
+
+def text(scene):
+    stream = io.StringIO()
+    Console(file=stream, width=150).print(render(explain(scene)))
+    return stream.getvalue()
+
+
+def part_of(flow, *kept):
+    return flow.model_copy(update={"effects": tuple(e for e in flow.effects if e.kind() in kept)})
+
+
+def test_whole_flow_leaves_nothing_out():
+    flow = agglomeration(BEST, 1, grains=60)
+    found = explain(flow)
+    assert [part.name for part in found.effects] == [effect.kind() for effect in flow.effects]
+    assert all(part.summary and part.source for part in found.effects)
+    names = {part.name for part in found.effects}
+    assert {part.name for part in found.absent_effects} == {k.kind() for k in known_effects()} - names
+    assert (found.particles, found.capacity) == (60, 60)
+
+
+def test_absent_effects_and_fields():
+    flow = part_of(agglomeration(BEST, 1, grains=60), "impact", "friction")
+    found = explain(flow)
+    absent = {part.name for part in found.absent_effects}
+    assert {"heating", "cooling", "reaction", "fragmentation", "agglomeration"} <= absent
+    assert not absent & {"impact", "friction", "impact_law", "operator", "force"}
+    fields = dict(found.absent_fields)
+    assert "reaction" in fields["temperature"]
+    assert "fragmentation" in fields["pieces"]
+    assert not {item.name for item in found.memory} & set(fields)
+
+
+def test_memory_is_what_is_allocated():
+    flow = agglomeration(BEST, 1, grains=60)
+    simulation = Simulation(flow)
+    sizes = {item.name: item.bytes for item in explain(flow).memory}
+    assert {name: sizes[name] for name in simulation.s.bytes()} == simulation.s.bytes()
+    assert sizes["position"] == 3 * sizes["radius"]
+    assert explain(flow).phases == tuple(simulation.program.names())
+    simulation.close()
+
+
+def test_parameters_have_units_and_sources():
+    shown = text(agglomeration(BEST, 1, grains=60))
+    assert "hardness = 265480 Pa" in shown
+    assert "heat_capacity = 1796.3 J/(kg K)" in shown
+    assert "Z04 Eq. (6.9)" in shown
+    assert "Rounds" not in shown
+    assert "Resolve*" in shown
