@@ -168,7 +168,7 @@ class Simulation:
             inside = ((start["position"] >= low) & (start["position"] < high)).all()
             must(bool(inside), "particles.position", "inside the domain", "a particle outside")
         known = {f.name for f in self.s.fields} | {"temperature"}
-        for name, values in start.items():
+        for name in start:
             must(
                 name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name
             )

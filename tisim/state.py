@@ -63,8 +63,8 @@ class State:
     """Device memory of ``worlds`` worlds of at most ``capacity`` particles.
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
-    ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters the
-    effects declare.
+    ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
+    that effects declare.
     """
 
     def __init__(
