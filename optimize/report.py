@@ -15,7 +15,7 @@ from rich.table import Table
 from optimize.outcome import Outcome
 from optimize.tables import best_columns, logbook_columns
 
-_BEST, _MEAN, _MARK = "#0b5394", "#8a8a8a", "#c9c9c9"
+_BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
 
 def best_table(outcome: Outcome) -> Table:
@@ -46,7 +46,8 @@ def write_csv(outcome: Outcome, path: str | Path) -> None:
 def convergence_figure(outcome: Outcome) -> Figure:
     """Best and mean fitness against generation, and below it the problem's first derived value of the best.
 
-    Dotted lines mark the generations after which the search box was re-centred.
+    Dotted lines mark the generations after which the search box was re-centred. Where the best design has
+    been run again from fresh starts, that stands at the end: the curve is lower by the luck of a winner.
     """
     problem = outcome.problem
     log = logbook_columns(problem, outcome.logbook)
@@ -62,6 +63,15 @@ def convergence_figure(outcome: Outcome) -> Figure:
         axes[0].plot(generation, best, color=_BEST, marker="o", ms=3.5, lw=1.6, label="best")
         if derived:
             axes[1].plot(generation, _plottable(log[derived]), color=_BEST, marker="o", ms=3.5, lw=1.6)
+        sure = outcome.best.confirmed if outcome.best else None
+        if sure is not None:
+            axes[0].errorbar(
+                generation[-1] + 0.4, sure.mean, sure.half_width, color=_SURE, marker="s", ms=3.5, lw=1.2,
+                capsize=2, ls="none", label="best, from fresh starts, 95 % CI",
+            )  # fmt: skip
+            if derived:
+                value = problem.derived[derived](sure.mean)
+                axes[1].plot(generation[-1] + 0.4, value, color=_SURE, marker="s", ms=3.5)
         for axis in axes:
             for count, at in enumerate(generation[np.array(log["recentred"], dtype=bool)]):
                 label = "search box re-centred" if count == 0 else None
