@@ -46,6 +46,8 @@ class Effect(Spec):
 class Force(Effect):
     """A force on a particle by itself: of its state, its place and the time."""
 
+    contract: ClassVar[bool] = True
+
     @ti.func
     def force(self, s, w, i, t):
         """Force on particle i of world w at time t. N."""
@@ -59,6 +61,7 @@ class PairForce(Effect):
     over the pair list; any other is summed over all pairs.
     """
 
+    contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = False
 
     @ti.func
@@ -75,6 +78,8 @@ class PairForce(Effect):
 class Operator(Effect):
     """A change of state between steps."""
 
+    contract: ClassVar[bool] = True
+
     @ti.func
     def particle(self, s, w, i, dt):
         """Change particle i alone, after a step of dt seconds."""
@@ -86,6 +91,8 @@ class Operator(Effect):
 
 class PairEvent(Effect):
     """Something sudden between two particles, such as an impact."""
+
+    contract: ClassVar[bool] = True
 
     @ti.func
     def contact(self, s, w, i, j, separation):

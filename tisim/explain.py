@@ -97,18 +97,11 @@ def explain(scene: Scene) -> Explanation:
 
 
 def known_effects() -> list[type[Effect]]:
-    """Every effect of the package, by name; classes that others are made from are contracts, not effects."""
+    """Every effect of the package, by name."""
     kinds.load(effects)
     kinds.load(operators)
-
-    def leaves(kind: type[Effect]) -> Iterator[type[Effect]]:
-        below = [k for k in kind.__subclasses__() if k.__module__.startswith("tisim.")]
-        for sub in below:
-            yield from leaves(sub)
-        if not below and kind.__module__.startswith((effects.__name__, operators.__name__)):
-            yield kind
-
-    return sorted(set(leaves(Effect)), key=lambda kind: kind.kind())
+    known = sorted(Effect.known().items())
+    return [kind for _, kind in known if kind.__module__.startswith((effects.__name__, operators.__name__))]
 
 
 def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:

@@ -44,10 +44,14 @@ class Spec(BaseModel):
     @classmethod
     def named(cls, kind: str, where: str) -> type[Self]:
         """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
-        # A class with subclasses is a contract, not something to ask for.
-        known = {sub.kind(): sub for sub in _descendants(cls) if not sub.__subclasses__()}
+        known = cls.known()
         must(kind in known, where, f"one of {', '.join(sorted(known))}", kind)
         return known[kind]
+
+    @classmethod
+    def known(cls) -> dict[str, type[Self]]:
+        """Every part made after this contract that has been imported, by name."""
+        return {sub.kind(): sub for sub in _descendants(cls) if not sub.__dict__.get("contract")}
 
     @classmethod
     def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
@@ -76,6 +80,8 @@ class Spec(BaseModel):
         """Attributes to set on the bound copy, chosen among the bound effects of the scene."""
         return {}
 
+    contract: ClassVar[bool] = False
+    """Set by a class that is no part of a scene itself, only what parts are made after."""
     requires: ClassVar[tuple[type[Spec], ...]] = ()
     """Effects without which this one means nothing."""
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 FILE = Path(__file__).with_name("fitness.json")
-STARTS = 16
+STARTS = 64
 GRAINS = 80
 
 BASE = {

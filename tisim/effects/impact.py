@@ -38,7 +38,7 @@ from tisim.errors import must
 class ImpactLaw(Effect):
     """What an effect may contribute to an impact; each does nothing unless overridden."""
 
-    requires: ClassVar[tuple[type, ...]] = ()
+    contract: ClassVar[bool] = True
 
     @classmethod
     def offers(cls, hook: str) -> bool:
