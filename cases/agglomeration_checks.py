@@ -28,7 +28,7 @@ HARDNESS, DENSITY, RADIUS, LENGTH = 3e5, 2000.0, 1e-3, 0.8
 BOUND = 1e-10
 """Relative error allowed to a closed form."""
 ROUNDING = 1e-12
-"""Relative change allowed to a conserved sum of some hundred terms."""
+"""Relative change allowed to a conserved sum of a thousand terms."""
 
 
 def pair(speed: float, *effects: Effect, radius: float = RADIUS) -> Scene:
@@ -151,7 +151,7 @@ def energy(result: Result) -> tuple[float, float]:
 
 def conservation() -> Iterator[Check]:
     """Mass, momentum and energy of a flow in which grains bond and break."""
-    flow = agglomeration.scene({**agglomeration.BEST, "surface_energy": 5e4}, seed=1, grains=250)
+    flow = agglomeration.scene({**agglomeration.BEST, "surface_energy": 5e4}, seed=1, grains=1000)
     result = tisim.run(flow)
     yield Check("the flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
     before, after = result.start, result.state

@@ -16,33 +16,11 @@ from rich.table import Table
 
 import tisim
 from cases.agglomeration import cost, scene
+from cases.agglomeration_strings import PUBLISHED, designs
 from optimize.student import student_t
 from tisim import Scene
 from tisim.steppers.controller import ApproachTime
 from tisim.steppers.verlet import Verlet
-
-KEYS = (
-    "relative_velocity", "length_ratio", "density", "hardness", "heat_capacity",
-    "friction", "temperature", "activation_energy", "reaction", "surface_energy",
-)  # fmt: skip
-FACTORS = (200.0, 1.0, 1e4, 1e6, 2e3, 1.0, 1e3, 1e3, 1e7, 1e16)
-"""The tables print each value divided by these."""
-PRINTED = (
-    (0.92344, 0.79041, 0.66527, 0.26548, 0.89815, 0.13456, 0.50218, 0.35241, 0.17765, 0.83685),
-    (0.99307, 0.79510, 0.90509, 0.49048, 0.94075, 0.17535, 0.62494, 0.12457, 0.20836, 0.85267),
-    (0.96042, 0.79726, 0.66773, 0.39772, 0.34235, 0.11000, 0.21911, 0.19785, 0.19901, 0.93462),
-    (0.93911, 0.79280, 0.53228, 0.20459, 0.98942, 0.15624, 0.90323, 0.38558, 0.15209, 0.91321),
-    (0.84977, 0.79226, 0.91791, 0.15671, 0.96995, 0.10455, 0.36270, 0.32326, 0.20403, 0.80388),
-    (0.16761, 0.79362, 0.93962, 0.10877, 0.95669, 0.15099, 0.52338, 0.29311, 0.11186, 0.25457),
-)
-"""Z04 tables 1 and 2."""
-PUBLISHED = (0.67708, 0.79078, 0.79636, 0.79957, 0.80036, 0.80691)
-"""Pi of Z04 table 3."""
-
-
-def designs() -> list[dict[str, float]]:
-    """The six strings in SI units, best first."""
-    return [dict(zip(KEYS, np.multiply(row, FACTORS).tolist(), strict=True)) for row in PRINTED]
 
 
 def changed(control: ApproachTime) -> Callable[[Scene], Scene]:
@@ -66,7 +44,7 @@ CHANGES: Mapping[str, Callable[[Scene], Scene]] = {
     "steps of at least 1e-5 s": changed(ApproachTime(shortest=1e-5)),
     "steps of at least 1e-4 s": changed(ApproachTime(shortest=1e-4)),
     "grains meet across the faces too": setting("domain.images", True),
-    "friction a tenth": setting("effects.friction.coefficient", 0.013456),
+    "friction ten times": setting("effects.friction.coefficient", 0.13456),
     "no work of deformation": without("deformation_work"),
     "no reaction": without("reaction"),
     "no softening": without("softening"),

@@ -24,6 +24,7 @@ from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
 from optimize.search import search
 from optimize.settings import Settings
+from tisim.durable import locked
 from tisim.errors import must
 from tisim.interrupt import Interrupt
 from tisim.output import writable
@@ -36,8 +37,11 @@ def clear(folder: Path, overwrite: bool) -> None:
     file = folder / FILE
     begun = file.exists() or file.with_name(FILE + ".journal").exists()
     must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
-    for name in (FILE, FILE + ".journal", FILE + ".lock"):
-        (folder / name).unlink(missing_ok=True)
+    # The lock file stays: without it two processes could lock two different files.
+    if begun:
+        with locked(folder / (FILE + ".lock"), exclusive=True):
+            for name in (FILE, FILE + ".journal"):
+                (folder / name).unlink(missing_ok=True)
 
 
 def session(

@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from tisim import runtime
 from tisim.durable import replace_file
 from tisim.errors import InputError, must
 from tisim.simulation import Simulation
@@ -34,6 +35,8 @@ def _identity(simulation: Simulation) -> dict[str, Any]:
     return {
         "scenes": json.dumps([scene.digest() for scene in simulation.scenes]),
         "precision": simulation.runtime.precision,
+        "device": simulation.runtime.device,
+        "backend": runtime.backend(),
         "worlds": simulation.worlds,
         "capacity": simulation.s.capacity,
     }

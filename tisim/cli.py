@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -33,6 +35,9 @@ from tisim.options import (
 )  # fmt: skip
 from tisim.result import Result
 from tisim.simulation import Simulation
+
+CHECKPOINT_SECONDS = float(os.environ.get("TISIM_CHECKPOINT_SECONDS", "60"))
+"""Wall time between checkpoints of a run."""
 
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
@@ -88,7 +93,7 @@ def run(
     if resume:
         checkpoint.restore(simulation, place.checkpoint)
     output.writable(place.path)
-    if not _advance(simulation, name):
+    if not _advance(simulation, name, place.checkpoint):
         checkpoint.save(simulation, place.checkpoint)
         err().print(
             f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
@@ -102,14 +107,24 @@ def run(
         raise RunError(f"run failed {result.status.reason}")
 
 
-def _advance(simulation: Simulation, name: str) -> bool:
-    """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps."""
+def _advance(simulation: Simulation, name: str, path: Path) -> bool:
+    """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps.
+
+    A long run saves a checkpoint now and then, so that one that is killed can go on from the last.
+    """
+    from tisim import checkpoint
+
+    saved = time.monotonic()
     with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
         def progress(fraction: float) -> None:
+            nonlocal saved
             bar.update(task, completed=fraction)
             ctrl_c.check()
+            if time.monotonic() - saved > CHECKPOINT_SECONDS:
+                checkpoint.save(simulation, path)
+                saved = time.monotonic()
 
         try:
             simulation.run(progress)

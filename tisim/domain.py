@@ -21,6 +21,10 @@ class Domain(Spec):
         """Whether opposite faces are joined."""
         return False
 
+    def periodic(self) -> bool:
+        """Whether particles see each other across joined faces."""
+        return False
+
     @ti.func
     def wrap(self, w, r):
         """The place inside the domain of a particle that has moved to r. m."""
@@ -75,6 +79,9 @@ class Box(Domain):
 
     def joined(self) -> bool:
         return True
+
+    def periodic(self) -> bool:
+        return self.images
 
     @ti.func
     def origin(self, w):

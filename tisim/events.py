@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from tisim._taichi import ti
 from tisim.domain import Domain
-from tisim.effect import PairEvent
+from tisim.effect import Operator, PairEvent
 from tisim.neighbours import Neighbours
 from tisim.program import PerParticle, Phase, Repeat
 from tisim.state import CROWDED, State
@@ -186,42 +186,40 @@ class Close(Phase):
 
 
 class Rearrange(Phase):
-    """Fill the slots of removed particles from the end, and let operators act on the world as a whole."""
+    """Let operators act on the world as a whole, and fill the slots of removed particles from the end."""
 
-    conditional = True
-
-    def __init__(self, s: State, operators: tuple, near: Neighbours | None) -> None:
-        self.s, self.operators, self.near, self.lists = s, operators, near, near is not None
-
-    @ti.func
-    def when(self, w):
-        return self.s.events[w] + self.s.changed[w]
+    def __init__(self, s: State, domain: Domain, operators: tuple, near: Neighbours | None) -> None:
+        self.s, self.domain, self.near, self.lists = s, domain, near, near is not None
+        self.operators = tuple(o for o in operators if type(o).world is not Operator.world)
 
     @ti.func
     def run(self, w, _k):
         s = self.s
-        s.events[w] = 1
-        # What the survey told the controller is no longer true.
-        s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
         # Before operators too: a slot that a merger has freed has room for a fragment.
         self.fill(w)
         for operator in ti.static(self.operators):
             operator.world(s, w)
         self.fill(w)
+        if s.events[w] > 0:
+            # What the survey told the controller is no longer true.
+            s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
 
     @ti.func
     def fill(self, w):
         s = self.s
         if s.changed[w] > 0:
             i = 0
-            while i < s.count[w]:
+            count = s.count[w]
+            while i < count:
                 if s.mass[w, i] > 0.0:
+                    s.position[w, i] = self.domain.wrap(w, s.position[w, i])
                     i += 1
                 else:
-                    last = s.count[w] - 1
-                    if i < last:
-                        s.copy(w, last, i)
-                    s.count[w] = last
+                    count -= 1
+                    if i < count:
+                        s.copy(w, count, i)
+            s.count[w] = count
             s.changed[w] = 0
+            s.events[w] = 1
             if ti.static(self.lists):
                 self.near.stale[w] = 1

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from tisim.errors import must
 from tisim.spec import Spec
 from tisim.steppers.controller import Controller
-from tisim.steppers.verlet import Verlet
+from tisim.steppers.stepper import Stepper
 
 Part = TypeVar("Part", bound=Spec)
 
@@ -31,13 +31,13 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
     return base.named(values.pop("kind"), f"{where}.kind")(**values)
 
 
-def stepper(data: Any) -> Verlet:
+def stepper(data: Any) -> Stepper:
     """The stepper of a scene, with its step control."""
     must(isinstance(data, Mapping), "stepper", "a table", data)
     values = dict(data)
     if "control" in values:
         values["control"] = from_dict(Controller, values["control"], "stepper.control")
-    return Verlet(**values)
+    return Stepper.named(values.pop("kind", "verlet"), "stepper.kind")(**values)
 
 
 def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import PairForce
 from tisim.program import PerParticle, Phase
-from tisim.state import State
+from tisim.state import NOT_FINITE, State
 
 SMALL = 48
 """Worlds of at most this many particles look at all pairs."""
@@ -150,6 +150,9 @@ class Bin(Phase):
         for i in range(count):
             low, high = ti.min(low, s.position[w, i]), ti.max(high, s.position[w, i])
             least = ti.min(least, s.radius[w, i])
+            # Not below infinity: also true of NaN, which belongs to no cell.
+            if not (ti.abs(s.position[w, i]).sum() + s.radius[w, i] < ti.math.inf):
+                s.fail(w, NOT_FINITE, i)
         if ti.static(n.joined):
             low = n.domain.origin(w)
             high = low + n.domain.side(w)

@@ -135,7 +135,7 @@ class Cloud(Start):
             raise InputError("domain must be bounded to hold a random cloud; received an open one")
         draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (self.number, 3))
         return {
-            "position": sequential_addition(self.number, self.radius, low, high, seed),
+            "position": sequential_addition(self.number, self.radius, low, high, seed, domain.periodic()),
             "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
             "radius": np.full(self.number, self.radius),
             "mass": self.masses(),

@@ -121,12 +121,13 @@ class Program:
     @ti.func
     def _step(self, w):
         for item in ti.static(self.items):
-            if ti.static(isinstance(item, Repeat)):
-                while item.pending(w) > 0:
-                    for phase in ti.static(item.phases):
-                        self._loop(phase, w)
-            else:
-                self._loop(item, w)
+            if self.s.status[w] == RUNNING:
+                if ti.static(isinstance(item, Repeat)):
+                    while item.pending(w) > 0:
+                        for phase in ti.static(item.phases):
+                            self._loop(phase, w)
+                else:
+                    self._loop(item, w)
 
     @ti.func
     def _loop(self, phase: ti.template(), w):  # type: ignore[valid-type]

@@ -17,6 +17,7 @@ from tisim.effect import Effect
 from tisim.errors import InputError, must
 from tisim.particles import Start
 from tisim.spec import Spec
+from tisim.steppers.stepper import Stepper
 from tisim.steppers.verlet import Verlet
 
 PHYSICS_VERSION = 1
@@ -41,7 +42,7 @@ class Scene(Spec):
     particles: Start
     effects: tuple[Effect, ...] = ()
     domain: Domain = Open()
-    stepper: Verlet = Verlet()
+    stepper: Stepper = Verlet()
     duration: float = Field(gt=0)
     seed: int = Field(0, ge=0, lt=2**63)
 
@@ -62,6 +63,7 @@ class Scene(Spec):
                     f"used together with effects.{needed.kind()}",
                     ", ".join(other.kind() for other in present),
                 )
+        self.capacity()
         return self
 
     def structure(self) -> tuple[Any, ...]:
@@ -88,7 +90,7 @@ class Scene(Spec):
             "seed": self.seed,
             "particles": kinds.to_dict(self.particles),
             "domain": kinds.to_dict(self.domain),
-            "stepper": {"control": kinds.to_dict(self.stepper.control)},
+            "stepper": {"kind": self.stepper.kind(), "control": kinds.to_dict(self.stepper.control)},
             "effects": {effect.kind(): kinds.to_dict(effect, named=False) for effect in self.effects},
         }
 

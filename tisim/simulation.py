@@ -21,7 +21,8 @@ from tisim.program import Phase, Program, Repeat
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fields
-from tisim.steppers.verlet import Advance, Clock, Finish, Kick, Move
+from tisim.steppers.stepper import Parts, Stepper
+from tisim.steppers.verlet import Finish
 from tisim.watch import Watch
 
 CHUNK_SECONDS = 0.25
@@ -54,7 +55,7 @@ class Simulation:
         self.table = Table(parts, worlds, self.runtime.real)
         *effects, domain, control = (self.table.bind(part) for part in parts)
         connect(effects)
-        self._compose(tuple(effects), domain, control)
+        self._compose(scene.stepper, tuple(effects), domain, control)
         self.s.status.fill(ENDED)
         self.program.compile()
         if self.first.items:
@@ -72,7 +73,7 @@ class Simulation:
         many = self.worlds >= self.runtime.threads
         return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
 
-    def _compose(self, effects: tuple[Effect, ...], domain: Any, control: Any) -> None:
+    def _compose(self, stepper: Stepper, effects: tuple[Effect, ...], domain: Any, control: Any) -> None:
         """The phases of a step, and those that prepare the first one."""
         s = self.s
         events = tuple(e for e in effects if isinstance(e, PairEvent))
@@ -88,19 +89,17 @@ class Simulation:
         self.near, self.contacts = near, contacts
 
         forced = bool(forces or pair_forces)
-        step: list[Phase | Repeat] = [
-            Clock(s, control, near),
-            Move(s, domain, operators, forced),
-            Advance(s, near),
-        ]
+        parts = Parts(s, control, domain, operators, near, forced)
+        step: list[Phase | Repeat] = [*stepper.before_forces(parts)]
         first: list[Phase | Repeat] = []
         listed = mutual.phases() if mutual else near.phases() if near else ()
         step += listed
         first += listed
         if forced:
             summed = SumForces(s, domain, forces, pair_forces, mutual)
-            step += [summed, Kick(s)]
+            step += [summed]
             first += [summed]
+        step += stepper.after_forces(parts)
         if near and contacts:
             survey = Survey(near, contacts, control)
             step += [survey]
@@ -108,7 +107,7 @@ class Simulation:
         if events and contacts:
             step += [Rounds(contacts)]
         if events or operators:
-            step += [Rearrange(s, operators, near)]
+            step += [Rearrange(s, domain, operators, near)]
         if near and contacts and events and control.watches_pairs:
             step += [*listed, SurveyAgain(near, contacts, control)]
         if forced and (events or operators):
@@ -172,6 +171,10 @@ class Simulation:
             must(
                 name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name
             )
+        for f in self.s.fields:
+            wanted = (len(start["mass"]),) + ((3,) if f.components == 3 else ())
+            shape = start[f.name].shape if f.name in start else wanted
+            must(shape == wanted, f"particles.{f.name}", f"of shape {wanted}", shape)
         cold = start.get("temperature", np.zeros(1)).min()
         must(cold >= 0, "particles.temperature", "at least 0 K", float(cold))
         missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - start.keys()

@@ -57,7 +57,7 @@ class Watch:
         """How a world whose status field holds ``code`` has ended, or that it runs."""
         if w in self.faults:
             when, why = self.faults[w]
-            return Status(False, f"at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
+            return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
         return Status(code == ENDED, REASONS[code])
 
     def _fault(self, w: int, reason: str) -> str:

@@ -26,26 +26,13 @@ import agglomeration_numba as peer
 import numba
 import numpy as np
 
-from cases.agglomeration import BEST, DURATION, cost, scene
+from cases.agglomeration import DURATION, cost, scene
+from cases.agglomeration_strings import designs
 from tisim import Result, Scene, Simulation, runtime
 from tisim.particles import Arrays
 
-TABLE = (
-    (0.92344 * 200, 0.79041, 0.66527e4, 0.26548e6, 0.89815 * 2e3, 0.13456,
-     0.50218e3, 0.35241e3, 0.17765e7, 0.83685e16),
-    (0.99307 * 200, 0.79510, 0.90509e4, 0.49048e6, 0.94075 * 2e3, 0.17535,
-     0.62494e3, 0.12457e3, 0.20836e7, 0.85267e16),
-    (0.96042 * 200, 0.79726, 0.66773e4, 0.39772e6, 0.34235 * 2e3, 0.11000,
-     0.21911e3, 0.19785e3, 0.19901e7, 0.93462e16),
-    (0.93911 * 200, 0.79280, 0.53228e4, 0.20459e6, 0.98942 * 2e3, 0.15624,
-     0.90323e3, 0.38558e3, 0.15209e7, 0.91321e16),
-    (0.84977 * 200, 0.79226, 0.91791e4, 0.15671e6, 0.96995 * 2e3, 0.10455,
-     0.36270e3, 0.32326e3, 0.20403e7, 0.80388e16),
-    (0.16761 * 200, 0.79362, 0.93962e4, 0.10877e6, 0.95669 * 2e3, 0.15099,
-     0.52338e3, 0.29311e3, 0.11186e7, 0.25457e16),
-)  # fmt: skip
-"""The designs, in the order of ``BEST``'s keys; Z04 tables 1 and 2, decoded."""
-DESIGNS = tuple(dict(zip(BEST, row, strict=True)) for row in TABLE)
+DESIGNS = designs()
+"""Z04 tables 1 and 2."""
 
 
 def parameters(design: dict[str, float], start: Arrays) -> dict[str, float]:

@@ -21,7 +21,7 @@ GRAINS = 80
 
 BASE = {
     "relative_velocity": 184.7, "length_ratio": 0.79, "density": 6652.7, "hardness": 2.655e5,
-    "heat_capacity": 1796.0, "friction": 0.13, "temperature": 502.0, "activation_energy": 352.0,
+    "heat_capacity": 1796.0, "friction": 0.013, "temperature": 502.0, "activation_energy": 352.0,
     "reaction": 1.7765e6, "surface_energy": 1e16,
 }  # fmt: skip
 DESIGNS: dict[str, dict[str, float]] = {
@@ -78,9 +78,10 @@ def main() -> int:
     parser.add_argument("--write", action="store_true", help="store this machine's values")
     parser.add_argument("--precision", default="f64")
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print the values and nothing else")
     options = parser.parse_args()
-    runtime.start(options.device, options.precision)
+    runtime.start(options.device, options.precision, options.threads)
     values = measure()
     if options.json:
         print(json.dumps(values))

@@ -49,13 +49,22 @@ def test_the_other_schedule_gives_the_same_fitness_to_the_last_bit(values):
     simulation.close()
 
 
-def test_single_precision_gives_the_same_fitness_in_the_mean():
-    """In a process of its own: precision belongs to the runtime."""
-    command = [sys.executable, fitness_record.__file__, "--precision", "f32", "--json"]
+def elsewhere(*options):
+    """The values from a process of its own: precision and threads belong to the runtime."""
+    command = [sys.executable, fitness_record.__file__, "--json", *options]
     root = Path(fitness_record.__file__).parents[2]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
-    deviations = fitness_record.deviations(json.loads(done.stdout.splitlines()[-1]), fitness_record.stored())
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_single_precision_gives_the_same_fitness_in_the_mean():
+    deviations = fitness_record.deviations(elsewhere("--precision", "f32"), fitness_record.stored())
     assert max(deviations.values()) < STANDARD_ERRORS
+
+
+def test_any_number_of_threads_gives_the_same_fitness_to_the_last_bit(values):
+    assert elsewhere("--threads", "1") == values
+    assert elsewhere("--threads", "3") == values
 
 
 def test_the_bound_would_notice_a_change_of_physics(values):

@@ -88,7 +88,7 @@ class Impact(PairEvent):
     hardness : H_0, Vickers hardness at high temperature, Pa.
     deformation_length : beta, deformation over the smaller radius (Z04 4.10).
     initial_area, final_area : a_0 and a_f, contact area over pi min(b)^2 at e = 1 and e = 0 (Z04 4.12).
-    tolerance : relative change of e at which the coupling to temperature has settled.
+    tolerance : change of e at which the coupling to temperature has settled.
 
     Source: Z04 Eqs (2.1)-(2.5), (3.1), (4.10), (4.12), (4.17), staggering scheme of section 6b.
     """
@@ -140,7 +140,11 @@ class Impact(PairEvent):
         """x = 1 - e from the force over 2 pi min(b)^2 (Pa): the quadratic above, in a form without loss."""
         a0, d = self.initial_area(w), self.final_area(w) - self.initial_area(w)
         p = pressure / hardness
-        return ti.min(1.0, 2.0 * p / (a0 + ti.sqrt(a0 * a0 + 4.0 * d * p)))
+        x = 0.0 * p
+        # Not so for a NaN, which must not bond, nor for what is too small to be seen.
+        if p > 0.0:
+            x = ti.min(1.0, 2.0 * p / (a0 + ti.sqrt(a0 * a0 + 4.0 * d * p)))
+        return x
 
     @ti.func
     def tangential(self, w, reduced, v_n, v_t, x):

@@ -11,8 +11,8 @@ from tisim.effects.impact import ImpactLaw
 
 GAS_CONSTANT = 8.31446261815324
 """J/(mol K), exact in SI."""
-LARGEST_EXPONENT = 80.0
-"""exp of it still fits f32; hardness is then 1e34 times H_0, and nothing bonds."""
+LARGEST_EXPONENT = 50.0
+"""Hardness is then 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a solid."""
 
 
 class Softening(ImpactLaw):

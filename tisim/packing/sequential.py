@@ -33,6 +33,7 @@ def _add(
     nx: ti.i32,
     ny: ti.i32,
     nz: ti.i32,
+    periodic: ti.i32,
 ) -> ti.i32:
     """Place the spheres; returns how many found room. ``cells[c, 0]`` counts the members that follow it."""
     placed = 0
@@ -56,6 +57,8 @@ def _add(
                 free = True
                 for dx, dy, dz in ti.static(ti.ndrange((-1, 2), (-1, 2), (-1, 2))):
                     c = cell + ti.Vector([dx, dy, dz])
+                    if periodic > 0:
+                        c = (c + dims) % dims
                     if c.min() >= 0 and (c < dims).all():
                         at = (c[0] * dims[1] + c[1]) * dims[2] + c[2]
                         for m in range(cells[at, 0]):
@@ -63,6 +66,8 @@ def _add(
                             gap = ti.Vector([
                                 x[0] - centres[j, 0], x[1] - centres[j, 1], x[2] - centres[j, 2]
                             ])  # fmt: skip
+                            if periodic > 0:
+                                gap -= side * ti.round(gap / side)
                             if gap.norm_sqr() < 4.0 * radius * radius:
                                 free = False
                 if free:
@@ -79,12 +84,13 @@ def _add(
 
 
 def sequential_addition(
-    count: int, radius: float, low: np.ndarray, high: np.ndarray, seed: int
+    count: int, radius: float, low: np.ndarray, high: np.ndarray, seed: int, periodic: bool = False
 ) -> np.ndarray:
     """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) that do not overlap.
 
-    Centres lie anywhere in the box ``low``..``high`` (m); spheres may reach over its faces. Depends on the
-    arguments alone, not on device or threads. InputError when the box has no room left.
+    Centres lie anywhere in the box ``low``..``high`` (m); spheres may reach over its faces, and where the box
+    is ``periodic`` they do not overlap across them either. Depends on the arguments alone, not on device or
+    threads. InputError when the box has no room left.
     """
     runtime.current()
     side = np.asarray(high, float) - np.asarray(low, float)
@@ -104,6 +110,7 @@ def sequential_addition(
         *np.asarray(low, float).tolist(),
         *side.tolist(),
         *dims.tolist(),
+        periodic,
     )
     if placed < count:
         fraction = count * 4 / 3 * np.pi * radius**3 / np.prod(side)

@@ -6,22 +6,22 @@ without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c
 
 from __future__ import annotations
 
-from typing import Any
-
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
-from tisim.spec import Spec
 from tisim.state import ENDED, NOT_FINITE
-from tisim.steppers.controller import ApproachTime, Controller
+from tisim.steppers.stepper import Parts, Stepper
 
 
-class Verlet(Spec):
+class Verlet(Stepper):
     """Explicit stepper with step control. Second order in dt for forces that depend on position only."""
 
-    control: Controller = ApproachTime()
+    def before_forces(self, parts: Parts) -> tuple[Phase, ...]:
+        s, near = parts.s, parts.near
+        move = Move(s, parts.domain, parts.operators, parts.forced)
+        return (Clock(s, parts.control, near), move, Advance(s, near))
 
-    def structure(self) -> tuple[Any, ...]:
-        return (type(self), *self.control.structure())
+    def after_forces(self, parts: Parts) -> tuple[Phase, ...]:
+        return (Kick(parts.s),) if parts.forced else ()
 
 
 class Clock(Phase):
@@ -64,8 +64,12 @@ class Move(PerParticle):
         dt = ti.cast(s.dt[w], s.real)
         if ti.static(self.forced):
             s.velocity[w, i] += 0.5 * dt / s.mass[w, i] * s.force[w, i]
-        v = s.velocity[w, i]
-        stride = ti.abs(ti.cast(v, ti.f64) - s.axes(s.frame, w)) * s.dt[w]
+        before = s.position[w, i]
+        s.position[w, i] = before + dt * s.velocity[w, i]
+        for operator in ti.static(self.operators):
+            operator.particle(s, w, i, dt)
+        # Operators may move particles too.
+        stride = ti.abs(ti.cast(s.position[w, i] - before, ti.f64) - s.axes(s.frame, w) * s.dt[w])
         # Not below infinity: also true of NaN.
         if not (stride.sum() < ti.math.inf):
             s.fail(w, NOT_FINITE, i)
@@ -73,9 +77,7 @@ class Move(PerParticle):
             for k in ti.static(range(3)):
                 if stride[k] > s.stride[w, k]:
                     ti.atomic_max(s.stride[w, k], stride[k])
-            s.position[w, i] = self.domain.wrap(w, s.position[w, i] + dt * v)
-            for operator in ti.static(self.operators):
-                operator.particle(s, w, i, dt)
+            s.position[w, i] = self.domain.wrap(w, s.position[w, i])
 
 
 class Kick(PerParticle):

@@ -1,0 +1,123 @@
+"""What the core promises operators: rules 6 and 10 of tisim/effect.py."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.scenes import scene
+from tisim import Box, Simulation, run
+from tisim._taichi import ti
+from tisim.effect import Operator, PairForce, parameter
+from tisim.effects.impact import Impact
+from tisim.operators.agglomeration import Agglomeration
+from tisim.state import Field
+
+
+class Census(Operator):
+    """Counts its calls; a world has no pair events to wait for."""
+
+    counts = ("censuses",)
+
+    @ti.func
+    def world(self, s, w):
+        s.censuses[w] += 1
+
+
+class Stepping(Operator):
+    """Moves particles by itself, as Brownian displacement does."""
+
+    needs = (Field("leap", "m", 3, "keep"),)
+
+    @ti.func
+    def particle(self, s, w, i, dt):
+        s.position[w, i] += s.leap[w, i]
+
+
+class Shell(PairForce):
+    """Repulsion of near neighbours, over the list or over all pairs."""
+
+    short_ranged = True
+    width: float = parameter("m", gt=0)
+
+    @ti.func
+    def reach(self, w):
+        return self.width(w)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        depth = self.width(w) - (distance - s.radius[w, i] - s.radius[w, j])
+        return -ti.max(depth, 0.0) / distance * separation
+
+
+class ShellOfAll(Shell):
+    short_ranged = False
+
+
+class Poison(Operator):
+    """Makes one component of one particle NaN after some steps."""
+
+    axis: int = 0
+
+    @ti.func
+    def particle(self, s, w, i, dt):
+        if s.steps[w] == 20 and i == 7:
+            s.position[w, i][self.axis] = ti.sqrt(-s.mass[w, i])
+
+
+def test_an_operator_sees_every_world_once_a_step():
+    result = run(scene([[0, 0, 0]], [[0, 0, 0]], (Census(),), dt=0.1, steps=10))
+    assert result.work["censuses"] == 10
+
+
+@pytest.mark.parametrize("kind", [Shell, ShellOfAll])
+def test_lists_follow_particles_that_operators_move(kind):
+    """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
+    grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    position = np.concatenate([[[-2.0, 2.0, 2.5]], grid])
+    leap = np.zeros_like(position)
+    leap[0, 0] = 0.05
+    wanted = scene(
+        position, np.zeros_like(position), (kind(width=0.3), Stepping()), radius=0.2, mass=1.0, dt=1e-3,
+        steps=160, quantities={"leap": leap},
+    )  # fmt: skip
+    velocity = np.zeros_like(position)
+    for _ in range(160):
+        position = position + 1e-3 * velocity + leap
+        d = position[None] - position[:, None]
+        distance = np.linalg.norm(d, axis=2) + np.eye(126)
+        push = -np.maximum(0.3 - (distance - 0.4), 0.0) * (1 - np.eye(126)) / distance
+        velocity = velocity + 1e-3 * (push[..., None] * d).sum(axis=1)
+    # The twin kicks once a step, the engine half before and half after: equal to first order in dt.
+    np.testing.assert_allclose(run(wanted).state["velocity"], velocity, rtol=0, atol=0.02 * velocity.max())
+    assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
+
+
+@pytest.mark.parametrize("schedule", ["world", "particle"])
+@pytest.mark.parametrize(("axis", "images"), [(0, True), (2, False)])
+def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
+    """More particles than look at all pairs; the bad one belongs to no cell."""
+    wanted = scene(
+        rng.uniform(0, 1, (300, 3)), rng.normal(size=(300, 3)), (Shell(width=0.05), Poison(axis=axis)),
+        radius=0.01, dt=1e-4, steps=40, domain=Box(low=(0, 0, 0), high=(1, 1, 1), images=images),
+    )  # fmt: skip
+    simulation = Simulation(wanted, schedule=schedule)
+    simulation.load([wanted])
+    simulation.run()
+    (result,) = simulation.results()
+    simulation.close()
+    assert not result.status.ok
+    assert "not finite" in result.status.reason
+    assert all(np.isfinite(values).all() for values in result.state.values())
+
+
+def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
+    """Two grains bond in the last step, one just outside the other's side of the box."""
+    wanted = scene(
+        [[0.9993, 0.5, 0.5], [0.0011, 0.5, 0.5]], [[10.0, 0, 0], [-10.0, 0, 0]],
+        (Impact(hardness=1.0), Agglomeration()), radius=1e-3, dt=1e-6, steps=1,
+        domain=Box(low=(0, 0, 0), high=(1, 1, 1)),
+    )  # fmt: skip
+    state = run(wanted).state
+    assert len(state["mass"]) == 1
+    assert ((state["position"] >= 0) & (state["position"] < 1)).all()
