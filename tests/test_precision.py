@@ -1,5 +1,9 @@
 """Single precision: the same scenes as in test_schedules, in a process of their own."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -40,3 +44,31 @@ def test_single_and_double_precision_agree_on_how_much_merges(elsewhere):
     for w in range(len(WORLDS)):
         single, double = (len(world(elsewhere, p, w)[0]["mass"]) for p in ("single precision", "one thread"))
         assert abs(single - double) <= 3 * np.sqrt(double)
+
+
+COLD = """
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import tisim
+from tests.scenes import head_on
+from tisim import runtime
+from tisim.effects.heating import Heating
+from tisim.effects.impact import Impact
+from tisim.effects.softening import Softening
+
+runtime.start(precision="f32")
+for hardness, activation, temperature in ((1e5, 2e5, 300.0), (1e6, 1e3, 0.0), (1e9, 1e3, 1e-3)):
+    effects = (Impact(hardness=hardness), Heating(heat_capacity=1e9), Softening(activation_energy=activation))
+    result = tisim.run(head_on(0.01, effects, quantities={"temperature": temperature}))
+    print(result.status.ok, result.work["impacts"], result.work["bonds"], result.work["unsettled"])
+"""
+
+
+def test_grains_too_hard_for_single_precision_rebound():
+    """exp(Q / (R T)) is capped where hardness still fits f32: nothing turns into a NaN that bonds."""
+    root = Path(__file__).parents[1]
+    done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True, check=True, cwd=root)
+    assert done.stdout.splitlines()[-3:] == ["True 1 0 0"] * 3

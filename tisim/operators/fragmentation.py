@@ -10,7 +10,6 @@ from tisim._taichi import ti
 from tisim.effect import Operator, parameter
 from tisim.effects.heating import Heating
 from tisim.effects.impact import Impact, ImpactLaw
-from tisim.errors import must
 from tisim.state import FULL, Field
 
 
@@ -42,9 +41,6 @@ class Fragmentation(ImpactLaw, Operator):
     threshold: float = parameter("", 2.0 ** (-1.0 / 3.0), gt=0, lt=1)
 
     def capacity(self, masses: np.ndarray) -> int:
-        lightest = float(masses.min())
-        rule = f"at most the mass of the lightest particle, {lightest:.6g} kg"
-        must(self.grain_mass <= lightest * (1 + 1e-6), "fragmentation.grain_mass", rule, self.grain_mass)
         return max(len(masses), int(masses.sum() / self.grain_mass * (1 + 1e-9)))
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:

@@ -1,0 +1,61 @@
+"""A run killed at any moment goes on from its last checkpoint, in another process, to the same bits."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+COMMAND = [
+    sys.executable, "-c", "from tisim.cli import main; main()", "run", "agglomeration", "--size", "paper",
+    "--set", "effects.impact.hardness=1e7", "--set", "duration=3e-3", "--seed", "4", "--out",
+]  # fmt: skip
+ROOT = Path(__file__).parents[1]
+
+
+def begin(folder, *more):
+    """Start a run that saves a checkpoint as often as it can."""
+    environment = {**os.environ, "TISIM_CHECKPOINT_SECONDS": "0", "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [*COMMAND, str(folder), *more],
+        env=environment,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def end_of(folder):
+    with h5py.File(folder / "result.h5") as file:
+        return {name: np.asarray(values) for name, values in file["end"].items()}, dict(file["work"].attrs)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole") / "run"
+    assert begin(folder).wait() == 0
+    return end_of(folder)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.15])
+def test_sigkill_and_resume_end_as_if_never_stopped(whole, tmp_path, delay):
+    folder = tmp_path / "cut"
+    running = begin(folder)
+    while not (folder / "checkpoint.h5").exists():
+        assert running.poll() is None
+        time.sleep(0.002)
+    time.sleep(delay)
+    running.kill()
+    running.wait()
+    assert not (folder / "result.h5").exists()
+    assert begin(folder, "--resume").wait() == 0
+    state, work = end_of(folder)
+    assert work == whole[1]
+    for name, values in whole[0].items():
+        np.testing.assert_array_equal(state[name], values)
