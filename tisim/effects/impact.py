@@ -166,11 +166,16 @@ class Impact(PairEvent):
     @ti.func
     def supplied(self, w, reduced, v_n, smaller, x):
         """Energy that the impact laws give each grain, J."""
-        e = 1.0 - x
         energy = 0.0 * x
         for law in ti.static(self.supply):
-            energy += law.supply(w, self.area(w, smaller, x), reduced * v_n * v_n * (1.0 - e * e) / 3.0)
+            energy += law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
         return energy
+
+    @ti.func
+    def work(self, reduced, v_n, x):
+        """Work of deformation (Z04 4.7-4.9; see heating.py), J."""
+        e = 1.0 - x
+        return reduced * v_n * v_n * (1.0 - e * e) / 3.0
 
     @ti.func
     def area(self, w, smaller, x):
@@ -223,13 +228,12 @@ class Impact(PairEvent):
 
         lost = self.lost(w, reduced, v_n, v_t, x)
         lost_i, lost_j = lost * m_j / (m_i + m_j), lost * m_i / (m_i + m_j)
-        e = 1.0 - x
         energy = self.supplied(w, reduced, v_n, smaller, x)
         for law in ti.static(self.temperature):
             s.temperature[w, i] = law.temperature(s, w, i, energy + lost_i)
             s.temperature[w, j] = law.temperature(s, w, j, energy + lost_j)
         for law in ti.static(self.supply):
-            given = law.supply(w, self.area(w, smaller, x), reduced * v_n * v_n * (1.0 - e * e) / 3.0)
+            given = law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
             law.book(s, w, i, given)
             law.book(s, w, j, given)
         broken = 0
