@@ -119,7 +119,7 @@ class Cloud(Start):
     component (Z04 section 7). The same seed gives the same lambdas whatever the other parameters.
     """
 
-    number: int = Field(gt=0)
+    number: int = Field(gt=0, le=10**8)
     radius: float = parameter("m", gt=0)
     density: float = parameter("kg/m^3", gt=0)
     mean_velocity: Vector = parameter("m/s", (0.0, 0.0, 0.0))

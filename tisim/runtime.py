@@ -56,6 +56,11 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def memory() -> int:
+    """Memory of this machine, bytes."""
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
 def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
     """Start Taichi with these settings, or keep it as it is when they have not changed.
 

@@ -45,6 +45,10 @@ class Simulation:
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
         capacity = capacity or scene.capacity()
+        # Fields and lists of a particle come to some hundred bytes; refused here, not in the compiler.
+        needed, there = 300 * worlds * capacity, runtime.memory()
+        rule = f"within the {there / 1e9:.0f} GB of this machine"
+        must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
         self.schedule = schedule or self._choose(capacity)
         must(self.schedule in ("world", "particle"), "schedule", "world or particle", schedule)
         forces = any(isinstance(e, Force | PairForce) for e in scene.effects)

@@ -228,3 +228,10 @@ def test_a_start_that_does_not_fit_is_refused():
     with pytest.raises(InputError, match=r"worlds must be at least 1; received 0"):
         Simulation(fits, worlds=0)
     simulation.close()
+
+
+def test_more_than_the_machine_holds_is_refused_before_anything_runs():
+    """A smallest piece of next to nothing asks for slots without end."""
+    made = flow(seed=1, grains=20).replace({"effects.fragmentation.grain_mass": 1e-20})
+    with pytest.raises(InputError, match=r"memory for 1 x \d+ particles must be within the \d+ GB"):
+        Simulation(made)
