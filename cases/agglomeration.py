@@ -77,7 +77,7 @@ SIZES = {
         {"generations": 8, "ensemble": {"tolerance": 1e-3, "min_starts": 8, "block": 8, "confirm": 24}},
     ),
     "paper": Size(
-        "1000 grains, 25 generations of 20, as Z04 section 8; about 15 minutes on 2 cores",
+        "1000 grains, 25 generations of 20, as Z04 section 8; under 10 minutes on 2 cores",
         {"grains": 1000},
         {"generations": 25, "ensemble": {"tolerance": 5e-4, "min_starts": 12, "block": 12, "confirm": 48}},
     ),

@@ -12,6 +12,8 @@ from tisim.effect import Operator, PairForce, parameter
 from tisim.effects.impact import Impact
 from tisim.operators.agglomeration import Agglomeration
 from tisim.state import Field
+from tisim.steppers.controller import ApproachTime
+from tisim.steppers.verlet import Verlet
 
 
 class Census(Operator):
@@ -121,3 +123,26 @@ def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
     state = run(wanted).state
     assert len(state["mass"]) == 1
     assert ((state["position"] >= 0) & (state["position"] < 1)).all()
+
+
+class Leave(Operator):
+    """Removes the last particle in the first step."""
+
+    @ti.func
+    def particle(self, s, w, i, dt):
+        if s.id[w, i] == 2 and s.steps[w] == 1:
+            s.remove(w, i)
+
+
+def test_step_control_sees_the_pairs_that_a_removal_leaves():
+    """Gap 0.8 m at 1 m/s: 0.5 s, the longest step, and then the 0.3 s that are left until surfaces meet."""
+    wanted = scene(
+        [[0, 0, 0], [1, 0, 0], [0, 9, 0]], [[1, 0, 0], [0, 0, 0], [0, 0, 0]], (Leave(),),
+        radius=0.1, dt=1, steps=2,
+    ).model_copy(update={"stepper": Verlet(control=ApproachTime(longest=0.5))})  # fmt: skip
+    simulation = Simulation(wanted)
+    simulation.load([wanted])
+    simulation.run(steps=2)
+    (result,) = simulation.results()
+    assert len(result.state["mass"]) == 2
+    assert result.time == pytest.approx(0.8, rel=1e-5)

@@ -112,7 +112,7 @@ class Simulation:
             step += [Rounds(contacts)]
         if events or operators:
             step += [Rearrange(s, domain, operators, near)]
-        if near and contacts and events and control.watches_pairs:
+        if near and contacts and (events or operators) and control.watches_pairs:
             step += [*listed, SurveyAgain(near, contacts, control)]
         if forced and (events or operators):
             step += [*listed, SumForcesAgain(s, domain, forces, pair_forces, mutual)]
