@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from tests.scenes import by_id, fixed, scene, simulate
-from tisim import Box, Scene, Simulation, noise
+from tisim import Scene, Simulation, noise
 from tisim._taichi import ti
 from tisim.effect import Force, Operator, PairForce, parameter
 from tisim.effects.impact import Impact
@@ -279,61 +279,3 @@ def test_a_scene_finds_them_by_name():
     assert again.digest() == made.digest()
     assert [type(e) for e in again.effects] == [Coulomb, Trap]
     assert again.stepper == fixed(1e-9)
-
-
-class SoftShell(PairForce):
-    """Linear repulsion within a gap: what a contact law needs of the core. Listed pairs only."""
-
-    short_ranged = True
-    stiffness: float = parameter("N/m", gt=0)
-    width: float = parameter("m", gt=0)
-
-    @ti.func
-    def reach(self, w):
-        return self.width(w)
-
-    @ti.func
-    def pair_force(self, s, w, i, j, separation, distance, t):
-        depth = self.width(w) - (distance - s.radius[w, i] - s.radius[w, j])
-        return -self.stiffness(w) * ti.max(depth, 0.0) / distance * separation
-
-
-class SoftShellOfAll(SoftShell):
-    """The same, summed over all pairs."""
-
-    short_ranged = False
-
-
-def shells(kind, rng, images):
-    """Polydisperse grains in a box, one of them with more neighbours than a list holds."""
-    radius = np.concatenate([[0.2], rng.uniform(0.005, 0.05, 299)])
-    return scene(
-        rng.uniform(0.0, 1.0, (300, 3)),
-        rng.normal(size=(300, 3)),
-        (kind(stiffness=500.0, width=0.04),),
-        radius=radius,
-        dt=1e-3,
-        steps=60,
-        domain=Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), images=images),
-    )
-
-
-@pytest.mark.parametrize("images", [True, False])
-@pytest.mark.parametrize("schedule", ["world", "particle"])
-def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, schedule):
-    """Through many lists made anew: same trajectories to rounding, and momentum conserved to rounding."""
-    results = []
-    for kind in (SoftShell, SoftShellOfAll):
-        wanted = shells(kind, np.random.default_rng(3), images)
-        simulation = Simulation(wanted, schedule=schedule)
-        simulation.load([wanted])
-        simulation.run()
-        results += simulation.results()
-        simulation.close()
-    listed, everyone = results
-    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-9)
-    for result in results:
-        assert np.abs(result.state["velocity"] - result.start["velocity"]).max() > 0.1
-        before = (result.start["mass"][:, None] * result.start["velocity"]).sum(axis=0)
-        after = (result.state["mass"][:, None] * result.state["velocity"]).sum(axis=0)
-        np.testing.assert_allclose(after, before, rtol=0, atol=1e-12 * result.state["mass"].sum())

@@ -27,7 +27,7 @@ FORMAT = "tisim checkpoint 1"
 def _columns(simulation: Simulation) -> tuple[str, ...]:
     """All of the state that decides how a simulation goes on."""
     s = simulation.s
-    return (*(field.name for field in s.fields), *CLOCK, *BOOKS, *s.counters, "frame", "seed")
+    return (*(field.name for field in s.fields), *CLOCK, *BOOKS, *s.counters, *s.keeps, "frame", "seed")
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:
@@ -79,8 +79,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
         raise InputError(f"checkpoint must be a whole file; received {str(path)!r} ({error})") from None
     for name, values in columns.items():
         simulation.s.write(name, values)
-    if simulation.near is not None:
-        simulation.near.stale.fill(1)
+    simulation.forget_lists()
     simulation.wall_s = wall_s
     simulation.watch = Watch(simulation.s, simulation.scenes)
 

@@ -6,30 +6,47 @@ Rules
    Every other option (bool, int, text) is compiled in, and the same for all worlds of a batch.
 3. ``needs`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
    A field that no other effect has ever needed is declared by putting a ``Field`` there.
-4. ``counts`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``.
-5. A ``Force`` is a pure function of the trial state; it writes nothing. Forces are summed in scene order.
-6. An ``Operator`` changes the state between steps: ``particle`` for each particle on its own (it may write
+4. ``counts`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
+   ``keeps`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start.
+5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
+   are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them by
+   the driver, and changed by ``remember`` only, once a step.
+6. A ``Source`` is an external field of place and time; whoever feels it finds it with ``sources``.
+7. A ``Mutual`` quantity of a particle depends on that of all others, such as an induced dipole; the driver
+   settles it before forces are summed.
+8. An ``Operator`` changes the state between steps: ``particle`` for each particle on its own (it may write
    only that particle), then ``world`` once per world, serially (it may add particles and remove them).
-7. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
+9. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
    exclusive access to both, earliest first (see events.py); it may remove either.
-8. ``connect`` returns what an effect wants to know of the other bound effects; ``requires`` names the
-   effects without which it means nothing. The driver never asks what an effect is called.
-9. ``capacity`` says how many particles may ever live at once, given the start.
-10. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; indices move only
+10. ``connect`` returns what an effect wants to know of the other bound effects; ``requires`` names the
+    effects without which it means nothing. The driver never asks what an effect is called.
+11. ``capacity`` says how many particles may ever live at once, given the start.
+12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; indices move only
     between steps. Nothing may depend on the order of parallel work: no float atomics.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import Field as Option
 
 from tisim._taichi import ti
 from tisim.spec import Spec, parameter
 from tisim.state import Field
 
-__all__ = ["Effect", "Force", "Operator", "PairEvent", "PairForce", "parameter"]
+__all__ = [
+    "Effect",
+    "Force",
+    "Mutual",
+    "Operator",
+    "PairEvent",
+    "PairForce",
+    "Source",
+    "parameter",
+    "sources",
+]
 
 
 class Effect(Spec):
@@ -37,10 +54,20 @@ class Effect(Spec):
 
     needs: ClassVar[tuple[str | Field, ...]] = ()
     counts: ClassVar[tuple[str, ...]] = ()
+    keeps: ClassVar[tuple[str, ...]] = ()
 
     def capacity(self, masses: np.ndarray) -> int:
         """Particles that may ever live at once, given those of the start (kg); their number by default."""
         return len(masses)
+
+    @classmethod
+    def offers(cls, hook: str) -> bool:
+        """Whether it defines a method that its contract leaves empty."""
+        return getattr(cls, hook) is not getattr(cls._promise(hook), hook)
+
+    @classmethod
+    def _promise(cls, hook: str) -> type:
+        return next(base for base in reversed(cls.__mro__) if hasattr(base, hook))
 
 
 class Force(Effect):
@@ -53,11 +80,16 @@ class Force(Effect):
         """Force on particle i of world w at time t. N."""
         return 0.0 * s.velocity[w, i]
 
+    @ti.func
+    def torque(self, s, w, i, t):
+        """Torque on particle i about its centre. N m."""
+        return 0.0 * s.velocity[w, i]
 
-class PairForce(Effect):
-    """A force between two particles, along any direction; ``pair_force(i, j) = -pair_force(j, i)``.
 
-    A ``short_ranged`` force is zero where the gap between surfaces is wider than ``reach``, and is summed
+class Pairwise(Effect):
+    """What is summed over pairs.
+
+    A ``short_ranged`` one is zero where the gap between surfaces is wider than ``reach``, and is summed
     over the pair list; any other is summed over all pairs.
     """
 
@@ -66,13 +98,93 @@ class PairForce(Effect):
 
     @ti.func
     def reach(self, w):
-        """Widest gap (m) at which a short-ranged force acts."""
+        """Widest gap (m) at which it acts, when short-ranged."""
         return 0.0
+
+
+class PairForce(Pairwise):
+    """A force between two particles, along any direction; ``pair_force(i, j) = -pair_force(j, i)``.
+
+    memory : values that a pair remembers while it touches, for short-ranged forces; a bound effect reads
+        them with ``self.past.recall(s, w, i, j)``, a vector, and zero for a pair that has just met.
+        One of the two keeps it: ``self.past.sign(s, w, i, j)`` is 1 when that is i, and -1 when it is j.
+    """
+
+    contract: ClassVar[bool] = True
+    memory: ClassVar[int] = 0
+    past: ClassVar[Any] = None
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
         """Force on i by j; ``separation`` is r_j - r_i (m), ``distance`` its length. N."""
         return 0.0 * separation
+
+    @ti.func
+    def pair_torque(self, s, w, i, j, separation, distance, t):
+        """Torque on i, about its centre, by j. N m."""
+        return 0.0 * separation
+
+    @ti.func
+    def touching(self, s, w, i, j, separation, distance):
+        """Whether the pair has something to remember; what it knows is forgotten when it has not."""
+        return distance <= s.radius[w, i] + s.radius[w, j]
+
+    @ti.func
+    def remember(self, s, w, i, j, separation, distance, past, dt):
+        """What the pair knows after a further dt (s), given ``past``; i is the one who keeps it."""
+        return past
+
+
+class Mutual(Pairwise):
+    """A quantity of each particle that depends on that of the others: q_i = response(sum_j influence(q_j)).
+
+    Settled by sweeps over all particles at once (the method of Jacobi), each starting from the last values,
+    also those of the last step, until no particle changes by more than ``tolerance`` times the largest
+    value. A world in which ``sweeps`` do not suffice fails, and says so; with ``sweeps`` of 0 there is one
+    sweep per step and no such test. Mind that sweeps need not converge: that takes weak coupling.
+    """
+
+    contract: ClassVar[bool] = True
+    quantity: ClassVar[str]
+    counts = ("mutual_sweeps",)
+
+    tolerance: float = parameter("", 1e-8, gt=0)
+    sweeps: int = Option(100, ge=0)
+
+    @ti.func
+    def influence(self, s, w, i, j, separation, distance, t):
+        """What j, with its present value, does at i."""
+        return 0.0 * separation
+
+    @ti.func
+    def response(self, s, w, i, total, t):
+        """The value of i, given the sum of influences on it."""
+        return total
+
+
+class Source(Effect):
+    """An external field of place and time, such as that of a magnet or a flow.
+
+    quantity : its standard name: "magnetic_flux_density" (T), "electric_field" (V/m), "flow_velocity" (m/s).
+    """
+
+    contract: ClassVar[bool] = True
+    quantity: ClassVar[str]
+
+    @ti.func
+    def value(self, w, r, t):
+        """The field at r (m) and time t (s)."""
+        return 0.0 * r
+
+    @ti.func
+    def gradient(self, w, r, t):
+        """Its gradient, [a, b] the derivative of component a along axis b; per metre."""
+        return r.outer_product(0.0 * r)
+
+
+def sources(peers: tuple[Any, ...], quantity: str) -> tuple[Any, ...]:
+    """The sources of a quantity among the bound effects of a scene, for ``connect``."""
+    return tuple(peer for peer in peers if isinstance(peer, Source) and peer.quantity == quantity)
 
 
 class Operator(Effect):

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from tisim._taichi import ti
 from tisim.domain import Domain
-from tisim.effect import Operator, PairEvent
+from tisim.effect import PairEvent
 from tisim.neighbours import Neighbours
 from tisim.program import PerParticle, Phase, Repeat
 from tisim.state import CROWDED, State
@@ -190,7 +190,7 @@ class Rearrange(Phase):
 
     def __init__(self, s: State, domain: Domain, operators: tuple, near: Neighbours | None) -> None:
         self.s, self.domain, self.near, self.lists = s, domain, near, near is not None
-        self.operators = tuple(o for o in operators if type(o).world is not Operator.world)
+        self.operators = tuple(o for o in operators if o.offers("world"))
 
     @ti.func
     def run(self, w, _k):

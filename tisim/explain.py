@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tisim import effects, kinds, operators
+from tisim.composition import needed_fields
 from tisim.effect import Effect
 from tisim.scene import Scene
 from tisim.simulation import Simulation
@@ -88,7 +89,7 @@ def explain(scene: Scene) -> Explanation:
         schedule=schedule,
         precision=precision,
         effects=tuple(_part(effect) for effect in scene.effects),
-        others=(_part(scene.domain), _part(scene.stepper.control)),
+        others=(_part(scene.domain), _part(scene.stepper), _part(scene.stepper.control)),
         memory=memory,
         phases=phases,
         absent_effects=tuple(Part(kind.kind(), _summary(kind), _source(kind), ()) for kind in absent),
@@ -105,20 +106,17 @@ def known_effects() -> list[type[Effect]]:
 
 
 def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
-    needed: dict[str, list[str]] = {}
+    users = {
+        need if isinstance(need, str) else need.name: why
+        for need, why in needed_fields(scene.effects, scene.stepper).items()
+    }
     core = {field.name for field in CORE}
-    for effect in scene.effects:
-        for name in _needs(type(effect)):
-            needed.setdefault(name, []).append(effect.kind())
     for name, size in simulation.s.bytes().items():
-        why = "every scene" if name in core else ", ".join(needed.get(name, ("forces",)))
-        yield Memory(name, size, why)
+        yield Memory(name, size, "every scene" if name in core else users[name])
     real = 8 if simulation.runtime.precision == "f64" else 4
     yield Memory("parameter table", simulation.worlds * simulation.table.slots * real, "effects' parameters")
-    if simulation.near is not None:
-        yield Memory("pair list", simulation.near.bytes(), "impacts, step control")
-    if simulation.contacts is not None:
-        yield Memory("contact list", simulation.contacts.bytes(), "impacts")
+    for part, name, why in simulation.made.memory:
+        yield Memory(name, part.bytes(), why)
 
 
 def _needs(kind: type[Effect]) -> list[str]:

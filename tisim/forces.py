@@ -1,17 +1,36 @@
-"""The loops that sum a scene's forces; they know no physics."""
+"""Force and torque on every particle."""
 
 from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import Force, PairForce
-from tisim.mutual import Mutual
-from tisim.program import PerParticle
+from tisim.halves import Halves
+from tisim.pairs import PairSum
 from tisim.state import Field, State
 
 FORCE = Field("force", "N", 3, "sum")
+TORQUE = Field("torque", "N m", 3, "sum")
 
 
-class SumForces(PerParticle):
-    """force[w, i] = sum of the scene's forces on i: single, all pairs, near pairs; each in a fixed order."""
+def turning(forces: tuple[Force, ...], pair_forces: tuple[PairForce, ...]) -> bool:
+    """Whether any of these exerts torques."""
+    return any(e.offers("torque") for e in forces) or any(e.offers("pair_torque") for e in pair_forces)
+
+
+@ti.func
+def _both(force, torque):
+    return ti.Vector([force[0], force[1], force[2], torque[0], torque[1], torque[2]])
+
+
+@ti.func
+def _force(force, torque):
+    return force
+
+
+class SumForces(PairSum):
+    """force[w, i] = sum of the scene's forces on i: single, all pairs, near pairs; each in a fixed order.
+
+    Where an effect of the scene exerts torques these are summed along with it: one vector of six.
+    """
 
     def __init__(
         self,
@@ -19,57 +38,53 @@ class SumForces(PerParticle):
         domain: Domain,
         forces: tuple[Force, ...],
         pair_forces: tuple[PairForce, ...],
-        mutual: Mutual | None,
+        halves: Halves | None,
     ) -> None:
-        super().__init__(s)
-        self.domain, self.forces, self.pair_forces = domain, forces, pair_forces
-        self.long_ranged = tuple(f for f in pair_forces if not f.short_ranged)
-        self.short_ranged = tuple(f for f in pair_forces if f.short_ranged)
-        self.mutual = mutual
+        super().__init__(s, domain, pair_forces, halves)
+        self.forces, self.pair_forces = forces, pair_forces
+        self.turning = turning(forces, pair_forces)
+        self.wrench = _both if self.turning else _force
 
     @ti.func
     def run(self, w, i):
         s = self.s
         t = s.time[w]
-        total = 0.0 * s.velocity[w, i]
+        total = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         for effect in ti.static(self.forces):
-            total += effect.force(s, w, i, t)
-        if ti.static(len(self.long_ranged) > 0):
-            for j in range(s.count[w]):
-                total += self.pair(self.long_ranged, w, i, j, t)
-        if ti.static(len(self.short_ranged) > 0):
-            near = self.mutual.near
-            for k in range(near.size(w, i)):
-                total += self.pair(self.short_ranged, w, i, near.candidate(w, i, k), t)
-            for k in range(self.mutual.size(w, i)):
-                total += self.pair(self.short_ranged, w, i, self.mutual.candidate(w, i, k), t)
-        s.force[w, i] = total
+            total += self.single(effect, w, i, t)
+        total = self.summed(total, w, i, t)
+        for k in ti.static(range(3)):
+            s.force[w, i][k] = total[k]
+            if ti.static(self.turning):
+                s.torque[w, i][k] = total[3 + k]
         # Not below infinity: also true of NaN.
         if not (total.norm_sqr() < ti.math.inf):
             self.find_fault(w, i)
 
     @ti.func
-    def pair(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
-        """Sum of the pair forces of ``effects`` on i by j; none of itself."""
+    def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
+        return self.wrench(effect.force(self.s, w, i, t), effect.torque(self.s, w, i, t))
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
         s = self.s
-        total = 0.0 * s.velocity[w, i]
-        if i != j:
-            d = self.domain.separation(w, s.position[w, i], s.position[w, j])
-            distance = d.norm()
-            for effect in ti.static(effects):
-                total += effect.pair_force(s, w, i, j, d, distance, t)
-        return total
+        return self.wrench(
+            effect.pair_force(s, w, i, j, separation, distance, t),
+            effect.pair_torque(s, w, i, j, separation, distance, t),
+        )
 
     @ti.func
     def find_fault(self, w, i):
         """Say which force it was."""
         s = self.s
+        t = s.time[w]
+        nothing = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         for effect in ti.static(self.forces):
-            if not (effect.force(s, w, i, s.time[w]).norm_sqr() < ti.math.inf):
+            if not (self.single(effect, w, i, t).norm_sqr() < ti.math.inf):
                 s.fault(w, i, effect.index)
         for effect in ti.static(self.pair_forces):
             for j in range(s.count[w]):
-                if not (self.pair((effect,), w, i, j, s.time[w]).norm_sqr() < ti.math.inf):
+                if not (self.of((effect,), nothing, w, i, j, t).norm_sqr() < ti.math.inf):
                     s.fault(w, i, effect.index)
 
 

@@ -11,8 +11,6 @@ from typing import Any, TypeVar
 
 from tisim.errors import must
 from tisim.spec import Spec
-from tisim.steppers.controller import Controller
-from tisim.steppers.stepper import Stepper
 
 Part = TypeVar("Part", bound=Spec)
 
@@ -28,21 +26,20 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
     must(isinstance(data, Mapping), where, "a table", data)
     values = dict(data)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
-    return base.named(values.pop("kind"), f"{where}.kind")(**values)
-
-
-def stepper(data: Any) -> Stepper:
-    """The stepper of a scene, with its step control."""
-    must(isinstance(data, Mapping), "stepper", "a table", data)
-    values = dict(data)
-    if "control" in values:
-        values["control"] = from_dict(Controller, values["control"], "stepper.control")
-    return Stepper.named(values.pop("kind", "verlet"), "stepper.kind")(**values)
+    kind = base.named(values.pop("kind"), f"{where}.kind")
+    for name, info in kind.model_fields.items():
+        inner = info.annotation
+        if name in values and isinstance(inner, type) and issubclass(inner, Spec):
+            values[name] = from_dict(inner, values[name], f"{where}.{name}")
+    return kind(**values)
 
 
 def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:
-    """Kind and parameters of a part, those left at None not among them."""
+    """Kind and parameters of a part and of those that it is made of, without what is left at None."""
     values = {key: value for key, value in part.model_dump(mode="json").items() if value is not None}
+    for key in values:
+        if isinstance(inner := getattr(part, key), Spec):
+            values[key] = to_dict(inner)
     return {"kind": part.kind(), **values} if named else values
 
 

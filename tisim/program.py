@@ -1,8 +1,8 @@
 """A step as a list of loops, and the two ways to run it.
 
 A ``Phase`` is one loop over the items of a world (its particles, its contacts, or the world itself) whose
-items are independent of each other. A ``Program`` is the list of phases that make one step. The same
-phases run on two schedules, with the same bits:
+items are independent of each other. A ``Program`` is the list of phases that make one step, some of them in
+a ``Repeat``. The same phases run on two schedules, with the same bits:
 
 "world"    - a thread takes a world through many steps in one launch. No launches and no barriers between
              phases, and a world stays in cache: the way for batches and small systems on a CPU.
@@ -13,6 +13,7 @@ That the bits agree needs no luck: phases only combine through sums in a fixed o
 floating-point minima and maxima, none of which depend on the order of parallel work.
 """
 
+from collections.abc import Iterator
 from typing import ClassVar
 
 from tisim._taichi import ti
@@ -55,22 +56,49 @@ class PerParticle(Phase):
 
 
 class Repeat:
-    """Phases to be run again while ``pending(w)`` is above zero."""
+    """Items, in order, again and again while ``pending(w)`` is above zero.
 
-    def __init__(self, phases: tuple[Phase, ...]) -> None:
-        self.phases = phases
+    Items are phases, and further repeats. Only the last phase may change what ``pending`` says.
+    """
+
+    def __init__(self, items: "tuple[Item, ...]") -> None:
+        self.items = items
 
     @ti.func
     def pending(self, w):
         return 0
 
 
+Item = Phase | Repeat
+
+
+class Nest:
+    """Repeats within each other, from the outermost; a loop in them runs while all are pending."""
+
+    def __init__(self, repeats: tuple[Repeat, ...] = ()) -> None:
+        self.repeats = repeats
+        self.inner: dict[Repeat, Nest] = {}
+
+    def within(self, repeat: Repeat) -> "Nest":
+        """This nest, and a repeat in it; the same object whenever asked, as kernels are compiled for each."""
+        return self.inner.setdefault(repeat, Nest((*self.repeats, repeat)))
+
+    def phases(self, items: tuple[Item, ...]) -> "Iterator[tuple[Phase, Nest]]":
+        """Every phase among the items, in order, with the nest that it is in."""
+        for item in items:
+            if isinstance(item, Repeat):
+                yield from self.within(item).phases(item.items)
+            else:
+                yield item, self
+
+
 @ti.data_oriented
 class Program:
-    """One step of every running world, compiled for a state and a list of phases."""
+    """One step of every running world, compiled for a state and a list of items."""
 
-    def __init__(self, s: State, items: tuple[Phase | Repeat, ...], schedule: str) -> None:
+    def __init__(self, s: State, items: tuple[Item, ...], schedule: str) -> None:
         self.s, self.items, self.schedule = s, items, schedule
+        self.outside = Nest()
 
     def advance(self, steps: int) -> None:
         """At most ``steps`` steps of every running world."""
@@ -78,35 +106,33 @@ class Program:
             self._advance_worlds(steps)
             return
         for _ in range(steps):
-            if not self._count_running():
+            if not self._count_running(self.outside):
                 return
-            for item in self.items:
-                if not isinstance(item, Repeat):
-                    self._sweep(item)
-                    continue
-                while self._count_pending(item):
-                    for phase in item.phases:
-                        self._sweep_pending(item, phase)
+            self._launch(self.items, self.outside)
+
+    def _launch(self, items: tuple[Item, ...], nest: Nest) -> None:
+        for item in items:
+            if isinstance(item, Repeat):
+                while self._count_running(nest.within(item)):
+                    self._launch(item.items, nest.within(item))
+            else:
+                self._sweep(item, nest)
 
     def compile(self) -> None:
         """Compile what ``advance`` runs, and run nothing: no world may be running."""
         if self.schedule == "world":
             self._advance_worlds(0)
             return
-        self._count_running()
-        for item in self.items:
-            if isinstance(item, Repeat):
-                self._count_pending(item)
-            for phase in item.phases if isinstance(item, Repeat) else (item,):
-                self._sweep_pending(item, phase) if isinstance(item, Repeat) else self._sweep(phase)
+        self._count_running(self.outside)
+        for phase, nest in self.outside.phases(self.items):
+            self._count_running(nest)
+            self._sweep(phase, nest)
 
     def names(self) -> list[str]:
-        """What runs in a step, in order."""
-        flat: list[str] = []
-        for item in self.items:
-            inner = item.phases if isinstance(item, Repeat) else (item,)
-            flat.extend(type(phase).__name__ + ("*" if isinstance(item, Repeat) else "") for phase in inner)
-        return flat
+        """What runs in a step, in order; repeated phases have a star for each repeat that they are in."""
+        return [
+            type(phase).__name__ + "*" * len(nest.repeats) for phase, nest in self.outside.phases(self.items)
+        ]
 
     @ti.kernel
     def _advance_worlds(self, steps: ti.i32):
@@ -115,19 +141,19 @@ class Program:
                 w = k // TASK
                 step = 0
                 while self.s.status[w] == RUNNING and step < steps:
-                    self._step(w)
+                    self._run(self.items, w)
                     step += 1
 
     @ti.func
-    def _step(self, w):
-        for item in ti.static(self.items):
+    def _run(self, items: ti.template(), w):  # type: ignore[valid-type]
+        for item in ti.static(items):
             if self.s.status[w] == RUNNING:
                 if ti.static(isinstance(item, Repeat)):
-                    while item.pending(w) > 0:
-                        for phase in ti.static(item.phases):
-                            self._loop(phase, w)
+                    while self.s.status[w] == RUNNING and item.pending(w) > 0:
+                        self._run(item.items, w)
                 else:
                     self._loop(item, w)
+                    self._heed(w)
 
     @ti.func
     def _loop(self, phase: ti.template(), w):  # type: ignore[valid-type]
@@ -139,30 +165,31 @@ class Program:
             for k in range(phase.size(w)):
                 phase.run(w, k)
 
-    @ti.kernel
-    def _sweep(self, phase: ti.template()):  # type: ignore[valid-type]
-        for w, k in ti.ndrange(self.s.worlds, phase.extent):
-            if self.s.status[w] == RUNNING and k < phase.size(w) and phase.when(w) > 0:
-                phase.run(w, k)
+    @ti.func
+    def _heed(self, w):
+        """Stop a world in which a phase has failed, once all of its items have been heard."""
+        if self.s.failed[w] > 0:
+            self.s.status[w] = self.s.failed[w]
+
+    @ti.func
+    def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]
+        active = self.s.status[w] == RUNNING
+        for repeat in ti.static(nest.repeats):
+            active = active and repeat.pending(w) > 0
+        return active
 
     @ti.kernel
-    def _sweep_pending(self, item: ti.template(), phase: ti.template()):  # type: ignore[valid-type]
+    def _sweep(self, phase: ti.template(), nest: ti.template()):  # type: ignore[valid-type]
         for w, k in ti.ndrange(self.s.worlds, phase.extent):
-            if self.s.status[w] == RUNNING and item.pending(w) > 0 and k < phase.size(w):
+            if self._active(nest, w) and k < phase.size(w) and phase.when(w) > 0:
                 phase.run(w, k)
+        for w in range(self.s.worlds):
+            self._heed(w)
 
     @ti.kernel
-    def _count_running(self) -> ti.i32:
+    def _count_running(self, nest: ti.template()) -> ti.i32:  # type: ignore[valid-type]
         n = 0
         for w in range(self.s.worlds):
-            if self.s.status[w] == RUNNING:
-                n += 1
-        return n
-
-    @ti.kernel
-    def _count_pending(self, item: ti.template()) -> ti.i32:  # type: ignore[valid-type]
-        n = 0
-        for w in range(self.s.worlds):
-            if self.s.status[w] == RUNNING and item.pending(w) > 0:
+            if self._active(nest, w):
                 n += 1
         return n

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from tisim import effects, kinds, operators
+from tisim import effects, kinds, operators, steppers
 from tisim.domain import Box, Domain, Open
 from tisim.effect import Effect
 from tisim.errors import InputError, must
@@ -90,7 +90,7 @@ class Scene(Spec):
             "seed": self.seed,
             "particles": kinds.to_dict(self.particles),
             "domain": kinds.to_dict(self.domain),
-            "stepper": {"kind": self.stepper.kind(), "control": kinds.to_dict(self.stepper.control)},
+            "stepper": kinds.to_dict(self.stepper),
             "effects": {effect.kind(): kinds.to_dict(effect, named=False) for effect in self.effects},
         }
 
@@ -103,7 +103,7 @@ class Scene(Spec):
         if "domain" in rest:
             made["domain"] = kinds.from_dict(Domain, rest.pop("domain"), "domain")
         if "stepper" in rest:
-            made["stepper"] = kinds.stepper(rest.pop("stepper"))
+            made["stepper"] = cls._stepper(rest.pop("stepper"))
         listed = rest.pop("effects", {})
         must(isinstance(listed, Mapping), "scene.effects", "a table of effects", listed)
         kinds.load(effects)
@@ -115,6 +115,12 @@ class Scene(Spec):
             for kind, values in listed.items()
         )
         return cls(**made, **rest)
+
+    @staticmethod
+    def _stepper(data: Any) -> Stepper:
+        kinds.load(steppers)
+        must(isinstance(data, Mapping), "stepper", "a table", data)
+        return kinds.from_dict(Stepper, {"kind": Verlet.kind(), **data}, "stepper")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Scene:

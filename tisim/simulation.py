@@ -10,19 +10,14 @@ import numpy as np
 
 from tisim import runtime
 from tisim.binding import Table, connect
-from tisim.effect import Effect, Force, Operator, PairEvent, PairForce
-from tisim.errors import InputError, must
-from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
-from tisim.forces import FORCE, SumForces, SumForcesAgain
-from tisim.mutual import Mutual
-from tisim.neighbours import Neighbours
+from tisim.composition import Composition, declared, needed_fields
+from tisim.errors import must
 from tisim.particles import Arrays
-from tisim.program import Phase, Program, Repeat
+from tisim.program import Program
 from tisim.result import Result
 from tisim.scene import Scene
+from tisim.starts import check_start, laid_out, volume
 from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fields
-from tisim.steppers.stepper import Parts, Stepper
-from tisim.steppers.verlet import Finish
 from tisim.watch import Watch
 
 CHUNK_SECONDS = 0.25
@@ -51,15 +46,16 @@ class Simulation:
         must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
         self.schedule = schedule or self._choose(capacity)
         must(self.schedule in ("world", "particle"), "schedule", "world or particle", schedule)
-        forces = any(isinstance(e, Force | PairForce) for e in scene.effects)
-        fields = resolve_fields((*(n for e in scene.effects for n in e.needs), *((FORCE,) if forces else ())))
-        counters = tuple(dict.fromkeys(name for e in scene.effects for name in e.counts))
-        self.s = State(worlds, capacity, fields, counters)
+        asked = (scene.effects, scene.stepper)
+        fields = resolve_fields(needed_fields(*asked))
+        self.s = State(worlds, capacity, fields, declared(*asked, "counts"), declared(*asked, "keeps"))
         parts = self._parts(scene)
         self.table = Table(parts, worlds, self.runtime.real)
-        *effects, domain, control = (self.table.bind(part) for part in parts)
+        *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
         connect(effects)
-        self._compose(scene.stepper, tuple(effects), domain, control)
+        self.made = Composition(self.s, stepper, tuple(effects), domain, control)
+        self.program = Program(self.s, self.made.step, self.schedule)
+        self.first = Program(self.s, self.made.first, self.schedule)
         self.s.status.fill(ENDED)
         self.program.compile()
         if self.first.items:
@@ -69,57 +65,13 @@ class Simulation:
 
     @staticmethod
     def _parts(scene: Scene) -> list[Any]:
-        return [*scene.effects, scene.domain, scene.stepper.control]
+        return [*scene.effects, scene.domain, scene.stepper, scene.stepper.control]
 
     def _choose(self, capacity: int) -> str:
         # A world per thread needs as many worlds as threads; one small world is faster without launches.
         small = capacity * self.worlds <= 20_000
         many = self.worlds >= self.runtime.threads
         return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
-
-    def _compose(self, stepper: Stepper, effects: tuple[Effect, ...], domain: Any, control: Any) -> None:
-        """The phases of a step, and those that prepare the first one."""
-        s = self.s
-        events = tuple(e for e in effects if isinstance(e, PairEvent))
-        operators = tuple(e for e in effects if isinstance(e, Operator))
-        forces = tuple(e for e in effects if isinstance(e, Force))
-        pair_forces = tuple(e for e in effects if isinstance(e, PairForce))
-        short_ranged = tuple(e for e in pair_forces if e.short_ranged)
-        surveyed = bool(events) or control.watches_pairs
-        near = Neighbours(s, domain, short_ranged) if surveyed or short_ranged else None
-        mutual = Mutual(near) if near and short_ranged else None
-        contacts = Contacts(s, domain, events) if surveyed else None
-        self.parts = [part for part in (s, self.table, near, mutual, contacts) if part is not None]
-        self.near, self.contacts = near, contacts
-
-        forced = bool(forces or pair_forces)
-        parts = Parts(s, control, domain, operators, near, forced)
-        step: list[Phase | Repeat] = [*stepper.before_forces(parts)]
-        first: list[Phase | Repeat] = []
-        listed = mutual.phases() if mutual else near.phases() if near else ()
-        step += listed
-        first += listed
-        if forced:
-            summed = SumForces(s, domain, forces, pair_forces, mutual)
-            step += [summed]
-            first += [summed]
-        step += stepper.after_forces(parts)
-        if near and contacts:
-            survey = Survey(near, contacts, control)
-            step += [survey]
-            first += [survey, Close(contacts)]
-        if events and contacts:
-            step += [Rounds(contacts)]
-        if events or operators:
-            step += [Rearrange(s, domain, operators, near)]
-        if near and contacts and (events or operators) and control.watches_pairs:
-            step += [*listed, SurveyAgain(near, contacts, control)]
-        if forced and (events or operators):
-            step += [*listed, SumForcesAgain(s, domain, forces, pair_forces, mutual)]
-        if contacts:
-            step += [Close(contacts)]
-        self.program = Program(s, (*step, Finish(s)), self.schedule)
-        self.first = Program(s, tuple(first), self.schedule)
 
     def load(self, scenes: Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
         """Put one scene in each of the first worlds; the others stay empty. No compilation.
@@ -140,56 +92,27 @@ class Simulation:
             )
         starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
         for scene, start in zip(scenes, starts, strict=True):
-            self._fits(scene, start)
-        columns = {f.name: self._blank(f) for f in self.s.fields}
-        for w, start in enumerate(starts):
-            for name, column in columns.items():
-                n = len(start["mass"])
-                column[w, :n] = np.arange(n) if name == "id" else start.get(name, 0)
-        for name, column in columns.items():
-            self.s.write(name, column)
+            check_start(self.s.fields, scene, start)
+        for f in self.s.fields:
+            self.s.write(f.name, laid_out(f, starts, self.worlds, self.s.capacity))
         counts = np.array([len(start["mass"]) for start in starts] + [0] * (self.worlds - len(starts)))
         self._reset(scenes, starts, counts)
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
-        if self.near is not None:
-            self.near.stale.fill(1)
+        self.forget_lists()
         if self.first.items:
             self.first.advance(1)
         self.watch = Watch(self.s, self.scenes)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.watch.look()
 
-    def _blank(self, f: Any) -> np.ndarray:
-        shape = (self.worlds, self.s.capacity) + ((3,) if f.components == 3 else ())
-        real = np.float64 if self.runtime.precision == "f64" else np.float32
-        return np.ones(shape, dtype=np.int32 if f.integer else real) * (f.name in ("mass", "radius"))
-
-    def _fits(self, scene: Scene, start: Arrays) -> None:
-        low, high = scene.domain.bounds()
-        if low is not None:
-            inside = ((start["position"] >= low) & (start["position"] < high)).all()
-            must(bool(inside), "particles.position", "inside the domain", "a particle outside")
-        known = {f.name for f in self.s.fields} | {"temperature"}
-        for name in start:
-            must(
-                name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name
-            )
-        for f in self.s.fields:
-            wanted = (len(start["mass"]),) + ((3,) if f.components == 3 else ())
-            shape = start[f.name].shape if f.name in start else wanted
-            must(shape == wanted, f"particles.{f.name}", f"of shape {wanted}", shape)
-        cold = start.get("temperature", np.zeros(1)).min()
-        must(cold >= 0, "particles.temperature", "at least 0 K", float(cold))
-        missing = {n for e in scene.effects for n in e.needs if isinstance(n, str)} - start.keys()
-        if missing:
-            names = ", ".join(sorted(missing))
-            raise InputError(
-                f"particles must be given {names}, which effects of the scene need; received none"
-            )
+    def forget_lists(self) -> None:
+        """Pair lists are made anew before they are used again."""
+        if self.made.near is not None:
+            self.made.near.stale.fill(1)
 
     def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
-        for name in (*CLOCK, *BOOKS, *self.s.counters):
+        for name in (*CLOCK, *BOOKS, *self.s.counters, *self.s.keeps):
             getattr(self.s, name).fill(0)
         empty = self.worlds - len(scenes)
         for name in MOTION:
@@ -202,7 +125,7 @@ class Simulation:
         self.s.write("status", np.array([RUNNING] * len(scenes) + [ENDED] * empty, dtype=np.int32))
         self.s.write("end", np.array([scene.duration for scene in scenes] + [0.0] * empty))
         self.s.write(
-            "volume", np.array([_volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty)
+            "volume", np.array([volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty)
         )
         self.s.approach_time.fill(np.inf)
         self.s.culprit.fill(2**31 - 1)
@@ -270,13 +193,5 @@ class Simulation:
 
     def close(self) -> None:
         """Give the device memory back."""
-        for part in self.parts:
+        for part in (self.s, self.table, *(part for part, _, _ in self.made.memory)):
             part.destroy()
-
-
-def _volume(scene: Scene, start: Arrays) -> float:
-    low, high = scene.domain.bounds()
-    if low is None or high is None:
-        reach = start["radius"].max()
-        low, high = start["position"].min(axis=0) - reach, start["position"].max(axis=0) + reach
-    return float(np.prod(high - low))

@@ -21,6 +21,10 @@ class Field:
 
     merge : what becomes of it when two particles become one: "mean" by mass, "sum", "volume" (a radius),
         or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
+    slots : a particle has so many values, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
+        They are its own: a piece that breaks off starts with the default.
+    default : what a particle starts with where the start does not say; None where it must.
+    minimum : the least value that a start may give.
     """
 
     name: str
@@ -28,23 +32,38 @@ class Field:
     components: Literal[1, 3] = 1
     merge: Literal["mean", "sum", "volume", "keep"] = "mean"
     integer: bool = False
+    slots: int = 0
+    default: float | None = 0.0
+    minimum: float | None = None
+
+    def shape(self, *particles: int) -> tuple[int, ...]:
+        """Of an array of it, for an array of particles of this shape."""
+        return (*particles, *((3,) if self.components == 3 else ()), *((self.slots,) if self.slots else ()))
 
 
 CORE = (
-    Field("position", "m", 3, "keep"),
-    Field("velocity", "m/s", 3),
-    Field("mass", "kg", 1, "sum"),
-    Field("radius", "m", 1, "volume"),
+    Field("position", "m", 3, "keep", default=None),
+    Field("velocity", "m/s", 3, default=None),
+    Field("mass", "kg", 1, "sum", default=None),
+    Field("radius", "m", 1, "volume", default=None),
     Field("id", "", 1, "keep", integer=True),
 )
-SHARED = {field.name: field for field in (*CORE, Field("temperature", "K"))}
+SHARED = {
+    field.name: field
+    for field in (
+        *CORE,
+        Field("temperature", "K", default=None, minimum=0.0),
+        Field("spin", "rad/s", 3),
+    )
+}
 """Fields that several effects share by name."""
 
-RUNNING, ENDED, NOT_FINITE, FULL, CROWDED = range(5)
-"""Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow."""
+RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED = range(6)
+"""Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow;
+a quantity that particles settle among themselves does not settle."""
 
 CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
-BOOKS = ("count", "status", "culprit", "blame", "changed", "events", "next_id")
+BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id")
 MOTION = ("frame", "stride", "travel")
 TALLIES = ("steps", "particle_steps")
 
@@ -64,20 +83,25 @@ class State:
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
     ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
-    that effects declare.
+    and quantities (f64) that effects and steppers declare.
     """
 
     def __init__(
-        self, worlds: int, capacity: int, fields: tuple[Field, ...], counters: tuple[str, ...]
+        self,
+        worlds: int,
+        capacity: int,
+        fields: tuple[Field, ...],
+        counters: tuple[str, ...],
+        keeps: tuple[str, ...] = (),
     ) -> None:
         self.worlds, self.capacity = worlds, capacity
-        self.fields, self.counters = fields, (*TALLIES, *counters)
+        self.fields, self.counters, self.keeps = fields, (*TALLIES, *counters), keeps
         self.real = runtime.current().real
         self._generation = runtime.generation()
         builder = ti.FieldsBuilder()
         for field in fields:
             setattr(self, field.name, self._place(builder, field))
-        for names, dtype in ((CLOCK, ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
+        for names, dtype in (((*CLOCK, *keeps), ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
             for name in names:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
@@ -90,8 +114,16 @@ class State:
             builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
             setattr(self, name, column)
         self._tree = builder.finalize()
-        everything = tuple(getattr(self, field.name) for field in fields)
-        self.all_fields = everything
+        self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
+        self.slotted = tuple(
+            (
+                getattr(self, field.name),
+                field.slots,
+                int(field.default or 0) if field.integer else field.default or 0.0,
+            )
+            for field in fields
+            if field.slots
+        )
         self.means = self._ruled("mean")
         self.sums = self._ruled("sum")
 
@@ -101,6 +133,10 @@ class State:
 
     def _place(self, builder: Any, field: Field) -> Any:
         dtype = ti.i32 if field.integer else self.real
+        if field.slots:
+            column = ti.field(dtype)
+            builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).dense(ti.k, field.slots).place(column)
+            return column
         column = ti.field(dtype) if field.components == 1 else ti.Vector.field(field.components, dtype)
         parts = [column] if field.components == 1 else [column.get_scalar_field(k) for k in range(3)]
         for part in parts:
@@ -114,7 +150,7 @@ class State:
         """Bytes of each particle field, all worlds together."""
         size = 8 if self.real == ti.f64 else 4
         return {
-            f.name: self.worlds * self.capacity * f.components * (4 if f.integer else size)
+            f.name: int(np.prod(f.shape(self.worlds, self.capacity))) * (4 if f.integer else size)
             for f in self.fields
         }
 
@@ -150,8 +186,11 @@ class State:
     @ti.func
     def copy(self, w, source, target):
         """Copy every field of one slot to another."""
-        for field in ti.static(self.all_fields):
+        for field in ti.static(self.singles):
             field[w, target] = field[w, source]
+        for column in ti.static(self.slotted):
+            for k in range(column[1]):
+                column[0][w, target, k] = column[0][w, source, k]
 
     @ti.func
     def remove(self, w, i):
@@ -164,6 +203,9 @@ class State:
         """A copy of particle i in a new slot, whose index is returned. The caller has checked ``room``."""
         k = self.count[w]
         self.copy(w, i, k)
+        for column in ti.static(self.slotted):
+            for m in range(column[1]):
+                column[0][w, k, m] = column[2]
         self.id[w, k] = self.next_id[w]
         self.next_id[w] += 1
         self.count[w] = k + 1
@@ -177,8 +219,9 @@ class State:
 
     @ti.func
     def fail(self, w, status, i):
-        """Stop a world. ``i`` is the particle at fault; of several, the lowest id is recorded."""
-        ti.atomic_max(self.status[w], status)
+        """Stop a world, after this phase: all of its items are heard, and of several particles at fault the
+        lowest id is recorded, whatever the order of parallel work."""
+        ti.atomic_max(self.failed[w], status)
         ti.atomic_min(self.culprit[w], self.id[w, i])
 
     @ti.func

@@ -6,7 +6,7 @@ import numpy as np
 
 from tisim.result import Status
 from tisim.scene import Scene
-from tisim.state import CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, State
+from tisim.state import CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, UNSETTLED, State
 
 REASONS = {
     RUNNING: "running",
@@ -14,6 +14,7 @@ REASONS = {
     NOT_FINITE: "a quantity is not finite",
     FULL: "more fragments than there is room for",
     CROWDED: "more simultaneous contacts than there is room for",
+    UNSETTLED: "a quantity that particles settle among themselves does not converge",
 }
 
 

@@ -40,11 +40,6 @@ class ImpactLaw(Effect):
 
     contract: ClassVar[bool] = True
 
-    @classmethod
-    def offers(cls, hook: str) -> bool:
-        """Whether this class overrides the hook."""
-        return getattr(cls, hook) is not getattr(ImpactLaw, hook)
-
     @ti.func
     def hardness_factor(self, w, temperature):
         """Factor on the hardness at this temperature (K)."""

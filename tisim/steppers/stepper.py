@@ -1,46 +1,57 @@
-"""The contract of a stepper: the phases it puts around the sum of forces."""
+"""The contract of a stepper: the order of a step."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from tisim.program import Phase, Repeat
+from tisim.program import Item
 from tisim.spec import Spec
-from tisim.state import State
+from tisim.state import Field, State
 from tisim.steppers.controller import ApproachTime, Controller
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a stepper works on: bound control, domain and operators; near is None without a pair list."""
+    """What a stepper makes a step of. All are bound to the state; a tuple is empty where nothing is to do.
+
+    control : decides how long the next step may be. domain, operators, near : as bound; near is None
+    without a pair list. turning : whether there are torques.
+
+    lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
+    pairs remember, over ``dt``; once a step. forces : settle what is mutual, and sum force and torque of the
+    trial state. Lists and forces may stand in an iteration, a ``Repeat``; positions must lie in the domain.
+    """
 
     s: State
     control: Any
     domain: Any
     operators: tuple[Any, ...]
     near: Any
-    forced: bool
+    lists: tuple[Item, ...]
+    remember: tuple[Item, ...]
+    forces: tuple[Item, ...]
+    turning: bool
 
 
 class Stepper(Spec):
     """How time advances. ``control`` chooses the length of the next step.
 
-    ``before_forces`` brings positions and time to the end of the step, ``after_forces`` velocities; an
-    iteration is a ``Repeat`` among them. Pair lists are brought up to date in between. ``forced`` says
-    whether the scene has forces at all.
+    As with effects, ``needs`` names fields, ``counts`` counters, ``keeps`` quantities of a world, and in a
+    kernel a parameter is a function of the world. Before the first step ``force`` and ``torque`` are those of
+    the start.
     """
 
     contract: ClassVar[bool] = True
+    needs: ClassVar[tuple[str | Field, ...]] = ()
+    counts: ClassVar[tuple[str, ...]] = ()
+    keeps: ClassVar[tuple[str, ...]] = ()
     control: Controller = ApproachTime()
 
     def structure(self) -> tuple[Any, ...]:
-        return (*super().structure()[:1], *self.control.structure())
+        own = tuple(option for option in super().structure() if option != ("control", self.control))
+        return (*own, *self.control.structure())
 
-    def before_forces(self, parts: Parts) -> tuple[Phase | Repeat, ...]:
-        """Phases up to the new positions."""
-        raise NotImplementedError(f"{type(self).__name__} must define before_forces")
-
-    def after_forces(self, parts: Parts) -> tuple[Phase | Repeat, ...]:
-        """Phases once ``force`` holds the forces at the new positions."""
-        raise NotImplementedError(f"{type(self).__name__} must define after_forces")
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        """The items of a step, up to pair events and what operators do to the world as a whole."""
+        raise NotImplementedError(f"{type(self).__name__} must define step")

@@ -4,10 +4,8 @@ Forces are kicked half before and half after the drift (L. Verlet 1967; W. C. Sw
 without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c), and has no kick at all.
 """
 
-from __future__ import annotations
-
 from tisim._taichi import ti
-from tisim.program import PerParticle, Phase
+from tisim.program import Item, PerParticle, Phase
 from tisim.state import ENDED, NOT_FINITE
 from tisim.steppers.stepper import Parts, Stepper
 
@@ -15,13 +13,21 @@ from tisim.steppers.stepper import Parts, Stepper
 class Verlet(Stepper):
     """Explicit stepper with step control. Second order in dt for forces that depend on position only."""
 
-    def before_forces(self, parts: Parts) -> tuple[Phase, ...]:
-        s, near = parts.s, parts.near
-        move = Move(s, parts.domain, parts.operators, parts.forced)
-        return (Clock(s, parts.control, near), move, Advance(s, near))
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        s, near, forced = parts.s, parts.near, bool(parts.forces)
+        drift = Move(s, parts.domain, parts.operators, forced, parts.turning)
+        kick = (Kick(s, parts.turning),) if forced else ()
+        start = (Clock(s, parts.control, near), drift, Advance(s, near))
+        return (*start, *parts.lists, *parts.remember, *parts.forces, *kick)
 
-    def after_forces(self, parts: Parts) -> tuple[Phase, ...]:
-        return (Kick(parts.s),) if parts.forced else ()
+
+@ti.func
+def half_kick(s, w, i, turning: ti.template()):  # type: ignore[valid-type]
+    """v += dt/2 F/m; spin += dt/2 M/I with I = 2/5 m R^2, a solid sphere's (Z16 7.8)."""
+    half = 0.5 * ti.cast(s.dt[w], s.real)
+    s.velocity[w, i] += half / s.mass[w, i] * s.force[w, i]
+    if ti.static(turning):
+        s.spin[w, i] += half / (0.4 * s.mass[w, i] * s.radius[w, i] ** 2) * s.torque[w, i]
 
 
 class Clock(Phase):
@@ -54,16 +60,16 @@ class Clock(Phase):
 class Move(PerParticle):
     """Kick, drift, wrap, and what operators do to single particles."""
 
-    def __init__(self, s, domain, operators, forced: bool) -> None:
+    def __init__(self, s, domain, operators, forced: bool, turning: bool) -> None:
         super().__init__(s)
-        self.domain, self.operators, self.forced = domain, operators, forced
+        self.domain, self.operators, self.forced, self.turning = domain, operators, forced, turning
 
     @ti.func
     def run(self, w, i):
         s = self.s
         dt = ti.cast(s.dt[w], s.real)
         if ti.static(self.forced):
-            s.velocity[w, i] += 0.5 * dt / s.mass[w, i] * s.force[w, i]
+            half_kick(s, w, i, self.turning)
         before = s.position[w, i]
         s.position[w, i] = before + dt * s.velocity[w, i]
         for operator in ti.static(self.operators):
@@ -83,10 +89,13 @@ class Move(PerParticle):
 class Kick(PerParticle):
     """The second half of the kick."""
 
+    def __init__(self, s, turning: bool) -> None:
+        super().__init__(s)
+        self.turning = turning
+
     @ti.func
     def run(self, w, i):
-        s = self.s
-        s.velocity[w, i] += 0.5 * ti.cast(s.dt[w], s.real) / s.mass[w, i] * s.force[w, i]
+        half_kick(self.s, w, i, self.turning)
 
 
 class Advance(Phase):

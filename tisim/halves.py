@@ -11,7 +11,7 @@ from tisim.program import PerParticle, Phase
 
 
 @ti.data_oriented
-class Mutual:
+class Halves:
     """Both halves of the neighbours of every particle."""
 
     def __init__(self, near: Neighbours) -> None:
@@ -59,9 +59,9 @@ class Due(PerParticle):
 
     conditional = True
 
-    def __init__(self, mutual: Mutual) -> None:
-        super().__init__(mutual.s)
-        self.m = mutual
+    def __init__(self, halves: Halves) -> None:
+        super().__init__(halves.s)
+        self.m = halves
 
     @ti.func
     def when(self, w):

@@ -1,0 +1,61 @@
+"""What a start must be for a scene, and how it is laid out in the memory of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tisim import runtime
+from tisim.errors import InputError, must
+from tisim.particles import Arrays
+from tisim.scene import Scene
+from tisim.state import SHARED, Field
+
+
+def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
+    """InputError unless the start gives what the scene needs and no more, of the right shape, in its domain.
+
+    A quantity that effects share, such as temperature, may be given to a scene that has no use for it.
+    """
+    low, high = scene.domain.bounds()
+    if low is not None:
+        inside = ((start["position"] >= low) & (start["position"] < high)).all()
+        must(bool(inside), "particles.position", "inside the domain", "a particle outside")
+    known = {f.name for f in fields} | SHARED.keys()
+    for name in start:
+        must(name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name)
+    missing = [f.name for f in fields if f.default is None and f.name not in start]
+    if missing:
+        names = ", ".join(sorted(missing))
+        raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
+    n = len(start["mass"])
+    for f in {**SHARED, **{f.name: f for f in fields}}.values():
+        if f.name in start:
+            _check(f, start[f.name], n)
+
+
+def _check(f: Field, values: np.ndarray, n: int) -> None:
+    must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
+    if f.minimum is not None:
+        least = float(values.min())
+        must(least >= f.minimum, f"particles.{f.name}", f"at least {f.minimum:g} {f.unit}", least)
+
+
+def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
+    """A field of all worlds: what each start says of it, else its default; ids count from 0."""
+    real = np.float64 if runtime.current().precision == "f64" else np.float32
+    column = np.full(f.shape(worlds, capacity), f.default or 0, dtype=np.int32 if f.integer else real)
+    for w, start in enumerate(starts):
+        n = len(start["mass"])
+        column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, column[w, :n])
+    return column
+
+
+def volume(scene: Scene, start: Arrays) -> float:
+    """Of the domain, or of the box around the particles where it has no bounds. m^3."""
+    low, high = scene.domain.bounds()
+    if low is None or high is None:
+        reach = start["radius"].max()
+        low, high = start["position"].min(axis=0) - reach, start["position"].max(axis=0) + reach
+    return float(np.prod(high - low))
