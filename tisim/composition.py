@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from tisim.cells import listing
 from tisim.effect import Effect, Force, Mutual, Operator, PairEvent, PairForce
 from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
 from tisim.forces import FORCE, TORQUE, SumForces, SumForcesAgain, turning
@@ -78,7 +79,7 @@ class Composition:
             if part is not None
         )
 
-        lists = self.halves.phases() if self.halves else near.phases() if near else ()
+        lists = self.halves.phases() if self.halves else listing(near) if near else ()
         parts = Parts(
             s=s,
             control=control,

@@ -6,7 +6,8 @@ sorted by index. A sum over neighbours then has the same order, and the same bit
 """
 
 from tisim._taichi import ti
-from tisim.neighbours import LISTED, SMALL, Neighbours
+from tisim.cells import listing
+from tisim.neighbours import Neighbours
 from tisim.program import PerParticle, Phase
 
 
@@ -19,17 +20,19 @@ class Halves:
         self.larger, self.found = ti.field(ti.i32), ti.field(ti.i32)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).place(self.found)
-        builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).dense(ti.k, LISTED).place(self.larger)
+        builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).dense(ti.k, near.room).place(
+            self.larger
+        )
         self._tree = builder.finalize()
 
     def phases(self) -> tuple[Phase, ...]:
         """Bring both halves up to date where it is due."""
-        first, *middle, last = self.near.phases()
-        return (first, *middle, Empty(self), Turn(self), Sort(self), last)
+        *others, last = listing(self.near)
+        return (*others, Empty(self), Turn(self), Sort(self), last)
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
-        return 4 * self.s.worlds * self.s.capacity * (1 + LISTED)
+        return 4 * self.s.worlds * self.s.capacity * (1 + self.near.room)
 
     def destroy(self) -> None:
         """Give the memory back."""
@@ -39,7 +42,7 @@ class Halves:
     def size(self, w, i):
         """How many candidates ``candidate`` offers particle i."""
         n = self.s.count[w]
-        if n > SMALL and self.found[w, i] >= 0:
+        if n > self.near.small and self.found[w, i] >= 0:
             n = self.found[w, i]
         return n
 
@@ -47,7 +50,7 @@ class Halves:
     def candidate(self, w, i, k):
         """The k-th particle that may be a neighbour and own the pair; i itself where there is none."""
         j = k
-        if self.s.count[w] > SMALL and self.found[w, i] >= 0:
+        if self.s.count[w] > self.near.small and self.found[w, i] >= 0:
             j = self.larger[w, i, k]
         elif k == i or not self.near.owns(w, k, i):
             j = i
@@ -65,7 +68,7 @@ class Due(PerParticle):
 
     @ti.func
     def when(self, w):
-        return self.m.near.stale[w] > 0 and self.s.count[w] > SMALL
+        return self.m.near.stale[w] > 0 and self.s.count[w] > self.m.near.small
 
 
 class Empty(Due):
@@ -86,7 +89,7 @@ class Turn(Due):
             j = n.candidate(w, i, k)
             if j != i:
                 slot = ti.atomic_add(m.found[w, j], 1)
-                if slot < LISTED:
+                if slot < n.room:
                     m.larger[w, j, slot] = i
 
 
@@ -97,7 +100,7 @@ class Sort(Due):
     def run(self, w, i):
         n, m = self.m.near, self.m
         self.order(n.other, w, i, n.listed[w, i])
-        if m.found[w, i] > LISTED:
+        if m.found[w, i] > n.room:
             m.found[w, i] = -1
         self.order(m.larger, w, i, m.found[w, i])
 
