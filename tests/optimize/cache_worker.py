@@ -1,4 +1,4 @@
-"""Run as a script by the cache tests: a process that writes, folds or searches until something stops it."""
+"""Run as a script by tests of kills: a process that writes, folds or searches until something stops it."""
 
 import os
 import resource
@@ -89,5 +89,26 @@ def search(path):
     print("done", flush=True)
 
 
+def tisim(*arguments):
+    """The command, naming each evaluation on standard output as soon as it counts as finished."""
+    from drift_case import CASE
+
+    from cases import case
+    from tisim.cli import main
+
+    every = case.every
+    case.every = lambda: {**every(), CASE.name: CASE}
+    put = Cache.put
+
+    def told(cache, record):
+        kept = put(cache, record)
+        os.write(1, f"stored {record.key}\n".encode())
+        return kept
+
+    Cache.put = told
+    main(arguments)
+
+
 if __name__ == "__main__":
-    {"write": write, "stepwise": stepwise, "limited": limited, "search": search}[sys.argv[1]](*sys.argv[2:])
+    known = {"write": write, "stepwise": stepwise, "limited": limited, "search": search, "tisim": tisim}
+    known[sys.argv[1]](*sys.argv[2:])

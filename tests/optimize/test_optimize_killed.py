@@ -1,0 +1,74 @@
+"""A real search, compiled kernels and all, killed again and again: nothing is lost, nothing changes."""
+
+import random
+import subprocess
+
+import pytest
+from test_cache_kill import worker
+
+from optimize.cache import Cache, list_records, verify
+
+QUICK = ("drift",)
+REAL = ("agglomeration", "--size", "small")
+
+
+def begin(case, folder):
+    """The search, in a process that names on its standard output what it has stored."""
+    settings = ("--generations", "5", "--seed", "3", "--out", folder)
+    return worker("tisim", "optimize", *case, *settings, stderr=subprocess.DEVNULL)
+
+
+def kill(search, rng):
+    """SIGKILL at a random moment, mostly while evaluations are stored; the keys of those told stored."""
+    told = ""
+    if rng.random() < 0.25:
+        with pytest.raises(subprocess.TimeoutExpired):
+            search.wait(rng.uniform(0.0, 2.0))  # while it starts, reads the file, compiles
+    else:
+        for _ in range(rng.randint(1, 40)):
+            told += search.stdout.readline()
+        with pytest.raises(subprocess.TimeoutExpired):
+            search.wait(rng.uniform(0.0, 0.02))
+    search.kill()
+    told += search.stdout.read()
+    return {line.split()[1] for line in told.splitlines(keepends=True) if line.endswith("\n")}
+
+
+def found(folder):
+    """All that a search has found: in its file, and in what it has written of its best designs."""
+    cache = Cache(folder / "search.h5")
+    tables = {name: cache.table(name).columns for name in cache.tables()}
+    written = [(folder / name).read_bytes() for name in ("best.csv", "best_scene.toml")]
+    fitness = {record.key: (record.fitness, record.design) for record in cache.records()}
+    return repr(tables), written, fitness
+
+
+@pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), pytest.param(REAL, 20, marks=pytest.mark.slow)])
+def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
+    with begin(case, tmp_path / "whole") as search:
+        search.communicate()
+    assert search.returncode == 0
+    whole = found(tmp_path / "whole")
+    folder = tmp_path / "cut"
+    file = folder / "search.h5"
+    rng = random.Random(kills)
+    seen, leftovers = {}, set()
+    for number in range(kills):
+        with begin(case, folder) as search:
+            stored = kill(search, rng)
+        if not (file.exists() or stored):
+            continue  # killed before there was anything
+        report = verify(file)
+        assert report.ok, report
+        leftovers |= {name for name in ("journal", "torn", "duplicates") if getattr(report, name)}
+        kept = {record.key: record.payload() for record in list_records(file)}
+        assert stored <= set(kept), number
+        assert {key: kept.get(key) for key in seen} == seen, number
+        seen = kept
+    assert "journal" in leftovers, "killed within a generation"
+    with begin(case, folder) as search:
+        again = search.communicate()[0].count("stored ")
+    assert search.returncode == 0
+    assert again == len(whole[2]) - len(seen) > 0, "nothing is run twice"
+    assert found(folder) == whole
+    assert verify(file).ok
