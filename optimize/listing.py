@@ -10,6 +10,7 @@ from rich.table import Table
 
 from optimize.cache import Cache, list_records
 from optimize.record import Record
+from optimize.stored import searches
 
 SHOWN = 5
 """Reasons of failures that are spelled out."""
@@ -19,14 +20,12 @@ def listing(path: str | Path) -> RenderableType:
     """Evaluations by problem, searches, and why evaluations failed. InputError if there is no such file."""
     records = list_records(path)
     cache = Cache(path)
-    searches = _table("search", "generations", "best", "ended by")
-    for name in cache.tables():
-        about = cache.table(name).attrs
-        if "stopped" in about:
-            best = cache.table(f"{name}/logbook").columns.get("best", [])
-            last = f"{best[-1]:.6g}" if best else "none"
-            searches.add_row(name, str(max(0, len(best) - 1)), last, str(about["stopped"]) or "not ended")
-    return Group(_evaluations(records), "", searches, *_failures(records))
+    table = _table("search", "generations", "best", "ended by")
+    for name, about in searches(cache).items():
+        best = cache.table(f"{name}/logbook").columns.get("best", [])
+        last = f"{best[-1]:.6g}" if best else "none"
+        table.add_row(name, str(max(0, len(best) - 1)), last, str(about["stopped"]) or "not ended")
+    return Group(_evaluations(records), "", table, *_failures(records))
 
 
 def _evaluations(records: Sequence[Record]) -> Table:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from deap import tools
 
 from optimize.breeding import Individual
 from optimize.problem import Problem
-from optimize.settings import Settings
+from optimize.settings import Settings, search_name
 
 Stopped = Literal["", "generations", "target", "patience", "evaluations", "wall clock", "interrupted"]
 
@@ -38,18 +39,22 @@ class Outcome:
     failed, best, mean, std (of the successful designs in the population; best is +inf and mean and std NaN
     if there is none), box (mean width of the search box it drew from), recentred (box moved after it).
     evaluations, hits : run, and found in the cache. stopped : the rule that ended it.
-    name : of its group in the cache file.
+    identity : see optimize.settings. name : of its group in the cache file.
     """
 
     problem: Problem
     settings: Settings
-    name: str
+    identity: Mapping[str, Any]
     hall: list[Individual] = field(default_factory=list)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0
     hits: int = 0
     elapsed_s: float = 0.0
     stopped: Stopped = ""
+
+    @property
+    def name(self) -> str:
+        return search_name(self.identity)
 
     @property
     def best(self) -> Individual | None:

@@ -6,10 +6,7 @@ on the same cache file: every finished evaluation comes from there, the rest fol
 
 from __future__ import annotations
 
-import importlib.metadata
-import json
 import math
-import platform
 import time
 from collections.abc import Callable
 from typing import Any
@@ -22,8 +19,8 @@ from optimize.cache import Cache
 from optimize.ensemble import Ensemble, Evaluator
 from optimize.outcome import Outcome, Progress, Stopped
 from optimize.problem import Problem
-from optimize.settings import Settings, search_name
-from optimize.tables import best_columns, logbook_columns
+from optimize.settings import Settings, identity
+from optimize.stored import searches, store
 
 
 class _OutOfTime(Exception):
@@ -49,17 +46,6 @@ def search(
     return _Search(problem, evaluator, cache, settings or Settings(), on_generation, on_progress).run()
 
 
-def versions() -> dict[str, str]:
-    """Versions of Python and of the installed packages that a result depends on."""
-    found = {"python": platform.python_version()}
-    for package in ("tisim", "taichi", "quadrants", "numpy", "deap", "h5py"):
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
-
-
 def _successful(function: Callable[[Any], Any], otherwise: float) -> Callable[[Any], float]:
     """The statistic over the designs that did not fail."""
 
@@ -80,7 +66,7 @@ class _Search:
         on_generation: Callable[[Progress], None] | None,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
-        self.problem, self.cache, self.settings, self.evaluator = problem, cache, settings, evaluator
+        self.problem, self.cache, self.settings = problem, cache, settings
         self.on_generation, self.on_progress = on_generation, on_progress
         self.ensemble = Ensemble(problem, evaluator, cache, settings.ensemble, settings.seed)
         self.breeder = Breeder(len(problem.genome), settings, settings.seed)
@@ -90,21 +76,12 @@ class _Search:
         self.statistics.register("best", _successful(np.min, math.inf))
         self.statistics.register("mean", _successful(np.mean, math.nan))
         self.statistics.register("std", _successful(np.std, math.nan))
-        self.outcome = Outcome(problem, settings, search_name(problem, settings, evaluator.settings))
-        self.outcome.logbook.header = [
-            "gen",
-            "designs",
-            "starts",
-            "failed",
-            "best",
-            "mean",
-            "std",
-            "box",
-            "recentred",
-        ]
+        self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
         self.began = time.monotonic()
 
     def run(self) -> Outcome:
+        if self.outcome.name not in searches(self.cache):
+            self._store()  # from now on the file is known to be of this search
         try:
             self._generations()
             self._confirm()
@@ -206,19 +183,8 @@ class _Search:
 
     def _store(self) -> None:
         """Bring the outcome up to date and put it into the cache file."""
-        out, name = self.outcome, self.outcome.name
+        out = self.outcome
         out.hall = self.ranked or list(self.hall)
         out.evaluations, out.hits = self.ensemble.evaluations, self.ensemble.hits
         out.elapsed_s = time.monotonic() - self.began
-        about = {
-            "problem": self.problem.name,
-            "problem_version": self.problem.version,
-            "settings": self.settings.model_dump_json(),
-            "evaluator": json.dumps(self.evaluator.settings, sort_keys=True),
-            "versions": json.dumps(versions()),
-            "stopped": out.stopped,
-        }
-        self.cache.put_table(name, {}, about)
-        self.cache.put_table(f"{name}/hall_of_fame", best_columns(self.problem, out.hall))
-        self.cache.put_table(f"{name}/logbook", logbook_columns(self.problem, out.logbook))
-        self.cache.fold()
+        store(self.cache, out)

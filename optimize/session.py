@@ -1,11 +1,4 @@
-"""A search with all around it: its file, its display, Ctrl-C, and what it leaves in its folder.
-
-search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
-best.csv          the best designs, all digits
-convergence.png   (and .pdf) best and mean fitness by generation
-best_scene.toml   the best design from the first random start, for ``tisim run``
-best_cloud.png    that run at start and end, where the problem says how to draw it
-"""
+"""A search with all around it: its folder, its display, Ctrl-C, and the files it leaves."""
 
 from __future__ import annotations
 
@@ -20,28 +13,13 @@ from optimize.cache import Cache
 from optimize.display import Display
 from optimize.ensemble import start_seed
 from optimize.evaluator import Evaluator
+from optimize.folder import FILE, check
 from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
 from optimize.search import search
-from optimize.settings import Settings
-from tisim.durable import locked
-from tisim.errors import must
+from optimize.settings import Settings, identity
 from tisim.interrupt import Interrupt
 from tisim.output import writable
-
-FILE = "search.h5"
-
-
-def clear(folder: Path, overwrite: bool) -> None:
-    """Make way for a new search; InputError when there is one already and it is not to be overwritten."""
-    file = folder / FILE
-    begun = file.exists() or file.with_name(FILE + ".journal").exists()
-    must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
-    # The lock file stays: without it two processes could lock two different files.
-    if begun:
-        with locked(folder / (FILE + ".lock"), exclusive=True):
-            for name in (FILE, FILE + ".journal"):
-                (folder / name).unlink(missing_ok=True)
 
 
 def session(
@@ -52,27 +30,17 @@ def session(
     bar: Console,
     stopping: Callable[[], None],
 ) -> Outcome:
-    """Search, or go on with the search in the folder, and write all that is listed above.
+    """Search, or go on with the search in the folder, and write all that is listed in optimize.folder.
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
-    search cleanly (Outcome.interrupted). InputError when the folder cannot be written or holds another file.
+    search cleanly (Outcome.interrupted). InputError when the folder is another search's or cannot be written.
     """
     writable(folder)
     evaluator = Evaluator()
     try:
-        with (
-            Cache(folder / FILE) as cache,
-            Interrupt(stopping) as ctrl_c,
-            Display(problem, settings.generations, bar) as display,
-        ):
-
-            def step(where: Progress) -> None:
-                display.step(where)
-                ctrl_c.check()
-
-            outcome = search(
-                problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step
-            )
+        with Cache(folder / FILE) as cache:
+            check(folder, cache, identity(problem, settings, evaluator.settings))
+            outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
         paths = [folder / FILE]
         if outcome.best is not None:
             say.print(report.best_table(outcome))
@@ -83,6 +51,24 @@ def session(
         evaluator.close()
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False)
     return outcome
+
+
+def _shown(
+    problem: Problem,
+    settings: Settings,
+    evaluator: Evaluator,
+    cache: Cache,
+    bar: Console,
+    stopping: Callable[[], None],
+) -> Outcome:
+    """The search behind its bar, until it ends or Ctrl-C stops it."""
+    with Interrupt(stopping) as ctrl_c, Display(problem, settings.generations, bar) as display:
+
+        def step(where: Progress) -> None:
+            display.step(where)
+            ctrl_c.check()
+
+        return search(problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step)
 
 
 def _show_best(best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""The settings of a search, and the name they give it."""
+"""The settings of a search, what they make it, and the name that gives it."""
 
 from __future__ import annotations
 
@@ -36,10 +36,23 @@ class Settings(Breeding):
 
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
+_AFTERWARDS = {"confirm"}
 
 
-def search_name(problem: Problem, settings: Settings, evaluator_settings: Mapping[str, Any]) -> str:
-    """Group of a search in its cache file: the same for searches that differ in when they stop only."""
-    decisive = settings.model_dump(exclude=_STOPPING)
-    digest = hashlib.sha256(canonical([problem.name, problem.version, decisive, dict(evaluator_settings)]))
-    return f"searches/{problem.name}-{digest.hexdigest()[:12]}"
+def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any]) -> dict[str, Any]:
+    """All that decides the course of a search. When it stops, and what is run again at its end, does not.
+
+    evaluator : the settings of the evaluator.
+    """
+    left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
+    return {
+        "problem": problem.name,
+        "problem_version": problem.version,
+        "search": settings.model_dump(mode="json", exclude=left_out),
+        "evaluator": dict(evaluator),
+    }
+
+
+def search_name(identity: Mapping[str, Any]) -> str:
+    """Group of a search in its cache file."""
+    return f"searches/{identity['problem']}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tisim import request, runtime
-from tisim.errors import InputError, RunError
+from tisim.errors import InputError, RunError, must
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads, err, out, stopping
 
 
@@ -38,9 +38,11 @@ def optimize(
 ) -> None:
     """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
     from cases.case import find
-    from optimize.session import FILE, clear, session
+    from optimize.folder import FILE, clear
+    from optimize.session import session
     from optimize.settings import Settings
 
+    must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
     found = find(case)
     chosen = found.size(size or "default")
     if found.problem is None:

@@ -12,6 +12,7 @@ from optimize.cache import Cache, verify
 from optimize.ensemble import EnsembleSettings
 from optimize.search import search
 from optimize.settings import Settings
+from optimize.stored import searches
 from tisim.errors import InputError, RunError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)  # a function without noise needs no averaging
@@ -173,9 +174,11 @@ def test_file_holds_what_is_needed_to_redo_the_search(path):
     about = cache.table(outcome.name).attrs
     settings = Settings.model_validate_json(about["settings"])
     assert settings == outcome.settings
-    assert json.loads(about["evaluator"]) == {"precision": "f64", "device": "cpu"}
+    made_of = json.loads(about["identity"])
+    assert (made_of["problem"], made_of["problem_version"]) == ("bowl", 1)
+    assert made_of["evaluator"] == {"precision": "f64", "device": "cpu"}
     assert {"python", "numpy", "deap", "h5py"} <= set(json.loads(about["versions"]))
-    assert (about["problem"], about["problem_version"], about["stopped"]) == ("bowl", 1, "generations")
+    assert about["stopped"] == "generations"
     assert cache.table(f"{outcome.name}/logbook").columns["best"] == outcome.logbook.select("best")
     hall = cache.table(f"{outcome.name}/hall_of_fame").columns
     assert hall["fitness"] == [s.estimate.mean for s in outcome.hall]
@@ -193,6 +196,16 @@ def test_longer_search_continues_a_shorter_one(path):
     assert list(longer.logbook)[:4] == list(short.logbook)
     assert longer.evaluations == 3 * 14
     assert run(path, generations=6, seed=2).name != short.name
+    confirmed = ONE.model_copy(update={"confirm": 2})
+    assert run(path, generations=6, ensemble=confirmed).evaluations == 6 * 2
+
+
+def test_file_is_of_the_search_before_anything_has_run(path):
+    outcome = run(path, FakeEvaluator(interrupt_after=0))
+    assert Cache(path).table(outcome.name).attrs["stopped"] == "interrupted"
+    with pytest.raises(RunError, match="in the middle"):
+        run(path, FakeEvaluator(_fail), seed=2)
+    assert len(searches(Cache(path))) == 2
 
 
 def test_unfit_operators_stop_it_before_anything_runs(path):
@@ -214,6 +227,10 @@ def test_full_disk_ends_the_search_clearly(path, monkeypatch):
         run(path, Filling(quiet_bowl))
     monkeypatch.undo()
     assert len(Cache(path)) == 5
+
+
+def _fail(design, seed):
+    raise RunError("in the middle of it all")
 
 
 def _full(handle, data, offset):

@@ -1,0 +1,60 @@
+"""The folder of a search: it belongs to one search, and to no other until that is to be overwritten.
+
+search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
+best.csv          the best designs, all digits
+convergence.png   (and .pdf) best and mean fitness by generation
+best_scene.toml   the best design from the first random start, for ``tisim run``
+best_cloud.png    that run at start and end, where the problem says how to draw it
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from optimize.cache import Cache
+from optimize.record import canonical
+from optimize.settings import search_name
+from optimize.stored import searches
+from tisim.durable import locked
+from tisim.errors import InputError, must
+
+FILE = "search.h5"
+BESIDE = ("best.csv", "convergence.png", "convergence.pdf", "best_scene.toml", "best_cloud.png")
+
+
+def clear(folder: Path, overwrite: bool) -> None:
+    """Make way for a new search; InputError when there is one already and it is not to be overwritten."""
+    file = folder / FILE
+    begun = file.exists() or file.with_name(FILE + ".journal").exists()
+    must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
+    # The lock file stays: without it two processes could lock two different files.
+    if begun:
+        with locked(folder / (FILE + ".lock"), exclusive=True):
+            for name in (FILE, FILE + ".journal", *BESIDE):
+                (folder / name).unlink(missing_ok=True)
+
+
+def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:
+    """InputError when the file in the folder is of another search than the one wished, by their identity."""
+    known = searches(cache)
+    if known and search_name(wished) not in known:
+        there = _leaves(json.loads(next(iter(known.values()))["identity"]))
+        here = _leaves(json.loads(canonical(wished)))
+        names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+        differ = ", ".join(f"{name} = {there.get(name)} and not {here.get(name)}" for name in names)
+        raise InputError(
+            "output folder must be without another search (or give --out, or --fresh --overwrite); "
+            f"received {str(folder)!r}, where one has {differ}"
+        )
+
+
+def _leaves(settings: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    """Nested settings by their dotted names."""
+    found: dict[str, Any] = {}
+    for name, value in settings.items():
+        inside = isinstance(value, Mapping)
+        found |= _leaves(value, f"{above}{name}.") if inside else {f"{above}{name}": value}
+    return found
