@@ -20,6 +20,9 @@ class FakeScene:
     def digest(self):
         return hashlib.sha256(json.dumps([self.design, self.seed], sort_keys=True).encode()).hexdigest()
 
+    def to_toml(self):
+        return f"seed = {self.seed}\n"
+
 
 def bowl(design, seed, noise=0.01):
     """A bowl with its minimum 0.5 at x = 0.3 in the unit cube, and reproducible noise."""
@@ -50,6 +53,9 @@ class FakeEvaluator:
             failed = isinstance(value, str)
             status = SimpleNamespace(ok=not failed, reason=value if failed else "")
             yield index, SimpleNamespace(status=status, wall_s=0.25, work={"steps": np.int64(7)}, value=value)
+
+    def close(self):
+        pass
 
 
 def fake_problem(genes=4, **changes):

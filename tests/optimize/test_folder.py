@@ -1,19 +1,26 @@
 """A folder belongs to one search: another one is refused before it runs, and nothing is overwritten."""
 
 import pytest
-from drift_case import CASE
+from fake_runs import FakeEvaluator, fake_problem
 
 from cases import case as catalogue
+from cases.case import Case, Size
 from tisim.cli import main
 
-SEARCH = ["optimize", "drift", "--out", "s", "--generations", "1"]
+BOWL = Case(
+    "bowl", "A bowl", "none", {"default": Size("", {}, {"population": 8, "parents": 2})},
+    scene=lambda size, seed: None, check=lambda: iter(()), problem=lambda size, variant: fake_problem(2),
+    variants=("only",),
+)  # fmt: skip
+SEARCH = ["optimize", "bowl", "--out", "s", "--generations", "1"]
 
 
 @pytest.fixture
 def optimize(tmp_path, monkeypatch, capsys):
     """Runs a search in a fresh folder with more arguments: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
+    monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
+    monkeypatch.setattr("optimize.session.Evaluator", FakeEvaluator)
 
     def command(*arguments):
         with pytest.raises(SystemExit) as exit_:
