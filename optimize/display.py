@@ -9,7 +9,7 @@ from rich.console import Console
 
 from optimize.outcome import Progress
 from optimize.problem import Problem
-from tisim.options import progress_bar
+from tisim.terminal import progress_bar
 
 
 class Display:

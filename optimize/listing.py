@@ -11,6 +11,7 @@ from rich.table import Table
 from optimize.cache import Cache, list_records
 from optimize.record import Record
 from optimize.stored import searches
+from tisim.terminal import plain_table
 
 SHOWN = 5
 """Reasons of failures that are spelled out."""
@@ -20,7 +21,7 @@ def listing(path: str | Path) -> RenderableType:
     """Evaluations by problem, searches, and why evaluations failed. InputError if there is no such file."""
     records = list_records(path)
     cache = Cache(path)
-    table = _table("search", "generations", "best", "ended by")
+    table = plain_table("search", "generations", "best", "ended by")
     for name, about in searches(cache).items():
         best = cache.table(f"{name}/logbook").columns.get("best", [])
         last = f"{best[-1]:.6g}" if best else "none"
@@ -29,7 +30,7 @@ def listing(path: str | Path) -> RenderableType:
 
 
 def _evaluations(records: Sequence[Record]) -> Table:
-    table = _table("problem", "evaluations", "failed", "lowest", "run time")
+    table = plain_table("problem", "evaluations", "failed", "lowest", "run time")
     for problem in dict.fromkeys(record.problem for record in records):
         mine = [record for record in records if record.problem == problem]
         good = [record.fitness for record in mine if record.ok]
@@ -44,10 +45,3 @@ def _failures(records: Sequence[Record]) -> list[str]:
     lines = [f"seed {record.seed}: {record.reason}" for record in failed[:SHOWN]]
     more = [f"and {len(failed) - SHOWN} more"] if len(failed) > SHOWN else []
     return ["", "failed:", *lines, *more] if failed else []
-
-
-def _table(*headings: str) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for number, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if number in (0, 3) and heading != "lowest" else "right")
-    return table

@@ -27,14 +27,10 @@ from tisim.options import (
     Size,
     Target,
     Threads,
-    err,
-    out,
-    plain_table,
-    progress_bar,
-    stopping,
-)  # fmt: skip
+)
 from tisim.result import Result
 from tisim.simulation import Simulation
+from tisim.terminal import err, out, plain_table, progress_bar, stopping
 
 CHECKPOINT_SECONDS = float(os.environ.get("TISIM_CHECKPOINT_SECONDS", "60"))
 """Wall time between checkpoints of a run."""

@@ -10,7 +10,8 @@ import typer
 
 from tisim import request, runtime
 from tisim.errors import InputError, RunError, must
-from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads, err, out, stopping
+from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads
+from tisim.terminal import err, out, stopping
 
 
 def optimize(
