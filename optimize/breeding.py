@@ -15,8 +15,8 @@ from pydantic import Field, model_validator
 
 from optimize.ensemble import Estimate
 from optimize.genome import Box
-from optimize.strict import Strict
 from tisim.errors import InputError, must
+from tisim.spec import Checked
 
 _UNFIT = {
     **dict.fromkeys(("selRoulette", "selStochasticUniversalSampling"), "favours large fitness values"),
@@ -43,7 +43,7 @@ class Individual(list[float]):
         self.confirmed: Estimate | None = None
 
 
-class Operator(Strict):
+class Operator(Checked):
     """An operator of deap.tools by name, with its keyword arguments (bounds low and up are filled in)."""
 
     name: str
@@ -85,7 +85,7 @@ class Operator(Strict):
         } | self.options
 
 
-class Breeding(Strict):
+class Breeding(Checked):
     """Composition of a generation. Defaults are Z04 section 8.
 
     population : strings per generation (S). parents : the best, kept unchanged and never evaluated again (K).

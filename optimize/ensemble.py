@@ -19,8 +19,8 @@ from optimize.cache import Cache
 from optimize.estimate import Estimate, settled_after
 from optimize.problem import Problem
 from optimize.record import Record, canonical, evaluation_key
-from optimize.strict import Strict
 from tisim.errors import InputError, RunError, must
+from tisim.spec import Checked
 
 if TYPE_CHECKING:
     from tisim.result import Result
@@ -45,7 +45,7 @@ class Evaluator(Protocol):
         ...
 
 
-class EnsembleSettings(Strict):
+class EnsembleSettings(Checked):
     """How many random starts a fitness is averaged over.
 
     tolerance : TOL of Z04 Eq. 8.1. block : starts per evaluator call (the first block has min_starts if
@@ -60,6 +60,11 @@ class EnsembleSettings(Strict):
     max_starts: int = Field(48, ge=1)
     common_starts: bool = True
     confirm: int = Field(0, ge=0)
+
+    @classmethod
+    def kind(cls) -> str:
+        """As in ``--set search.ensemble.block=2``."""
+        return "search.ensemble"
 
     @model_validator(mode="after")
     def _ordered(self) -> EnsembleSettings:

@@ -34,6 +34,11 @@ class Settings(Breeding):
     max_evaluations: int | None = Field(None, ge=1)
     wall_clock_s: float | None = Field(None, gt=0)
 
+    @classmethod
+    def kind(cls) -> str:
+        """As in ``--set search.population=30``."""
+        return "search"
+
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
 _AFTERWARDS = {"confirm"}

@@ -20,15 +20,10 @@ Vector = tuple[float, float, float]
 """Three Cartesian components."""
 
 
-class Spec(BaseModel):
-    """A part of a scene: frozen, unknown keys refused, NaN and infinity refused."""
+class Checked(BaseModel):
+    """Plain data that is right or refused (InputError): frozen, no unknown keys, no NaN, no infinity."""
 
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        allow_inf_nan=False,
-        ignored_types=(DEVICE_FUNCTION,),
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __init__(self, **data: Any) -> None:
         try:
@@ -38,8 +33,14 @@ class Spec(BaseModel):
 
     @classmethod
     def kind(cls) -> str:
-        """The name of this class in files: snake_case."""
+        """The name of this class in files and messages: snake_case."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+
+
+class Spec(Checked):
+    """A part of a scene."""
+
+    model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
 
     @classmethod
     def named(cls, kind: str, where: str) -> type[Self]:
@@ -144,6 +145,7 @@ def explain_invalid(invalid: ValidationError, where: str) -> str:
         if fault["type"] == "missing":
             lines.append(f"{name} must be given; received nothing")
             continue
-        rule = _RULES.get(fault["type"], fault["msg"]).format(**context)
+        known = _RULES.get(fault["type"])
+        rule = known.format(**context) if known else fault["msg"].removeprefix("Input should be ")
         lines.append(f"{name} must be {rule}; received {fault['input']!r}")
     return "\n".join(lines)

@@ -139,9 +139,9 @@ def test_callers_random_numbers_do_not_steer_the_search():
         ({"parents": 15}, "parents . offspring must be <= population = 20; received 30"),
         ({"parents": 5, "method": "z04"}, "even"),
         ({"offspring": 8, "method": "z04"}, "two for each pair"),
-        ({"population": 0}, "population must be greater than or equal to 2; received 0"),
+        ({"population": 0}, "breeding.population must be at least 2; received 0"),
         ({"recentre_factor": float("nan")}, "recentre_factor must be"),
-        ({"popultion": 20}, "popultion must be a known setting; received 20"),
+        ({"popultion": 20}, "breeding.popultion must be a known key; received 20"),
     ],
 )
 def test_unfit_settings_are_refused_before_anything_runs(settings, message):

@@ -6,6 +6,7 @@ from fake_runs import FakeEvaluator, FakeScene, fake_problem
 
 from optimize.cache import Cache
 from optimize.ensemble import Ensemble, EnsembleSettings, settled_after, start_seed
+from optimize.settings import Settings
 from tisim.errors import InputError, RunError
 
 DESIGNS = [{"x0": 0.1, "x1": 0.2}, {"x0": 0.9, "x1": 0.2}, {"x0": 0.5, "x1": 0.5}]
@@ -180,5 +181,11 @@ def test_evaluator_that_forgets_a_scene_is_caught(tmp_path):
 def test_settings_are_checked():
     with pytest.raises(InputError, match="min_starts must be <= max_starts = 3; received 4"):
         EnsembleSettings(max_starts=3)
-    with pytest.raises(InputError, match="tolerance must be greater than 0; received 0"):
+    with pytest.raises(
+        InputError, match=r"search\.ensemble\.tolerance must be greater than 0\.0; received 0"
+    ):
         EnsembleSettings(tolerance=0)
+    with pytest.raises(InputError, match=r"^search\.ensemble\.blok must be a known key; received 2$"):
+        Settings(ensemble={"blok": 2})
+    with pytest.raises(InputError, match=r"^search\.ensemble must be a valid dictionary .*; received 3$"):
+        Settings(ensemble=3)
