@@ -1,24 +1,12 @@
 import multiprocessing
 
 import pytest
+from cache_files import journal_of, payloads
 from fake_runs import fake_record
 
 from optimize import cache as cache_module
 from optimize.cache import Cache, compact, list_records, verify
 from tisim.errors import InputError
-
-
-def payloads(records):
-    return sorted(record.payload() for record in records)
-
-
-def journal_of(path):
-    return path.with_name(path.name + ".journal")
-
-
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "cache.h5"
 
 
 def test_round_trip_through_journal_and_hdf5(path):

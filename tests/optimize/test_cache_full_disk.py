@@ -3,6 +3,7 @@ import os
 
 import h5py
 import pytest
+from cache_files import journal_of, payloads
 from fake_runs import fake_record
 
 from optimize.cache import Cache, verify
@@ -10,19 +11,6 @@ from optimize.store import image
 from tisim import durable
 from tisim.durable import replace_file
 from tisim.errors import RunError
-
-
-def payloads(records):
-    return sorted(record.payload() for record in records)
-
-
-def journal_of(path):
-    return path.with_name(path.name + ".journal")
-
-
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "cache.h5"
 
 
 @pytest.mark.parametrize("kept", [0, 1, 40])

@@ -1,25 +1,14 @@
-import os
 import random
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from cache_files import worker
 from fake_runs import fake_record
 
 from optimize.cache import Cache, verify
 
-WORKER = Path(__file__).with_name("cache_worker.py")
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
-
-def worker(*arguments, **options):
-    command = [sys.executable, str(WORKER), *map(str, arguments)]
-    return subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True, **options)
-
-
-def test_sigkill_at_random_moments_loses_no_announced_evaluation(tmp_path):
-    path = tmp_path / "cache.h5"
+def test_sigkill_at_random_moments_loses_no_announced_evaluation(path):
     rng = random.Random(8)
     announced = 0
     leftovers = set()
@@ -66,8 +55,7 @@ def test_sigkill_at_every_system_call_leaves_a_whole_cache(tmp_path):
         assert (after.rows, after.journal, after.duplicates, after.torn, after.ok) == (4, 0, 0, 0, True)
 
 
-def test_file_size_limit_is_a_clear_error_and_keeps_what_was_stored(tmp_path):
-    path = tmp_path / "cache.h5"
+def test_file_size_limit_is_a_clear_error_and_keeps_what_was_stored(path):
     with Cache(path) as cache:
         for number in range(30):
             cache.put(fake_record(number))

@@ -4,7 +4,7 @@ import random
 import subprocess
 
 import pytest
-from test_cache_kill import worker
+from cache_files import worker
 
 from optimize.cache import Cache, list_records, verify
 

@@ -2,8 +2,8 @@ import random
 import subprocess
 
 import pytest
+from cache_files import worker
 from fake_runs import FakeEvaluator, fake_problem
-from test_cache_kill import worker
 
 from optimize.cache import Cache, verify
 from optimize.search import search
@@ -27,8 +27,7 @@ def uninterrupted(tmp_path_factory):
 
 
 @pytest.mark.parametrize("after", [0, 1, 30, 200, 400])
-def test_resume_after_interrupt_equals_never_interrupted(tmp_path, uninterrupted, after):
-    path = tmp_path / "cache.h5"
+def test_resume_after_interrupt_equals_never_interrupted(path, uninterrupted, after):
     first = FakeEvaluator(interrupt_after=after)
     part = run(path, first)
     assert (part.stopped, part.interrupted) == ("interrupted", True)
@@ -43,8 +42,7 @@ def test_resume_after_interrupt_equals_never_interrupted(tmp_path, uninterrupted
     assert len(first.ran) + len(second.ran) == uninterrupted.evaluations
 
 
-def test_resume_after_sigkill_equals_never_interrupted(tmp_path, uninterrupted):
-    path = tmp_path / "cache.h5"
+def test_resume_after_sigkill_equals_never_interrupted(path, uninterrupted):
     rng = random.Random(3)
     stored = []
     for _ in range(4):

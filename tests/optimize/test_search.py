@@ -36,11 +36,6 @@ def run(path, evaluator=None, genes=4, problem=None, callbacks=None, **settings)
         )
 
 
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "search.h5"
-
-
 @pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
 def test_beats_random_search_at_equal_evaluations(tmp_path, settings):
     """In 10 dimensions, three seeds: the median best lies far below that of as many random points."""

@@ -1,0 +1,24 @@
+"""Looking at a cache file from outside, and processes that use one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+WORKER = Path(__file__).with_name("cache_worker.py")
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def payloads(records):
+    """The records as bytes, in an order of their own."""
+    return sorted(record.payload() for record in records)
+
+
+def journal_of(path):
+    return path.with_name(path.name + ".journal")
+
+
+def worker(*arguments, **options):
+    """Start cache_worker.py."""
+    command = [sys.executable, str(WORKER), *map(str, arguments)]
+    return subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True, **options)
