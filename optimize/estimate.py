@@ -32,11 +32,6 @@ class Estimate:
     def ok(self) -> bool:
         return not self.reason
 
-    @property
-    def status(self) -> str:
-        """One word for tables, or the reason of a failure."""
-        return self.reason or ("settled" if self.settled else "not settled")
-
     @classmethod
     def of(cls, values: Sequence[float], settled: bool) -> Estimate:
         """From the fitness of each start; at least one."""

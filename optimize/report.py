@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,28 +11,41 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from rich.console import Group, RenderableType
 from rich.table import Table
+from rich.text import Text
 
 from optimize.outcome import Outcome
 from optimize.tables import best_columns, logbook_columns
 
+WIDTH = 80
+"""Of the table of the best designs; every terminal has as many columns."""
 _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
 
-def best_table(outcome: Outcome) -> Table:
+def best_table(outcome: Outcome) -> RenderableType:
     """The best designs for the terminal: a column per design, genes in their units, fitness with its 95 %
-    interval, derived values. (Z04 splits its ten genes over two tables; ranks as columns fit one screen.)
+    interval, derived values. In several tables where they would not fit on WIDTH columns side by side.
     """
-    problem = outcome.problem
-    table = Table(title=problem.title or problem.name)
-    for index, (heading, values) in enumerate(best_columns(problem, outcome.hall).items()):
-        if index == 0:
-            table.add_column(heading)
-            for rank in values:
-                table.add_column(str(rank), justify="right")
-        else:
-            table.add_row(heading, *map(_text, values))
-    return table
+    headings, *rows = (
+        (heading, *map(_text, values))
+        for heading, values in best_columns(outcome.problem, outcome.hall).items()
+    )
+    designs = max(1, (WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
+    blocks: list[RenderableType] = [Text(outcome.problem.title or outcome.problem.name, "italic")]
+    for first in range(1, max(2, len(headings)), designs):
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+        table.add_column(headings[0], no_wrap=True)
+        for heading in headings[first : first + designs]:
+            table.add_column(heading, justify="right", no_wrap=True)
+        for name, *cells in rows:
+            table.add_row(Text(name), *cells[first - 1 : first - 1 + designs])
+        blocks += ["", table]
+    return Group(*blocks)
+
+
+def _widest(rows: Sequence[Sequence[str]]) -> int:
+    return max((len(cell) for row in rows for cell in row[1:]), default=0)
 
 
 def write_csv(outcome: Outcome, path: str | Path) -> None:
@@ -101,7 +115,11 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """Four digits; 1.5e8 and not 1.5e+08, which is two columns more."""
+    if not isinstance(value, float):
+        return str(value)
+    digits, power, exponent = f"{value:.4g}".partition("e")
+    return f"{digits}e{int(exponent)}" if power else digits
 
 
 def _plottable(values: list[float]) -> np.ndarray:

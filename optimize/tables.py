@@ -13,8 +13,8 @@ from optimize.problem import Problem
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
     """Z04 tables 1 to 3 in one: rank, every gene in its unit, fitness with the half-width of its 95 %
-    confidence interval, the problem's derived columns, starts, status; the same from fresh starts where the
-    designs have been confirmed. Heading -> values, best first.
+    confidence interval, the derived columns of the problem, starts, whether their mean has settled; the same
+    from fresh starts where the designs have been confirmed. Heading -> values, best first.
     """
     estimates = [string.estimate for string in hall if string.estimate is not None]
     columns: dict[str, list[Any]] = {"rank": list(range(1, len(estimates) + 1))}
@@ -26,7 +26,7 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
     for heading, function in problem.derived.items():
         columns[heading] = [float(function(estimate.mean)) for estimate in estimates]
     columns["starts"] = [estimate.starts for estimate in estimates]
-    columns["status"] = [estimate.status for estimate in estimates]
+    columns["settled"] = ["yes" if estimate.settled else "no" for estimate in estimates]
     confirmed = [string.confirmed for string in hall if string.confirmed is not None]
     if confirmed:
         columns[f"{problem.symbol}, fresh starts"] = [estimate.mean for estimate in confirmed]
