@@ -16,17 +16,18 @@ except ImportError:
 
 
 @contextlib.contextmanager
-def locked(path: Path, *, exclusive: bool) -> Iterator[None]:
+def locked(path: Path, *, exclusive: bool) -> Iterator[int]:
     """Hold the advisory lock of a lock file, among processes and threads; a killed holder lets go of it.
 
-    The lock file stays behind on purpose: removing it would let two processes lock two different files.
+    Gives a handle of the file. A lock file stays behind on purpose: removing it would let two processes lock
+    two different files.
     """
     if fcntl is None:
         raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH)
-        yield
+        yield handle
     finally:
         os.close(handle)
 
@@ -54,24 +55,41 @@ def append_at(path: Path, end: int, data: bytes) -> int:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Put data in the place of path so that path is, at every instant, the old file or the new one.
+    """Put data in the place of path so that path is, at every instant, the old file or a new one, whole.
 
-    The caller holds the lock, so one name for the unfinished file serves and a killed writer's is reused.
+    Writers of one path take turns: one name serves for the unfinished file, and a killed writer's is reused.
     RunError if the disk is full; path is then the old file.
     """
     unfinished = path.with_name(path.name + ".new")
     try:
-        handle = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
-        try:
-            _write_all(handle, data, 0)
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-        unfinished.replace(path)
+        while True:
+            with locked(unfinished, exclusive=True) as handle:
+                # Whoever had it before may have put it in its place; then that is the file locked here.
+                if _names(unfinished, handle):
+                    _finish(handle, unfinished, path, data)
+                    break
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise _full(path, error) from error
     _sync_folder(path)
+
+
+def _names(path: Path, handle: int) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(handle))
+    except FileNotFoundError:
+        return False
+
+
+def _finish(handle: int, unfinished: Path, path: Path, data: bytes) -> None:
+    """Make data all that is in the file, on the disk, and put it in its place; take it away if that fails."""
+    try:
+        os.ftruncate(handle, 0)
+        _write_all(handle, data, 0)
+        os.fsync(handle)
+        unfinished.replace(path)
+    except OSError:
+        unfinished.unlink(missing_ok=True)
+        raise
 
 
 def _write_all(handle: int, data: bytes, offset: int) -> None:

@@ -1,5 +1,6 @@
 import errno
 import os
+import threading
 
 import h5py
 import pytest
@@ -80,3 +81,26 @@ def test_replace_file_is_all_or_nothing(tmp_path):
     replace_file(target, image(None, [fake_record(1)], {}))
     with h5py.File(target) as file:
         assert len(file["evaluations/key"]) == 1
+
+
+def test_writers_without_a_lock_of_their_own_take_turns(tmp_path):
+    """Some write much and some little, to one path: it is always one of the contents, whole."""
+    target = tmp_path / "file"
+    contents = [bytes([65 + k]) * (1 + 300_000 * (k % 2)) for k in range(4)]
+    replace_file(target, contents[0])
+    failures = []
+
+    def write(content):
+        try:
+            for _ in range(40):
+                replace_file(target, content)
+        except BaseException as failure:
+            failures.append(failure)
+
+    threads = [threading.Thread(target=write, args=(content,)) for content in contents]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        assert target.read_bytes() in contents
+    assert failures == []
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
