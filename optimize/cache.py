@@ -189,9 +189,9 @@ def _existing(path: str | Path) -> Path:
     return path
 
 
-def list_records(path: str | Path) -> list[Record]:
-    """All evaluations of an existing cache file, oldest first. InputError if there is no such file."""
-    return Cache(_existing(path)).records()
+def existing(path: str | Path) -> Cache:
+    """The cache of a file that is there already. InputError if there is no such file."""
+    return Cache(_existing(path))
 
 
 def verify(path: str | Path) -> VerifyReport:
@@ -226,6 +226,6 @@ def verify(path: str | Path) -> VerifyReport:
 
 def compact(path: str | Path) -> int:
     """Fold an existing cache file's journal, drop duplicates and damaged rows; return how many are kept."""
-    cache = Cache(_existing(path))
+    cache = existing(path)
     cache.fold(always=True)
     return len(cache)

@@ -46,11 +46,11 @@ class Display:
         self.bar.update(self.task, best=self._fitness(where.best_fitness).split("  ")[0])
         ran = f"{where.evaluations} runs" + (f", {where.hits} from the file" if where.hits else "")
         line = f"generation {where.generation:3d}  best {self._fitness(where.best_fitness)}  ({ran})"
-        self.console.print(line, highlight=False)
+        self.console.print(line, highlight=False, markup=False)
         if where.best_design is not None and where.best_design != self.best:
             self.best = where.best_design
             text = f"    {self._design(self.best)}"
-            self.console.print(text, style="dim", highlight=False, soft_wrap=True)
+            self.console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
 
     def _fitness(self, fitness: float) -> str:
         if not math.isfinite(fitness):

@@ -36,7 +36,7 @@ class Estimate:
     def of(cls, values: Sequence[float], settled: bool) -> Estimate:
         """From the fitness of each start; at least one."""
         n = len(values)
-        mean = float((np.cumsum(values) / np.arange(1, n + 1))[-1])
+        mean = float(np.cumsum(values)[-1] / n)  # summed as in settled_after, to the last bit
         std = float(np.std(values, ddof=1)) if n > 1 else math.nan
         half_width = student_t(n - 1) * std / math.sqrt(n) if n > 1 else math.nan
         return cls(mean, std, half_width, n, settled)

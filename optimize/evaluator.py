@@ -15,12 +15,12 @@ class Evaluator:
     """Scenes to results, many worlds at a time; a start that cannot be made gives a failed Result.
 
     batch : most worlds that run side by side. settings : what decides the last bits of a result beside the
-    scene; part of the key under which it is cached.
+    scene - precision, device, compiler; part of the key under which it is cached.
     """
 
     def __init__(self, batch: int = 256) -> None:
         self.batches = Batches(batch)
-        self.settings: dict[str, Any] = dict(runtime.current().settings)
+        self.settings: dict[str, Any] = {**runtime.current().settings, "backend": runtime.backend()}
 
     def evaluate(
         self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None

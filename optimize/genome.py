@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -56,18 +56,6 @@ class Gene:
             value = self.low + u * (self.high - self.low)
         return float(min(max(value, self.low), self.high))
 
-    def encode(self, value: float) -> float:
-        """Place in 0..1 of a physical value within low..high; InputError outside."""
-        must(
-            self.low <= value <= self.high,
-            f"gene {self.name}",
-            f"within {self.low} .. {self.high} {self.unit}".strip(),
-            value,
-        )
-        if self.scale == "log":
-            return math.log(value / self.low) / math.log(self.high / self.low)
-        return (value - self.low) / (self.high - self.low)
-
 
 @dataclass(frozen=True)
 class Genome:
@@ -93,14 +81,6 @@ class Genome:
         must(point.shape == (len(self),), "unit-cube point", f"of shape ({len(self)},)", point.shape)
         must(bool(np.all((point >= 0) & (point <= 1))), "unit-cube point", "within 0..1", point.tolist())
         return {gene.name: gene.decode(float(x)) for gene, x in zip(self.genes, point, strict=True)}
-
-    def encode(self, design: Mapping[str, float]) -> NDArray[np.float64]:
-        """Point of the unit cube, shape (genes,), of a design in physical units.
-
-        InputError for unknown, missing or out-of-range genes.
-        """
-        must(set(design) == set(self.names), "design", f"exactly the genes {list(self.names)}", list(design))
-        return np.array([gene.encode(design[gene.name]) for gene in self.genes])
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Group, RenderableType
+from rich.markup import escape
 from rich.table import Table
 
-from optimize.cache import Cache, list_records
+from optimize.cache import existing
 from optimize.record import Record
 from optimize.stored import searches
 from tisim.terminal import plain_table
@@ -19,8 +20,8 @@ SHOWN = 5
 
 def listing(path: str | Path) -> RenderableType:
     """Evaluations by problem, searches, and why evaluations failed. InputError if there is no such file."""
-    records = list_records(path)
-    cache = Cache(path)
+    cache = existing(path)
+    records = cache.records()
     table = plain_table("search", "generations", "best", "ended by")
     for name, about in searches(cache).items():
         best = cache.table(f"{name}/logbook").columns.get("best", [])
@@ -42,6 +43,6 @@ def _evaluations(records: Sequence[Record]) -> Table:
 
 def _failures(records: Sequence[Record]) -> list[str]:
     failed = [record for record in records if not record.ok]
-    lines = [f"seed {record.seed}: {record.reason}" for record in failed[:SHOWN]]
+    lines = [escape(f"seed {record.seed}: {record.reason}") for record in failed[:SHOWN]]
     more = [f"and {len(failed) - SHOWN} more"] if len(failed) > SHOWN else []
     return ["", "failed:", *lines, *more] if failed else []

@@ -34,7 +34,8 @@ class Progress:
 class Outcome:
     """What a search found.
 
-    hall : the best different designs, best first (empty if none succeeded); failed designs never enter.
+    hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
+    succeeded); failed designs never enter.
     logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations asked for),
     failed, best, mean, std (of the successful designs in the population; best is +inf and mean and std NaN
     if there is none), box (mean width of the search box it drew from), recentred (box moved after it).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from rich.text import Text
 
 from optimize.outcome import Outcome
 from optimize.tables import best_columns, logbook_columns
+from tisim.durable import replace_file
 
 WIDTH = 80
 """Of the table of the best designs; every terminal has as many columns."""
@@ -48,13 +50,14 @@ def _widest(rows: Sequence[Sequence[str]]) -> int:
     return max((len(cell) for row in rows for cell in row[1:]), default=0)
 
 
-def write_csv(outcome: Outcome, path: str | Path) -> None:
+def best_csv(outcome: Outcome) -> bytes:
     """The best designs as CSV, all digits, one column per heading of best_columns."""
     columns = best_columns(outcome.problem, outcome.hall)
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue().encode()
 
 
 def convergence_figure(outcome: Outcome) -> Figure:
@@ -103,15 +106,28 @@ def convergence_figure(outcome: Outcome) -> Figure:
 
 
 def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
-    """Write best.csv, convergence.png and convergence.pdf into a folder (made if missing); name -> path."""
+    """Write best.csv, convergence.png and convergence.pdf into a folder (made if missing); name -> path.
+
+    Each file is, at every instant, the old one or the new one. RunError if the disk is full.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    paths = {name: folder / name for name in ("best.csv", "convergence.png", "convergence.pdf")}
-    write_csv(outcome, paths["best.csv"])
     figure = convergence_figure(outcome)
-    figure.savefig(paths["convergence.png"], dpi=200)
-    figure.savefig(paths["convergence.pdf"])
-    return paths
+    contents = {
+        "best.csv": best_csv(outcome),
+        "convergence.png": drawn(figure, "png", dpi=200),
+        "convergence.pdf": drawn(figure, "pdf"),
+    }
+    for name, content in contents.items():
+        replace_file(folder / name, content)
+    return {name: folder / name for name in contents}
+
+
+def drawn(figure: Figure, kind: str, **options: Any) -> bytes:
+    """A figure as the bytes of a file of that kind."""
+    file = io.BytesIO()
+    figure.savefig(file, format=kind, **options)
+    return file.getvalue()
 
 
 def _text(value: Any) -> str:

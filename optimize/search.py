@@ -94,12 +94,12 @@ class _Search:
 
     def _confirm(self) -> None:
         """Run the best designs again from fresh starts, and rank them by that."""
-        if not self.settings.ensemble.confirm or not self.hall:
+        if not self.settings.ensemble.confirm or not self.hall or self._out_of_time():
             return
         ranked = list(self.hall)
         last = len(self.outcome.logbook) - 1
         designs = [self.problem.genome.decode(string) for string in ranked]
-        found = self.ensemble.confirm(designs, lambda fraction: self._report(last, fraction))
+        found = self.ensemble.confirm(designs, lambda fraction: self._report(last, 1.0))
         for string, estimate in zip(ranked, found, strict=True):
             string.confirmed = estimate
         order = sorted(range(len(ranked)), key=lambda k: found[k].mean)

@@ -18,6 +18,7 @@ from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
 from optimize.search import search
 from optimize.settings import Settings, identity
+from tisim.durable import replace_file
 from tisim.interrupt import Interrupt
 from tisim.output import writable
 
@@ -49,7 +50,7 @@ def session(
                 paths += _show_best(outcome.best, outcome, evaluator, folder)
     finally:
         evaluator.close()
-    say.print("written  " + "\n         ".join(map(str, paths)), highlight=False)
+    say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
     return outcome
 
 
@@ -73,13 +74,15 @@ def _shown(
 
 def _show_best(best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path) -> list[Path]:
     """Run the best design once more, from the first start, for its picture."""
-    problem = outcome.problem
-    scene = problem.scene(problem.genome.decode(best), start_seed(outcome.settings.seed, 0))
+    problem, settings = outcome.problem, outcome.settings
+    design = problem.genome.decode(best)
+    own = None if settings.ensemble.common_starts else design
+    scene = problem.scene(design, start_seed(settings.seed, 0, own))
     text = folder / "best_scene.toml"
-    text.write_text(scene.to_toml(), encoding="utf-8")
+    replace_file(text, scene.to_toml().encode())
     if problem.picture is None:
         return [text]
     _, result = next(evaluator.evaluate([scene]))
     image = folder / "best_cloud.png"
-    problem.picture(scene, result).savefig(image, dpi=150)
+    replace_file(image, report.drawn(problem.picture(scene, result), "png", dpi=150))
     return [text, image]

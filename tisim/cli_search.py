@@ -68,6 +68,8 @@ def optimize(
     if outcome.interrupted:
         err().print(f"stopped; {place / FILE} has all that is done. To go on, give the same command again.")
         raise typer.Exit(130)
+    if not outcome.logbook:
+        raise RunError("the time was over before the first generation; to go on, give the same command again")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {place / FILE}' says why")
 

@@ -5,7 +5,7 @@ from cache_files import journal_of, payloads
 from fake_runs import fake_record
 
 from optimize import cache as cache_module
-from optimize.cache import Cache, compact, list_records, verify
+from optimize.cache import Cache, compact, existing, verify
 from tisim.errors import InputError
 
 
@@ -20,7 +20,7 @@ def test_round_trip_through_journal_and_hdf5(path):
     for record in records[6:]:
         cache.put(record)
     assert payloads(Cache(path).records()) == payloads(records)
-    assert payloads(list_records(path)) == payloads(records)
+    assert payloads(existing(path).records()) == payloads(records)
     assert Cache(path).get(records[8].key) == records[8]
     report = verify(path)
     assert (report.rows, report.journal, report.ok, report.duplicates, report.torn) == (6, 4, True, 0, 0)
@@ -32,7 +32,7 @@ def test_first_record_of_a_key_counts(path):
     with Cache(path) as cache:
         assert cache.put(fake_record(1)).fitness == 1 / 7
         assert cache.put(fake_record(1, fitness=9.0)).fitness == 1 / 7
-    assert [record.fitness for record in list_records(path)] == [1 / 7]
+    assert [record.fitness for record in existing(path).records()] == [1 / 7]
 
 
 def test_other_process_records_appear(path):

@@ -4,7 +4,7 @@ import pytest
 from cache_files import journal_of, payloads
 from fake_runs import fake_record
 
-from optimize.cache import Cache, compact, list_records, verify
+from optimize.cache import Cache, compact, existing, verify
 from optimize.journal import Journal, frame, scan
 from tisim.errors import InputError
 
@@ -56,7 +56,7 @@ def test_verify_finds_conflicting_fitnesses(path):
         cache.put(fake_record(1))
     Journal(journal_of(path)).append(0, fake_record(1, fitness=0.25).payload())
     assert verify(path).conflicts == [fake_record(1).key]
-    assert [record.fitness for record in list_records(path)] == [1 / 7]
+    assert [record.fitness for record in existing(path).records()] == [1 / 7]
     assert not verify(path).ok
 
 
@@ -110,7 +110,7 @@ def test_no_flipped_bit_anywhere_goes_unnoticed(path):
             continue
         outcomes.add("reported" if found else "harmless")
         if not found:
-            assert payloads(list_records(path)) == payloads([fake_record(1), fake_record(2)])
+            assert payloads(existing(path).records()) == payloads([fake_record(1), fake_record(2)])
             assert Cache(path).table("a/log") == table
     assert {"refused", "reported"} <= outcomes
 
@@ -127,7 +127,7 @@ def test_file_that_is_none_of_ours_is_refused_and_kept(path, content):
     else:
         path.write_bytes({"cut": whole[: len(whole) // 2], "text": b"not hdf5 at all", "empty": b""}[content])
     before = path.read_bytes()
-    for function in (Cache, verify, list_records, compact):
+    for function in (Cache, verify, existing, compact):
         with pytest.raises(
             InputError, match=r"cache\.h5 must be a whole HDF5 file written by a cache; received"
         ):
@@ -136,7 +136,7 @@ def test_file_that_is_none_of_ours_is_refused_and_kept(path, content):
 
 
 def test_missing_file_is_refused(path):
-    for function in (verify, list_records, compact):
+    for function in (verify, existing, compact):
         with pytest.raises(InputError, match="cache file must be an existing file; received"):
             function(path)
     assert list(path.parent.iterdir()) == []

@@ -1,10 +1,14 @@
 """A folder belongs to one search: another one is refused before it runs, and nothing is overwritten."""
 
+import csv
+import tomllib
+
 import pytest
 from fake_runs import FakeEvaluator, fake_problem
 
 from cases import case as catalogue
 from cases.case import Case, Size
+from optimize.cache import Cache
 from tisim.cli import main
 
 BOWL = Case(
@@ -58,3 +62,20 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
     assert optimize("--seed", 1)[0] == 2
+
+
+def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path):
+    code, err = optimize("--budget-minutes", 1e-9)
+    assert code == 1
+    assert "the time was over before the first generation; to go on, give the same command again" in err
+    assert optimize()[0] == 0
+
+
+@pytest.mark.parametrize("common", ["true", "false"])
+def test_best_scene_is_one_that_the_search_has_run(optimize, tmp_path, common):
+    assert optimize("--set", f"search.ensemble.common_starts={common}")[0] == 0
+    seed = tomllib.loads((tmp_path / "s" / "best_scene.toml").read_text())["seed"]
+    with (tmp_path / "s" / "best.csv").open() as file:
+        best = next(csv.DictReader(file))
+    ran = [record for record in Cache(tmp_path / "s" / "search.h5").records() if record.seed == seed]
+    assert [float(best["x0 (m)"]), float(best["x1 (m)"])] in [list(record.design.values()) for record in ran]

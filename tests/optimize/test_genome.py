@@ -7,10 +7,7 @@ from tisim.errors import InputError
 GENOME = Genome((Gene("v", "m/s", 20.0, 200.0), Gene("H0", "Pa", 1e5, 1e6, "log"), Gene("mu", "", 0.01, 0.1)))
 
 
-def test_round_trip_and_exact_ends():
-    rng = np.random.default_rng(1)
-    for u in rng.random((200, 3)):
-        np.testing.assert_allclose(GENOME.encode(GENOME.decode(u)), u, atol=1e-13)
+def test_exact_ends():
     assert GENOME.decode([0, 0, 0]) == {"v": 20.0, "H0": 1e5, "mu": 0.01}
     assert GENOME.decode([1, 1, 1]) == {"v": 200.0, "H0": 1e6, "mu": 0.1}
 
@@ -33,11 +30,6 @@ def test_log_scale_is_uniform_in_the_exponent():
         (lambda: GENOME.decode([0, 0, 1.01]), "within 0..1"),
         (lambda: GENOME.decode([0, 0, float("nan")]), "within 0..1"),
         (lambda: GENOME.decode([0, 0]), "of shape"),
-        (lambda: GENOME.encode({"v": 100.0}), "exactly the genes"),
-        (
-            lambda: GENOME.encode({"v": 10.0, "H0": 1e5, "mu": 0.05}),
-            "gene v must be within 20.0 .. 200.0 m/s",
-        ),
         (lambda: Box.full(2).recentre([0.5, 0.5], 0.0), "recentre factor must be"),
         (lambda: Box.full(2).recentre([0.5, 1.5], 0.5), "best point must be"),
     ],

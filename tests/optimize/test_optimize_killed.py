@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from cache_files import worker
 
-from optimize.cache import Cache, list_records, verify
+from optimize.cache import Cache, existing, verify
 
 QUICK = ("drift",)
 REAL = ("agglomeration", "--size", "small")
@@ -61,7 +61,7 @@ def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
         report = verify(file)
         assert report.ok, report
         leftovers |= {name for name in ("journal", "torn", "duplicates") if getattr(report, name)}
-        kept = {record.key: record.payload() for record in list_records(file)}
+        kept = {record.key: record.payload() for record in existing(file).records()}
         assert stored <= set(kept), number
         assert {key: kept.get(key) for key in seen} == seen, number
         seen = kept

@@ -15,6 +15,7 @@ from optimize.outcome import Outcome
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.tables import best_columns
+from tisim.errors import RunError
 
 N = 1000
 DERIVED = {
@@ -61,6 +62,18 @@ def test_csv_holds_all_digits(outcome, tmp_path):
         assert float(row["Pi"]) == string.estimate.mean
         assert float(row["95 % +-"]) == string.estimate.half_width
         assert float(row["n_f"]) == pytest.approx(float(row["b_f/b_0"]) ** 3)
+
+
+def test_a_full_disk_is_told_and_keeps_the_old_files(outcome, tmp_path, monkeypatch):
+    old = {name: path.read_bytes() for name, path in report.write(outcome, tmp_path).items()}
+
+    def full(handle, data, offset):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tisim.durable.os.pwrite", full)
+    with pytest.raises(RunError, match=r"best\.csv could not be written: No space left on device"):
+        report.write(outcome, tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == old
 
 
 def test_derived_columns_reproduce_z04_table_3():
