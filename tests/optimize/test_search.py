@@ -9,7 +9,7 @@ from fake_runs import FakeEvaluator, bowl, fake_problem
 
 from optimize.breeding import Operator
 from optimize.cache import Cache, verify
-from optimize.ensemble import EnsembleSettings
+from optimize.ensemble import EnsembleSettings, start_seed
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.stored import searches
@@ -115,8 +115,9 @@ def test_wall_clock_stops_in_the_middle_of_a_generation(path):
 
 
 def test_wall_clock_stops_between_generations(path):
-    outcome = run(path, generations=10_000, wall_clock_s=1.0)
+    outcome = run(path, generations=10_000, wall_clock_s=1.0, ensemble=ONE.model_copy(update={"confirm": 4}))
     assert outcome.stopped == "wall clock"
+    assert outcome.best.confirmed is None
     assert 0 < len(outcome.logbook) < 10_000
     assert outcome.best.estimate.mean == min(outcome.logbook.select("best"))
 
@@ -201,6 +202,25 @@ def test_file_is_of_the_search_before_anything_has_run(path):
     with pytest.raises(RunError, match="in the middle"):
         run(path, FakeEvaluator(_fail), seed=2)
     assert len(searches(Cache(path))) == 2
+
+
+def test_best_designs_are_confirmed_from_starts_that_have_not_been_used(path):
+    settings = EnsembleSettings(max_starts=6, confirm=10)
+    evaluator = FakeEvaluator(lambda design, seed: bowl(design, seed + int(1e9 * design["x0"]), noise=0.3))
+    outcome = run(path, evaluator, generations=3, ensemble=settings)
+    fresh = {start_seed(1, k) for k in range(6, 16)}
+    assert not fresh & {scene.seed for call in evaluator.calls[:-1] for scene in call}
+    assert {scene.seed for scene in evaluator.calls[-1]} == fresh
+    for string in outcome.hall:
+        values = [evaluator.function(outcome.problem.genome.decode(string), seed) for seed in fresh]
+        assert string.confirmed.starts == 10
+        assert string.confirmed.mean == pytest.approx(np.mean(values), rel=1e-12)
+    means = [string.confirmed.mean for string in outcome.hall]
+    assert means == sorted(means)
+    estimates = [string.estimate.mean for string in outcome.hall]
+    assert estimates != sorted(estimates), "ranked anew"
+    columns = Cache(path).table(f"{outcome.name}/hall_of_fame").columns
+    assert columns["fitness, fresh starts"] == means
 
 
 def test_unfit_operators_stop_it_before_anything_runs(path):
