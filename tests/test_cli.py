@@ -144,6 +144,10 @@ WRONG = [
     (["run", "FLOW", "--set", "effects.impact.hardness=nan"], "impact.hardness must be a finite number"),
     (["run", "FLOW", "--set", "particles.density=-1"], "cloud.density must be greater than 0"),
     (["run", "FLOW", "--set", "duration=0"], "scene.duration must be greater than 0"),
+    (["run", "FLOW", "--without", "warp"], "effect to leave out must be one of impact; received 'warp'"),
+    (["run", "agglomeration", "--without", "heating"], "must be used together with effects.heating"),
+    (["explain", "agglomeration", "--without", "impact"], "must be used together with effects.impact"),
+    (["run", "FLOW", "--without", "impact", "--set", "effects.impact.hardness=1"], "a setting of this scene"),
     (["run", "FLOW", "--device", "abacus"], "device must be one of cpu, cuda; received 'abacus'"),
     (["run", "FLOW", "--precision", "f16"], "precision must be one of f64, f32; received 'f16'"),
     (["run", "FLOW", "--resume"], "output folder must be one that an interrupted run has left"),
@@ -202,6 +206,21 @@ def test_cases_explain_and_version(tisim):
     assert "60 particles" in out
     assert "hardness = 265480 Pa" in out
     assert tisim("--version")[1].startswith("tisim 0.")
+
+
+def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
+    assert tisim("run", impacts, "--without", "impact")[0] == 0
+    assert Scene.from_toml(tmp_path / "out" / "flow" / "scene.toml").effects == ()
+    with h5py.File(tmp_path / "out/flow/result.h5") as file:
+        assert "impacts" not in file["work"].attrs
+    code, out, _ = tisim(
+        "explain", "agglomeration", "--size", "small", "--without", "fragmentation", "--without", "cooling"
+    )
+    assert code == 0
+    present, left_out = out.split("It leaves out")
+    assert not any(word in present for word in ("fragmentation", "cooling", "pieces", "fracture_energy"))
+    assert "pieces (of fragmentation)" in left_out
+    assert "cooling_loss (of cooling)" in left_out
 
 
 def test_check_tells_right_from_wrong(tisim, monkeypatch):

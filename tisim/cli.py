@@ -35,6 +35,11 @@ from tisim.terminal import err, out, plain_table, progress_bar, stopping
 CHECKPOINT_SECONDS = float(os.environ.get("TISIM_CHECKPOINT_SECONDS", "60"))
 """Wall time between checkpoints of a run."""
 
+Absent = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="EFFECT", help="Leave an effect out: cooling. Repeatable."),
+]
+
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
     no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None,
@@ -73,7 +78,7 @@ def _options(
 
 @app.command()
 def run(
-    target: Target, changes: Changes = None, folder: Out = None,
+    target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
     threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
 ) -> None:  # fmt: skip
@@ -81,7 +86,7 @@ def run(
     from tisim import checkpoint, output
 
     runtime.start(device, precision, threads)
-    name, scene = request.scene(target, size, seed, changes or ())
+    name, scene = request.scene(target, size, seed, absent or (), changes or ())
     place = output.Folder(folder or Path("out") / name)
     place.check(overwrite, resume)
     simulation = Simulation(scene)
@@ -160,14 +165,14 @@ def cases() -> None:
 
 @app.command()
 def explain(
-    target: Target, changes: Changes = None, seed: Seed = None, size: Size = None,
-    device: Device = "cpu", precision: Precision = "f64",
+    target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
+    size: Size = None, device: Device = "cpu", precision: Precision = "f64",
 ) -> None:  # fmt: skip
     """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
     from tisim.explain import explain, render
 
     runtime.start(device, precision)
-    _, scene = request.scene(target, size, seed, changes or ())
+    _, scene = request.scene(target, size, seed, absent or (), changes or ())
     out().print(render(explain(scene)))
 
 

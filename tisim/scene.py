@@ -149,3 +149,12 @@ class Scene(Spec):
             must(isinstance(place, dict), key, "a setting of this scene", last)
             place[last] = value
         return type(self).from_dict(data)
+
+    def without(self, *names: str) -> Scene:
+        """A copy that leaves effects out; InputError when one is not there, or those that stay need it."""
+        data = self.to_dict()
+        for name in names:
+            known = ", ".join(data["effects"]) or "none, as this scene has none"
+            must(name in data["effects"], "effect to leave out", f"one of {known}", name)
+        kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
+        return type(self).from_dict({**data, "effects": kept})
