@@ -101,10 +101,7 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
             DeformationWork(),
             Softening(activation_energy=design["activation_energy"]),
             Reaction(energy_density=design["reaction"]),
-            Fragmentation(
-                surface_energy=design["surface_energy"],
-                grain_mass=design["density"] * 4 / 3 * np.pi * radius**3,
-            ),
+            Fragmentation(surface_energy=design["surface_energy"]),
             Agglomeration(),
             Cooling(),
         ),

@@ -236,6 +236,18 @@ class TestFragmentation:
         assert single.work["fractures"] == 0
         assert len(single.state["mass"]) == 1
 
+    def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density(self):
+        """Two grains of eight beside one of one: each gives eight pieces, however dense all of them are."""
+        light = scene(
+            [[-2 * RADIUS, 0, 0], [2 * RADIUS, 0, 0], [0, 1, 0]], [[1e3, 0, 0], [-1e3, 0, 0], [0, 0, 0]],
+            laws(SOFT, 1.0, grain_mass=None), radius=[2 * RADIUS, 2 * RADIUS, RADIUS], dt=1e-15,
+            quantities={"temperature": 300.0},
+        )  # fmt: skip
+        given = light.replace({"effects.fragmentation.grain_mass": 2 * GRAIN})
+        results = run([light, light.replace({"particles.density": 7 * DENSITY}), given])
+        assert [len(result.state["mass"]) for result in results] == [17, 17, 9]
+        assert light.replace({"particles.density": DENSITY / 7}).capacity() == light.capacity() == 17
+
     def test_agglomerate_of_grains_breaks_into_all_of_them(self):
         """Rounding of the summed masses costs no piece: 7 merged grains give 7."""
         radius = RADIUS * 7 ** (1 / 3)

@@ -71,6 +71,11 @@ class Scene(Spec):
         parts = (*self.effects, self.domain, self.stepper)
         return tuple(part.structure() for part in parts)
 
+    def acting(self) -> tuple[Effect, ...]:
+        """The effects, with what they take from the start filled in."""
+        masses = self.particles.masses()
+        return tuple(effect.at_start(masses) for effect in self.effects)
+
     def capacity(self) -> int:
         """Particles that may ever live at once."""
         masses = self.particles.masses()
