@@ -93,3 +93,16 @@ def test_two_leave_the_box_in_one_step_and_meet_inside_it():
     assert result.work["impacts"] == 1
     np.testing.assert_allclose(by_id(result)["position"][:, 0], [0.1, 0.1015], atol=1e-12)
     assert by_id(result)["velocity"][0, 0] < by_id(result)["velocity"][1, 0]
+
+
+@pytest.mark.parametrize("images", [False, True])
+def test_a_step_that_loses_the_place_in_the_box_is_a_clear_failure(images):
+    """1e12 boxes in a step leave three digits of the place; 1e14 leave one, and 1e300 none at all."""
+    box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
+    far, *lost = run([drift([[0.1, 0.2, 0.3]], [[v, 0, 0]], domain=box) for v in (1e12, 1e14, -1e14, 1e300)])
+    assert far.status.ok
+    np.testing.assert_allclose(far.state["position"], [[0.1, 0.2, 0.3]], atol=1e-3)
+    for result in lost:
+        assert not result.status.ok
+        assert "rounding loses the place in the box, at particle 0" in result.status.reason
+        np.testing.assert_array_equal(result.state["position"], result.start["position"])
