@@ -17,7 +17,9 @@ f''/(2 f') < 1.5/t for the equation below; a change below rounding would be wait
 
 
 class Cooling(Operator):
-    """m C dT/dt = -h_c a_s (T - T_gas) - sigma eps a_s (T^4 - T_s^4), a_s = 4 pi b^2.
+    """Grains exchange heat with a gas and with what surrounds them. With a_s = 4 pi b^2,
+
+        m C dT/dt = -h_c a_s (T - T_gas) - sigma eps a_s (T^4 - T_s^4)
 
     emissivity : eps, 0..1. surroundings : T_s. convection : h_c. gas : T_gas.
     Source: Z04 Eq. (6.20). The paper steps it explicitly (6.21), which turns negative for a small hot
