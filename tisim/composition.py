@@ -89,6 +89,7 @@ class Composition:
             lists=lists,
             remember=self._remember(),
             forces=self._summed(SumForces),
+            forced=bool(self.forces or self.pair_forces),
             turning=turning(self.forces, self.pair_forces),
         )
         step: list[Item] = [*stepper.step(parts)]

@@ -16,7 +16,7 @@ class Parts:
     """What a stepper makes a step of. All are bound to the state; a tuple is empty where nothing is to do.
 
     control : decides how long the next step may be. domain, operators, near : as bound; near is None
-    without a pair list. turning : whether there are torques.
+    without a pair list. forced, turning : whether there are forces, and torques.
 
     lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
     pairs remember, over ``dt``; once a step. forces : settle what is mutual, and sum force and torque of the
@@ -31,6 +31,7 @@ class Parts:
     lists: tuple[Item, ...]
     remember: tuple[Item, ...]
     forces: tuple[Item, ...]
+    forced: bool
     turning: bool
 
 

@@ -14,7 +14,7 @@ class Verlet(Stepper):
     """Explicit stepper with step control. Second order in dt for forces that depend on position only."""
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, near, forced = parts.s, parts.near, bool(parts.forces)
+        s, near, forced = parts.s, parts.near, parts.forced
         drift = Move(s, parts.domain, parts.operators, forced, parts.turning)
         kick = (Kick(s, parts.turning),) if forced else ()
         start = (Clock(s, parts.control, near), drift, Advance(s, near))
