@@ -77,6 +77,13 @@ class Poison(Operator):
             s.position[w, i][self.axis] = ti.sqrt(-s.mass[w, i])
 
 
+@pytest.mark.parametrize("wrong", [{"slots": 3}, {"integer": True}, {"components": 3, "slots": 3}])
+def test_a_field_that_could_not_be_merged_is_refused(wrong):
+    """Not when two particles merge, where the compiler would stop or a fraction be lost."""
+    with pytest.raises(TypeError, match="field tag"):
+        Field("tag", "", **wrong)
+
+
 def test_an_operator_sees_every_world_once_a_step():
     result = run(scene([[0, 0, 0]], [[0, 0, 0]], (Census(),), dt=0.1, steps=10))
     assert result.work["censuses"] == 10

@@ -36,6 +36,12 @@ class Field:
     default: float | None = 0.0
     minimum: float | None = None
 
+    def __post_init__(self) -> None:
+        if self.slots and (self.merge != "keep" or self.components != 1):
+            raise TypeError(f"field {self.name} with slots must have one component and be merged as 'keep'")
+        if self.integer and self.merge != "keep":
+            raise TypeError(f"field {self.name} of integers must be merged as 'keep'")
+
     def shape(self, *particles: int) -> tuple[int, ...]:
         """Of an array of it, for an array of particles of this shape."""
         return (*particles, *((3,) if self.components == 3 else ()), *((self.slots,) if self.slots else ()))
