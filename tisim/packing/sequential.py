@@ -97,8 +97,9 @@ def sequential_addition(
     must(bool((side > 0).all()), "box", "wider than nothing in each direction", side.tolist())
     # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
     dims = np.clip(np.floor(side / (2.0 * radius)), 1, CELLS).astype(int)
-    members = int(np.ceil(np.prod(side / dims) / (8 * radius**3))) * PER_CELL
-    cells = np.zeros((int(np.prod(dims)), 1 + min(count, members)), dtype=np.int32)
+    wide = np.prod(np.minimum(side / dims / (2.0 * radius), 1e6))
+    members = min(count, int(np.ceil(wide)) * PER_CELL)
+    cells = np.zeros((int(np.prod(dims)), 1 + members), dtype=np.int32)
     centres = np.zeros((count, 3))
     placed = _add(
         centres,
