@@ -47,7 +47,7 @@ class Explanation:
     """A scene, as one world of it is compiled.
 
     particles, capacity : at the start, and room for. memory : every allocation, fields first. phases : of a
-    step, in order; those with * are repeated until no pair waits. absent_effects : known, and left out.
+    step, in order; those with * are repeated until nothing waits. absent_effects : known, and left out.
     absent_fields : (field, effects that would need it), not allocated.
     """
 
