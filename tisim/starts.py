@@ -58,12 +58,12 @@ def _real() -> type:
 
 def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
     """A field of all worlds: what each start says of it, else its default; ids count from 0."""
-    column: np.ndarray = np.full(
-        f.shape(worlds, capacity), f.default or 0, dtype=np.int32 if f.integer else _real()
-    )
+    copied, number = (f.default, 0) if isinstance(f.default, str) else (None, f.default or 0)
+    column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=np.int32 if f.integer else _real())
     for w, start in enumerate(starts):
         n = len(start["mass"])
-        column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, column[w, :n])
+        default = start[copied] if copied else column[w, :n]
+        column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, default)
     return column
 
 

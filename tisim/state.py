@@ -23,7 +23,8 @@ class Field:
         or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
     slots : a particle has so many values, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
         They are its own: a piece that breaks off starts with the default.
-    default : what a particle starts with where the start does not say; None where it must.
+    default : what a particle starts with where the start does not say: a number, or the name of a field of
+        which it is a copy then, such as "position"; None where the start must say.
     minimum : the least value that a start may give.
     """
 
@@ -33,7 +34,7 @@ class Field:
     merge: Literal["mean", "sum", "volume", "keep"] = "mean"
     integer: bool = False
     slots: int = 0
-    default: float | None = 0.0
+    default: float | str | None = 0.0
     minimum: float | None = None
 
     def __post_init__(self) -> None:
@@ -60,6 +61,7 @@ SHARED = {
         *CORE,
         Field("temperature", "K", default=None, minimum=0.0),
         Field("spin", "rad/s", 3),
+        Field("charge", "C", 1, "sum", default=None),
     )
 }
 """Fields that several effects share by name."""
@@ -126,7 +128,7 @@ class State:
             (
                 getattr(self, field.name),
                 field.slots,
-                int(field.default or 0) if field.integer else field.default or 0.0,
+                int(field.default or 0) if field.integer else float(field.default or 0.0),
             )
             for field in fields
             if field.slots
