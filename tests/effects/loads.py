@@ -4,6 +4,11 @@ import numpy as np
 
 from tests.scenes import compiled, scene
 from tisim._taichi import ti
+from tisim.composition import needed_fields
+from tisim.state import CORE, resolve_fields
+
+WORLDS = 8
+"""At a time: one number for all, so that each structure is compiled once."""
 
 
 def vector(rng, scale=1.0):
@@ -22,14 +27,16 @@ def loads(scenes, dt=0.0, capacity=16):
 
     dt : of the step (s) that the forces are told they are in.
     """
-    simulation = compiled(scenes[0], worlds=len(scenes), capacity=capacity)
+    simulation = compiled(scenes[0], worlds=WORLDS, capacity=capacity)
     simulation.load(scenes)
-    simulation.s.write("dt", np.full(len(scenes), dt))
+    simulation.s.write("dt", np.full(WORLDS, dt))
     simulation.first.advance(1)
     columns = {field.name: simulation.s.read(field.name) for field in simulation.s.fields}
     counts = simulation.s.read("count")
     assert (simulation.s.read("failed") == 0).all()
-    return [{name: column[w, :n] for name, column in columns.items()} for w, n in enumerate(counts)]
+    return [
+        {name: column[w, :n] for name, column in columns.items()} for w, n in enumerate(counts[: len(scenes)])
+    ]
 
 
 @ti.kernel
@@ -43,11 +50,11 @@ def _jacobians(s: ti.template(), effect: ti.template(), out: ti.types.ndarray())
 
 def jacobians(scenes, step, capacity=16):
     """velocity_jacobian of the only force of these scenes, and its central difference; step in m/s."""
-    simulation = compiled(scenes[0], worlds=len(scenes), capacity=capacity)
+    simulation = compiled(scenes[0], worlds=WORLDS, capacity=capacity)
     simulation.load(scenes)
     (force,) = simulation.made.forces
     assert force.offers("velocity_jacobian")
-    claimed = np.zeros((len(scenes), capacity, 3, 3))
+    claimed = np.zeros((WORLDS, capacity, 3, 3))
     _jacobians(simulation.s, force, claimed)
     start = simulation.s.read("velocity")
     found = np.zeros_like(claimed)
@@ -57,6 +64,12 @@ def jacobians(scenes, step, capacity=16):
         found[..., b] += sign * simulation.s.read("force") / (2 * step)
     n = [len(scene.particles.position) for scene in scenes]
     return [claimed[w, : n[w]] for w in range(len(n))], [found[w, : n[w]] for w in range(len(n))]
+
+
+def fields_beside_the_core(made):
+    """Names of what a scene needs and so has allocated, beyond position, velocity, mass, radius and id."""
+    fields = resolve_fields(needed_fields(made.effects, made.stepper))
+    return {field.name for field in fields} - {field.name for field in CORE}
 
 
 def pairs(state):

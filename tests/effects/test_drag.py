@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.effects.loads import close, cloud, jacobians, loads, vector
+from tests.effects.loads import WORLDS, close, cloud, jacobians, loads, vector
 from tests.scenes import scene
 from tisim._taichi import ti
 from tisim.effect import Source, parameter
 from tisim.effects.drag import ChowDrag, ConstantDrag, StokesDrag
 from tisim.errors import InputError
 from tisim.spec import Vector
-
-WORLDS = 6
 
 
 class Shear(Source):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.effects.loads import close, cloud, jacobians, loads, vector
+from tests.effects.loads import WORLDS, close, cloud, fields_beside_the_core, jacobians, loads, vector
 from tests.scenes import scene, simulate
-from tisim import Scene, Simulation
+from tisim import Scene
 from tisim._taichi import ti
 from tisim.effect import Source, parameter
 from tisim.effects.lorentz import Lorentz
@@ -13,8 +13,6 @@ from tisim.effects.magnetic_body_force import MagneticBodyForce
 from tisim.errors import InputError
 from tisim.sources.uniform import ElectricField, MagneticField
 from tisim.spec import Vector
-
-WORLDS = 6
 
 
 class Quadrupole(Source):
@@ -139,7 +137,6 @@ def test_the_velocity_jacobian_of_the_lorentz_force(rng):
 
 
 def test_only_what_is_needed_is_allocated():
-    core = {"position", "velocity", "mass", "radius", "id"}
     field = MagneticField(constant=(0, 0, 1))
     extra = {
         (field,): set(),
@@ -147,9 +144,7 @@ def test_only_what_is_needed_is_allocated():
         (field, MagneticBodyForce(gamma=1)): {"force"},
     }
     for effects, more in extra.items():
-        made = Simulation(scene([[0, 0, 0]], [[0, 0, 0]], effects))
-        assert {f.name for f in made.s.fields} == core | more
-        made.close()
+        assert fields_beside_the_core(scene([[0, 0, 0]], [[0, 0, 0]], effects)) == more
     assert not MagneticBodyForce.offers("velocity_jacobian")
 
 
