@@ -12,6 +12,7 @@ from tisim._taichi import ti
 from tisim.effect import parameter
 from tisim.program import PerParticle, Phase, Repeat
 from tisim.state import Field
+from tisim.steppers.controller import Controller
 from tisim.steppers.stepper import Stepper
 
 
@@ -88,14 +89,17 @@ class Iteration(Repeat):
 class Implicit(Stepper):
     """Trapezoidal rule by fixed-point iteration."""
 
-    needs = (
-        Field("position_before", "m", 3, "keep"),
-        Field("velocity_before", "m/s", 3, "keep"),
-        Field("force_before", "N", 3, "keep"),
-    )
     counts = ("corrections",)
     keeps = ("unsolved", "largest_change")
+    control: Controller
     tolerance: float = parameter("m", 1e-14, gt=0)
+
+    def needs(self, turning, independent):
+        return (
+            Field("position_before", "m", 3, "keep"),
+            Field("velocity_before", "m/s", 3, "keep"),
+            Field("force_before", "N", 3, "keep"),
+        )
 
     def step(self, parts):
         s, judge = parts.s, Judge(parts, self.tolerance)

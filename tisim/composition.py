@@ -6,21 +6,26 @@ from collections.abc import Sequence
 from typing import Any
 
 from tisim.cells import listing
-from tisim.effect import Effect, Force, Mutual, Operator, PairEvent, PairForce
+from tisim.effect import Effect, Force, Mutual, Operator, PairEvent, PairForce, Source
 from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
-from tisim.forces import FORCE, TORQUE, SumForces, SumForcesAgain, turning
+from tisim.forces import FORCE, TORQUE, SumForces, SumForcesAgain, SumTrialForces, turning
 from tisim.halves import Halves
 from tisim.history import History, Remember, memory_fields
 from tisim.neighbours import Neighbours
 from tisim.program import Item
 from tisim.settle import Settling
 from tisim.state import Field, State
+from tisim.steppers.phases import Finish
 from tisim.steppers.stepper import Parts, Stepper
-from tisim.steppers.verlet import Finish
 
 
 def _of(effects: Sequence[Effect], kind: type) -> tuple[Any, ...]:
     return tuple(effect for effect in effects if isinstance(effect, kind))
+
+
+def independent(effects: Sequence[Effect]) -> bool:
+    """Whether particles feel nothing of each other, and only forces change them."""
+    return all(isinstance(effect, Force | Source) for effect in effects)
 
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
@@ -35,7 +40,8 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
         needed += [(need, effect.kind()) for need in effect.needed()]
         if isinstance(effect, PairForce):
             needed += [(field, effect.kind()) for field in memory_fields(effect)]
-    needed += [(need, stepper.kind()) for need in stepper.needs]
+    wanted = stepper.needs(turning(forces, pair_forces), independent(effects))
+    needed += [(need, stepper.kind()) for need in wanted]
     users: dict[str | Field, list[str]] = {}
     for need, who in needed:
         users.setdefault(need, []).append(who)
@@ -44,8 +50,8 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
 
 def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[str, ...]:
     """Names of the counters (``counts``) or quantities of a world (``keeps``) of a scene, each once."""
-    parts: tuple[Any, ...] = (*effects, stepper)
-    return tuple(dict.fromkeys(name for part in parts for name in getattr(part, what)))
+    parts: tuple[Any, ...] = (*effects, stepper, stepper.control)
+    return tuple(dict.fromkeys(name for part in parts for name in getattr(part, what, ())))
 
 
 class Composition:
@@ -90,9 +96,14 @@ class Composition:
             remember=self._remember(),
             forces=self._summed(SumForces),
             forced=bool(self.forces or self.pair_forces),
+            trial_forces=self._summed(SumTrialForces),
+            summed=self._sum(SumForces),
+            singles=self.forces,
             turning=turning(self.forces, self.pair_forces),
+            independent=independent(effects),
         )
         step: list[Item] = [*stepper.step(parts)]
+        self.memory += tuple(parts.owned)
         first: list[Item] = [*lists, *parts.forces]
         if near and contacts:
             survey = Survey(near, contacts, control)
@@ -126,5 +137,8 @@ class Composition:
         for settling in self.settlings:
             items += settling.phases(again=kind.conditional)
         if self.forces or self.pair_forces:
-            items.append(kind(self.s, self.domain, self.forces, self.pair_forces, self.halves))
+            items.append(self._sum(kind))
         return tuple(items)
+
+    def _sum(self, kind: type[SumForces]) -> SumForces:
+        return kind(self.s, self.domain, self.forces, self.pair_forces, self.halves)

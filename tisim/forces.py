@@ -47,16 +47,35 @@ class SumForces(PairSum):
 
     @ti.func
     def run(self, w, i):
+        t = self.s.time[w]
+        total = self.summed(self.singles(w, i, t), w, i, t)
+        self.write(w, i, total)
+        self.check(w, i, total)
+
+    @ti.func
+    def alone(self, w, i, t):
+        """The force on i, at a time of its own, where particles do not feel each other."""
+        self.write(w, i, self.singles(w, i, t))
+
+    @ti.func
+    def singles(self, w, i, t):
+        """Sum of the forces on i by itself."""
         s = self.s
-        t = s.time[w]
         total = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         for effect in ti.static(self.forces):
             total += self.single(effect, w, i, t)
-        total = self.summed(total, w, i, t)
+        return total
+
+    @ti.func
+    def write(self, w, i, total):
+        s = self.s
         for k in ti.static(range(3)):
             s.force[w, i][k] = total[k]
             if ti.static(self.turning):
                 s.torque[w, i][k] = total[3 + k]
+
+    @ti.func
+    def check(self, w, i, total):
         # Not below infinity: also true of NaN.
         if not (total.norm_sqr() < ti.math.inf):
             self.find_fault(w, i)
@@ -86,6 +105,33 @@ class SumForces(PairSum):
             for j in range(s.count[w]):
                 if not (self.of((effect,), nothing, w, i, j, t).norm_sqr() < ti.math.inf):
                     s.fault(w, i, effect.index)
+
+    @ti.func
+    def largest(self, w, i):
+        """Index of the effect whose force on i is largest, or not finite."""
+        s = self.s
+        t = s.time[w]
+        nothing = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
+        most, found = ti.cast(-1.0, s.real), 0
+        for effect in ti.static(self.forces):
+            size = self.single(effect, w, i, t).norm()
+            if not (size <= most):
+                most, found = size, effect.index
+        for effect in ti.static(self.pair_forces):
+            total = nothing
+            for j in range(s.count[w]):
+                total += self.of((effect,), nothing, w, i, j, t)
+            if not (total.norm() <= most):
+                most, found = total.norm(), effect.index
+        return found
+
+
+class SumTrialForces(SumForces):
+    """The same for a trial state, which may be one that is to be given up."""
+
+    @ti.func
+    def check(self, w, i, total):
+        pass
 
 
 class SumForcesAgain(SumForces):

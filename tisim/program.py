@@ -26,9 +26,13 @@ over all threads."""
 
 
 class Phase:
-    """One loop. ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds size."""
+    """One loop. ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds size.
+
+    ``long`` says that one item is work enough for a launch.
+    """
 
     conditional: ClassVar[bool] = False
+    long: ClassVar[bool] = False
     extent: int = 1
 
     @ti.func

@@ -13,7 +13,7 @@ from tisim.binding import Table, connect
 from tisim.composition import Composition, declared, needed_fields
 from tisim.errors import must
 from tisim.particles import Arrays
-from tisim.program import Program
+from tisim.program import Phase, Program
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.starts import check_start, laid_out, volume
@@ -44,8 +44,7 @@ class Simulation:
         needed, there = 300 * worlds * capacity, runtime.memory()
         rule = f"within the {there / 1e9:.0f} GB of this machine"
         must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
-        self.schedule = schedule or self._choose(capacity)
-        must(self.schedule in ("world", "particle"), "schedule", "world or particle", schedule)
+        must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
         asked = (scene.effects, scene.stepper)
         fields = resolve_fields(needed_fields(*asked))
         self.s = State(worlds, capacity, fields, declared(*asked, "counts"), declared(*asked, "keeps"))
@@ -54,6 +53,7 @@ class Simulation:
         *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
         connect(effects)
         self.made = Composition(self.s, stepper, tuple(effects), domain, control)
+        self.schedule = schedule or self._choose(capacity)
         self.program = Program(self.s, self.made.step, self.schedule)
         self.first = Program(self.s, self.made.first, self.schedule)
         self.s.status.fill(ENDED)
@@ -68,6 +68,8 @@ class Simulation:
         return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
 
     def _choose(self, capacity: int) -> str:
+        if any(phase.long for phase in self.made.step if isinstance(phase, Phase)):
+            return "particle"
         # A world per thread needs as many worlds as threads; one small world is faster without launches.
         small = capacity * self.worlds <= 20_000
         many = self.worlds >= self.runtime.threads

@@ -14,13 +14,15 @@ TOUCH = 1.0 + 1e-6
 """Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
 
 
-class Controller(Spec):
-    """The contract of step control: ``pair`` sees every near pair, ``note`` every particle, ``next`` decides.
+class StepControl(Spec):
+    """The contract of step control: ``pair`` sees every near pair, ``note`` every particle.
 
-    ``watches_pairs`` says whether it needs to see pairs at all.
+    ``watches_pairs`` says whether it needs to see pairs at all; ``keeps`` names quantities of a world.
     """
 
+    contract: ClassVar[bool] = True
     watches_pairs: ClassVar[bool] = False
+    keeps: ClassVar[tuple[str, ...]] = ()
 
     @ti.func
     def pair(self, s, w, i, j, separation):
@@ -30,6 +32,12 @@ class Controller(Spec):
     @ti.func
     def note(self, s, w, i, soonest):
         """Note for a particle the least time that its pairs allow. s, f64."""
+
+
+class Controller(StepControl):
+    """Control of explicit steppers: ``next`` decides before the step is made."""
+
+    contract: ClassVar[bool] = True
 
     @ti.func
     def next(self, s, w, horizon):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from tisim.program import Item
 from tisim.spec import Spec
 from tisim.state import Field, State
-from tisim.steppers.controller import ApproachTime, Controller
+from tisim.steppers.controller import StepControl
 
 
 @dataclass(frozen=True)
@@ -16,11 +16,15 @@ class Parts:
     """What a stepper makes a step of. All are bound to the state; a tuple is empty where nothing is to do.
 
     control : decides how long the next step may be. domain, operators, near : as bound; near is None
-    without a pair list. forced, turning : whether there are forces, and torques.
+    without a pair list. singles : forces on single particles. forced, turning : whether there are forces, and
+    torques. independent : whether particles neither feel each other nor are changed by operators.
+    owned : memory that the stepper has allocated, what it is, and for what; it adds to the list.
 
     lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
     pairs remember, over ``dt``; once a step. forces : settle what is mutual, and sum force and torque of the
-    trial state. Lists and forces may stand in an iteration, a ``Repeat``; positions must lie in the domain.
+    trial state; trial_forces : the same for a state that may be far from any solution, where a force that is
+    not finite is the stepper's to deal with, and ``summed`` to find out about. Lists and forces may stand in
+    an iteration, a ``Repeat``; positions must lie in the domain.
     """
 
     s: State
@@ -31,27 +35,35 @@ class Parts:
     lists: tuple[Item, ...]
     remember: tuple[Item, ...]
     forces: tuple[Item, ...]
+    trial_forces: tuple[Item, ...]
+    summed: Any
+    singles: tuple[Any, ...]
     forced: bool
     turning: bool
+    independent: bool
+    owned: list[tuple[Any, str, str]] = field(default_factory=list)
 
 
 class Stepper(Spec):
     """How time advances. ``control`` chooses the length of the next step.
 
-    As with effects, ``needs`` names fields, ``counts`` counters, ``keeps`` quantities of a world, and in a
-    kernel a parameter is a function of the world. Before the first step ``force`` and ``torque`` are those of
+    As with effects, ``counts`` names counters, ``keeps`` quantities of a world, and in a kernel a parameter
+    is a function of the world. Before the first step ``force`` and ``torque`` are those of
     the start.
     """
 
     contract: ClassVar[bool] = True
-    needs: ClassVar[tuple[str | Field, ...]] = ()
     counts: ClassVar[tuple[str, ...]] = ()
     keeps: ClassVar[tuple[str, ...]] = ()
-    control: Controller = ApproachTime()
+    control: StepControl
 
     def structure(self) -> tuple[Any, ...]:
         own = tuple(option for option in super().structure() if option != ("control", self.control))
         return (*own, *self.control.structure())
+
+    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+        """Fields that it reads or writes, in a scene that has torques, or whose particles are independent."""
+        return ()
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         """The items of a step, up to pair events and what operators do to the world as a whole.

@@ -1,0 +1,104 @@
+"""Boris' stepper, the standard of charged particles in magnetic fields."""
+
+from typing import ClassVar
+
+from tisim._taichi import ti
+from tisim.forces import FORCE
+from tisim.program import Item, PerParticle, Phase
+from tisim.state import Field
+from tisim.steppers.controller import Controller
+from tisim.steppers.phases import Clock, Listen, Operate, advance_clock, arrive
+from tisim.steppers.solve import summed_jacobian, with_jacobian
+from tisim.steppers.stepper import Parts, Stepper
+
+
+class Boris(Stepper):
+    """Half a drift, half a kick, a rotation, half a kick, half a drift; explicit, of second order.
+
+    With F = F_0 + J v, J that of ``velocity_jacobian``: v- = v + dt/2m F_0, (1 - dt/2m J) v+ =
+    (1 + dt/2m J) v-, v' = v+ + dt/2m F_0, all at the middle of the step. For the Lorentz force the middle one
+    is Boris' rotation: it keeps the speed to rounding whatever the step. One sum of forces a step; torques
+    turn particles by one kick, at the middle.
+
+    Source: J. P. Boris, Proc. 4th Conf. Numerical Simulation of Plasmas (1970) 3-67; C. K. Birdsall, A. B.
+    Langdon, Plasma Physics via Computer Simulation (1985), section 4-3.
+    """
+
+    control: Controller
+
+    keeps: ClassVar = ("time_before",)
+
+    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+        return (FORCE,)
+
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        s, near = parts.s, parts.near
+        listen = (Listen(parts),) if near else ()
+        first, second = (Drift(parts), *listen), (Drift(parts), *listen)
+        kick = (*parts.lists, *parts.remember, *parts.forces, Rotate(parts))
+        operate = (Operate(parts), *listen) if parts.operators else ()
+        return (Clock(s, parts.control, near), Middle(s), *first, *kick, *second, *operate, End(s))
+
+
+class Middle(Phase):
+    """Forces are those at the middle of the step."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.time_before[w] = s.time[w]
+        s.time[w] += 0.5 * s.dt[w]
+
+
+class Drift(PerParticle):
+    """r += dt/2 v."""
+
+    def __init__(self, parts) -> None:
+        super().__init__(parts.s)
+        self.domain = parts.domain
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        moved = 0.5 * ti.cast(s.dt[w], s.real) * s.velocity[w, i]
+        drift = ti.cast(moved, ti.f64) - 0.5 * s.dt[w] * s.axes(s.frame, w)
+        arrive(s, self.domain, w, i, s.position[w, i] + moved, drift, ti.cast(0.0, ti.f64))
+
+
+class Rotate(PerParticle):
+    """v- to v+ to v', with the forces at the middle of the step."""
+
+    def __init__(self, parts) -> None:
+        super().__init__(parts.s)
+        self.linear, self.turning = with_jacobian(parts.singles), parts.turning
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        dt, m = ti.cast(s.dt[w], s.real), s.mass[w, i]
+        half = 0.5 * dt / m
+        if ti.static(len(self.linear) > 0):
+            jacobian = summed_jacobian(self.linear, s, w, i, s.time[w])
+            rest = half * (s.force[w, i] - jacobian @ s.velocity[w, i])
+            one, turn = ti.Matrix.identity(s.real, 3), half * jacobian
+            minus = s.velocity[w, i] + rest
+            s.velocity[w, i] = (one - turn).inverse() @ ((one + turn) @ minus) + rest
+        else:
+            s.velocity[w, i] += 2.0 * half * s.force[w, i]
+        if ti.static(self.turning):
+            s.spin[w, i] += dt / (0.4 * m * s.radius[w, i] ** 2) * s.torque[w, i]
+
+
+class End(Phase):
+    """The step is done."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.time[w] = self.s.time_before[w]
+        advance_clock(self.s, w)

@@ -1,0 +1,118 @@
+"""How long the next step of an implicit stepper may be: from how its iteration went, and from its error."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from tisim._taichi import ti
+from tisim.errors import must
+from tisim.spec import parameter
+from tisim.steppers.controller import StepControl
+
+
+class IterationControl(StepControl):
+    """Steps such that the fixed-point iteration meets its tolerance in the desired number of iterations.
+
+    With w_K the change of the last iteration over the displacement in the step, Lambda_K =
+    (TOL / w_0)^(1/(p K_d)) / (w_K / w_0)^(1/(p K)) and w_0 = 1, as the first iterate is compared with
+    the place where the step began (Z13 A9, Z16 C.5). The step is accepted when w_K <= TOL within K_d
+    iterations; the next one is Lambda_K times as long, or a rejected one is tried again so.
+
+    This bounds the error of the iteration only. That of the trapezoidal rule itself is not seen, and is left
+    to ``longest``. What the papers leave open: the step never changes by more than ``most`` or less than
+    ``least`` times in one go, and a step that fails at ``shortest`` stops the world, with time, particle and
+    force.
+
+    tolerance : TOL. iterations : K_d. order : p. first : dt_0. longest : dt_lim. Source: Z16 section 8.1.
+    """
+
+    tolerance: float = parameter("", 5e-4, gt=0)
+    iterations: int = Field(10, ge=2)
+    order: float = parameter("", 2.0, gt=0)
+    first: float = parameter("s", 1e-5, gt=0)
+    longest: float = parameter("s", 2.5e-4, gt=0)
+    shortest: float = parameter("s", 1e-12, gt=0)
+    most: float = parameter("", 4.0, ge=1)
+    least: float = parameter("", 0.1, gt=0, lt=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        name = self.kind()
+        must(self.longest >= self.shortest, f"{name}.longest", "at least shortest", self.longest)
+        must(self.shortest <= self.first, f"{name}.first", "at least shortest", self.first)
+        return self
+
+    @ti.func
+    def step(self, w, wanted):
+        """The step (s, f64) where this one was wanted; 0 for the first of all."""
+        shortest, longest = ti.cast(self.shortest(w), ti.f64), ti.cast(self.longest(w), ti.f64)
+        return ti.max(
+            shortest, ti.min(ti.select(wanted > 0.0, wanted, ti.cast(self.first(w), ti.f64)), longest)
+        )
+
+    @ti.func
+    def solved(self, w, change):
+        """Whether the iteration may end, its last relative change having been this."""
+        return change <= self.tolerance(w)
+
+    @ti.func
+    def accepts(self, w, error):
+        """Whether a solved step is accurate enough; ``error`` is that of the rule over the displacement."""
+        return True
+
+    @ti.func
+    def scale(self, s, w, i, moved):
+        """What the error of a particle that has moved so far is compared with. m."""
+        return moved
+
+    @ti.func
+    def hopeless(self, w, dt):
+        """Whether a step of this length (s) that has failed must not be made shorter."""
+        return dt <= ti.cast(self.shortest(w), ti.f64) * (1.0 + 1e-9)
+
+    @ti.func
+    def factor(self, w, change, k, error):
+        """What the next step is to be multiplied by, after K = k iterations."""
+        p = ti.cast(self.order(w), ti.f64)
+        wanted = ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / (p * self.iterations))
+        return self.limited(w, wanted, ti.pow(change, 1.0 / (p * k)))
+
+    @ti.func
+    def limited(self, w, wanted, reached):
+        """wanted / reached, between ``least`` and ``most``; the least for a NaN."""
+        least, most = ti.cast(self.least(w), ti.f64), ti.cast(self.most(w), ti.f64)
+        factor = least
+        if wanted >= least * reached:
+            factor = ti.min(most, wanted / ti.max(reached, wanted / most))
+        return factor
+
+
+class ErrorControl(IterationControl):
+    """The same, and steps whose truncation error is that asked for.
+
+    error : of a step over the displacement in it, as the stepper estimates it; it falls as dt^2. A step with
+    more is rejected. safety : how much of it the next step aims at. resolution : part of its radius that is
+    added to a particle's displacement here: for one that starts from rest, and for no force, the ratio of
+    error and displacement has no limit. Source: as for any embedded estimate, E.
+    Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, Eq. (II.4.13).
+    """
+
+    error: float = parameter("", 1e-4, gt=0)
+    safety: float = parameter("", 0.8, gt=0, lt=1)
+    resolution: float = parameter("", 1e-3, ge=0)
+
+    @ti.func
+    def scale(self, s, w, i, moved):
+        return moved + self.resolution(w) * s.radius[w, i]
+
+    @ti.func
+    def accepts(self, w, error):
+        return error <= self.error(w)
+
+    @ti.func
+    def factor(self, w, change, k, error):
+        by_iteration = IterationControl.factor(self, w, change, k, error)
+        wanted = ti.cast(self.safety(w), ti.f64) * ti.sqrt(ti.cast(self.error(w), ti.f64))
+        return ti.min(by_iteration, self.limited(w, wanted, ti.sqrt(error)))

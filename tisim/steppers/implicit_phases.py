@@ -1,0 +1,227 @@
+"""The phases of an implicit step: attempts of some length, each an iteration, until one is accepted."""
+
+from tisim._taichi import ti
+from tisim.blocks import PerBlock
+from tisim.program import PerParticle, Phase, Repeat
+from tisim.state import STUCK
+from tisim.steppers.phases import advance_clock, note_stride
+
+TRIED, ACCEPTED, HOPELESS = range(3)
+"""Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
+
+SHORTER = 0.8
+"""The longest that a second attempt may be, in lengths of the first."""
+
+
+class Begin(Phase):
+    """A step begins."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.time_before[w] = s.time[w]
+        s.attempting[w] = 1.0
+        s.approach_time[w] = ti.math.inf
+        s.fastest[w] = 0.0
+        s.events[w] = 0
+        s.steps[w] += 1
+        s.particle_steps[w] += s.count[w]
+        for k in ti.static(range(3)):
+            s.stride[w, k] = 0.0
+
+
+class Keep(PerParticle):
+    """Keep the state at the beginning of the step."""
+
+    def __init__(self, solve) -> None:
+        super().__init__(solve.s)
+        self.solve = solve
+
+    @ti.func
+    def run(self, w, i):
+        self.solve.keep(w, i)
+
+
+class Attempt(Repeat):
+    """Attempts at a step, until one is accepted or all hope is lost."""
+
+    def __init__(self, s, items) -> None:
+        super().__init__(items)
+        self.s = s
+
+    @ti.func
+    def pending(self, w):
+        return ti.cast(self.s.attempting[w], ti.i32)
+
+
+class Iteration(Repeat):
+    """Iterations of an attempt, until there is a verdict."""
+
+    def __init__(self, s, items) -> None:
+        super().__init__(items)
+        self.s = s
+
+    @ti.func
+    def pending(self, w):
+        return ti.cast(self.s.iterating[w], ti.i32)
+
+
+class Try(Phase):
+    """Choose the step; the last one ends exactly on time. Forces will be those of the end of the step."""
+
+    def __init__(self, parts) -> None:
+        self.s, self.control = parts.s, parts.control
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        dt = self.control.step(w, s.next_dt[w])
+        left = s.end[w] - s.time_before[w]
+        # A remainder as small as rounding leaves is not worth a step of its own.
+        if dt * (1.0 + 1e-6) >= left:
+            dt = left
+        s.dt[w] = dt
+        s.time[w] = s.time_before[w] + dt
+        s.iterating[w], s.solver_iteration[w] = 1.0, 1.0
+
+
+class Predict(PerParticle):
+    """The first iterate, K = 1, with the force at the beginning of the step."""
+
+    def __init__(self, solve) -> None:
+        super().__init__(solve.s)
+        self.solve = solve
+
+    @ti.func
+    def run(self, w, i):
+        s, solve = self.s, self.solve
+        dt = ti.cast(s.dt[w], s.real)
+        v = solve.velocity(w, i, dt, s.time[w])
+        if not solve.sound(w, i, v, dt):
+            v = s.velocity_before[w, i]
+        solve.advance(w, i, v, dt)
+        moved = ti.cast(solve.displacement(w, i, v, dt), ti.f64)
+        note_stride(s, w, moved - s.axes(s.frame, w) * s.dt[w])
+
+
+class Correct(PerBlock):
+    """The next iterate, and sums of change, displacement, error, and what the error is compared with. m."""
+
+    def __init__(self, parts, sums, solve) -> None:
+        super().__init__(sums)
+        self.control, self.solve = parts.control, solve
+
+    @ti.func
+    def each(self, w, i):
+        s, solve = self.s, self.solve
+        dt = ti.cast(s.dt[w], s.real)
+        last = s.velocity[w, i]
+        v = solve.velocity(w, i, dt, s.time[w])
+        change = ti.cast(ti.math.inf, s.real)
+        if solve.sound(w, i, v, dt):
+            step = solve.phi(w) * dt * (v - last)
+            change = step.norm() + solve.advance(w, i, v, dt)
+            note_stride(s, w, ti.cast(step, ti.f64))
+        s.iterate_change[w, i] = change
+        moved = solve.displacement(w, i, v, dt).norm()
+        error, scale = solve.error(w, i, dt), self.control.scale(s, w, i, moved)
+        return ti.cast(ti.Vector([change, moved, error, scale]), ti.f64)
+
+
+class Judge(Phase):
+    """Is the iteration solved, to go on, or to be given up?"""
+
+    def __init__(self, parts, sums) -> None:
+        self.s, self.control, self.sums, self.summed = parts.s, parts.control, sums, parts.summed
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        total = self.sums.total(w)
+        change, error = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+        # Nothing moves where nothing changes: 0/0 is no error.
+        if total[0] != 0.0:
+            change = total[0] / total[1]
+        if total[2] > 0.0:
+            error = total[2] / total[3]
+        k = s.solver_iteration[w] + 1.0
+        s.solver_iteration[w] = k
+        s.solver_iterations[w] += 1
+        s.force_evaluations[w] += 1
+        s.verdict[w] = TRIED
+        solved = self.control.solved(w, change)
+        # Not below infinity: also true of NaN.
+        if solved or k >= self.control.iterations or not (change < ti.math.inf):
+            if solved and self.control.accepts(w, error):
+                s.verdict[w] = ACCEPTED
+            elif self.control.hopeless(w, s.dt[w]):
+                s.verdict[w] = HOPELESS
+                self.accuse(w)
+            factor = self.control.factor(w, change, k, error)
+            # A step that was not accepted would fail again in the same way if it were as long.
+            s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))
+            s.iterating[w] = 0.0
+
+    @ti.func
+    def accuse(self, w):
+        """The particle whose last iterate changed most, and the largest force on it."""
+        s = self.s
+        worst, most = 0, s.iterate_change[w, 0]
+        for i in range(s.count[w]):
+            if s.iterate_change[w, i] > most:
+                worst, most = i, s.iterate_change[w, i]
+        s.culprit[w] = s.id[w, worst]
+        s.blame[w] = self.summed.largest(w, worst)
+
+
+class GiveUp(PerParticle):
+    """An attempt that has failed leaves everything as it was."""
+
+    conditional = True
+
+    def __init__(self, solve) -> None:
+        super().__init__(solve.s)
+        self.solve = solve
+
+    @ti.func
+    def when(self, w):
+        return ti.select(self.s.verdict[w] == ACCEPTED, 0, 1)
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        back = self.solve.domain.nearest(w, s.position[w, i], s.position_before[w, i])
+        note_stride(s, w, ti.cast(back, ti.f64))
+        self.solve.give_up(w, i)
+
+
+class Decide(Phase):
+    """Try again, or not."""
+
+    def __init__(self, parts) -> None:
+        self.s = parts.s
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        if s.verdict[w] != ACCEPTED:
+            s.rejections[w] += 1
+            s.time[w] = s.time_before[w]
+        if s.verdict[w] == HOPELESS:
+            s.failed[w] = STUCK
+        s.attempting[w] = ti.select(s.verdict[w] == TRIED, 1.0, 0.0)
+
+
+class Advance(Phase):
+    """The step is done."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.time[w] = self.s.time_before[w]
+        advance_clock(self.s, w)

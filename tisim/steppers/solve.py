@@ -1,0 +1,102 @@
+"""The implicit equations of a step, for one particle and given the force on it (Z13 appendix, Z16 section 8).
+
+What is exact of a step is its velocity: displacement is dt (phi v' + (1 - phi) v), so two iterates are
+compared by their velocities, and positions may be wrapped into a box in between.
+"""
+
+from tisim._taichi import ti
+
+
+def with_jacobian(forces):
+    """Those forces that say how they depend on velocity."""
+    return tuple(force for force in forces if force.offers("velocity_jacobian"))
+
+
+@ti.func
+def summed_jacobian(forces: ti.template(), s, w, i, t):  # type: ignore[valid-type]
+    """Sum of the derivatives of forces on i by its velocity. N s/m."""
+    total = ti.Matrix.zero(s.real, 3, 3)
+    for force in ti.static(forces):
+        total += force.velocity_jacobian(s, w, i, t)
+    return total
+
+
+@ti.data_oriented
+class Solve:
+    """One iterate of a particle, given the force at the last one."""
+
+    def __init__(self, parts, phi) -> None:
+        self.s, self.domain, self.phi, self.turning = parts.s, parts.domain, phi, parts.turning
+        self.linear = with_jacobian(parts.singles)
+
+    @ti.func
+    def displacement(self, w, i, v, dt):
+        """dt (phi v' + (1 - phi) v). m."""
+        return dt * (self.phi(w) * v + (1.0 - self.phi(w)) * self.s.velocity_before[w, i])
+
+    @ti.func
+    def velocity(self, w, i, dt, t):
+        """v' of m v' = m v + dt (phi (F' + J (v' - v_K)) + (1 - phi) F), with F' and J those at v_K. m/s."""
+        s, phi = self.s, self.phi(w)
+        m, v = s.mass[w, i], s.velocity_before[w, i]
+        total = phi * s.force[w, i] + (1.0 - phi) * s.force_before[w, i]
+        new = v + dt / m * total
+        if ti.static(len(self.linear) > 0):
+            jacobian = summed_jacobian(self.linear, s, w, i, t)
+            matrix = m * ti.Matrix.identity(s.real, 3) - phi * dt * jacobian
+            new = matrix.inverse() @ (m * v + dt * (total - phi * (jacobian @ s.velocity[w, i])))
+            s.force[w, i] += jacobian @ (new - s.velocity[w, i])
+        return new
+
+    @ti.func
+    def turn(self, w, i, dt):
+        """spin' = spin + dt/I (phi M' + (1 - phi) M), I = 2/5 m R^2; returns how far the surface moved, m."""
+        s, phi, radius = self.s, self.phi(w), self.s.radius[w, i]
+        torque = phi * s.torque[w, i] + (1.0 - phi) * s.torque_before[w, i]
+        new = s.spin_before[w, i] + dt / (0.4 * s.mass[w, i] * radius * radius) * torque
+        change = phi * dt * radius * (new - s.spin[w, i]).norm()
+        s.spin[w, i] = new
+        return change
+
+    @ti.func
+    def advance(self, w, i, v, dt):
+        """Put a particle where it gets with v'; returns how far its surface moved besides, by turning, m."""
+        s = self.s
+        s.velocity[w, i] = v
+        s.position[w, i] = self.domain.wrap(w, s.position_before[w, i] + self.displacement(w, i, v, dt))
+        turned = ti.cast(0.0, s.real)
+        if ti.static(self.turning):
+            turned = self.turn(w, i, dt)
+        return turned
+
+    @ti.func
+    def error(self, w, i, dt):
+        """Of a step, to leading order: (phi - 1/2) dt^2 a + (phi^2 - 1/6) dt^3 da/dt. m."""
+        a, b, phi = self.s.force_before[w, i], self.s.force[w, i], self.phi(w)
+        total = (phi - 0.5) * (phi * b + (1.0 - phi) * a) + (phi * phi - 1.0 / 6.0) * (b - a)
+        return dt * dt / self.s.mass[w, i] * total.norm()
+
+    @ti.func
+    def sound(self, w, i, v, dt):
+        """Whether a particle with v' gets to a place that numbers can tell."""
+        r = self.s.position_before[w, i] + self.displacement(w, i, v, dt)
+        # Below infinity: not true of NaN.
+        return r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
+
+    @ti.func
+    def keep(self, w, i):
+        """Keep the state of a particle at the beginning of a step."""
+        s = self.s
+        s.position_before[w, i], s.velocity_before[w, i] = s.position[w, i], s.velocity[w, i]
+        s.force_before[w, i] = s.force[w, i]
+        if ti.static(self.turning):
+            s.spin_before[w, i], s.torque_before[w, i] = s.spin[w, i], s.torque[w, i]
+
+    @ti.func
+    def give_up(self, w, i):
+        """Back to the beginning of the step."""
+        s = self.s
+        s.position[w, i], s.velocity[w, i] = s.position_before[w, i], s.velocity_before[w, i]
+        s.force[w, i] = s.force_before[w, i]
+        if ti.static(self.turning):
+            s.spin[w, i], s.torque[w, i] = s.spin_before[w, i], s.torque_before[w, i]

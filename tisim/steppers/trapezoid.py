@@ -1,0 +1,89 @@
+"""The adaptive implicit stepper of Z13 (appendix) and Z16 (section 8, appendix C)."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field as Option
+
+from tisim.blocks import BlockSums
+from tisim.forces import FORCE
+from tisim.program import Item
+from tisim.spec import parameter
+from tisim.state import Field
+from tisim.steppers.acceleration import accelerated, memory_of_iterates
+from tisim.steppers.alone import Alone, Close, Window
+from tisim.steppers.implicit_control import IterationControl
+from tisim.steppers.implicit_phases import (
+    Advance,
+    Attempt,
+    Begin,
+    Correct,
+    Decide,
+    GiveUp,
+    Iteration,
+    Judge,
+    Keep,
+    Predict,
+    Try,
+)
+from tisim.steppers.phases import Listen, Operate
+from tisim.steppers.solve import Solve
+from tisim.steppers.stepper import Parts, Stepper
+
+BEFORE = (
+    Field("position_before", "m", 3, "keep"),
+    Field("velocity_before", "m/s", 3, "keep"),
+    Field("force_before", "N", 3, "keep"),
+)
+TURNING_BEFORE = (Field("spin_before", "rad/s", 3, "keep"), Field("torque_before", "N m", 3, "keep"))
+CHANGE = Field("iterate_change", "m", 1, "keep")
+OWN_STEP = Field("own_dt", "s", 1, "keep")
+
+
+class Trapezoid(Stepper):
+    """v' = v + dt/m (phi F' + (1 - phi) F), r' = r + dt (phi v' + (1 - phi) v), and spin as v.
+
+    phi = 1/2 is the trapezoidal rule, of second order; 1 is implicit Euler and 0 explicit Euler, of first.
+    F' is the force at the end of the step, by fixed-point iteration: each iterate is made with the force
+    that positions, velocities and spins of the last one give, at the end of the step. The first one takes F
+    itself. Each world has its own step, iterations and end.
+
+    The part of the force that is linear in velocity, of effects that give ``velocity_jacobian``, is solved
+    exactly with each iterate. ``acceleration`` makes iterates from the last two (see acceleration.py), which
+    converges in fewer of them, and where plain iteration does not. Particles that do not feel each other
+    take their own steps, within windows of ``window`` longest steps; a step of the world is then a window.
+
+    Source: Z13 (A1)-(A10); Z16 (8.4), (C.1)-(C.5).
+    """
+
+    phi: float = parameter("", 0.5, ge=0, le=1)
+    control: IterationControl = IterationControl()
+    acceleration: Literal["none", "anderson"] = "none"
+    window: int = Option(64, ge=1)
+
+    counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
+    keeps: ClassVar = ("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt")
+
+    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+        accelerated = self.acceleration == "anderson" and not independent
+        return (
+            FORCE,
+            *BEFORE,
+            *(TURNING_BEFORE if turning else ()),
+            *(memory_of_iterates(turning) if accelerated else ()),
+            OWN_STEP if independent else CHANGE,
+        )
+
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        s, solve = parts.s, Solve(parts, self.phi)
+        if parts.independent:
+            return (Window(s, parts.control, self.window), Alone(parts, solve), Close(s))
+        listen = (Listen(parts),) if parts.near else ()
+        sums = BlockSums(s, 4)
+        parts.owned.append((sums, "sums of the iteration", self.kind()))
+        forces = (*parts.lists, *parts.trial_forces)
+        if self.acceleration == "anderson":
+            forces = accelerated(parts, forces)
+        iteration = Iteration(s, (*forces, Correct(parts, sums, solve), *listen, Judge(parts, sums)))
+        attempt = (Try(parts), Predict(solve), *listen, iteration, GiveUp(solve), *listen, Decide(parts))
+        operate = (Operate(parts), *listen) if parts.operators else ()
+        return (Begin(s), Keep(solve), Attempt(s, attempt), *parts.remember, *operate, Advance(s))
