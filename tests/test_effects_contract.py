@@ -1,4 +1,4 @@
-"""The core takes effects it has never heard of: all of these are defined here and nowhere else."""
+"""The core takes effects it has never heard of: those of tests/throwaway.py."""
 
 import time
 
@@ -6,73 +6,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.scenes import by_id, fixed, scene, simulate
-from tisim import Scene, Simulation, noise
-from tisim._taichi import ti
-from tisim.effect import Force, Operator, PairForce, parameter
+from tests.scenes import fixed, scene
+from tests.throwaway import K_E, WORLDS, Coulomb, RandomKicks, Trap, charges, run
+from tisim import Scene, Simulation
 from tisim.effects.impact import Impact
 from tisim.errors import InputError
 from tisim.operators.agglomeration import Agglomeration
-from tisim.state import Field
-
-K_E = 8.9875517873681764e9
-"""Coulomb's constant, N m^2/C^2."""
-
-
-class Coulomb(PairForce):
-    """F_i = -k q_i q_j / d^2 n_ij, between all pairs; only this effect needs the charge."""
-
-    needs = ("charge",)
-    constant: float = parameter("N m^2/C^2", K_E, gt=0)
-
-    @ti.func
-    def pair_force(self, s, w, i, j, separation, distance, t):
-        return -self.constant(w) * s.charge[w, i] * s.charge[w, j] / distance**3 * separation
-
-
-class Trap(Force):
-    """F = -k (r - c) + m g cos(omega t): a spring to a place, and a force that depends on time."""
-
-    stiffness: float = parameter("N/m", ge=0)
-    centre: tuple[float, float, float] = parameter("m", (0.0, 0.0, 0.0))
-    shake: tuple[float, float, float] = parameter("m/s^2", (0.0, 0.0, 0.0))
-    omega: float = parameter("1/s", 0.0, ge=0)
-
-    @ti.func
-    def force(self, s, w, i, t):
-        spring = -self.stiffness(w) * (s.position[w, i] - self.centre(w))
-        return spring + s.mass[w, i] * self.shake(w) * ti.cast(ti.cos(self.omega(w) * t), s.real)
-
-
-class RandomKicks(Operator):
-    """v += sigma sqrt(dt) normal, three draws for each particle and step; sums what each has received."""
-
-    needs = (Field("kicked", "m/s", 3), "velocity")
-    counts = ("kicks",)
-    sigma: float = parameter("m/s^1.5", ge=0)
-
-    @ti.func
-    def particle(self, s, w, i, dt):
-        a = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 0))
-        b = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 1))
-        kick = self.sigma(w) * ti.sqrt(dt) * ti.cast(ti.Vector([a[0], a[1], b[0]]), s.real)
-        s.velocity[w, i] += kick
-        s.kicked[w, i] += kick
-        ti.atomic_add(s.kicks[w], 1)
-
-
-WORLDS, CAPACITY = 40, 32
-
-
-def run(scenes):
-    return simulate(scenes, worlds=WORLDS, capacity=CAPACITY)
-
-
-def charges(position, velocity, charge, trap, mass=1.0, **more):
-    effects = (Coulomb(), Trap(**trap))
-    return scene(
-        position, velocity, effects, mass=mass, quantities={"charge": np.asarray(charge, float)}, **more
-    )
 
 
 def test_forces_are_their_numpy_twin(rng):
@@ -106,81 +45,6 @@ def test_forces_are_their_numpy_twin(rng):
         expected += state["mass"][:, None] * np.array(trap.shake) * np.cos(trap.omega * result.time)
         scale = np.abs(expected).max()
         np.testing.assert_allclose(state["force"], expected, rtol=1e-13, atol=1e-13 * scale)
-
-
-def orbit(steps):
-    """Opposite charges on a circle of radius 1 m each about their centre; one period in 2 pi seconds."""
-    q = np.sqrt(4.0 / K_E)
-    period = 2 * np.pi
-    return charges(
-        [[1, 0, 0], [-1, 0, 0]],
-        [[0, 1, 0], [0, -1, 0]],
-        [q, -q],
-        {"stiffness": 0.0},
-        dt=period / steps,
-        steps=steps,
-    )
-
-
-def test_two_body_orbit_closes_at_second_order():
-    """Velocity Verlet on a Kepler circle: the error after one period falls as dt^2."""
-    steps = 2 ** np.arange(7, 12)
-    results = run([orbit(int(n)) for n in steps])
-    errors = np.array([np.abs(by_id(r)["position"] - [[1, 0, 0], [-1, 0, 0]]).max() for r in results])
-    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert order == pytest.approx(2.0, abs=0.02)
-    assert errors[-1] < 1e-4
-    for result, n in zip(results, steps, strict=True):
-        assert result.work["steps"] == n
-        np.testing.assert_allclose(result.state["velocity"].sum(axis=0), 0, atol=1e-14 * n)
-
-
-def potential(state):
-    gap = np.linalg.norm(state["position"][0] - state["position"][1])
-    return 0.5 * (state["velocity"] ** 2).sum() + K_E * state["charge"].prod() / gap
-
-
-def test_energy_of_an_eccentric_orbit_does_not_drift():
-    """Twenty periods at e = 0.36: the energy error stays that of one step size, and falls as its square."""
-    q = np.sqrt(4.0 / K_E)
-    results = run(
-        [
-            charges(
-                [[1, 0, 0], [-1, 0, 0]],
-                [[0, 0.8, 0], [0, -0.8, 0]],
-                [q, -q],
-                {"stiffness": 0.0},
-                dt=2 * np.pi / n,
-                steps=20 * n,
-            )
-            for n in (500, 1000)
-        ]
-    )
-    coarse, fine = (abs(potential(r.state) / potential(r.start) - 1) for r in results)
-    assert coarse < 1e-3
-    assert fine < coarse / 3
-
-
-def test_spring_under_a_force_that_depends_on_time():
-    """Forced oscillator from rest, r = g (cos(omega t) - cos(w0 t)) / (w0^2 - omega^2), at second order."""
-    stiffness, omega, shake, end = 4.0, 1.3, 0.7, 3.0
-    steps = 2 ** np.arange(5, 10)
-    made = [
-        charges(
-            [[0, 0, 0]],
-            [[0, 0, 0]],
-            [0.0],
-            {"stiffness": stiffness, "shake": (shake, 0, 0), "omega": omega},
-            dt=end / n,
-            steps=int(n),
-        )
-        for n in steps
-    ]
-    w0 = np.sqrt(stiffness)
-    expected = shake * (np.cos(omega * end) - np.cos(w0 * end)) / (w0**2 - omega**2)
-    errors = np.array([abs(r.state["position"][0, 0] - expected) for r in run(made)])
-    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.05)
-    assert errors[-1] < 1e-5
 
 
 def kicked(sigma=2.0, seed=5, steps=200, n=30):

@@ -206,3 +206,15 @@ def test_a_number_settles_too_and_without_any_force(schedule):
     assert result.status.ok
     assert "force" not in result.state
     np.testing.assert_allclose(result.state["potential"], 1 / (1 - 0.1 / 1.5), rtol=1e-13)
+
+
+class Forgetful(Polarisation):
+    """Does not say that it needs its quantity."""
+
+    needs = ("radius",)
+
+
+def test_a_quantity_that_is_not_needed_is_refused():
+    made = scene([[0, 0, 0]], [[0, 0, 0]], (Forgetful(chi=1.0),))
+    with pytest.raises(TypeError, match=r"Forgetful\.needs must name its quantity, 'dipole'"):
+        Simulation(made)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.scenes import scene
+from tests.scenes import by_id, scene
 from tisim import Box, Simulation, run
 from tisim._taichi import ti
 from tisim.effect import Operator, PairForce, parameter
@@ -163,6 +163,36 @@ def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
     state = run(wanted).state
     assert len(state["mass"]) == 1
     assert ((state["position"] >= 0) & (state["position"] < 1)).all()
+
+
+class Teleport(Operator):
+    """Every tenth step, throws the first grain of a world across the box, and out of it."""
+
+    @ti.func
+    def world(self, s, w):
+        if s.steps[w] % 10 == 0:
+            s.position[w, 0] += ti.Vector([0.7, 0.9, 1.3])
+            s.disturb(w)
+
+
+def test_lists_follow_what_operators_do_to_the_world(rng):
+    """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
+    results = []
+    position, velocity = rng.uniform(0.0, 1.0, (200, 3)), rng.normal(size=(200, 3))
+    for kind in (Shell, ShellOfAll):
+        made = scene(
+            position,
+            velocity,
+            (kind(width=0.05), Teleport()),
+            radius=0.03,
+            dt=1e-3,
+            steps=45,
+            domain=Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0)),
+        )
+        results.append(run(made))
+    listed, everyone = (by_id(result) for result in results)
+    assert ((listed["position"] >= 0) & (listed["position"] < 1)).all()
+    np.testing.assert_allclose(listed["position"], everyone["position"], rtol=0, atol=1e-9)
 
 
 class Leave(Operator):

@@ -24,8 +24,9 @@ Rules
     effects without which it means nothing. The driver never asks what an effect is called.
 11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may
     ever live at once, given the start.
-12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; indices move only
-    between steps. Nothing may depend on the order of parallel work: no float atomics.
+12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
+    say with ``s.disturb(w)`` that they have moved or resized one. Indices move only between steps. Nothing
+    may depend on the order of parallel work: no float atomics.
 """
 
 from __future__ import annotations

@@ -27,8 +27,10 @@ class Settling:
 
     def __init__(self, s: State, domain: Domain, effect: Mutual, halves: Halves | None) -> None:
         self.s, self.domain, self.effect, self.halves = s, domain, effect, halves
-        self.value = getattr(s, effect.quantity)
-        self.components = next(f.components for f in s.fields if f.name == effect.quantity)
+        declared = [f.components for f in s.fields if f.name == effect.quantity]
+        if not declared:
+            raise TypeError(f"{type(effect).__name__}.needs must name its quantity, {effect.quantity!r}")
+        self.value, self.components = getattr(s, effect.quantity), declared[0]
         self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
         self.size = _length if self.components == 3 else _magnitude
         self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))

@@ -208,6 +208,12 @@ class State:
         ti.atomic_max(self.changed[w], 1)
 
     @ti.func
+    def disturb(self, w):
+        """Say that a particle has been moved or resized other than by a step: it is put back into the domain,
+        and pair lists are made anew."""
+        ti.atomic_max(self.changed[w], 1)
+
+    @ti.func
     def append(self, w, i):
         """A copy of particle i in a new slot, whose index is returned. The caller has checked ``room``."""
         k = self.count[w]

@@ -5,9 +5,9 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tests.steppers.charged import charged, equal_steps
-from tests.test_effects_contract import Trap
 from tests.test_mutual import cloud
 from tests.test_short_ranged import SoftShell, SoftShellOfAll, grains, shells
+from tests.throwaway import Trap
 from tisim import Simulation
 from tisim.errors import InputError
 from tisim.steppers.controller import FixedStep

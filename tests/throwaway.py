@@ -1,0 +1,68 @@
+"""Effects that the core has never heard of, and scenes of them."""
+
+import numpy as np
+
+from tests.scenes import scene, simulate
+from tisim import noise
+from tisim._taichi import ti
+from tisim.effect import Force, Operator, PairForce, parameter
+from tisim.state import Field
+
+K_E = 8.9875517873681764e9
+"""Coulomb's constant, N m^2/C^2."""
+
+
+class Coulomb(PairForce):
+    """F_i = -k q_i q_j / d^2 n_ij, between all pairs; only this effect needs the charge."""
+
+    needs = ("charge",)
+    constant: float = parameter("N m^2/C^2", K_E, gt=0)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        return -self.constant(w) * s.charge[w, i] * s.charge[w, j] / distance**3 * separation
+
+
+class Trap(Force):
+    """F = -k (r - c) + m g cos(omega t): a spring to a place, and a force that depends on time."""
+
+    stiffness: float = parameter("N/m", ge=0)
+    centre: tuple[float, float, float] = parameter("m", (0.0, 0.0, 0.0))
+    shake: tuple[float, float, float] = parameter("m/s^2", (0.0, 0.0, 0.0))
+    omega: float = parameter("1/s", 0.0, ge=0)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        spring = -self.stiffness(w) * (s.position[w, i] - self.centre(w))
+        return spring + s.mass[w, i] * self.shake(w) * ti.cast(ti.cos(self.omega(w) * t), s.real)
+
+
+class RandomKicks(Operator):
+    """v += sigma sqrt(dt) normal, three draws for each particle and step; sums what each has received."""
+
+    needs = (Field("kicked", "m/s", 3), "velocity")
+    counts = ("kicks",)
+    sigma: float = parameter("m/s^1.5", ge=0)
+
+    @ti.func
+    def particle(self, s, w, i, dt):
+        a = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 0))
+        b = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 1))
+        kick = self.sigma(w) * ti.sqrt(dt) * ti.cast(ti.Vector([a[0], a[1], b[0]]), s.real)
+        s.velocity[w, i] += kick
+        s.kicked[w, i] += kick
+        ti.atomic_add(s.kicks[w], 1)
+
+
+WORLDS, CAPACITY = 40, 32
+
+
+def run(scenes):
+    return simulate(scenes, worlds=WORLDS, capacity=CAPACITY)
+
+
+def charges(position, velocity, charge, trap, mass=1.0, **more):
+    effects = (Coulomb(), Trap(**trap))
+    return scene(
+        position, velocity, effects, mass=mass, quantities={"charge": np.asarray(charge, float)}, **more
+    )
