@@ -54,6 +54,7 @@ SHARED = {
         *CORE,
         Field("temperature", "K", default=None, minimum=0.0),
         Field("spin", "rad/s", 3),
+        Field("charge", "C", 1, "sum", default=None),
     )
 }
 """Fields that several effects share by name."""
