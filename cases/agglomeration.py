@@ -101,10 +101,7 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
             DeformationWork(),
             Softening(activation_energy=design["activation_energy"]),
             Reaction(energy_density=design["reaction"]),
-            Fragmentation(
-                surface_energy=design["surface_energy"],
-                grain_mass=design["density"] * 4 / 3 * np.pi * radius**3,
-            ),
+            Fragmentation(surface_energy=design["surface_energy"]),
             Agglomeration(),
             Cooling(),
         ),
@@ -129,12 +126,12 @@ def problem(size: str = "default", variant: str = "paper") -> Problem:
     """The inverse problem of Z04 section 7: the flow whose grains grow the most."""
     must(variant in SURFACE_ENERGY, "variant", f"one of {', '.join(SURFACE_ENERGY)}", variant)
     settings = CASE.size(size).scene
-    edge = settings["grains"] ** (1 / 3)
+    edge, energy = settings["grains"] ** (1 / 3), SURFACE_ENERGY[variant]
     return Problem(
         name=f"agglomeration-{size}" if variant == "paper" else f"agglomeration-{variant}-{size}",
         title=f"{CASE.title}: the largest grains, {settings['grains']} at the start",
-        description="Minimise Pi = 1 - b_f / b*: the mean radius falls short of one sphere of all the mass.",
-        genome=Genome((*GENES, SURFACE_ENERGY[variant])),
+        description=f"the largest grains; surface energy {energy.low:g} to {energy.high:g} {energy.unit}",
+        genome=Genome((*GENES, energy)),
         scene=lambda design, seed: scene(design, seed, **settings),
         objective=cost,
         symbol="Pi",

@@ -28,11 +28,6 @@ def changed(control: ApproachTime) -> Callable[[Scene], Scene]:
     return lambda s: s.model_copy(update={"stepper": Verlet(control=control)})
 
 
-def without(kind: str) -> Callable[[Scene], Scene]:
-    """One effect left out."""
-    return lambda s: s.model_copy(update={"effects": tuple(e for e in s.effects if e.kind() != kind)})
-
-
 def setting(key: str, value: float | bool) -> Callable[[Scene], Scene]:
     """One setting changed."""
     return lambda s: s.replace({key: value})
@@ -45,9 +40,9 @@ CHANGES: Mapping[str, Callable[[Scene], Scene]] = {
     "steps of at least 1e-4 s": changed(ApproachTime(shortest=1e-4)),
     "grains meet across the faces too": setting("domain.images", True),
     "friction ten times": setting("effects.friction.coefficient", 0.13456),
-    "no work of deformation": without("deformation_work"),
-    "no reaction": without("reaction"),
-    "no softening": without("softening"),
+    "no work of deformation": lambda s: s.without("deformation_work"),
+    "no reaction": lambda s: s.without("reaction"),
+    "no softening": lambda s: s.without("softening"),
     "hardness a quarter": setting("effects.impact.hardness", 0.25 * 0.26548e6),
     "four times as long": lambda s: s.model_copy(update={"duration": 4 * s.duration}),
 }  # fmt: skip

@@ -27,7 +27,7 @@ import sys
 import numpy as np
 from tests import scenes
 from tests.test_effects_contract import kicked
-from tests.test_schedules import WORLDS
+from tests.test_schedules import BATCH, crowd, pick
 from tisim import runtime
 
 kept = {}
@@ -38,20 +38,24 @@ def keep(name, result):
     kept.update({f"{name}/start/{key}": values for key, values in result.start.items()})
     kept[f"{name}/work"] = np.array([result.work[key] for key in sorted(result.work)])
 
+def keep_crowd(name):
+    results = scenes.simulate(crowd(), worlds=BATCH, capacity=200, schedule="world")
+    for w, result in enumerate(pick(results)):
+        keep(f"{name}/{w}", result)
+    kept[f"{name}/left"] = np.array([len(result.state["mass"]) for result in results])
+
 runtime.start(threads=1)
-for w, result in enumerate(scenes.simulate(WORLDS, worlds=len(WORLDS), capacity=200)):
-    keep(f"one thread/{w}", result)
+keep_crowd("one thread")
 keep("one thread/kicked", scenes.simulate([kicked()], worlds=1, capacity=32)[0])
 runtime.start(precision="f32", threads=2)
-for w, result in enumerate(scenes.simulate(WORLDS, worlds=len(WORLDS), capacity=200)):
-    keep(f"single precision/{w}", result)
+keep_crowd("single precision")
 np.savez(sys.argv[1], **kept)
 """
 
 
 @pytest.fixture(scope="session")
 def elsewhere(tmp_path_factory):
-    """Results of test_schedules.WORLDS in another process: with one thread, and in single precision."""
+    """Results of test_schedules.crowd in another process: with one thread, and in single precision."""
     file = tmp_path_factory.mktemp("elsewhere") / "results.npz"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)

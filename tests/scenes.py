@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tisim import Box, Particles, Scene, Simulation, runtime
 from tisim.effects.friction import Friction
@@ -21,6 +22,8 @@ RADIUS = 1e-3
 GRAIN = DENSITY * 4 / 3 * np.pi * RADIUS**3
 """kg, of a grain of RADIUS and DENSITY."""
 HEAT_CAPACITY = 500.0
+SOFT = 1.0
+"""Pa; a hardness at which everything bonds."""
 
 _compiled: dict = {}
 
@@ -81,6 +84,32 @@ def head_on(speed, effects, radius=RADIUS, **more):
     )
 
 
+def hit(speed, effects, **more):
+    """The same at room temperature, for a time so short that nothing but the impact happens."""
+    return head_on(speed, effects, dt=1e-15, quantities={"temperature": 300.0}, **more)
+
+
+def laws(
+    hardness=SOFT,
+    surface_energy=1e16,
+    grain_mass=GRAIN,
+    threshold=2 ** (-1 / 3),
+    activation_energy=0.0,
+    reaction=1e3,
+):
+    """All that Z04 has happen in an impact; a hardness that does not depend on temperature by default."""
+    return (
+        Impact(hardness=hardness),
+        Friction(coefficient=0.1),
+        Heating(heat_capacity=HEAT_CAPACITY),
+        DeformationWork(),
+        Softening(activation_energy=activation_energy),
+        Reaction(energy_density=reaction),
+        Fragmentation(surface_energy=surface_energy, grain_mass=grain_mass, threshold=threshold),
+        Agglomeration(),
+    )
+
+
 def flow(
     seed=0,
     grains=100,
@@ -105,17 +134,7 @@ def flow(
             density=DENSITY,
             quantities={"temperature": draw.uniform(200, 600, grains)},
         ),
-        effects=(
-            Impact(hardness=hardness),
-            Friction(coefficient=0.1),
-            Heating(heat_capacity=HEAT_CAPACITY),
-            DeformationWork(),
-            Softening(activation_energy=300.0),
-            Reaction(energy_density=2e4),
-            Fragmentation(surface_energy=surface_energy, grain_mass=grain_mass, threshold=threshold),
-            Agglomeration(),
-            Cooling(),
-        ),
+        effects=(*laws(hardness, surface_energy, grain_mass, threshold, 300.0, 2e4), Cooling()),
         domain=Box(low=(-side / 2,) * 3, high=(side / 2,) * 3, images=images),
         stepper=stepper or Verlet(),
         duration=duration,
@@ -135,3 +154,15 @@ def energy(state, heat_capacity=HEAT_CAPACITY):
     spent = sum(state[name].sum() for name in ("cooling_loss", "fracture_energy") if name in state)
     given = sum(state[name].sum() for name in ("reaction_heat", "deformation_work") if name in state)
     return kinetic + heat + spent - given
+
+
+def check_sums(result):
+    """Mass, volume and momentum to rounding; energy, with all its books, to that of what has passed."""
+    start, end = result.start, result.state
+    assert result.status.ok, result.status.reason
+    assert all(np.isfinite(values).all() for values in end.values())
+    assert end["mass"].sum() == pytest.approx(start["mass"].sum(), rel=1e-14)
+    assert (end["radius"] ** 3).sum() == pytest.approx((start["radius"] ** 3).sum(), rel=1e-13)
+    size = (start["mass"] * np.linalg.norm(start["velocity"], axis=1)).sum()
+    np.testing.assert_allclose(momentum(end), momentum(start), rtol=0, atol=1e-13 * size)
+    assert energy(end) == pytest.approx(energy(start), rel=1e-12)

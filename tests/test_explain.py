@@ -16,10 +16,6 @@ def text(scene):
     return stream.getvalue()
 
 
-def part_of(flow, *kept):
-    return flow.model_copy(update={"effects": tuple(e for e in flow.effects if e.kind() in kept)})
-
-
 def test_whole_flow_leaves_nothing_out():
     flow = agglomeration(BEST, 1, grains=60)
     found = explain(flow)
@@ -31,8 +27,10 @@ def test_whole_flow_leaves_nothing_out():
 
 
 def test_absent_effects_and_fields():
-    flow = part_of(agglomeration(BEST, 1, grains=60), "impact", "friction")
-    found = explain(flow)
+    whole = agglomeration(BEST, 1, grains=60)
+    found = explain(
+        whole.without(*(e.kind() for e in whole.effects if e.kind() not in ("impact", "friction")))
+    )
     absent = {part.name for part in found.absent_effects}
     assert {"heating", "cooling", "reaction", "fragmentation", "agglomeration"} <= absent
     assert not absent & {"impact", "friction", "impact_law", "operator", "force"}
@@ -40,6 +38,16 @@ def test_absent_effects_and_fields():
     assert "reaction" in fields["temperature"]
     assert "fragmentation" in fields["pieces"]
     assert not {item.name for item in found.memory} & set(fields)
+
+
+def test_without_any_effect_nothing_of_effects_is_compiled():
+    whole = agglomeration(BEST, 1, grains=60)
+    found = explain(whole.without(*(effect.kind() for effect in whole.effects)))
+    assert found.effects == ()
+    assert {
+        item.why for item in found.memory if item.bytes and not item.name.endswith(("table", "list"))
+    } == {"every scene"}
+    assert not {"Open*", "Bid*", "Resolve*", "Rearrange", "SumForces"} & set(found.phases)
 
 
 def test_memory_is_what_is_allocated():

@@ -1,5 +1,6 @@
 """Single precision: the same scenes as in test_schedules, in a process of their own."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -7,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.scenes import energy
+from tests.scenes import energy, head_on, simulate
 from tests.test_schedules import WORLDS
+from tisim.effects.heating import Heating
+from tisim.effects.impact import Impact
+from tisim.effects.softening import Softening
 
 
 def world(elsewhere, precision, w):
@@ -40,35 +44,46 @@ def test_single_precision_stays_finite_and_keeps_mass_and_energy(elsewhere, w):
 
 
 def test_single_and_double_precision_agree_on_how_much_merges(elsewhere):
-    """Chaotic trajectories part; the numbers of grains left, each within 3 sqrt(N), do not."""
-    for w in range(len(WORLDS)):
-        single, double = (len(world(elsewhere, p, w)[0]["mass"]) for p in ("single precision", "one thread"))
-        assert abs(single - double) <= 3 * np.sqrt(double)
+    """Chaotic trajectories part, and in few of 240 worlds (measured: 3) the number of grains left too."""
+    single, double = (elsewhere[f"{name}/left"] for name in ("single precision", "one thread"))
+    assert (single != double).sum() <= 12
+    assert single.sum() == pytest.approx(double.sum(), rel=0.01)
 
 
-COLD = """
-import subprocess
-import sys
-from pathlib import Path
+@pytest.fixture(scope="module")
+def single():
+    """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
 
-import numpy as np
-import tisim
-from tests.scenes import head_on
-from tisim import runtime
-from tisim.effects.heating import Heating
-from tisim.effects.impact import Impact
-from tisim.effects.softening import Softening
+    def call(module, name):
+        code = (
+            "import json; from tisim import runtime; runtime.start(precision='f32'); "
+            f"from tests.{module} import {name}; print(json.dumps({name}()))"
+        )
+        command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]
+        root = Path(__file__).parents[1]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
+        return json.loads(done.stdout.splitlines()[-1])
 
-runtime.start(precision="f32")
-for hardness, activation, temperature in ((1e5, 2e5, 300.0), (1e6, 1e3, 0.0), (1e9, 1e3, 1e-3)):
-    effects = (Impact(hardness=hardness), Heating(heat_capacity=1e9), Softening(activation_energy=activation))
-    result = tisim.run(head_on(0.01, effects, quantities={"temperature": temperature}))
-    print(result.status.ok, result.work["impacts"], result.work["bonds"], result.work["unsettled"])
-"""
+    return call
 
 
-def test_grains_too_hard_for_single_precision_rebound():
+def rebounds_of_cold_grains():
+    """Status, impacts, bonds and impacts that have not settled, of grains with an immense hardness."""
+    found = []
+    for hardness, activation, temperature in ((1e5, 2e5, 300.0), (1e6, 1e3, 0.0), (1e9, 1e3, 1e-3)):
+        effects = (
+            Impact(hardness=hardness), Heating(heat_capacity=1e9), Softening(activation_energy=activation)
+        )  # fmt: skip
+        (result,) = simulate([head_on(0.01, effects, quantities={"temperature": temperature})])
+        found.append([result.status.ok, *(result.work[name] for name in ("impacts", "bonds", "unsettled"))])
+    return found
+
+
+def test_grains_too_hard_for_single_precision_rebound(single):
     """exp(Q / (R T)) is capped where hardness still fits f32: nothing turns into a NaN that bonds."""
-    root = Path(__file__).parents[1]
-    done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True, check=True, cwd=root)
-    assert done.stdout.splitlines()[-3:] == ["True 1 0 0"] * 3
+    assert single("test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3
+
+
+def test_cooling_is_as_right_as_single_precision_can_be(single):
+    """From 0 K to 1e5 K; a stop criterion of double precision would be below the last digit here."""
+    assert max(single("test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps

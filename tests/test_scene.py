@@ -138,6 +138,28 @@ class TestReplace:
         assert str(fault.value) == message
 
 
+class TestWithout:
+    def test_leaves_out_what_is_named_and_nothing_else(self):
+        assert cloud().without("cooling").effects == cloud().effects[:-1]
+        assert cloud().without("cooling", "heating").effects == cloud().effects[:-2]
+        assert cloud().without().digest() == cloud().digest()
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            (
+                "warp",
+                "effect to leave out must be one of impact, friction, heating, cooling; received 'warp'",
+            ),
+            ("heating", "effects.cooling must be used together with effects.heating; received 'impact, "),
+        ],
+    )
+    def test_says_what_is_wrong(self, name, message):
+        with pytest.raises(InputError) as fault:
+            cloud().without(name)
+        assert str(fault.value).startswith(message)
+
+
 class TestRequires:
     @pytest.mark.parametrize(
         ("effects", "message"),

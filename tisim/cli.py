@@ -35,6 +35,11 @@ from tisim.terminal import err, out, plain_table, progress_bar, stopping
 CHECKPOINT_SECONDS = float(os.environ.get("TISIM_CHECKPOINT_SECONDS", "60"))
 """Wall time between checkpoints of a run."""
 
+Absent = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="EFFECT", help="Leave an effect out: cooling. Repeatable."),
+]
+
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
     no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None,
@@ -73,7 +78,7 @@ def _options(
 
 @app.command()
 def run(
-    target: Target, changes: Changes = None, folder: Out = None,
+    target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
     threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
 ) -> None:  # fmt: skip
@@ -81,11 +86,12 @@ def run(
     from tisim import checkpoint, output
 
     runtime.start(device, precision, threads)
-    name, scene = request.scene(target, size, seed, changes or ())
+    name, scene = request.scene(target, size, seed, absent or (), changes or ())
     place = output.Folder(folder or Path("out") / name)
     place.check(overwrite, resume)
-    simulation = Simulation(scene)
-    simulation.load([scene])
+    with err().status("compiling"):
+        simulation = Simulation(scene)
+        simulation.load([scene])
     if resume:
         checkpoint.restore(simulation, place.checkpoint)
     output.writable(place.path)
@@ -98,7 +104,7 @@ def run(
         raise typer.Exit(130)
     result = simulation.results()[0]
     paths = output.write(result, place)
-    out().print(_summary(result, paths))
+    out().print(_summary(result, simulation.setup_s, paths))
     if not result.status.ok:
         raise RunError(f"run failed {result.status.reason}")
 
@@ -131,14 +137,15 @@ def _advance(simulation: Simulation, name: str, path: Path) -> bool:
     return True
 
 
-def _summary(result: Result, paths: Sequence[Path]) -> Table:
+def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
     counts = len(result.start["mass"]), len(result.state["mass"])
     table = plain_table()
     table.add_row("status", "ok" if result.status.ok else "failed")
     table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s")
     table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
-    table.add_row("work", ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in result.work.items()))
-    table.add_row("wall time", f"{result.wall_s:.2f} s")
+    for name, n in result.work.items():
+        table.add_row(name.replace("_", " "), str(n))
+    table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
     table.add_row("written", "\n".join(map(str, paths)))
     return table
 
@@ -153,22 +160,26 @@ def cases() -> None:
         table = plain_table()
         for name, size in case.sizes.items():
             table.add_row(f"    --size {name}", size.summary)
-        for variant in case.variants:
-            table.add_row(f"    --variant {variant}", "inverse problem, for tisim optimize")
+        if case.problem is not None:
+            for variant in case.variants:
+                problem = case.problem("default", variant)
+                table.add_row(f"    --variant {variant}", f"of tisim optimize: {problem.description}")
         out().print(table)
 
 
 @app.command()
 def explain(
-    target: Target, changes: Changes = None, seed: Seed = None, size: Size = None,
-    device: Device = "cpu", precision: Precision = "f64",
+    target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
+    size: Size = None, device: Device = "cpu", precision: Precision = "f64",
 ) -> None:  # fmt: skip
     """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
     from tisim.explain import explain, render
 
     runtime.start(device, precision)
-    _, scene = request.scene(target, size, seed, changes or ())
-    out().print(render(explain(scene)))
+    _, scene = request.scene(target, size, seed, absent or (), changes or ())
+    with err().status("compiling"):
+        explanation = explain(scene)
+    out().print(render(explanation))
 
 
 @app.command()

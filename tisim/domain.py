@@ -31,6 +31,11 @@ class Domain(Spec):
         return r
 
     @ti.func
+    def lost(self, w, r):
+        """Whether r is so far out that rounding has taken its place inside."""
+        return 0
+
+    @ti.func
     def separation(self, w, a, b):
         """Vector from a to b as contacts and forces see it. m."""
         return b - a
@@ -103,6 +108,12 @@ class Box(Domain):
                 if inside[k] >= low[k] + side[k]:
                     inside[k] = low[k]
         return inside
+
+    @ti.func
+    def lost(self, w, r):
+        # A number so large that a thousandth of the side is below half of its last digit.
+        blurred = r + 1e-3 * self.side(w) == r
+        return blurred.any()
 
     @ti.func
     def nearest(self, w, a, b):

@@ -20,14 +20,15 @@ Rules
    exclusive access to both, earliest first (see events.py); it may remove either.
 10. ``connect`` returns what an effect wants to know of the other bound effects; ``requires`` names the
     effects without which it means nothing. The driver never asks what an effect is called.
-11. ``capacity`` says how many particles may ever live at once, given the start.
+11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may
+    ever live at once, given the start.
 12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; indices move only
     between steps. Nothing may depend on the order of parallel work: no float atomics.
 """
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field as Option
@@ -55,6 +56,10 @@ class Effect(Spec):
     needs: ClassVar[tuple[str | Field, ...]] = ()
     counts: ClassVar[tuple[str, ...]] = ()
     keeps: ClassVar[tuple[str, ...]] = ()
+
+    def at_start(self, masses: np.ndarray) -> Self:
+        """With parameters left at None taken from the masses of the start (kg); itself by default."""
+        return self
 
     def capacity(self, masses: np.ndarray) -> int:
         """Particles that may ever live at once, given those of the start (kg); their number by default."""

@@ -88,7 +88,7 @@ def explain(scene: Scene) -> Explanation:
         capacity=capacity,
         schedule=schedule,
         precision=precision,
-        effects=tuple(_part(effect) for effect in scene.effects),
+        effects=tuple(_part(effect) for effect in scene.acting()),
         others=(_part(scene.domain), _part(scene.stepper), _part(scene.stepper.control)),
         memory=memory,
         phases=phases,

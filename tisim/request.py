@@ -1,4 +1,4 @@
-"""From the words of a command line to a scene: a case or a file, its size and seed, and --set key=value."""
+"""From the words of a command line to a scene: a case or a file, its size and seed, --without and --set."""
 
 from __future__ import annotations
 
@@ -12,9 +12,16 @@ from tisim.scene import Scene
 
 
 def scene(
-    target: str, size: str | None = None, seed: int | None = None, changes: Sequence[str] = ()
+    target: str,
+    size: str | None = None,
+    seed: int | None = None,
+    absent: Sequence[str] = (),
+    changes: Sequence[str] = (),
 ) -> tuple[str, Scene]:
-    """Name and scene of a case, or of a file that ends in .toml; InputError when there is none."""
+    """Name and scene of a case, or of a file that ends in .toml; InputError when there is none.
+
+    absent : effects to leave out. changes : key=value texts, of what is then there.
+    """
     if target.endswith(".toml"):
         must(size is None, "--size", "given for a case only", size)
         name, made = Path(target).stem, _from_file(Path(target))
@@ -28,7 +35,7 @@ def scene(
         case = known[target]
         case.size(size or "default")
         name, made = case.name, case.scene(size or "default", seed or 0)
-    return name, made.replace(assignments(changes)) if changes else made
+    return name, made.without(*absent).replace(assignments(changes))
 
 
 def _from_file(path: Path) -> Scene:

@@ -71,6 +71,11 @@ class Scene(Spec):
         parts = (*self.effects, self.domain, self.stepper)
         return tuple(part.structure() for part in parts)
 
+    def acting(self) -> tuple[Effect, ...]:
+        """The effects, with what they take from the start filled in."""
+        masses = self.particles.masses()
+        return tuple(effect.at_start(masses) for effect in self.effects)
+
     def capacity(self) -> int:
         """Particles that may ever live at once."""
         masses = self.particles.masses()
@@ -149,3 +154,12 @@ class Scene(Spec):
             must(isinstance(place, dict), key, "a setting of this scene", last)
             place[last] = value
         return type(self).from_dict(data)
+
+    def without(self, *names: str) -> Scene:
+        """A copy that leaves effects out; InputError when one is not there, or those that stay need it."""
+        data = self.to_dict()
+        for name in names:
+            known = ", ".join(data["effects"]) or "none, as this scene has none"
+            must(name in data["effects"], "effect to leave out", f"one of {known}", name)
+        kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
+        return type(self).from_dict({**data, "effects": kept})

@@ -65,7 +65,7 @@ class Simulation:
 
     @staticmethod
     def _parts(scene: Scene) -> list[Any]:
-        return [*scene.effects, scene.domain, scene.stepper, scene.stepper.control]
+        return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
 
     def _choose(self, capacity: int) -> str:
         # A world per thread needs as many worlds as threads; one small world is faster without launches.

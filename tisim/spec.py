@@ -58,7 +58,7 @@ class Spec(Checked):
     def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
         """Name, declaration and number of components of each parameter that may differ per world."""
         for name, info in cls.model_fields.items():
-            if info.annotation is float:
+            if info.annotation in (float, float | None):
                 yield name, info, 1
             elif info.annotation == Vector:
                 yield name, info, 3

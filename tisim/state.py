@@ -59,9 +59,10 @@ SHARED = {
 }
 """Fields that several effects share by name."""
 
-RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED = range(6)
+RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED, LOST = range(7)
 """Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow;
-a quantity that particles settle among themselves does not settle."""
+a quantity that particles settle among themselves does not settle; a particle has left the box so far that its
+place is lost."""
 
 CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
 BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id")

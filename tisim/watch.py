@@ -6,7 +6,7 @@ import numpy as np
 
 from tisim.result import Status
 from tisim.scene import Scene
-from tisim.state import CROWDED, ENDED, FULL, NOT_FINITE, RUNNING, UNSETTLED, State
+from tisim.state import CROWDED, ENDED, FULL, LOST, NOT_FINITE, RUNNING, UNSETTLED, State
 
 REASONS = {
     RUNNING: "running",
@@ -15,6 +15,7 @@ REASONS = {
     FULL: "more fragments than there is room for",
     CROWDED: "more simultaneous contacts than there is room for",
     UNSETTLED: "a quantity that particles settle among themselves does not converge",
+    LOST: "a step so long or so fast that rounding loses the place in the box",
 }
 
 

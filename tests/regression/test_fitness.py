@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tisim
@@ -68,14 +69,19 @@ def test_any_number_of_threads_gives_the_same_fitness_to_the_last_bit(values):
 
 
 def test_the_bound_would_notice_a_change_of_physics(values):
-    """Twice the hardness is seen in the mean alone; finer changes are for the bits."""
+    """Half as hard again, as f32 or another platform must not be: 7, 30 and 10 standard errors (measured).
+
+    A quarter is seen too (19), by the design whose starts differ least.
+    """
     from cases import agglomeration
 
-    design = {**fitness_record.BASE, "hardness": 2.0 * fitness_record.BASE["hardness"]}
+    names = ("published", "hard and slow", "fragile")
     scenes = [
-        agglomeration.scene(design, seed, grains=fitness_record.GRAINS)
+        agglomeration.scene({**design, "hardness": 1.5 * design["hardness"]}, seed, fitness_record.GRAINS)
+        for design in (fitness_record.DESIGNS[name] for name in names)
         for seed in range(fitness_record.STARTS)
     ]
-    harder = [agglomeration.cost(result) for result in tisim.run(scenes)]
-    moved = fitness_record.deviations({"published": harder}, {"values": {"published": values["published"]}})
-    assert moved["published"] > STANDARD_ERRORS
+    costs = [agglomeration.cost(result) for result in tisim.run(scenes)]
+    harder = dict(zip(names, np.reshape(costs, (len(names), -1)).tolist(), strict=True))
+    moved = fitness_record.deviations(harder, {"values": values})
+    assert min(moved.values()) > STANDARD_ERRORS

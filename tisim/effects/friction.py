@@ -10,7 +10,7 @@ from tisim.effects.impact import Impact, ImpactLaw
 
 
 class Friction(ImpactLaw):
-    """Tangential impulse mu |I_n| dtau against the slip, at most what stops it.
+    """Slip is slowed by a tangential impulse mu |I_n| dtau, or stopped where that is more than it takes.
 
     coefficient : mu. Grains do not rotate (Z04 section 2). Z04 prints no bound at sticking, without which
     friction could reverse the slip.

@@ -27,12 +27,12 @@ class Heating(ImpactLaw):
 
 
 class DeformationWork(ImpactLaw):
-    """The work term dW of Z04 (6.10), m_ij v_n^2 (1 - e^2) / 3 for each grain, from (4.7)-(4.9).
+    """Each grain receives the work of deformation of Z04 (6.10), dW = m_ij v_n^2 (1 - e^2) / 3.
 
-    With the linear force and velocity histories of (4.4)-(4.6), the integral of |I_n| over the relative
-    approach is I* v_n (dtau_1 - e dtau_2) / 6, I* = 2 |I_n|. It is two thirds of the kinetic energy lost,
-    which (6.10) also counts, and both grains receive it: an energy source of the paper's model, kept in
-    the books as ``deformation_work``. A scene without this effect conserves energy without it.
+    With the linear force and velocity histories of (4.4)-(4.6), the integral (4.7)-(4.9) of |I_n| over the
+    relative approach is I* v_n (dtau_1 - e dtau_2) / 6, I* = 2 |I_n|. It is two thirds of the kinetic energy
+    lost, which (6.10) also counts, and both grains receive it: an energy source of the paper's model, kept
+    in the books as ``deformation_work``. A scene without this effect conserves energy without it.
     """
 
     needs = ("temperature", Field("deformation_work", "J", 1, "sum"))

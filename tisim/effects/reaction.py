@@ -12,7 +12,7 @@ from tisim.state import Field
 
 
 class Reaction(ImpactLaw):
-    """Energy dH = alpha a given to each grain, a the contact area.
+    """Adsorbed gas gives each grain the energy dH = alpha a, a the contact area.
 
     energy_density : alpha, energy released per contact area. Source: Z04 Eq. (6.9).
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -22,7 +22,8 @@ class Fragmentation(ImpactLaw, Operator):
     momentum and kinetic energy are conserved; the new surface takes dZ = gamma (n 4 pi b^2 - 4 pi b_0^2)
     from the grain's heat (6.8). A grain that breaks does not bond in that impact.
 
-    surface_energy : gamma. grain_mass : mass of an original grain, the smallest piece.
+    surface_energy : gamma. grain_mass : mass of an original grain, the smallest piece; by default the
+        lightest particle of the start, so that it follows the start's density and radius.
     threshold : b / b_0 below which it breaks; 2^(-1/3), two pieces, by default. Z04 remark 5.1 uses 1/2.
     Source: Z04 Eqs (5.1)-(5.3).
     """
@@ -37,11 +38,17 @@ class Fragmentation(ImpactLaw, Operator):
     requires: ClassVar = (Impact,)
 
     surface_energy: float = parameter("J/m^2", gt=0)
-    grain_mass: float = parameter("kg", gt=0)
+    grain_mass: float | None = parameter("kg", None, gt=0)
     threshold: float = parameter("", 2.0 ** (-1.0 / 3.0), gt=0, lt=1)
 
+    def at_start(self, masses: np.ndarray) -> Self:
+        return self.model_copy(update={"grain_mass": self._grain(masses)})
+
     def capacity(self, masses: np.ndarray) -> int:
-        return max(len(masses), int(masses.sum() / self.grain_mass * (1 + 1e-9)))
+        return max(len(masses), int(masses.sum() / self._grain(masses) * (1 + 1e-9)))
+
+    def _grain(self, masses: np.ndarray) -> float:
+        return float(masses.min()) if self.grain_mass is None else self.grain_mass
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"heating": tuple(peer for peer in peers if isinstance(peer, Heating))}

@@ -6,7 +6,7 @@ without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c
 
 from tisim._taichi import ti
 from tisim.program import Item, PerParticle, Phase
-from tisim.state import ENDED, NOT_FINITE
+from tisim.state import ENDED, LOST, NOT_FINITE
 from tisim.steppers.stepper import Parts, Stepper
 
 
@@ -79,6 +79,8 @@ class Move(PerParticle):
         # Not below infinity: also true of NaN.
         if not (stride.sum() < ti.math.inf):
             s.fail(w, NOT_FINITE, i)
+        elif self.domain.lost(w, s.position[w, i]):
+            s.fail(w, LOST, i)
         else:
             for k in ti.static(range(3)):
                 if stride[k] > s.stride[w, k]:

@@ -1,0 +1,66 @@
+"""The command line in a fresh folder, with a scene file to try it on."""
+
+import os
+import signal
+
+import pytest
+
+from tisim import Box, Cloud, Scene
+from tisim.cli import main
+from tisim.effects.impact import Impact
+from tisim.interrupt import Interrupt
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.verlet import Verlet
+
+
+@pytest.fixture
+def tisim(tmp_path, monkeypatch, capsys):
+    """Runs a command in a fresh folder: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments):
+        with pytest.raises(SystemExit) as exit_:
+            main([str(argument) for argument in arguments])
+        return exit_.value.code, *capsys.readouterr()
+
+    return command
+
+
+@pytest.fixture
+def toml(tmp_path):
+    """A scene file that is quick to compile and run, in several looks at progress."""
+    scene = Scene(
+        particles=Cloud(number=80, radius=4e-4, density=3000.0, deviation=(60.0, 60.0, 60.0)),
+        domain=Box(low=(-5e-3,) * 3, high=(5e-3,) * 3),
+        stepper=Verlet(control=FixedStep(dt=1e-6)),
+        duration=1e-3,
+    )
+    (tmp_path / "flow.toml").write_text(scene.to_toml())
+    return "flow.toml"
+
+
+@pytest.fixture
+def impacts(tmp_path, toml):
+    """The same with an effect, for what goes wrong before anything is compiled."""
+    scene = Scene.from_toml(toml).model_copy(update={"effects": (Impact(hardness=2e5),)})
+    (tmp_path / toml).write_text(scene.to_toml())
+    return toml
+
+
+@pytest.fixture
+def press_ctrl_c():
+    """Press Ctrl-C when progress is looked at for the ``after``-th time."""
+
+    def press(monkeypatch, after, times=1):
+        looked = []
+
+        def check(self, original=Interrupt.check):
+            looked.append(1)
+            if len(looked) == after:
+                for _ in range(times):
+                    os.kill(os.getpid(), signal.SIGINT)
+            original(self)
+
+        monkeypatch.setattr(Interrupt, "check", check)
+
+    return press

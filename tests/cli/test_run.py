@@ -1,0 +1,86 @@
+"""tisim run: what it writes, and how it is stopped, goes on and fails."""
+
+import h5py
+import numpy as np
+
+from tisim import Scene
+
+
+def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
+    code, out, _ = tisim("run", toml, "--set", "particles.density=2e3", "--seed", 7)
+    assert code == 0
+    assert "ok" in out
+    assert ["particle", "steps", "80000"] in [line.split() for line in out.splitlines()]
+    folder = tmp_path / "out" / "flow"
+    assert {path.name for path in folder.iterdir()} == {
+        "result.h5",
+        "scene.toml",
+        "versions.json",
+        "cloud.png",
+    }
+    written = Scene.from_toml(folder / "scene.toml")
+    assert (written.seed, written.particles.density) == (7, 2e3)
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    code, _, err = tisim("run", toml)
+    assert (code, err.strip()) == (
+        2, "output folder must be without a finished run (or give --overwrite); received 'out/flow'"
+    )  # fmt: skip
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "whole" / "result.h5").write_text("of an earlier run")
+    assert tisim("run", toml, "--out", "whole", "--overwrite")[0] == 0
+    with monkeypatch.context() as patch:
+        press_ctrl_c(patch, after=2)
+        code, _, err = tisim("run", toml, "--out", "cut")
+    assert code == 130
+    assert "same command with --resume" in " ".join(err.split())
+    assert [path.name for path in (tmp_path / "cut").iterdir()] == ["checkpoint.h5"]
+    code, _, err = tisim("run", toml, "--out", "cut")
+    assert code == 2
+    assert "--resume" in err
+    assert tisim("run", toml, "--out", "cut", "--resume")[0] == 0
+    assert not (tmp_path / "cut" / "checkpoint.h5").exists()
+    with h5py.File(tmp_path / "whole/result.h5") as whole, h5py.File(tmp_path / "cut/result.h5") as cut:
+        assert dict(whole["work"].attrs) == dict(cut["work"].attrs)
+        for name, values in whole["end"].items():
+            np.testing.assert_array_equal(cut["end"][name], values)
+
+
+def test_second_ctrl_c_stops_at_once(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
+    press_ctrl_c(monkeypatch, after=1, times=2)
+    assert tisim("run", toml)[0] == 130
+    assert list((tmp_path / "out" / "flow").iterdir()) == []
+
+
+BEYOND_RANGE = [
+    *("--set", "particles.deviation=[1e308, 1e308, 1e308]"),
+    *("--set", "duration=1e9", "--set", "stepper.control.dt=1e9"),
+]
+
+
+def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_path):
+    code, out, err = tisim("run", toml, *BEYOND_RANGE)
+    assert code == 1
+    assert "failed" in out
+    assert "at t = " in err
+    with h5py.File(tmp_path / "out/flow/result.h5") as file:
+        assert not file.attrs["ok"]
+        assert np.isfinite(file["end/velocity"]).all()
+
+
+def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
+    assert tisim("run", impacts, "--without", "impact")[0] == 0
+    assert Scene.from_toml(tmp_path / "out" / "flow" / "scene.toml").effects == ()
+    with h5py.File(tmp_path / "out/flow/result.h5") as file:
+        assert "impacts" not in file["work"].attrs
+    code, out, _ = tisim(
+        "explain", "agglomeration", "--size", "small", "--without", "fragmentation", "--without", "cooling"
+    )
+    assert code == 0
+    present, left_out = out.split("It leaves out")
+    assert not any(word in present for word in ("fragmentation", "cooling", "pieces", "fracture_energy"))
+    assert "pieces (of fragmentation)" in left_out
+    assert "cooling_loss (of cooling)" in left_out

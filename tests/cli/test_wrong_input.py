@@ -1,0 +1,64 @@
+"""Wrong input: a message of one line, exit code 2, and nothing written."""
+
+import pytest
+
+WRONG = [
+    (["run", "nosuch"], "case must be one of agglomeration, or a scene file ending in .toml"),
+    (["run", "none.toml"], "scene file must exist; received 'none.toml'"),
+    (["run", "FLOW", "--size", "small"], "--size must be given for a case only; received 'small'"),
+    (["run", "FLOW", "--set", "hardness"], "--set must be key=value; received 'hardness'"),
+    (["run", "FLOW", "--set", "effects.warp.speed=9"], "effects.warp.speed must be a setting of this scene"),
+    (["run", "FLOW", "--set", "effects.impact.hardnes=1"], "impact.hardnes must be a known key; received 1"),
+    (["run", "FLOW", "--set", "effects.impact.hardness=nan"], "impact.hardness must be a finite number"),
+    (["run", "FLOW", "--set", "particles.density=-1"], "cloud.density must be greater than 0"),
+    (["run", "FLOW", "--set", "duration=0"], "scene.duration must be greater than 0"),
+    (["run", "FLOW", "--without", "warp"], "effect to leave out must be one of impact; received 'warp'"),
+    (["run", "agglomeration", "--without", "heating"], "must be used together with effects.heating"),
+    (["explain", "agglomeration", "--without", "impact"], "must be used together with effects.impact"),
+    (["run", "FLOW", "--without", "impact", "--set", "effects.impact.hardness=1"], "a setting of this scene"),
+    (["run", "FLOW", "--device", "abacus"], "device must be one of cpu, cuda; received 'abacus'"),
+    (["run", "FLOW", "--precision", "f16"], "precision must be one of f64, f32; received 'f16'"),
+    (["run", "FLOW", "--resume"], "output folder must be one that an interrupted run has left"),
+    (["run", "agglomeration", "--size", "huge"], "size must be one of small, default, paper; received"),
+    (["explain", "nosuch"], "case must be one of"),
+    (["check", "nosuch"], "case must be one of agglomeration; received 'nosuch'"),
+    (["optimize", "agglomeration", "--population", "1"], "search.population must be at least 2; received 1"),
+    (["optimize", "agglomeration", "--variant", "x"], "variant must be one of paper, fragmenting; received"),
+    (["optimize", "agglomeration", "--set", "block=2"], "--set must be of the form search.KEY=VALUE"),
+    (["optimize", "agglomeration", "--set", "search.blok=2"], "search.blok must be a known key; received 2"),
+    (["cache", "none.h5"], "cache file must be an existing file; received 'none.h5'"),
+    (["cache", "flow.toml"], "must be a whole HDF5 file written by a cache"),
+    (["frobnicate"], "No such command 'frobnicate'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG, ids=[" ".join(w[0][:2]) for w in WRONG])
+def test_wrong_input_is_told_and_nothing_written(tisim, impacts, tmp_path, arguments, message):
+    code, out, err = tisim(*(impacts if a == "FLOW" else a for a in arguments))
+    assert code == 2
+    assert message in err
+    assert "Traceback" not in err
+    assert out == ""
+    assert [path.name for path in tmp_path.iterdir()] == [impacts]
+
+
+def test_unwritable_folder(tisim, toml):
+    code, _, err = tisim("run", toml, "--out", "flow.toml/x")
+    assert code == 2
+    assert "output folder must be writable; received 'flow.toml/x'" in err
+
+
+def test_scene_files_that_are_none(tisim, impacts, tmp_path):
+    content = (tmp_path / impacts).read_text()
+    for text, message in {
+        content[: len(content) // 2] + "[": "scene file must be TOML",
+        content.replace("duration", "durration"): "must be",
+        content.replace("[effects.impact]", "[effects.warp]"): "effects.warp.kind must be one of",
+        "": "scene.particles must be given; received 'nothing'",
+    }.items():
+        (tmp_path / impacts).write_text(text)
+        code, _, err = tisim("run", impacts)
+        assert code == 2
+        assert message in err
+    (tmp_path / "folder.toml").mkdir()
+    assert tisim("run", "folder.toml")[0] == 2
