@@ -7,6 +7,7 @@ from tisim.result import Result
 from tisim.run import run
 from tisim.scene import Box, Open, Scene
 from tisim.simulation import Simulation
+from tisim.trajectory import Recording
 
 __version__ = "0.1.0"
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "RandomInBall",
     "RandomInBox",
     "RandomInDomain",
+    "Recording",
     "Result",
     "Scene",
     "Simulation",
