@@ -12,7 +12,7 @@ from typing import Annotated, NoReturn
 import typer
 from rich.table import Table
 
-from tisim import __version__, cli_search, request, runtime
+from tisim import __version__, cli_search, cli_watch, request, runtime
 from tisim.errors import InputError, RunError
 from tisim.interrupt import Interrupt
 from tisim.options import (
@@ -226,3 +226,6 @@ def doctor() -> None:
 
 app.command()(cli_search.optimize)
 app.command()(cli_search.cache)
+app.command()(cli_watch.plot)
+app.command()(cli_watch.movie)
+app.command()(cli_watch.export)

@@ -163,12 +163,14 @@ class Recorder:
         steps = s.read("steps")
         for w, interval in enumerate(self.interval):
             time = float(good["time"][w])
-            if (time >= self.due[w] or not running[w]) and time > self.last[w]:
+            if time < self.due[w] and running[w]:
+                continue
+            self.due[w] = self._after(time, interval)
+            if time > self.last[w]:
                 n = int(good["count"][w])
                 arrays = {f.name: good[f.name][w, :n] for f in self.trajectory.fields[self.indices[w]]}
                 self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
                 self.last[w] = time
-                self.due[w] = self._after(time, interval)
         s.write("hold", self.due)
 
 
