@@ -10,14 +10,20 @@ from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 import tisim
-from tests.scenes import GRAIN, scene
+from tests.scenes import scene
 from tisim import Box, Recording
 from tisim.errors import InputError
 from tisim.frames import frames
 from tisim.movie import movie
 from tisim.plots import clouds, courses, history
 
-MOVING = dict(position=[(0, 0, 0), (0.01, 0, 0)], velocity=[(1.0, 2.0, 0), (3.0, 2.0, 0)], dt=1e-3, steps=4)
+MOVING = dict(
+    position=[(0, 0, 0), (0.01, 0, 0)],
+    velocity=[(1.0, 2.0, 0), (3.0, 2.0, 0)],
+    mass=[1.0, 3.0],
+    dt=1e-3,
+    steps=4,
+)
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +37,9 @@ def test_history_is_that_of_two_grains_in_straight_flight(file):
     with frames(file) as found:
         seen = history(found)
     np.testing.assert_allclose(seen.time, np.arange(5) * 1e-3, rtol=1e-12)
-    np.testing.assert_allclose(seen.kinetic_energy, 0.5 * GRAIN * (1 + 4 + 9 + 4), rtol=1e-12)
-    np.testing.assert_allclose(seen.drift, [[2.0, 2.0, 0]] * 5, rtol=1e-12)
-    np.testing.assert_allclose(seen.shift, seen.time[:, None] * [2.0, 2.0, 0], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(seen.kinetic_energy, 0.5 * (1 + 4) + 1.5 * (9 + 4), rtol=1e-12)
+    np.testing.assert_allclose(seen.drift, [[2.5, 2.0, 0]] * 5, rtol=1e-12)
+    np.testing.assert_allclose(seen.shift, seen.time[:, None] * [2.5, 2.0, 0], rtol=1e-9, atol=1e-15)
     assert seen.number.tolist() == [2] * 5
 
 
@@ -55,7 +61,7 @@ def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
     with frames(tmp_path / "t.h5") as found:
         centre = courses(found).axes[1]
     assert "velocity" in centre.get_ylabel()
-    np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.0)
+    np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.5)
 
 
 def test_clouds_are_of_the_first_and_last_frame(file):

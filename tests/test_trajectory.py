@@ -226,6 +226,9 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
     now = float(made.s.read("time")[0])
     assert now < cut[-1].time < FLOWS[0].duration
     with Trajectory.going_on(asked, FLOWS[0], now) as trajectory:
+        kept = [frame.time for frame in cut if frame.time <= now]
+        assert trajectory.groups[0]["position/time"][:].tolist() == kept
+        assert len(kept) > 1
         trajectory.record(made, [0])
         made.run()
     recorded(tmp_path / "whole.h5", frames=15)
