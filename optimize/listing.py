@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Group, RenderableType
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from optimize.cache import existing
 from optimize.record import Record
@@ -41,8 +41,8 @@ def _evaluations(records: Sequence[Record]) -> Table:
     return table
 
 
-def _failures(records: Sequence[Record]) -> list[str]:
+def _failures(records: Sequence[Record]) -> list[RenderableType]:
     failed = [record for record in records if not record.ok]
-    lines = [escape(f"seed {record.seed}: {record.reason}") for record in failed[:SHOWN]]
+    lines: list[RenderableType] = [Text(f"seed {record.seed}: {record.reason}") for record in failed[:SHOWN]]
     more = [f"and {len(failed) - SHOWN} more"] if len(failed) > SHOWN else []
     return ["", "failed:", *lines, *more] if failed else []

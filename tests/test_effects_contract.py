@@ -17,13 +17,12 @@ from tisim.state import Field
 
 K_E = 8.9875517873681764e9
 """Coulomb's constant, N m^2/C^2."""
-CHARGE = Field("charge", "C", 1, "sum")
 
 
 class Coulomb(PairForce):
-    """F_i = -k q_i q_j / d^2 n_ij, between all pairs; the charge is a field that only this effect needs."""
+    """F_i = -k q_i q_j / d^2 n_ij, between all pairs; only this effect needs the charge."""
 
-    needs = (CHARGE,)
+    needs = ("charge",)
     constant: float = parameter("N m^2/C^2", K_E, gt=0)
 
     @ti.func

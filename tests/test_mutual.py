@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.scenes import scene
+from tests.scenes import scene, simulate
 from tisim import Simulation
 from tisim._taichi import ti
 from tisim.effect import Force, Mutual, PairForce, Source, parameter, sources
@@ -179,3 +179,30 @@ def test_one_sweep_a_step_when_asked():
     exact = solved(result.state)[0]
     error = np.abs(result.state["dipole"] - exact).max() / np.abs(exact).max()
     assert 1e-8 < error < 1e-2
+
+
+class Potential(Mutual):
+    """phi_i = 1 + strength sum_j phi_j / d_ij: a number, not a vector."""
+
+    needs = (Field("potential", "V", 1, "keep"),)
+    quantity = "potential"
+    strength: float = parameter("m", gt=0)
+
+    @ti.func
+    def influence(self, s, w, i, j, separation, distance, t):
+        return self.strength(w) * s.potential[w, j] / distance
+
+    @ti.func
+    def response(self, s, w, i, total, t):
+        return 1.0 + total
+
+
+@pytest.mark.parametrize("schedule", ["world", "particle"])
+def test_a_number_settles_too_and_without_any_force(schedule):
+    """Two at distance d: phi = 1/(1 - strength/d). Nothing in the scene needs a force, so there is none."""
+    effects = (Potential(strength=0.1, tolerance=1e-14),)
+    made = scene([[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 0, 0], [0.5, 0, 0]], effects, dt=0.1, steps=10)
+    (result,) = simulate([made], schedule=schedule)
+    assert result.status.ok
+    assert "force" not in result.state
+    np.testing.assert_allclose(result.state["potential"], 1 / (1 - 0.1 / 1.5), rtol=1e-13)

@@ -56,6 +56,16 @@ class ShellOfAll(Shell):
     short_ranged = False
 
 
+class Growing(Operator):
+    """Radii grow, each at a rate of its own."""
+
+    needs = ("radius", Field("growth", "m/s", 1, "keep"))
+
+    @ti.func
+    def particle(self, s, w, i, dt):
+        s.radius[w, i] += s.growth[w, i] * dt
+
+
 class Poison(Operator):
     """Makes one component of one particle NaN after some steps."""
 
@@ -65,6 +75,13 @@ class Poison(Operator):
     def particle(self, s, w, i, dt):
         if s.steps[w] == 20 and i == 7:
             s.position[w, i][self.axis] = ti.sqrt(-s.mass[w, i])
+
+
+@pytest.mark.parametrize("wrong", [{"slots": 3}, {"integer": True}, {"components": 3, "slots": 3}])
+def test_a_field_that_could_not_be_merged_is_refused(wrong):
+    """Not when two particles merge, where the compiler would stop or a fraction be lost."""
+    with pytest.raises(TypeError, match="field tag"):
+        Field("tag", "", **wrong)
 
 
 def test_an_operator_sees_every_world_once_a_step():
@@ -93,6 +110,29 @@ def test_lists_follow_particles_that_operators_move(kind):
     # The twin kicks once a step, the engine half before and half after: equal to first order in dt.
     np.testing.assert_allclose(run(wanted).state["velocity"], velocity, rtol=0, atol=0.02 * velocity.max())
     assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
+
+
+def test_lists_follow_particles_that_grow(rng):
+    """Grains at rest, out of each other's reach, that grow until they push each other apart."""
+    grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    position, growth = grid + rng.uniform(-0.1, 0.1, grid.shape), rng.uniform(0.5, 2.0, len(grid))
+    listed, everyone = (
+        run(
+            scene(
+                position,
+                0 * position,
+                (kind(width=0.02), Growing()),
+                radius=0.04,
+                mass=1.0,
+                dt=1e-3,
+                steps=300,
+                quantities={"growth": growth},
+            )
+        )
+        for kind in (Shell, ShellOfAll)
+    )
+    assert np.abs(everyone.state["velocity"]).max() > 1e-3
+    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("schedule", ["world", "particle"])

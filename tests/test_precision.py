@@ -13,6 +13,7 @@ from tests.test_schedules import WORLDS
 from tisim.effects.heating import Heating
 from tisim.effects.impact import Impact
 from tisim.effects.softening import Softening
+from tisim.errors import InputError
 
 
 def world(elsewhere, precision, w):
@@ -87,3 +88,26 @@ def test_grains_too_hard_for_single_precision_rebound(single):
 def test_cooling_is_as_right_as_single_precision_can_be(single):
     """From 0 K to 1e5 K; a stop criterion of double precision would be below the last digit here."""
     assert max(single("test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps
+
+
+def refused():
+    """What is said of scenes whose numbers f64 holds and f32 does not."""
+    said = []
+    for hardness, more in (
+        (1e200, {"quantities": {"temperature": 1.0}}),
+        (1e5, {"radius": 1e-17, "quantities": {"temperature": 1.0}}),
+        (1e5, {"quantities": {"temperature": 1e39}}),
+    ):
+        try:
+            simulate([head_on(0.01, (Impact(hardness=hardness), Heating(heat_capacity=1e3)), **more)])
+        except InputError as fault:
+            said.append(str(fault))
+    return said
+
+
+def test_what_single_precision_cannot_hold_is_refused(single):
+    """Not an infinite hardness, nor a mass of zero, which would make the particle vanish."""
+    hardness, mass, temperature = single("test_precision", "refused")
+    assert hardness.startswith("impact.hardness must be within the range of f32; received 1e+200")
+    assert mass.startswith("particles.mass must be within the range of f32; received 8.37")
+    assert temperature.startswith("particles.temperature must be within the range of f32")

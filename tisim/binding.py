@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from tisim._taichi import ti
+from tisim.errors import must
 from tisim.spec import Spec
 
 Part = TypeVar("Part", bound=Spec)
@@ -54,11 +55,24 @@ class Table:
         return bound
 
     def write(self, rows: Sequence[Sequence[Spec]]) -> None:
-        """Set the parameters of each world from its parts, in the order they were bound."""
+        """Set the parameters of each world from its parts, in the order they were bound.
+
+        InputError for one that the precision cannot hold.
+        """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):
             table[world, : self.slots] = [value for part in parts for value in part.values()]
-        self.field.from_numpy(table.astype(np.float64 if self.field.dtype == ti.f64 else np.float32))
+        with np.errstate(over="ignore"):
+            held = table.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
+        for world, slot in np.argwhere(~np.isfinite(held)):
+            slots = [
+                (part.kind(), name)
+                for part in rows[world]
+                for name, _, n in part.parameters()
+                for _ in range(n)
+            ]
+            must(False, ".".join(slots[slot]), "within the range of f32", float(table[world, slot]))
+        self.field.from_numpy(held)
 
     def destroy(self) -> None:
         """Give the memory back."""

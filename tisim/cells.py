@@ -38,7 +38,9 @@ class Bin(Phase):
             low = n.domain.origin(w)
             high = low + n.domain.side(w)
         extent = ti.max(high - low, 1e-3 * least)
-        spacing = ti.pow(extent[0] * extent[1] * extent[2] / count, 1.0 / 3.0)
+        # Root by root: in f32 a volume of 7000 million km cubed is infinite.
+        roots = ti.pow(extent, 1.0 / 3.0)
+        spacing = roots[0] * roots[1] * roots[2] / ti.pow(ti.cast(count, s.real), 1.0 / 3.0)
         n.skin[w] = ti.min(2.0 * n.ahead * ti.cast(s.axes(s.stride, w), s.real), spacing)
         n.gap[w] = n.horizon(w)
         for effect in ti.static(n.short_ranged):

@@ -11,6 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 from rich.table import Table
+from rich.text import Text
 
 from tisim import __version__, cli_search, cli_watch, request, runtime
 from tisim.errors import InputError, RunError
@@ -163,7 +164,7 @@ def cases() -> None:
     from cases.case import every
 
     for case in every().values():
-        out().print(f"[bold]{case.name}[/]  {case.title}\n    {case.source}", highlight=False)
+        out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))
         table = plain_table()
         for name, size in case.sizes.items():
             table.add_row(f"    --size {name}", size.summary)
@@ -204,7 +205,7 @@ def check(case: CaseName, device: Device = "cpu", precision: Precision = "f64", 
             table.add_row(
                 item.name, f"{item.measured:.10g}", f"{item.expected:.10g}",
                 f"{abs(item.measured - item.expected):.1e}", f"{item.bound:.1e}",
-                "[green]pass" if item.ok else "[bold red]FAIL",
+                Text("pass", "green") if item.ok else Text("FAIL", "bold red"),
             )  # fmt: skip
             status.update(f"checked: {item.name}")
     out().print(table)

@@ -32,7 +32,7 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
     if turning(forces, pair_forces):
         needed += [(TORQUE, "torques"), ("spin", "torques")]
     for effect in effects:
-        needed += [(need, effect.kind()) for need in effect.needs]
+        needed += [(need, effect.kind()) for need in effect.needed()]
         if isinstance(effect, PairForce):
             needed += [(field, effect.kind()) for field in memory_fields(effect)]
     needed += [(need, stepper.kind()) for need in stepper.needs]
@@ -89,6 +89,7 @@ class Composition:
             lists=lists,
             remember=self._remember(),
             forces=self._summed(SumForces),
+            forced=bool(self.forces or self.pair_forces),
             turning=turning(self.forces, self.pair_forces),
         )
         step: list[Item] = [*stepper.step(parts)]

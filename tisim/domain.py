@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydantic import model_validator
 
@@ -77,6 +79,8 @@ class Box(Domain):
     def _ordered(self) -> Box:
         ordered = all(a < b for a, b in zip(self.low, self.high, strict=True))
         must(ordered, "box.high", "above box.low in every component", self.high)
+        volume = math.prod(b - a for a, b in zip(self.low, self.high, strict=True))
+        must(math.isfinite(volume), "volume of the box", "a finite number", volume)
         return self
 
     def bounds(self) -> tuple[np.ndarray | None, np.ndarray | None]:

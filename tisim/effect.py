@@ -5,13 +5,15 @@ Rules
 2. Every float or Vector parameter may differ per world; in a kernel it is a function, ``self.name(w)``.
    Every other option (bool, int, text) is compiled in, and the same for all worlds of a batch.
 3. ``needs`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
-   A field that no other effect has ever needed is declared by putting a ``Field`` there.
+   A field that no other effect has ever needed is declared by putting a ``Field`` there. Where the
+   effect's options decide, ``needed`` returns those of this one.
 4. ``counts`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
    ``keeps`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
    are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them by
    the driver, and changed by ``remember`` only, once a step.
-6. A ``Source`` is an external field of place and time; whoever feels it finds it with ``sources``.
+6. A ``Source`` is an external field of place and time; whoever feels it finds it with ``sources``, and
+   names in ``feels`` the quantities of which a scene must have at least one source.
 7. A ``Mutual`` quantity of a particle depends on that of all others, such as an induced dipole; the driver
    settles it before forces are summed.
 8. An ``Operator`` changes the state between steps: ``particle`` for each particle on its own (it may write
@@ -56,6 +58,11 @@ class Effect(Spec):
     needs: ClassVar[tuple[str | Field, ...]] = ()
     counts: ClassVar[tuple[str, ...]] = ()
     keeps: ClassVar[tuple[str, ...]] = ()
+    feels: ClassVar[tuple[str, ...]] = ()
+
+    def needed(self) -> tuple[str | Field, ...]:
+        """The particle fields that this one needs, given its options; all of ``needs`` by default."""
+        return self.needs
 
     def at_start(self, masses: np.ndarray) -> Self:
         """With parameters left at None taken from the masses of the start (kg); itself by default."""
@@ -89,6 +96,15 @@ class Force(Effect):
     def torque(self, s, w, i, t):
         """Torque on particle i about its centre. N m."""
         return 0.0 * s.velocity[w, i]
+
+    @ti.func
+    def velocity_jacobian(self, s, w, i, t):
+        """[a, b] the derivative of component a of ``force`` by component b of the velocity of i. N s/m.
+
+        Of the trial state, like ``force``. Implicit steppers solve with it what is linear in velocity
+        exactly; a force of which ``offers("velocity_jacobian")`` is false they take as given.
+        """
+        return ti.Matrix.zero(s.real, 3, 3)
 
 
 class Pairwise(Effect):

@@ -11,7 +11,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tisim import effects, kinds, operators
+from tisim import effects, kinds, operators, sources
 from tisim.composition import needed_fields
 from tisim.effect import Effect
 from tisim.scene import Scene
@@ -47,7 +47,7 @@ class Explanation:
     """A scene, as one world of it is compiled.
 
     particles, capacity : at the start, and room for. memory : every allocation, fields first. phases : of a
-    step, in order; those with * are repeated until no pair waits. absent_effects : known, and left out.
+    step, in order; those with * are repeated until nothing waits. absent_effects : known, and left out.
     absent_fields : (field, effects that would need it), not allocated.
     """
 
@@ -99,10 +99,11 @@ def explain(scene: Scene) -> Explanation:
 
 def known_effects() -> list[type[Effect]]:
     """Every effect of the package, by name."""
-    kinds.load(effects)
-    kinds.load(operators)
-    known = sorted(Effect.known().items())
-    return [kind for _, kind in known if kind.__module__.startswith((effects.__name__, operators.__name__))]
+    packages = (effects, operators, sources)
+    for package in packages:
+        kinds.load(package)
+    homes = tuple(package.__name__ for package in packages)
+    return [kind for _, kind in sorted(Effect.known().items()) if kind.__module__.startswith(homes)]
 
 
 def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:

@@ -114,7 +114,7 @@ def _image(result: Result) -> bytes:
 
 
 def _units(scene: Scene) -> dict[str, str]:
-    fields = resolve_fields(need for effect in scene.effects for need in effect.needs)
+    fields = resolve_fields(need for effect in scene.effects for need in effect.needed())
     return {field.name: field.unit for field in fields}
 
 

@@ -154,6 +154,13 @@ class Cloud(Start):
         """Number of spheres."""
         return self.placement.sites() or self.number or 0
 
+    @model_validator(mode="after")
+    def _weighs(self) -> Self:
+        with np.errstate(over="ignore"):
+            mass = float(self.density * 4 / 3 * np.pi * np.float64(self.radius) ** 3)
+        must(0 < mass < np.inf, "mass of a particle of the cloud", "greater than 0 and finite", mass)
+        return self
+
     def masses(self) -> np.ndarray:
         return np.full(self.count(), self.density * 4 / 3 * np.pi * self.radius**3)
 

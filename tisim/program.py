@@ -58,7 +58,8 @@ class PerParticle(Phase):
 class Repeat:
     """Items, in order, again and again while ``pending(w)`` is above zero.
 
-    Items are phases, and further repeats. Only the last phase may change what ``pending`` says.
+    Items are phases, and further repeats. Only the last phase may change what ``pending`` says, and once it
+    says 0, the items of that phase that are left must have nothing to do: they may be skipped.
     """
 
     def __init__(self, items: "tuple[Item, ...]") -> None:

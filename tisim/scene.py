@@ -11,9 +11,9 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from tisim import effects, kinds, operators, steppers
+from tisim import effects, kinds, operators, sources, steppers
 from tisim.domain import Box, Domain, Open
-from tisim.effect import Effect
+from tisim.effect import Effect, Source
 from tisim.errors import InputError, must
 from tisim.particles import Start
 from tisim.spec import Spec
@@ -60,9 +60,16 @@ class Scene(Spec):
                 must(
                     any(issubclass(other, needed) for other in present),
                     f"effects.{kind.kind()}",
-                    f"used together with effects.{needed.kind()}",
+                    f"used together with {' or '.join(_names(needed))}",
                     ", ".join(other.kind() for other in present),
                 )
+            given = {other.quantity for other in present if issubclass(other, Source)}
+            must(
+                not kind.feels or not given.isdisjoint(kind.feels),
+                f"effects.{kind.kind()}",
+                f"used together with a source of {' or '.join(kind.feels)}",
+                ", ".join(other.kind() for other in present),
+            )
         self.capacity()
         return self
 
@@ -113,6 +120,7 @@ class Scene(Spec):
         must(isinstance(listed, Mapping), "scene.effects", "a table of effects", listed)
         kinds.load(effects)
         kinds.load(operators)
+        kinds.load(sources)
         for kind, values in listed.items():
             must(isinstance(values, Mapping), f"effects.{kind}", "a table", values)
         made["effects"] = tuple(
@@ -163,3 +171,9 @@ class Scene(Spec):
             must(name in data["effects"], "effect to leave out", f"one of {known}", name)
         kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
         return type(self).from_dict({**data, "effects": kept})
+
+
+def _names(kind: type[Spec]) -> list[str]:
+    """Of an effect in files, or of those known that are made after a contract."""
+    contract = bool(kind.__dict__.get("contract"))
+    return [f"effects.{name}" for name in (sorted(kind.known()) if contract else [kind.kind()])]

@@ -11,6 +11,16 @@ from tisim.program import PerParticle, Phase, Repeat
 from tisim.state import UNSETTLED, State
 
 
+@ti.func
+def _length(value):
+    return value.norm()
+
+
+@ti.func
+def _magnitude(value):
+    return ti.abs(value)
+
+
 @ti.data_oriented
 class Settling:
     """One mutual quantity on its way: the values of the next sweep, and whether there must be one."""
@@ -19,7 +29,8 @@ class Settling:
         self.s, self.domain, self.effect, self.halves = s, domain, effect, halves
         self.value = getattr(s, effect.quantity)
         self.components = next(f.components for f in s.fields if f.name == effect.quantity)
-        self.next = ti.Vector.field(self.components, s.real)
+        self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
+        self.size = _length if self.components == 3 else _magnitude
         self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
         self.largest = ti.field(s.real)
         builder = ti.FieldsBuilder()
@@ -98,7 +109,7 @@ class Sweep(PairSum):
         total = self.summed(0.0 * self.settling.next[w, i], w, i, t)
         new = self.effect.response(self.s, w, i, total, t)
         self.settling.next[w, i] = new
-        size = new.norm()
+        size = self.settling.size(new)
         if size > self.settling.largest[w]:
             ti.atomic_max(self.settling.largest[w], size)
         # Not below infinity: also true of NaN.
@@ -116,7 +127,7 @@ class Take(PerParticle):
     @ti.func
     def run(self, w, i):
         a, s = self.settling, self.s
-        change = (a.next[w, i] - a.value[w, i]).norm()
+        change = a.size(a.next[w, i] - a.value[w, i])
         a.value[w, i] = a.next[w, i]
         if ti.static(self.effect.sweeps > 0):
             unsettled = change > self.effect.tolerance(w) * a.largest[w]

@@ -117,6 +117,7 @@ _RULES = {
     "float_parsing": "a number",
     "float_type": "a number",
     "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number that is not so large",
     "int_type": "a whole number",
     "int_from_float": "a whole number",
     "bool_parsing": "true or false",

@@ -37,18 +37,33 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
 
 def _check(f: Field, values: np.ndarray, n: int) -> None:
     must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
+    held: np.ndarray
+    with np.errstate(over="ignore"):
+        held = values.astype(_real())
+    lost = ~np.isfinite(held)
+    if f.name in ("mass", "radius"):
+        # No mass is what marks a particle as gone.
+        lost |= held == 0
+    if lost.any():
+        rule = f"within the range of {runtime.current().precision}"
+        must(False, f"particles.{f.name}", rule, float(values[lost][0]))
     if f.minimum is not None:
         least = float(values.min())
         must(least >= f.minimum, f"particles.{f.name}", f"at least {f.minimum:g} {f.unit}", least)
 
 
+def _real() -> type:
+    return np.float64 if runtime.current().precision == "f64" else np.float32
+
+
 def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
     """A field of all worlds: what each start says of it, else its default; ids count from 0."""
-    real = np.float64 if runtime.current().precision == "f64" else np.float32
-    column = np.full(f.shape(worlds, capacity), f.default or 0, dtype=np.int32 if f.integer else real)
+    copied, number = (f.default, 0) if isinstance(f.default, str) else (None, f.default or 0)
+    column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=np.int32 if f.integer else _real())
     for w, start in enumerate(starts):
         n = len(start["mass"])
-        column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, column[w, :n])
+        default = start[copied] if copied else column[w, :n]
+        column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, default)
     return column
 
 

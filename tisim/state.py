@@ -23,7 +23,8 @@ class Field:
         or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
     slots : a particle has so many values, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
         They are its own: a piece that breaks off starts with the default.
-    default : what a particle starts with where the start does not say; None where it must.
+    default : what a particle starts with where the start does not say: a number, or the name of a field of
+        which it is a copy then, such as "position"; None where the start must say.
     minimum : the least value that a start may give.
     """
 
@@ -33,8 +34,14 @@ class Field:
     merge: Literal["mean", "sum", "volume", "keep"] = "mean"
     integer: bool = False
     slots: int = 0
-    default: float | None = 0.0
+    default: float | str | None = 0.0
     minimum: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.slots and (self.merge != "keep" or self.components != 1):
+            raise TypeError(f"field {self.name} with slots must have one component and be merged as 'keep'")
+        if self.integer and self.merge != "keep":
+            raise TypeError(f"field {self.name} of integers must be merged as 'keep'")
 
     def shape(self, *particles: int) -> tuple[int, ...]:
         """Of an array of it, for an array of particles of this shape."""
@@ -124,7 +131,7 @@ class State:
             (
                 getattr(self, field.name),
                 field.slots,
-                int(field.default or 0) if field.integer else field.default or 0.0,
+                int(field.default or 0) if field.integer else float(field.default or 0.0),
             )
             for field in fields
             if field.slots

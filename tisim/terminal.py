@@ -1,4 +1,5 @@
-"""What runs and searches print on: where text goes, bars and tables."""
+"""What runs and searches print on: where text goes, bars and tables. Text is printed as it is: names of files
+and of extras may have brackets, which are no markup here."""
 
 import sys
 
@@ -12,19 +13,20 @@ WIDTH = 110
 
 def out() -> Console:
     """For results."""
-    return Console(width=None if sys.stdout.isatty() else WIDTH)
+    return Console(markup=False, width=None if sys.stdout.isatty() else WIDTH)
 
 
 def err() -> Console:
     """For progress."""
-    return Console(stderr=True, width=None if sys.stderr.isatty() else WIDTH)
+    return Console(stderr=True, markup=False, width=None if sys.stderr.isatty() else WIDTH)
 
 
 def progress_bar(before: str, after: str = "", console: Console | None = None) -> bars.Progress:
     """A bar with the time taken and left, between two texts with fields of its task."""
     return bars.Progress(
-        bars.TextColumn(before), bars.BarColumn(), bars.TaskProgressColumn(), bars.TimeElapsedColumn(),
-        bars.TextColumn("left"), bars.TimeRemainingColumn(), bars.TextColumn(after), console=console or err(),
+        bars.TextColumn(before, markup=False), bars.BarColumn(), bars.TaskProgressColumn(),
+        bars.TimeElapsedColumn(), bars.TextColumn("left"), bars.TimeRemainingColumn(),
+        bars.TextColumn(after, markup=False), console=console or err(),
     )  # fmt: skip
 
 

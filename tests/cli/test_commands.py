@@ -37,5 +37,5 @@ def test_doctor(tisim, monkeypatch):
     monkeypatch.setattr("tisim.doctor.rate_of", lambda backend: {"taichi": 1e8}.get(backend))
     code, out, _ = tisim("doctor")
     assert code == 0
-    for word in ("backend", "LLVM", "processor", "cores", "memory", "cuda", "numpy"):
+    for word in ("backend", "LLVM", "processor", "cores", "memory", "cuda", "numpy", "'tisim[quadrants]'"):
         assert word in out

@@ -28,6 +28,11 @@ BAD = {
     "negative radius": (lambda: Cloud(**{**CLOUD, "radius": -1}), "cloud.radius must be greater than 0"),
     "radius nan": (lambda: Cloud(**{**CLOUD, "radius": NAN}), "cloud.radius must be a finite number"),
     "absolute zero": (lambda: Cloud(**CLOUD, temperature=0), "cloud.temperature must be greater than 0"),
+    "no mass at all": (
+        lambda: Cloud(**{**CLOUD, "radius": 1e-120}),
+        "mass of a particle of the cloud must be",
+    ),
+    "mass beyond numbers": (lambda: Cloud(**{**CLOUD, "radius": 1e200}), "mass of a particle of the cloud"),
     "unknown key": (lambda: Cloud(**CLOUD, colour="red"), "cloud.colour must be a known key; received 'red'"),
     "unit in text": (
         lambda: Cloud(**{**CLOUD, "radius": "1 mm"}),
@@ -69,6 +74,7 @@ BAD = {
     ),
     "box inside out": (lambda: Box(low=(0, 0, 0), high=(1, 1, 0)), "box.high must be above box.low in every"),
     "box infinite": (lambda: Box(low=(0, 0, 0), high=(1, 1, INF)), "box.high.2 must be a finite number"),
+    "box beyond numbers": (lambda: Box(low=(0, 0, 0), high=(1e200,) * 3), "volume of the box must be"),
     "step zero": (lambda: FixedStep(dt=0), "fixed_step.dt must be greater than 0"),
     "limits crossed": (
         lambda: ApproachTime(shortest=1e-2),

@@ -133,8 +133,9 @@ def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndar
     """The first centres, found by trying places in all of the region."""
     # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
     dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, CELLS).astype(int)
-    members = int(np.ceil(np.prod(region.side / dims) / (8 * radius**3))) * PER_CELL
-    cells = np.zeros((int(np.prod(dims)), 1 + min(count, members)), dtype=np.int32)
+    wide = np.prod(np.minimum(region.side / dims / (2.0 * radius), 1e6))
+    members = min(count, int(np.ceil(wide)) * PER_CELL)
+    cells = np.zeros((int(np.prod(dims)), 1 + members), dtype=np.int32)
     centres = np.zeros((count, 3))
     placed = _add(
         centres,

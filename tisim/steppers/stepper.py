@@ -16,7 +16,7 @@ class Parts:
     """What a stepper makes a step of. All are bound to the state; a tuple is empty where nothing is to do.
 
     control : decides how long the next step may be. domain, operators, near : as bound; near is None
-    without a pair list. turning : whether there are torques.
+    without a pair list. forced, turning : whether there are forces, and torques.
 
     lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
     pairs remember, over ``dt``; once a step. forces : settle what is mutual, and sum force and torque of the
@@ -31,6 +31,7 @@ class Parts:
     lists: tuple[Item, ...]
     remember: tuple[Item, ...]
     forces: tuple[Item, ...]
+    forced: bool
     turning: bool
 
 
@@ -53,5 +54,12 @@ class Stepper(Spec):
         return (*own, *self.control.structure())
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
-        """The items of a step, up to pair events and what operators do to the world as a whole."""
+        """The items of a step, up to pair events and what operators do to the world as a whole.
+
+        They set ``dt`` and move ``time`` on, to ``end`` at most; count ``steps`` and ``particle_steps``; set
+        ``events`` to 0; once the controller has been asked, set ``approach_time`` to infinity and ``fastest``
+        to 0, for its notes on the next step; call ``particle`` of each operator; put back into the domain
+        what has left it; and say how far particles have moved: ``stride`` relative to the frame, then
+        ``near.moved(w)``, or simply ``near.stale[w] = 1``. Verlet is a pattern.
+        """
         raise NotImplementedError(f"{type(self).__name__} must define step")

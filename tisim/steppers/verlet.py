@@ -14,7 +14,7 @@ class Verlet(Stepper):
     """Explicit stepper with step control. Second order in dt for forces that depend on position only."""
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, near, forced = parts.s, parts.near, bool(parts.forces)
+        s, near, forced = parts.s, parts.near, parts.forced
         drift = Move(s, parts.domain, parts.operators, forced, parts.turning)
         kick = (Kick(s, parts.turning),) if forced else ()
         start = (Clock(s, parts.control, near), drift, Advance(s, near))
@@ -70,12 +70,14 @@ class Move(PerParticle):
         dt = ti.cast(s.dt[w], s.real)
         if ti.static(self.forced):
             half_kick(s, w, i, self.turning)
-        before = s.position[w, i]
+        before, size = s.position[w, i], s.radius[w, i]
         s.position[w, i] = before + dt * s.velocity[w, i]
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, dt)
-        # Operators may move particles too.
+        # Operators may move particles too, and a surface that grows is one that moves.
         stride = ti.abs(ti.cast(s.position[w, i] - before, ti.f64) - s.axes(s.frame, w) * s.dt[w])
+        if ti.static(len(self.operators) > 0):
+            stride += ti.abs(ti.cast(s.radius[w, i] - size, ti.f64))
         # Not below infinity: also true of NaN.
         if not (stride.sum() < ti.math.inf):
             s.fail(w, NOT_FINITE, i)

@@ -1,0 +1,184 @@
+"""Charged and magnetic particles in external fields, against their NumPy twins."""
+
+import numpy as np
+import pytest
+
+from tests.effects.loads import WORLDS, close, cloud, fields_beside_the_core, jacobians, loads, vector
+from tests.scenes import scene, simulate
+from tisim import Scene
+from tisim._taichi import ti
+from tisim.effect import Source, parameter
+from tisim.effects.lorentz import Lorentz
+from tisim.effects.magnetic_body_force import MagneticBodyForce
+from tisim.errors import InputError
+from tisim.sources.uniform import ElectricField, MagneticField
+from tisim.spec import Vector
+
+
+class Quadrupole(Source):
+    """B = C + S (y, x, z^2), whose gradient is not symmetric once sheared by the scale of each component."""
+
+    quantity = "magnetic_flux_density"
+    constant: Vector = parameter("T")
+    scale: Vector = parameter("T/m")
+
+    @ti.func
+    def value(self, w, r, t):
+        return self.constant(w) + self.scale(w) * ti.Vector([r[1], r[0], r[2] * r[2]])
+
+    @ti.func
+    def gradient(self, w, r, t):
+        a = self.scale(w)
+        return ti.Matrix([[0.0, a[0], 0.0], [a[1], 0.0, 0.0], [0.0, 0.0, 2.0 * a[2] * r[2]]])
+
+
+def waves(source, t):
+    return np.array(source.constant) + np.array(source.amplitude) * np.sin(
+        np.array(source.omega) * t + np.array(source.phase)
+    )
+
+
+def oscillating(kind, rng):
+    return kind(constant=vector(rng), amplitude=vector(rng), omega=vector(rng, 3), phase=vector(rng))
+
+
+def lorentz_twin(made, state, t=0.0):
+    b = e = np.zeros(3)
+    for source in made.effects:
+        if isinstance(source, ElectricField):
+            e = waves(source, t)
+        if isinstance(source, MagneticField):
+            b = waves(source, t)
+    return state["charge"][:, None] * (e + np.cross(state["velocity"], b))
+
+
+@pytest.mark.parametrize("kinds", [(ElectricField, MagneticField), (ElectricField,), (MagneticField,)])
+def test_lorentz_force(kinds, rng):
+    """Both fields, oscillating, or one alone."""
+    made = [
+        cloud(
+            rng,
+            (*(oscillating(kind, rng) for kind in kinds), Lorentz()),
+            quantities={"charge": rng.normal(size=12)},
+        )
+        for _ in range(WORLDS)
+    ]
+    for one, state in zip(made, loads(made), strict=True):
+        close(state["force"], lorentz_twin(one, state))
+
+
+def test_fields_oscillate_in_time(rng):
+    """Heavy charges keep their velocity: the force after steps is that of the field then."""
+    made = [
+        cloud(
+            rng,
+            (oscillating(ElectricField, rng), oscillating(MagneticField, rng), Lorentz()),
+            quantities={"charge": 1e-9 * rng.normal(size=12)},
+            dt=0.37,
+            steps=k + 1,
+        )
+        for k in range(WORLDS)
+    ]
+    for one, result in zip(made, simulate(made, worlds=WORLDS, capacity=16), strict=True):
+        close(result.state["force"], lorentz_twin(one, result.state, result.time), 1e-7)
+        assert result.time > 0.3
+
+
+def test_no_oscillation_no_sine_is_the_same_field(rng):
+    """A field of amplitude 0 in one world of a batch beside one that oscillates."""
+    still = ElectricField(constant=vector(rng), omega=vector(rng), phase=vector(rng))
+    made = [
+        cloud(rng, (field, Lorentz()), quantities={"charge": 1.0})
+        for field in (still, oscillating(ElectricField, rng))
+    ]
+    for one, state in zip(made, loads(made), strict=True):
+        close(state["force"], lorentz_twin(one, state))
+
+
+def test_magnetic_body_force_is_the_gradient_of_gamma_b_squared(rng):
+    """Against a central difference of gamma B.B, of two sources together."""
+    made = [
+        cloud(
+            rng,
+            (
+                Quadrupole(constant=vector(rng), scale=vector(rng)),
+                MagneticField(constant=vector(rng)),
+                MagneticBodyForce(gamma=float(rng.normal())),
+            ),
+        )
+        for _ in range(WORLDS)
+    ]
+
+    def energy(one, r):
+        field, uniform, law = one.effects
+        b = np.array(field.constant) + np.array(uniform.constant)
+        b = b + np.array(field.scale) * np.stack([r[:, 1], r[:, 0], r[:, 2] ** 2], axis=1)
+        return law.gamma * (b * b).sum(axis=1)
+
+    h = 1e-5
+    for one, state in zip(made, loads(made), strict=True):
+        r = state["position"]
+        expected = [(energy(one, r + h * axis) - energy(one, r - h * axis)) / (2 * h) for axis in np.eye(3)]
+        close(state["force"], np.stack(expected, axis=1), 1e-8)
+
+
+def test_the_velocity_jacobian_of_the_lorentz_force(rng):
+    """Against a central difference of the force."""
+    made = [
+        cloud(
+            rng,
+            (oscillating(ElectricField, rng), oscillating(MagneticField, rng), Lorentz()),
+            quantities={"charge": rng.normal(size=12)},
+        )
+        for _ in range(WORLDS)
+    ]
+    for claimed, found in zip(*jacobians(made, 1e-3), strict=True):
+        close(claimed, found, 1e-9)
+
+
+def test_only_what_is_needed_is_allocated():
+    field = MagneticField(constant=(0, 0, 1))
+    extra = {
+        (field,): set(),
+        (field, Lorentz()): {"charge", "force"},
+        (field, MagneticBodyForce(gamma=1)): {"force"},
+    }
+    for effects, more in extra.items():
+        assert fields_beside_the_core(scene([[0, 0, 0]], [[0, 0, 0]], effects)) == more
+    assert not MagneticBodyForce.offers("velocity_jacobian")
+
+
+AT_REST = ([[0, 0, 0]], [[0, 0, 0]])
+WRONG = {
+    "effects.lorentz must be used together with a source of electric_field or magnetic_flux_density; "
+    "received 'lorentz'": lambda: scene(*AT_REST, (Lorentz(),)),
+    "effects.magnetic_body_force must be used together with a source of magnetic_flux_density; "
+    "received 'electric_field, magnetic_body_force'": lambda: scene(
+        *AT_REST, (ElectricField(), MagneticBodyForce(gamma=1))
+    ),
+    "particles must be given charge, which effects of the scene need; received none": lambda: loads(
+        [scene(*AT_REST, (MagneticField(), Lorentz()))]
+    ),
+    "magnetic_field.constant.1 must be a finite number; received inf": lambda: MagneticField(
+        constant=(0, np.inf, 0)
+    ),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_wrong_is_named(message):
+    with pytest.raises(InputError) as fault:
+        WRONG[message]()
+    assert str(fault.value) == message
+
+
+def test_a_scene_in_a_file_finds_sources():
+    made = scene(
+        [[0, 0, 0]],
+        [[1, 0, 0]],
+        (MagneticField(constant=(0, 0, 1), amplitude=(1, 2, 3)), Lorentz()),
+        quantities={"charge": 2.0},
+    )
+    again = Scene.from_dict(made.to_dict())
+    assert again.digest() == made.digest()
+    assert [type(effect) for effect in again.effects] == [MagneticField, Lorentz]

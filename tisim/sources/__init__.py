@@ -1,0 +1,1 @@
+"""External fields of place and time, one file each."""
