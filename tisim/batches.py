@@ -11,6 +11,7 @@ from tisim.particles import Arrays
 from tisim.result import Result, Status
 from tisim.scene import Scene
 from tisim.simulation import Simulation
+from tisim.trajectory import Trajectory
 
 SLOTS = 300_000
 """Particles of all worlds of a batch together; keeps its memory to some hundred MB."""
@@ -33,12 +34,17 @@ class Batches:
         self._made: dict[Any, Simulation] = {}
 
     def run(
-        self, scenes: Sequence[Scene], progress: Progress | None = None, strict: bool = True
+        self,
+        scenes: Sequence[Scene],
+        progress: Progress | None = None,
+        strict: bool = True,
+        trajectory: Trajectory | None = None,
     ) -> Iterator[tuple[int, Result]]:
         """Yield (index into scenes, Result) as worlds end.
 
         progress : called with the finished fraction of this call, 0..1. strict : raise the InputError of a
-        start that cannot be made; otherwise it becomes a failed Result.
+        start that cannot be made; otherwise it becomes a failed Result. trajectory : made for these scenes;
+        records them.
         """
         starts: dict[int, Arrays] = {}
         groups: dict[Any, list[int]] = {}
@@ -58,6 +64,8 @@ class Batches:
             for begin in range(0, len(members), simulation.worlds):
                 batch = members[begin : begin + simulation.worlds]
                 simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
+                if trajectory:
+                    trajectory.record(simulation, batch)
                 chunks = simulation.chunks()
                 given: set[int] = set()
                 while len(given) < len(batch):

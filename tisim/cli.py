@@ -13,13 +13,15 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from tisim import __version__, cli_search, request, runtime
+from tisim import __version__, cli_search, cli_watch, request, runtime
 from tisim.errors import InputError, RunError
 from tisim.interrupt import Interrupt
 from tisim.options import (
     CaseName,
     Changes,
     Device,
+    Every,
+    Frames,
     Out,
     Overwrite,
     Precision,
@@ -82,21 +84,26 @@ def run(
     target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
     threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
+    frames: Frames = None, every: Every = None,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim import checkpoint, output
+    from tisim.trajectory import asked, recorded
 
     runtime.start(device, precision, threads)
     name, scene = request.scene(target, size, seed, absent or (), changes or ())
     place = output.Folder(folder or Path("out") / name)
     place.check(overwrite, resume)
+    recording = asked(place.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)
         simulation.load([scene])
     if resume:
         checkpoint.restore(simulation, place.checkpoint)
     output.writable(place.path)
-    if not _advance(simulation, name, place.checkpoint):
+    with recorded(recording, place.trajectory, simulation, resume):
+        done = _advance(simulation, name, place.checkpoint)
+    if not done:
         checkpoint.save(simulation, place.checkpoint)
         err().print(
             f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
@@ -104,7 +111,7 @@ def run(
         )
         raise typer.Exit(130)
     result = simulation.results()[0]
-    paths = output.write(result, place)
+    paths = [*output.write(result, place), *((place.trajectory,) if recording else ())]
     out().print(_summary(result, simulation.setup_s, paths))
     if not result.status.ok:
         raise RunError(f"run failed {result.status.reason}")
@@ -220,3 +227,6 @@ def doctor() -> None:
 
 app.command()(cli_search.optimize)
 app.command()(cli_search.cache)
+app.command()(cli_watch.plot)
+app.command()(cli_watch.movie)
+app.command()(cli_watch.export)

@@ -7,7 +7,7 @@ import json
 import pkgutil
 from collections.abc import Mapping
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from tisim.errors import must
 from tisim.spec import Spec
@@ -28,10 +28,18 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
     for name, info in kind.model_fields.items():
-        inner = info.annotation
-        if name in values and isinstance(inner, type) and issubclass(inner, Spec):
+        inner = _part(info.annotation)
+        if name in values and inner is not None:
             values[name] = from_dict(inner, values[name], f"{where}.{name}")
     return kind(**values)
+
+
+def _part(annotation: Any) -> type[Spec] | None:
+    """The kind of part that a field holds, also where it may hold none."""
+    kinds = [
+        t for t in (get_args(annotation) or (annotation,)) if isinstance(t, type) and issubclass(t, Spec)
+    ]
+    return kinds[0] if kinds else None
 
 
 def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:

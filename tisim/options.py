@@ -25,3 +25,10 @@ Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run has left.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from where Ctrl-C stopped the same run.")]
+Frames = Annotated[
+    int | None,
+    typer.Option("--frames", help="Also write trajectory.h5, with so many frames after the start."),
+]
+Every = Annotated[
+    float | None, typer.Option("--every", metavar="SECONDS", help="As --frames, by simulated time between.")
+]

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder: result.h5, scene.toml, versions.json and cloud.png.
+"""What a run leaves in its folder: result.h5, scene.toml, versions.json, cloud.png; trajectory.h5 if asked.
 
 result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
 one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts; the attributes
@@ -39,6 +39,10 @@ class Folder:
         return self.path / "result.h5"
 
     @property
+    def trajectory(self) -> Path:
+        return self.path / "trajectory.h5"
+
+    @property
     def checkpoint(self) -> Path:
         return self.path / "checkpoint.h5"
 
@@ -51,7 +55,7 @@ class Folder:
             finished = self.result.exists()
             must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
             rule = "without an interrupted run (or give --resume or --overwrite)"
-            must(not begun, what, rule, str(self.path))
+            must(not begun and not self.trajectory.exists(), what, rule, str(self.path))
 
 
 def writable(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a scene starts with: particles given one by one, or a random cloud."""
+"""What a scene starts with: particles given one by one, or a cloud of equal spheres."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from tisim.domain import Domain
 from tisim.errors import InputError, must
-from tisim.packing.sequential import sequential_addition
+from tisim.packing.placement import Placement, RandomInDomain
+from tisim.pulses import Pulse
 from tisim.spec import Spec, Vector, parameter
 
 Arrays = dict[str, np.ndarray]
@@ -113,18 +114,45 @@ def _worst(column: np.ndarray) -> float:
 
 
 class Cloud(Start):
-    """Equal spheres at random places that do not overlap, with random velocities about a mean.
+    """Equal spheres: where they lie, how fast they are and what they carry.
+
+    number : of spheres; left out where the placement fixes it, as a lattice does.
+    placement : where the centres lie; at random in the domain unless given.
+    pulse : velocities added at the start, such as a blast's.
+    specific_charge : C/kg; each sphere carries its mass times this.
+    quantities : any further field by name, such as charge (C); one number, or three components, for all.
 
     Velocity: ``mean_velocity + deviation * lambda`` with lambda uniform in -1..1 for each particle and
-    component (Z04 section 7). The same seed gives the same lambdas whatever the other parameters.
+    component (Z04 section 7), and the pulse. The same seed gives the same lambdas whatever the other
+    parameters.
     """
 
-    number: int = Field(gt=0, le=10**8)
+    number: int | None = Field(None, gt=0, le=10**8)
     radius: float = parameter("m", gt=0)
     density: float = parameter("kg/m^3", gt=0)
+    placement: Placement = RandomInDomain()
     mean_velocity: Vector = parameter("m/s", (0.0, 0.0, 0.0))
     deviation: Vector = parameter("m/s", (0.0, 0.0, 0.0))
+    pulse: Pulse | None = None
     temperature: float = parameter("K", 300.0, gt=0)
+    specific_charge: float | None = parameter("C/kg", None)
+    quantities: Mapping[str, float | Vector] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        sites = self.placement.sites()
+        rule = "given" if sites is None else f"{sites}, as the placement has sites, or left out"
+        agrees = self.number is not None if sites is None else self.number in (None, sites)
+        must(agrees, "cloud.number", rule, "nothing" if self.number is None else self.number)
+        own = {"position", "velocity", "radius", "mass", "temperature", "id"}
+        own |= {"charge"} if self.specific_charge is not None else set()
+        for name, value in self.quantities.items():
+            must(name not in own, f"cloud.quantities.{name}", "given beside quantities, and once", value)
+        return self
+
+    def count(self) -> int:
+        """Number of spheres."""
+        return self.placement.sites() or self.number or 0
 
     @model_validator(mode="after")
     def _weighs(self) -> Self:
@@ -134,20 +162,24 @@ class Cloud(Start):
         return self
 
     def masses(self) -> np.ndarray:
-        return np.full(self.number, self.density * 4 / 3 * np.pi * self.radius**3)
+        return np.full(self.count(), self.density * 4 / 3 * np.pi * self.radius**3)
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
-        low, high = domain.bounds()
-        if low is None or high is None:
-            raise InputError("domain must be bounded to hold a random cloud; received an open one")
-        draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (self.number, 3))
-        return {
-            "position": sequential_addition(self.number, self.radius, low, high, seed, domain.periodic()),
+        n = self.count()
+        draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
+        arrays = {
+            "position": self.placement.centres(n, self.radius, domain, seed),
             "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
-            "radius": np.full(self.number, self.radius),
+            "radius": np.full(n, self.radius),
             "mass": self.masses(),
-            "temperature": np.full(self.number, self.temperature),
+            "temperature": np.full(n, self.temperature),
+            **{name: np.repeat([value], n, axis=0).astype(float) for name, value in self.quantities.items()},
         }
+        if self.specific_charge is not None:
+            arrays["charge"] = arrays["mass"] * self.specific_charge
+        if self.pulse is not None:
+            arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
+        return arrays
 
     def structure(self) -> tuple[Any, ...]:
         return (type(self),)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -13,6 +15,7 @@ from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from tisim.domain import Domain
 from tisim.particles import Arrays
 from tisim.result import Result
 
@@ -30,11 +33,18 @@ _TOWARDS = np.array([
 ])  # fmt: skip
 _RIGHT = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
 _UP = np.cross(_TOWARDS, _RIGHT)
+SEEN = np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
+"""A point times this is right, up and towards the viewer."""
 _LIGHT = np.array([-0.45, 0.6, 0.66])
 
 
 def cloud(result: Result) -> Figure:
-    """Start and end of a run side by side, seen from one side without perspective.
+    """Start and end of a run side by side, as ``start_and_end``."""
+    return start_and_end((result.start, result.state), (0.0, result.time), result.scene.domain)
+
+
+def start_and_end(states: tuple[Arrays, Arrays], times: tuple[float, float], domain: Domain) -> Figure:
+    """Two states (at times in s) side by side, seen from one side without perspective.
 
     Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
     In open space each panel has its own scale, which its bar gives.
@@ -42,28 +52,34 @@ def cloud(result: Result) -> Figure:
     figure = Figure(figsize=(10.4, 5.0), layout=ConstrainedLayoutEngine(h_pad=0.1), facecolor="white")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, 2)
-    states = (result.start, result.state)
-    norm = _norm(states)
-    corners = _corners(*result.scene.domain.bounds())
+    norm = temperatures(states)
+    seen = corners(*domain.bounds())
     both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
-    views = [_view(both if len(corners) else state, corners) for state in states]
-    for axis, state, view, heading, time in zip(
-        axes, states, views, ("start", "end"), (0.0, result.time), strict=True
-    ):
-        _panel(axis, state, view, corners, norm)
-        n, mean = len(state["radius"]), float(state["radius"].mean())
-        grains = f"{n} grain" + "s" * (n != 1)
-        title = f"{heading}, t = {_si(time, 's')}: {grains}, mean radius {_si(mean, 'm')}"
-        axis.set_title(title, fontsize=10)
+    views = [view(both if len(seen) else state, seen) for state in states]
+    for axis, state, square, heading, time in zip(axes, states, views, ("start", "end"), times, strict=True):
+        panel(axis, state, square, seen, norm)
+        axis.set_title(f"{heading}, {caption(state, time)}", fontsize=10)
     if norm is not None:
-        bar = figure.colorbar(ScalarMappable(norm, HEAT), ax=axes, shrink=0.72, pad=0.01)
-        bar.set_label("temperature (K)")
-        bar.outline.set_visible(False)
+        scale(figure, axes, norm)
     return figure
 
 
-def _norm(states: tuple[Arrays, ...]) -> Normalize | None:
-    """Scale of temperature, over both ends; logarithmic when it spans much."""
+def caption(state: Arrays, time: float) -> str:
+    """Time (s), number and mean radius of the grains."""
+    n, mean = len(state["radius"]), float(state["radius"].mean())
+    return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}, mean radius {si(mean, 'm')}"
+
+
+def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = None) -> None:
+    """What the colours mean: beside axes, or in a place of its own."""
+    at = {"ax": beside, "shrink": 0.72, "pad": 0.01} if place is None else {"cax": place}
+    bar = figure.colorbar(ScalarMappable(norm, HEAT), **at)
+    bar.set_label("temperature (K)")
+    bar.outline.set_visible(False)
+
+
+def temperatures(states: Sequence[Arrays]) -> Normalize | None:
+    """Scale of temperature over all states; logarithmic when it spans much; None where one has none."""
     if any("temperature" not in state for state in states):
         return None
     values = np.concatenate([state["temperature"] for state in states])
@@ -78,37 +94,38 @@ def _norm(states: tuple[Arrays, ...]) -> Normalize | None:
 
 def _project(points: np.ndarray) -> np.ndarray:
     """Right, up and towards the viewer, for points of shape (n, 3). m."""
-    return np.asarray(points) @ np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
+    return np.asarray(points) @ SEEN
 
 
-def _corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
+def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
     """Corners of the box as seen, shape (8, 3); none in open space. m."""
     if low is None or high is None:
         return np.empty((0, 3))
     return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
-def _view(state: Arrays, corners: np.ndarray) -> tuple[float, float, float]:
+def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
     """Left, bottom and side of a square that holds all grains and the box. m."""
     seen, radius = _project(state["position"]), state["radius"][:, None]
-    low = np.vstack([seen - radius, corners]).min(axis=0)[:2]
-    high = np.vstack([seen + radius, corners]).max(axis=0)[:2]
+    low = np.vstack([seen - radius, box]).min(axis=0)[:2]
+    high = np.vstack([seen + radius, box]).max(axis=0)[:2]
     side = 1.06 * float((high - low).max())
     left, bottom = (low + high) / 2 - side / 2
     return float(left), float(bottom), side
 
 
-def _panel(
-    axis: Axes, state: Arrays, view: tuple[float, float, float], corners: np.ndarray, norm: Normalize | None
+def panel(
+    axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray, norm: Normalize | None
 ) -> None:
-    left, bottom, side = view
+    """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``."""
+    left, bottom, side = square
     colour = np.tile(PLAIN, (len(state["radius"]), 1))
     if norm is not None:
         colour = HEAT(norm(state["temperature"]))[:, :3]
     image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
     axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
-    if len(corners):
-        _edges(axis, corners)
+    if len(box):
+        _edges(axis, box)
     _scale_bar(axis, left, bottom, side)
     axis.set_xlim(left, left + side)
     axis.set_ylim(bottom, bottom + side)
@@ -156,10 +173,10 @@ def _scale_bar(axis: Axes, left: float, bottom: float, side: float) -> None:
     length = power * max(k for k in (1, 2, 5) if k * power <= side / 4)
     x, y = left + 0.02 * side, bottom + 0.015 * side
     axis.plot([x, x + length], [y, y], color="0.2", lw=2, solid_capstyle="butt", zorder=4)
-    axis.text(x + length / 2, y + 0.012 * side, _si(length, "m"), ha="center", fontsize=9, zorder=4)
+    axis.text(x + length / 2, y + 0.012 * side, si(length, "m"), ha="center", fontsize=9, zorder=4)
 
 
-def _si(value: float, unit: str) -> str:
+def si(value: float, unit: str) -> str:
     """A value with a prefix: 0.01 s is 10 ms."""
     if value == 0:
         return f"0 {unit}"

@@ -106,12 +106,12 @@ class Program:
         self.outside = Nest()
 
     def advance(self, steps: int) -> None:
-        """At most ``steps`` steps of every running world."""
+        """At most ``steps`` steps of every running world; none goes on past its ``hold``."""
         if self.schedule == "world":
             self._advance_worlds(steps)
             return
         for _ in range(steps):
-            if not self._count_running(self.outside):
+            if not self._count_going_on():
                 return
             self._launch(self.items, self.outside)
 
@@ -128,7 +128,7 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(0)
             return
-        self._count_running(self.outside)
+        self._count_going_on()
         for phase, nest in self.outside.phases(self.items):
             self._count_running(nest)
             self._sweep(phase, nest)
@@ -145,7 +145,7 @@ class Program:
             if k % TASK == 0:
                 w = k // TASK
                 step = 0
-                while self.s.status[w] == RUNNING and step < steps:
+                while self.s.status[w] == RUNNING and step < steps and self.s.time[w] < self.s.hold[w]:
                     self._run(self.items, w)
                     step += 1
 
@@ -178,7 +178,7 @@ class Program:
 
     @ti.func
     def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]
-        active = self.s.status[w] == RUNNING
+        active = self.s.status[w] == RUNNING and self.s.held[w] == 0
         for repeat in ti.static(nest.repeats):
             active = active and repeat.pending(w) > 0
         return active
@@ -190,6 +190,16 @@ class Program:
                 phase.run(w, k)
         for w in range(self.s.worlds):
             self._heed(w)
+
+    @ti.kernel
+    def _count_going_on(self) -> ti.i32:
+        """Between two steps: which worlds wait, and how many do not."""
+        n = 0
+        for w in range(self.s.worlds):
+            self.s.held[w] = ti.cast(self.s.time[w] >= self.s.hold[w], ti.i32)
+            if self._active(self.outside, w):
+                n += 1
+        return n
 
     @ti.kernel
     def _count_running(self, nest: ti.template()) -> ti.i32:  # type: ignore[valid-type]

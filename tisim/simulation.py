@@ -102,6 +102,8 @@ class Simulation:
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.forget_lists()
+        self.look: Callable[[], None] | None = None
+        self.s.hold.fill(np.inf)
         if self.first.items:
             self.first.advance(1)
         self.watch = Watch(self.s, self.scenes)
@@ -144,7 +146,11 @@ class Simulation:
 
     def chunks(self, steps: int | None = None) -> Iterator[None]:
         """The same in stretches of some steps, about four a second: between them, whoever runs this may look
-        at the state, save a checkpoint, or stop for good or for a while."""
+        at the state, save a checkpoint, or stop for good or for a while.
+
+        What a recorder has put in ``look`` is called there too; worlds wait at ``s.hold`` for it, so some of
+        them may have taken fewer than ``steps`` steps at the end.
+        """
         self.s.check()
         done, chunk = 0, 8
         while (self.s.read("status") == RUNNING).any() and (steps is None or done < steps):
@@ -152,6 +158,8 @@ class Simulation:
             began = time.perf_counter()
             self.program.advance(n)
             self.watch.look()
+            if self.look:
+                self.look()
             taken = time.perf_counter() - began
             self.wall_s += taken
             done += n

@@ -213,7 +213,7 @@ def test_a_start_that_does_not_fit_is_refused():
         stepper=Verlet(control=FixedStep(dt=1.0)),
         duration=1.0,
     )
-    with pytest.raises(InputError, match=r"volume fraction .* must be within reach.*; received 1\.676"):
+    with pytest.raises(InputError, match=r"volume fraction must be at most 0.384.*; received 1\.676"):
         tisim.run(dense)
     with pytest.raises(
         InputError, match=r"domain must be bounded to hold a random cloud; received an open one"

@@ -1,0 +1,76 @@
+"""Trajectories from the command line, and what shows them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tisim.frames import frames
+
+
+def every_frame(path):
+    with frames(path) as found:
+        return list(found)
+
+
+def test_run_plot_movie_and_export(tisim, toml, tmp_path):
+    code, out, _ = tisim("run", toml, "--frames", 3)
+    assert code == 0
+    assert "trajectory.h5" in out
+    folder = tmp_path / "out" / "flow"
+    assert [round(1e3 * frame.time, 9) for frame in every_frame(folder / "trajectory.h5")] == [
+        0, 0.334, 0.667, 1,
+    ]  # fmt: skip
+    assert tisim("plot", folder, "--out", "p")[0] == 0
+    assert {path.name for path in (tmp_path / "p").iterdir()} == {"cloud.png", "courses.png"}
+    assert tisim("movie", folder, "--to", "m/flow.gif", "--rate", 5)[0] == 0
+    assert (tmp_path / "m/flow.gif").read_bytes()[:4] == b"GIF8"
+    code, out, _ = tisim("export", folder, "--format", "vtk", "--out", "v")
+    assert (code, out.strip()) == (0, "v/trajectory.pvd")
+    assert len(list((tmp_path / "v").glob("*.vtu"))) == 4
+    (folder / "trajectory.h5").unlink()
+    code, out, _ = tisim("export", folder, "--format", "xyz")
+    assert (code, out.strip()) == (0, str(folder / "result.xyz"))
+
+
+def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
+    assert tisim("run", toml, "--every", "5e-5", "--out", "whole")[0] == 0
+    with monkeypatch.context() as patch:
+        press_ctrl_c(patch, after=4)
+        assert tisim("run", toml, "--every", "5e-5", "--out", "cut")[0] == 130
+    cut = tmp_path / "cut" / "trajectory.h5"
+    begun = every_frame(cut)
+    code, _, err = tisim("run", toml, "--out", "cut", "--resume")
+    assert code == 2
+    assert "--frames or --every must be given as before, to go on with trajectory.h5" in err
+    code, _, err = tisim("run", toml, "--out", "cut")
+    assert code == 2
+    assert tisim("run", toml, "--every", "5e-5", "--out", "cut", "--resume")[0] == 0
+    whole, found = every_frame(tmp_path / "whole" / "trajectory.h5"), every_frame(cut)
+    assert 0 < len(begun) < len(whole) == 21
+    for frame, other in zip(found, whole, strict=True):
+        assert (frame.time, frame.step) == (other.time, other.step)
+        for name, values in frame.arrays.items():
+            np.testing.assert_array_equal(values, other.arrays[name])
+
+
+def test_a_run_without_frames_leaves_none_of_an_earlier_run(tisim, toml, tmp_path):
+    assert tisim("run", toml, "--frames", 2)[0] == 0
+    assert tisim("run", toml, "--overwrite")[0] == 0
+    assert not (tmp_path / "out/flow/trajectory.h5").exists()
+
+
+def test_wrong_input(tisim, toml, tmp_path):
+    for arguments, message in (
+        (["run", toml, "--frames", 0], "frames must be at least 1; received 0"),
+        (
+            ["run", toml, "--frames", 2, "--every", 1],
+            "recording must be given frames or every; received 'both'",
+        ),
+        (["plot", "none.h5"], "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5'"),
+        (["movie", toml], "file must be a trajectory.h5 or result.h5 of a run; received 'flow.toml'"),
+        (["export", "none.h5"], "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5'"),
+    ):
+        code, out, err = tisim(*arguments)
+        assert (code, out) == (2, "")
+        assert message in err
+    assert [path.name for path in tmp_path.iterdir()] == [toml]

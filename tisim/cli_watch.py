@@ -1,0 +1,108 @@
+"""The commands that show what a run has left: ``tisim plot``, ``tisim movie`` and ``tisim export``."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tisim.terminal import err, progress_bar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+File = Annotated[
+    Path, typer.Argument(help="A run's folder, or its trajectory.h5 or result.h5.", metavar="FILE")
+]
+World = Annotated[int, typer.Option(help="Which world of a batch, from 0.")]
+Into = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to; that of the file by default.")
+]
+
+
+def plot(file: File, world: World = 0, folder: Into = None) -> None:
+    """Draw the cloud at its start and end, and energy, centre of gravity and number of particles in time."""
+    from tisim import plots
+    from tisim.frames import frames
+    from tisim.output import writable
+
+    file = _file(file)
+    place = folder or file.parent
+    with frames(file, world) as found:
+        pictures = {"cloud.png": plots.clouds(found), "courses.png": plots.courses(found)}
+    writable(place)
+    for name, figure in pictures.items():
+        print(_saved(figure, place / name))
+
+
+def movie(
+    file: File,
+    to: Annotated[
+        Path | None, typer.Option("--to", metavar="NAME.gif", help="A .gif, or an .mp4 with ffmpeg.")
+    ] = None,
+    rate: Annotated[int, typer.Option(help="Frames a second.")] = 20,
+    world: World = 0,
+) -> None:
+    """Draw a trajectory as a moving picture."""
+    from tisim.frames import frames
+    from tisim.movie import check
+    from tisim.movie import movie as draw
+    from tisim.output import writable
+
+    file = _file(file)
+    path = to or file.with_suffix(".gif")
+    with frames(file, world) as found:
+        check(found, path, rate)
+        writable(path.parent)
+        with _bar("drawing") as progress:
+            draw(found, path, rate, progress)
+    print(path)
+
+
+def export(
+    file: File,
+    kind: Annotated[str, typer.Option("--format", help="vtk (ParaView), xyz (OVITO, ASE) or h5md.")] = "vtk",
+    folder: Into = None,
+) -> None:
+    """Write the frames of a run for other programs; h5md also mends the file of a killed run."""
+    from tisim.export import check
+    from tisim.export import export as write
+    from tisim.output import writable
+
+    file = _file(file)
+    check(file, kind)
+    place = folder or file.parent
+    writable(place)
+    with _bar("writing") as progress:
+        made = write(file, kind, place, progress)
+    print(made)
+
+
+def _file(path: Path) -> Path:
+    """The trajectory in a folder, or its result where it has none."""
+    if not path.is_dir():
+        return path
+    trajectory = path / "trajectory.h5"
+    return trajectory if trajectory.exists() else path / "result.h5"
+
+
+def _saved(figure: Figure, path: Path) -> Path:
+    from tisim.durable import replace_file
+
+    image = io.BytesIO()
+    figure.savefig(image, dpi=150, format="png")
+    replace_file(path, image.getvalue())
+    return path
+
+
+@contextmanager
+def _bar(what: str) -> Iterator[Callable[[float], None]]:
+    with progress_bar("{task.description}", console=err()) as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)

@@ -1,0 +1,76 @@
+"""A moving picture of a run: its frames one after another, as .gif or .mp4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from tisim import picture
+from tisim.errors import InputError, must
+from tisim.frames import Frames
+from tisim.particles import Arrays
+
+SIDE = 5.0
+"""Of the picture, inches; of DPI pixels each."""
+DPI = 110
+
+
+def movie(
+    found: Frames, path: Path, rate: int = 20, progress: Callable[[float], None] = lambda fraction: None
+) -> None:
+    """Write a moving picture of all frames, ``rate`` of them a second, in place of any before.
+
+    path : ends in .gif, or in .mp4 where ffmpeg is installed; InputError otherwise. progress : called with
+    the finished fraction, 0..1.
+    """
+    writer = check(found, path, rate)
+    coloured, ranges = _scales(found)
+    figure = Figure(figsize=(SIDE + 0.9 * (coloured is not None), SIDE), facecolor="white")
+    FigureCanvasAgg(figure)
+    axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
+    seen = picture.corners(*found.scene.domain.bounds())
+    square = picture.view(ranges, seen)
+    if coloured is not None:
+        side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
+        picture.scale(figure, None, coloured, side)
+    unfinished = path.with_name(f"{path.stem}.new{path.suffix}")
+    with writer.saving(figure, str(unfinished), DPI):
+        for k, frame in enumerate(found):
+            axis.clear()
+            picture.panel(axis, frame.arrays, square, seen, coloured)
+            figure.suptitle(picture.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
+            writer.grab_frame()
+            progress((k + 1) / len(found))
+    unfinished.replace(path)
+
+
+def check(found: Frames, path: Path, rate: int) -> AbstractMovieWriter:
+    """What writes such a file; InputError when there is no movie to make, or nothing to make it with."""
+    must(0 < rate <= 100, "frames a second", "1 to 100", rate)
+    must(len(found) > 1, "file", "one with 2 frames or more", f"{len(found)} frames")
+    if path.suffix == ".mp4":
+        if not FFMpegWriter.isAvailable():
+            raise InputError(f"movie must be a .gif where ffmpeg is not installed; received {path.name!r}")
+        return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
+    must(path.suffix == ".gif", "movie", "a .gif or .mp4 file", path.name)
+    return PillowWriter(fps=rate)
+
+
+def _scales(found: Frames) -> tuple[picture.Normalize | None, Arrays]:
+    """Scale of temperature, and the farthest reaches of the cloud, over all frames."""
+    position, radius, heat = [], [], []
+    for frame in found:
+        arrays = frame.arrays
+        for extreme in (np.argmin, np.argmax):
+            for k in {int(i) for i in extreme(arrays["position"] @ picture.SEEN, axis=0)}:
+                position.append(arrays["position"][k])
+                radius.append(arrays["radius"].max())
+        if "temperature" in arrays:
+            heat.append({"temperature": arrays["temperature"]})
+    norm = picture.temperatures(heat) if heat else None
+    return norm, {"position": np.array(position), "radius": np.array(radius)}

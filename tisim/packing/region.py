@@ -1,0 +1,69 @@
+"""Where the centres of a random packing may lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tisim.errors import must
+
+
+@dataclass(frozen=True)
+class Region:
+    """A box ``low``..``high`` (m, shape (3,) each) of centres, or the ball that touches its faces.
+
+    periodic : spheres see each other across opposite faces. ball : see above.
+    volume : m^3, of the container that volume fractions are of.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    volume: float
+    periodic: bool = False
+    ball: bool = False
+
+    @property
+    def side(self) -> np.ndarray:
+        """m, shape (3,)."""
+        return self.high - self.low
+
+    @property
+    def centre(self) -> np.ndarray:
+        """m, shape (3,)."""
+        return (self.low + self.high) / 2
+
+    @property
+    def reach(self) -> float:
+        """Of the ball, m."""
+        return float(self.side[0]) / 2
+
+    def covered(self, radius: float) -> float:
+        """Volume of all places that spheres of ``radius`` (m) with centres in the region can take up, m^3."""
+        if self.ball:
+            return 4 / 3 * np.pi * (self.reach + radius) ** 3
+        return float(np.prod(self.side if self.periodic else self.side + 2 * radius))
+
+
+def box(low: np.ndarray, high: np.ndarray, periodic: bool = False) -> Region:
+    """Centres anywhere in a box; spheres may reach over its faces."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    wide = bool((high > low).all())
+    must(wide, "box", "wider than nothing in each direction", (high - low).tolist())
+    return Region(low, high, float(np.prod(high - low)), periodic)
+
+
+def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
+    """Spheres of ``radius`` (m) wholly inside a box low..high (m)."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    room = bool((high - low > 2 * radius).all())
+    must(room, "box", f"wider than a sphere, {2 * radius:g} m, in each direction", (high - low).tolist())
+    return Region(low + radius, high - radius, float(np.prod(high - low)))
+
+
+def inside_ball(centre: np.ndarray, size: float, radius: float) -> Region:
+    """Spheres of ``radius`` (m) wholly inside a ball of radius ``size`` (m)."""
+    must(size > radius, "ball", f"larger than a sphere, of radius {radius:g} m", size)
+    centre = np.asarray(centre, float)
+    reach = size - radius
+    return Region(centre - reach, centre + reach, 4 / 3 * np.pi * size**3, ball=True)

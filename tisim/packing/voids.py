@@ -1,0 +1,141 @@
+"""What room random sequential addition has left, down to none: the packing is then saturated.
+
+G. Zhang and S. Torquato, Phys. Rev. E 88 (2013) 053312: space is cut into voxels, those that lie wholly
+within a diameter of a centre are dropped, and places are tried in the others only. Where tries fail, voxels
+are cut in eight. A centre that is uniform in the voxels left is uniform in the room left, so this is the same
+process as trying places everywhere, without the tries that cannot succeed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tisim.packing.region import Region
+
+COARSE = 0.5
+"""Side of the first voxels, in diameters."""
+BLOCK = 200_000
+"""Voxels worked on at once."""
+NEAREST = 4
+"""Centres that may cover a voxel, of those nearest to the voxel that it was cut from; what is missed for the
+moment is found in a finer cut."""
+FINEST = 40
+"""Times that voxels are cut; their side is then below the rounding of a diameter."""
+
+
+def fill(
+    centres: np.ndarray, count: int, diameter: float, region: Region, generator: np.random.Generator
+) -> np.ndarray:
+    """Centres, shape (n, 3), m: those given, and more until there are ``count`` or no room is left."""
+    return _Voids(np.asarray(centres, float), diameter, region).fill(count, generator)
+
+
+class _Voids:
+    """index : of the voxels left, shape (m, 3); voxel k spans index_k step .. (index_k + 1) step.
+
+    Places are counted from the lower corner of the region, m.
+    """
+
+    def __init__(self, centres: np.ndarray, diameter: float, region: Region) -> None:
+        self.diameter, self.region = diameter, region
+        self.box = region.side if region.periodic else None
+        self.places = centres - region.low
+        self.tree = self._tree(self.places)
+        dims = np.maximum(np.ceil(region.side / (COARSE * diameter)), 1).astype(int)
+        self.step = region.side / dims
+        self.index = np.concatenate([
+            self._outside(self._in_ball(np.stack(np.unravel_index(block, dims), axis=1)), self.tree)
+            for block in _blocks(np.arange(np.prod(dims)))
+        ])  # fmt: skip
+
+    def _tree(self, places: np.ndarray) -> cKDTree:
+        # Rounding can put a centre on the upper face, which a periodic tree refuses.
+        return cKDTree(places % self.box if self.box is not None else places, boxsize=self.box)
+
+    def fill(self, count: int, generator: np.random.Generator) -> np.ndarray:
+        for _ in range(FINEST):
+            while len(self.index) and len(self.places) < count:
+                tries = len(self.index)
+                new = self._try(tries, generator)[: count - len(self.places)]
+                if len(new):
+                    self._add(new)
+                if len(new) < 0.2 * tries:
+                    break
+            if not len(self.index) or len(self.places) >= count:
+                break
+            self._cut()
+        return self.region.low + self.places
+
+    def _try(self, tries: int, generator: np.random.Generator) -> np.ndarray:
+        """Places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
+        voxel = self.index[generator.integers(len(self.index), size=tries)]
+        places = (voxel + generator.random((tries, 3))) * self.step
+        if self.region.ball:
+            places = places[((places - self.region.reach) ** 2).sum(axis=1) <= self.region.reach**2]
+        distance, _ = self.tree.query(places, distance_upper_bound=self.diameter)
+        places = places[np.isinf(distance)]
+        return places[self._first_come(places)]
+
+    def _first_come(self, places: np.ndarray) -> np.ndarray:
+        """Which places are taken when each, in turn, is taken if no earlier one is within a diameter."""
+        taken = np.ones(len(places), dtype=bool)
+        if len(places):
+            pairs = self._tree(places).query_pairs(self.diameter, output_type="ndarray")
+            for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
+                if taken[i]:
+                    taken[j] = False
+        return taken
+
+    def _add(self, new: np.ndarray) -> None:
+        self.places = np.concatenate([self.places, new])
+        self.tree = self._tree(self.places)
+        added = self._tree(new)
+        self.index = np.concatenate([self._outside(block, added) for block in _blocks(self.index)])
+
+    def _cut(self) -> None:
+        """Cut each voxel in eight, and keep what may hold a further centre."""
+        parents, coarse = self.index, self.step
+        self.step = coarse / 2
+        eighths = np.indices((2, 2, 2)).reshape(3, -1).T
+        reach = self.diameter + float(np.linalg.norm(coarse)) / 2
+        kept = []
+        for block in _blocks(parents):
+            _, near = self.tree.query((block + 0.5) * coarse, k=NEAREST, distance_upper_bound=reach)
+            index = 2 * block[:, None, :] + eighths
+            middle = (index + 0.5) * self.step
+            left = np.ones(index.shape[:2], dtype=bool)
+            for k in range(NEAREST):
+                there = near[:, k] < len(self.places)
+                left[there] &= ~self._covered(middle[there], self.places[near[there, k], None, :])
+            kept.append(self._in_ball(index[left]))
+        self.index = np.concatenate(kept)
+
+    def _outside(self, index: np.ndarray, tree: cKDTree) -> np.ndarray:
+        """The voxels that the nearest centre of a tree does not cover."""
+        middle = (index + 0.5) * self.step
+        distance, nearest = tree.query(middle, distance_upper_bound=self.diameter)
+        close = np.flatnonzero(np.isfinite(distance))
+        covered = self._covered(middle[close], tree.data[nearest[close]])
+        return np.delete(index, close[covered], axis=0)
+
+    def _covered(self, middle: np.ndarray, centre: np.ndarray) -> np.ndarray:
+        """Whether all of a voxel lies within a diameter of a centre: its farthest corner does."""
+        apart = np.abs(middle - centre)
+        if self.box is not None:
+            apart = np.minimum(apart, np.abs(self.box - apart))
+        return np.asarray(((apart + self.step / 2) ** 2).sum(axis=-1) < self.diameter**2)
+
+    def _in_ball(self, index: np.ndarray) -> np.ndarray:
+        """The voxels that reach into the region, where it is a ball."""
+        if not self.region.ball:
+            return index
+        gap = np.maximum(np.abs((index + 0.5) * self.step - self.region.reach) - self.step / 2, 0.0)
+        return index[(gap**2).sum(axis=1) <= self.region.reach**2]
+
+
+def _blocks(items: np.ndarray) -> Iterator[np.ndarray]:
+    for begin in range(0, max(len(items), 1), BLOCK):
+        yield items[begin : begin + BLOCK]
