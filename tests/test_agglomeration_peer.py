@@ -54,6 +54,7 @@ def apart(result, final):
     return max(np.abs(x[a] - result.state[name][b]).max() / np.abs(x).max() for name, x in final.items())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("hardness", "even", "steps", "tolerance"),
     [(1, False, 40, 1e-9), (1, True, 200, 1e-9), (200, False, 25, 1e-9)],

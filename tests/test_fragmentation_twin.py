@@ -119,6 +119,7 @@ def swarm(rng):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_every_step_has_the_same_pieces_as_the_twin(rng):
     """Numbers, places, velocities, masses, heat and energy of new surface; they part by 2e-14 (measured)."""
     if runtime.current().precision != "f64":

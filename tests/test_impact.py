@@ -22,6 +22,7 @@ def impacts(request):
     return kinds, pairs, results
 
 
+@pytest.mark.long
 def test_impact_is_its_twin(impacts):
     kinds, pairs, results = impacts
     seen = set()

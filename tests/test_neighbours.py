@@ -192,6 +192,7 @@ def same(a, b):
         np.testing.assert_array_equal(values, b.state[name], err_msg=name)
 
 
+@pytest.mark.long
 def test_results_do_not_depend_on_the_skin(rng, outcome):
     """Lists made in every step, and too short for most grains: the same bits, adaptive steps among them."""
     start = crowd(rng, Verlet())
@@ -201,6 +202,7 @@ def test_results_do_not_depend_on_the_skin(rng, outcome):
     same(usual, outcome(start, AHEAD=0.0, LISTED=2))
 
 
+@pytest.mark.long
 def test_results_do_not_depend_on_lists_at_all(rng, outcome):
     """With steps of one length, cell lists and looking at all pairs give the same bits."""
     start = crowd(rng, fixed(4e-6))

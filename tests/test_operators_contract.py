@@ -89,6 +89,7 @@ def test_an_operator_sees_every_world_once_a_step():
     assert result.work["censuses"] == 10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [Shell, ShellOfAll])
 def test_lists_follow_particles_that_operators_move(kind):
     """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
@@ -112,6 +113,7 @@ def test_lists_follow_particles_that_operators_move(kind):
     assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
 
 
+@pytest.mark.long
 def test_lists_follow_particles_that_grow(rng):
     """Grains at rest, out of each other's reach, that grow until they push each other apart."""
     grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -135,6 +137,7 @@ def test_lists_follow_particles_that_grow(rng):
     np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("schedule", ["world", "particle"])
 @pytest.mark.parametrize(("axis", "images"), [(0, True), (2, False)])
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
@@ -175,6 +178,7 @@ class Teleport(Operator):
             s.disturb(w)
 
 
+@pytest.mark.long
 def test_lists_follow_what_operators_do_to_the_world(rng):
     """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
     results = []

@@ -23,6 +23,7 @@ def world(elsewhere, precision, w):
     return {key: values for key, values in found.items() if "/" not in key}, start
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("w", range(len(WORLDS)))
 def test_single_precision_stays_finite_and_keeps_mass_and_energy(elsewhere, w):
     state, start = world(elsewhere, "single precision", w)
@@ -80,6 +81,7 @@ def rebounds_of_cold_grains():
     return found
 
 
+@pytest.mark.long
 def test_grains_too_hard_for_single_precision_rebound(single):
     """exp(Q / (R T)) is capped where hardness still fits f32: nothing turns into a NaN that bonds."""
     assert single("test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3

@@ -43,6 +43,7 @@ def whole(tmp_path_factory):
     return end_of(folder)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("delay", [0.0, 0.15])
 def test_sigkill_and_resume_end_as_if_never_stopped(whole, tmp_path, delay):
     folder = tmp_path / "cut"

@@ -56,6 +56,7 @@ print("made anew")
 """
 
 
+@pytest.mark.long
 def test_simulation_of_an_earlier_start_says_so():
     """Not a segmentation fault; and what is made anew works."""
     done = subprocess.run(

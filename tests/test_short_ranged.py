@@ -46,6 +46,7 @@ def shells(kind, rng, images):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("images", [True, False])
 @pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, schedule):
@@ -162,6 +163,7 @@ def twin(start, steps, stiffness, grip):
     return v, spin
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
@@ -191,6 +193,7 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
         np.testing.assert_array_equal(again.state[name], result.state[name])
 
 
+@pytest.mark.long
 def test_what_is_remembered_is_bounded_and_forgotten():
     """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
     made = grains()

@@ -67,6 +67,7 @@ def states():
     return seen
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_a_run_is_the_same_to_the_last_bit_with_a_trajectory(tmp_path, schedule):
     made = simulation(schedule)
@@ -262,6 +263,7 @@ def synthetic(k):
     return Frame(1e-3 * k, 10 * k, arrays)
 
 
+@pytest.mark.long
 def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for kill in range(2):

@@ -41,13 +41,31 @@ class Halves:
     @ti.func
     def size(self, w, i):
         """How many candidates ``candidate`` offers particle i."""
+        return self.near.size(w, i) + self.others(w, i)
+
+    @ti.func
+    def candidate(self, w, i, k):
+        """The k-th particle that may be a neighbour of i, those it owns first; i itself where there is none.
+
+        One loop over both halves: what is done with a pair is compiled once.
+        """
+        j, own = 0, self.near.size(w, i)
+        if k < own:
+            j = self.near.candidate(w, i, k)
+        if k >= own:
+            j = self.owner(w, i, k - own)
+        return j
+
+    @ti.func
+    def others(self, w, i):
+        """How many candidates ``owner`` offers particle i."""
         n = self.s.count[w]
         if n > self.near.small and self.found[w, i] >= 0:
             n = self.found[w, i]
         return n
 
     @ti.func
-    def candidate(self, w, i, k):
+    def owner(self, w, i, k):
         """The k-th particle that may be a neighbour and own the pair; i itself where there is none."""
         j = k
         if self.s.count[w] > self.near.small and self.found[w, i] >= 0:

@@ -98,12 +98,7 @@ class Remember(PerParticle):
     @ti.func
     def visit(self, w, i, new: ti.template()):  # type: ignore[valid-type]
         """Go through the pairs that i keeps; returns how many are new to it, and the slots of the others."""
-        near = self.halves.near
         met, known = 0, 0
-        for k in range(near.size(w, i)):
-            slot = self.look(w, i, near.candidate(w, i, k), new)
-            met += ti.select(slot == UNKNOWN, 1, 0)
-            known |= ti.select(slot >= 0, 1 << ti.max(slot, 0), 0)
         for k in range(self.halves.size(w, i)):
             slot = self.look(w, i, self.halves.candidate(w, i, k), new)
             met += ti.select(slot == UNKNOWN, 1, 0)

@@ -34,9 +34,6 @@ class PairSum(PerParticle):
             for j in range(self.s.count[w]):
                 total += self.of(self.long_ranged, 0.0 * total, w, i, j, t)
         if ti.static(len(self.short_ranged) > 0):
-            near = self.halves.near
-            for k in range(near.size(w, i)):
-                total += self.of(self.short_ranged, 0.0 * total, w, i, near.candidate(w, i, k), t)
             for k in range(self.halves.size(w, i)):
                 total += self.of(self.short_ranged, 0.0 * total, w, i, self.halves.candidate(w, i, k), t)
         return total

@@ -1,6 +1,7 @@
 """tisim optimize and tisim cache, on a problem that takes seconds."""
 
 import numpy as np
+import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
@@ -56,6 +57,7 @@ TOY = Case(
 SEARCH = ["optimize", "toy", "--out", "s", "--generations", "1", "--set", "search.ensemble.max_starts=4"]
 
 
+@pytest.mark.long
 def test_optimize_ends_with_all_its_files_and_resumes(tisim, tmp_path, monkeypatch, press_ctrl_c):
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": TOY})
     with monkeypatch.context() as patch:

@@ -2,6 +2,7 @@
 
 import h5py
 import numpy as np
+import pytest
 
 from tisim import Scene
 
@@ -28,6 +29,7 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+@pytest.mark.long
 def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
     (tmp_path / "whole").mkdir()
     (tmp_path / "whole" / "result.h5").write_text("of an earlier run")
@@ -71,6 +73,7 @@ def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_pa
         assert np.isfinite(file["end/velocity"]).all()
 
 
+@pytest.mark.long
 def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
     assert tisim("run", impacts, "--without", "impact")[0] == 0
     assert Scene.from_toml(tmp_path / "out" / "flow" / "scene.toml").effects == ()

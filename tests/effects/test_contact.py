@@ -130,6 +130,7 @@ COMBINATIONS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", COMBINATIONS)
 def test_contact_is_its_numpy_twin(name, rng):
     """Random heaps, all worlds of one batch; forces and torques; momentum and angular momentum."""

@@ -40,6 +40,7 @@ def poisoned(what, when=50, seed=9):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("what", "fault"),
     [

@@ -15,6 +15,7 @@ def run(scenes):
     return simulate(scenes, worlds=BATCH, capacity=200, schedule="world")
 
 
+@pytest.mark.long
 def test_all_particles_merge_into_one():
     """Everything bonds, images across the faces: one sphere of all mass, and it travels on, to rounding."""
     made = flow(seed=5, grains=150, hardness=10.0, side=0.016, images=True, duration=0.05)
@@ -50,6 +51,7 @@ def test_a_long_violent_flow_keeps_its_sums_and_books():
     assert sum(r.work["merges"] for r in results) > 100
 
 
+@pytest.mark.long
 def test_fragments_of_one_grain_fill_every_slot():
     """Two grains of 32 break into all 64: exactly the room there is, nothing lost."""
     radius = RADIUS * 32 ** (1 / 3)

@@ -43,6 +43,7 @@ def found(folder):
     return repr(tables), written, fitness
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), pytest.param(REAL, 20, marks=pytest.mark.slow)])
 def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
     with begin(case, tmp_path / "whole") as search:

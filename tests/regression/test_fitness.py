@@ -28,6 +28,7 @@ def test_the_record_is_of_this_physics():
     assert fitness_record.stored()["physics"] == PHYSICS_VERSION
 
 
+@pytest.mark.long
 def test_same_settings_give_the_same_fitness_to_the_last_bit(values):
     """On the platform of the record; on another one, whose exp and pow round differently, in the mean."""
     record = fitness_record.stored()
@@ -38,6 +39,7 @@ def test_same_settings_give_the_same_fitness_to_the_last_bit(values):
         assert max(fitness_record.deviations(values, record).values()) < STANDARD_ERRORS
 
 
+@pytest.mark.long
 def test_the_other_schedule_gives_the_same_fitness_to_the_last_bit(values):
     from cases import agglomeration
 
@@ -58,11 +60,13 @@ def elsewhere(*options):
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.long
 def test_single_precision_gives_the_same_fitness_in_the_mean():
     deviations = fitness_record.deviations(elsewhere("--precision", "f32"), fitness_record.stored())
     assert max(deviations.values()) < STANDARD_ERRORS
 
 
+@pytest.mark.long
 def test_any_number_of_threads_gives_the_same_fitness_to_the_last_bit(values):
     assert elsewhere("--threads", "1") == values
     assert elsewhere("--threads", "3") == values

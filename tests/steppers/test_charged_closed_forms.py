@@ -38,6 +38,7 @@ def turned(v, angle):
     return c * v[0] + s * v[1], -s * v[0] + c * v[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", STEPPERS)
 def test_error_falls_as_the_square_of_the_step(name):
     """All forms at once, four step lengths each: order 2, with Omega at resonance too."""
@@ -55,6 +56,7 @@ def test_error_falls_as_the_square_of_the_step(name):
         assert errors[-1] < 1e-3, what
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("phi", "expected"), [(1.0, 1.0), (0.0, 1.0), (0.5, 2.0)])
 def test_order_of_the_implicit_stepper(phi, expected):
     """phi = 1/2 is of second order; implicit and explicit Euler are of first."""

@@ -5,8 +5,7 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tests.steppers.charged import charged, equal_steps
-from tests.test_mutual import cloud
-from tests.test_short_ranged import SoftShell, SoftShellOfAll, grains, shells
+from tests.test_short_ranged import SoftShell, grains, shells
 from tests.throwaway import Trap
 from tisim import Simulation
 from tisim.errors import InputError
@@ -19,11 +18,11 @@ def with_stepper(made, stepper, **more):
     return made.model_copy(update={"stepper": stepper, **more})
 
 
-@pytest.mark.parametrize("kind", [SoftShell, SoftShellOfAll])
-def test_schedules_agree_and_momentum_is_kept(kind):
+@pytest.mark.long
+def test_schedules_agree_and_momentum_is_kept():
     """Rejected attempts and new lists among the iterations: the same bits, momentum to rounding."""
     made = with_stepper(
-        shells(kind, np.random.default_rng(3), True),
+        shells(SoftShell, np.random.default_rng(3), True),
         Trapezoid(
             control=IterationControl(first=4e-3, longest=4e-3, shortest=1e-6, tolerance=1e-9, iterations=12)
         ),
@@ -39,16 +38,7 @@ def test_schedules_agree_and_momentum_is_kept(kind):
     assert np.abs(a.state["velocity"] - a.start["velocity"]).max() > 1
 
 
-def test_lists_in_the_iteration_are_as_good_as_all_pairs():
-    listed, everyone = (
-        simulate(
-            [with_stepper(shells(kind, np.random.default_rng(3), True), equal_steps(1e-3))], capacity=300
-        )[0]
-        for kind in (SoftShell, SoftShellOfAll)
-    )
-    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-9)
-
-
+@pytest.mark.long
 def test_acceleration_finds_the_same_solution_in_fewer_iterations():
     """Anderson's: forces that repel stiffly and torques; two thirds of the work or less, to 1e-7."""
     plain, mixed = (
@@ -70,6 +60,7 @@ def test_acceleration_finds_the_same_solution_in_fewer_iterations():
     np.testing.assert_allclose(mixed.state["position"], plain.state["position"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 def test_acceleration_of_grains_that_turn():
     """Torques are mixed along with forces: the solution of plain iteration."""
     plain, mixed = (
@@ -119,6 +110,7 @@ def test_what_cannot_be_solved_says_when_who_and_which_force():
     assert failed.time == 0.0
 
 
+@pytest.mark.long
 def test_what_cannot_be_solved_together_says_so_too():
     """The same among particles that feel each other: the state is that of the last good step."""
     made = with_stepper(
@@ -154,6 +146,7 @@ def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
     assert result.work["solver_iterations"] <= 2 * result.work["particle_steps"]
 
 
+@pytest.mark.long
 def test_time_does_not_drift():
     """A million steps of 1e-6 s end at one second exactly, the place of the oscillator being right."""
     made = oscillator(equal_steps(1e-6, tolerance=1e-6), duration=1.0)
@@ -170,15 +163,6 @@ def test_linear_terms_in_velocity_are_solved_exactly():
     assert result.status.ok
     assert result.work["force_evaluations"] == result.work["particle_steps"]
     assert np.linalg.norm(result.state["velocity"]) == pytest.approx(1.0, rel=1e-12)
-
-
-def test_it_settles_mutual_quantities_in_the_iteration():
-    """Induced dipoles: the trajectory of velocity Verlet, to the error of both."""
-    made = cloud(1)
-    implicit = simulate([with_stepper(made, equal_steps(1e-3))], worlds=2)[0]
-    explicit = simulate([made], worlds=2)[0]
-    assert implicit.work["mutual_sweeps"] > implicit.work["force_evaluations"]
-    np.testing.assert_allclose(implicit.state["position"], explicit.state["position"], rtol=0, atol=1e-5)
 
 
 def test_only_what_is_needed_is_allocated():

@@ -1,0 +1,149 @@
+"""Electromagnetically induced vibration of particles in a binder (Z13 section 4).
+
+Z13 is T. I. Zohdi, Electromagnetically-induced vibration in particulate-functionalized materials, J. Vib.
+Acoust. (2013), doi 10.1115/1.4023251. A cubic array of charged particles, each tethered to its place, in a
+constant magnetic field along z and an electric one that oscillates along x.
+
+The near field that is printed is far from equilibrium: attraction and repulsion balance at alpha_2/alpha_1 =
+0.5 m, and neighbours are 1/30 m apart. It throws the array apart, and single paths are chaotic after some
+0.01 s. The centre of gravity does not care: forces between particles cancel, tether and Lorentz force are
+linear, so it follows ``charged_closed_forms.response`` exactly. The size "equilibrium" has a near field in
+balance with its neighbours, in which the slow frequencies that the paper speaks of can be seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cases.case import Case, Check, Size
+from cases.charged_closed_forms import resonances, response
+from tisim import Cloud, Result, Scene, run
+from tisim.effects.lorentz import Lorentz
+from tisim.effects.near_field import NearField, TruncatedNearField
+from tisim.effects.tether import Tether
+from tisim.packing.placement import Lattice
+from tisim.sources.uniform import ElectricField, MagneticField
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.trapezoid import Trapezoid
+
+CUBE, SITES = 0.2, 7
+"""Side of the array, m, and particles along it (Z13 section 4)."""
+DENSITY, RADIUS, CHARGE = 2000.0, 0.005, 1.0
+"""kg/m^3, m, C (Z13 section 4)."""
+FLUX, FIELD, STIFFNESS = 1.0, 0.1, 0.5
+"""B_3 (T), E_0 (N/C), k (N/m) (Z13 section 4)."""
+ATTRACTION, REPULSION = 2.0, 1.0
+"""alpha_1 (N m) and alpha_2 (N m^2) with exponents 1 and 2 (Z13 section 4)."""
+RATIOS = (0.1, 0.2, 0.4, 0.8, 1.0, 1.2, 1.4, 1.8)
+"""Omega/w of Z13 Fig. 3."""
+
+MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
+CYCLOTRON = CHARGE * FLUX / MASS
+"""w = q B/m: 954.930 1/s. Z13 prints 1819.385 1/s for the same data, which is wrong."""
+SPACING = CUBE / (SITES - 1)
+
+SIZES = {
+    "alone": Size(
+        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}
+    ),
+    "default": Size("343 particles, the near field as printed, 0.005 s", {}),
+    "equilibrium": Size(
+        "343 particles, near field in balance with the six neighbours, 0.05 s",
+        {"near_field": "equilibrium", "duration": 0.05},
+    ),
+}
+
+
+def near_fields(name: str) -> tuple[NearField, ...]:
+    """None, the one printed, or one in equilibrium at the distance of neighbours and for them only."""
+    if name == "none":
+        return ()
+    if name == "printed":
+        return (NearField(alpha1=ATTRACTION, beta1=1, alpha2=REPULSION, beta2=2),)
+    balanced = ATTRACTION * SPACING
+    return (TruncatedNearField(alpha1=ATTRACTION, beta1=1, alpha2=balanced, beta2=2, cutoff=1.3 * SPACING),)
+
+
+def scene(
+    ratio: float = 0.8,
+    near_field: str = "printed",
+    duration: float = 0.005,
+    sites: int = SITES,
+    error: float = 1e-6,
+    seed: int = 0,
+) -> Scene:
+    """The array, driven at Omega = ratio w; ``error`` is asked of a step, over the displacement in it."""
+    return Scene(
+        name="vibration",
+        particles=Cloud(
+            radius=RADIUS,
+            density=DENSITY,
+            placement=Lattice(shape=(sites,) * 3, spacing=SPACING),
+            quantities={"charge": CHARGE},
+        ),
+        effects=(
+            Lorentz(),
+            ElectricField(amplitude=(FIELD, 0.0, 0.0), omega=(ratio * CYCLOTRON, 0.0, 0.0)),
+            MagneticField(constant=(0.0, 0.0, FLUX)),
+            Tether(stiffness=(STIFFNESS,) * 3),
+            *near_fields(near_field),
+        ),
+        stepper=Trapezoid(control=ErrorControl(error=error, tolerance=error / 10, first=1e-7, longest=1e-3)),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """The array of a size; nothing in it is random."""
+    return scene(seed=seed, **CASE.size(size).scene)
+
+
+def centre_of_gravity(result: Result) -> complex:
+    """x + i y of the array's centre of gravity, less where it began, m."""
+    moved = np.average(result.state["position"], axis=0, weights=result.state["mass"])
+    start = np.average(result.start["position"], axis=0, weights=result.start["mass"])
+    return complex(moved[0] - start[0], moved[1] - start[1])
+
+
+def expected(ratio: float, t: float) -> complex:
+    """The same in closed form."""
+    push = CHARGE * FIELD / MASS
+    return complex(response(t, CYCLOTRON, STIFFNESS / MASS, push, ratio * CYCLOTRON))
+
+
+def deviation(results: list[Result], ratios: tuple[float, ...]) -> float:
+    """Largest distance of the centre of gravity from its closed form, over the largest displacement."""
+    found = np.array([centre_of_gravity(result) for result in results])
+    exact = np.array([expected(r, result.time) for r, result in zip(ratios, results, strict=True)])
+    return float(np.abs(found - exact).max() / np.abs(exact).max())
+
+
+def check() -> Iterator[Check]:
+    """Z13's numbers, its slip among them, and the centre of gravity against its closed form."""
+    slow, fast = resonances(CYCLOTRON, STIFFNESS / MASS)
+    yield Check("w = q B/m, 1/s (printed: 1819.385)", CYCLOTRON, 954.930, 1e-3)
+    yield Check("sqrt(k/m), 1/s", float(np.sqrt(STIFFNESS / MASS)), 21.851, 1e-3)
+    pair = float(np.sqrt(ATTRACTION * (ATTRACTION / REPULSION) ** 2 / MASS))
+    yield Check("sqrt(alpha_1 (alpha_1/alpha_2)^2/m), 1/s", pair, 87.404, 1e-3)
+    yield Check("product of the two resonances, k/m, 1/s^2", slow * fast, STIFFNESS / MASS, 1e-9)
+    alone = run([scene(r, "none", duration=0.05, sites=1) for r in RATIOS])
+    yield Check("one particle, 0.05 s, all of Fig. 3: off by", deviation(alone, RATIOS), 0.0, 1e-3)
+    some = (0.1, 0.8, 1.8)
+    for name, duration in (("printed", 0.005), ("equilibrium", 0.02)):
+        cloud = run([scene(r, name, duration, error=1e-5) for r in some])
+        yield Check(f"centre of gravity, {name}, {duration} s: off by", deviation(cloud, some), 0.0, 1e-3)
+        drift = max(float(np.abs(np.average(r.state["position"], axis=0)[2])) for r in cloud)
+        yield Check(f"centre of gravity along z, {name}, m", drift, 0.0, 1e-12)
+
+
+CASE = Case(
+    name="vibration",
+    title="Electromagnetically induced vibration of particles in a binder",
+    source="T. I. Zohdi, J. Vib. Acoust. (2013), doi 10.1115/1.4023251",
+    sizes=SIZES,
+    scene=scene_for,
+    check=check,
+)
