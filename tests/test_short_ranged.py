@@ -47,8 +47,7 @@ def shells(kind, rng, images):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("images", [True, False])
-@pytest.mark.parametrize("schedule", ["world", "particle"])
+@pytest.mark.parametrize(("schedule", "images"), [("world", True), ("particle", False)])
 def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, schedule):
     """Through many lists made anew: same trajectories to rounding, and momentum conserved to rounding."""
     results = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from pydantic import model_validator
@@ -14,6 +15,8 @@ from tisim.spec import Spec, Vector, parameter
 
 class Domain(Spec):
     """Unbounded space; the contract of a domain."""
+
+    contract: ClassVar[bool] = True
 
     def bounds(self) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Corners in m, shape (3,) each; None where there are none."""

@@ -56,6 +56,8 @@ __all__ = [
 class Effect(Spec):
     """Anything physical that a scene can call for."""
 
+    contract: ClassVar[bool] = True
+
     needs: ClassVar[tuple[str | Field, ...]] = ()
     counts: ClassVar[tuple[str, ...]] = ()
     keeps: ClassVar[tuple[str, ...]] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
@@ -20,6 +20,8 @@ Arrays = dict[str, np.ndarray]
 
 class Start(Spec):
     """A starting configuration."""
+
+    contract: ClassVar[bool] = True
 
     def masses(self) -> np.ndarray:
         """Mass of each particle, kg, shape (n,); known without placing them."""

@@ -51,8 +51,8 @@ class Spec(Checked):
 
     @classmethod
     def known(cls) -> dict[str, type[Self]]:
-        """Every part made after this contract that has been imported, by name."""
-        return {sub.kind(): sub for sub in _descendants(cls) if not sub.__dict__.get("contract")}
+        """Every part made after this contract that has been imported, by name; itself too if it is none."""
+        return {kind.kind(): kind for kind in (cls, *_descendants(cls)) if not kind.__dict__.get("contract")}
 
     @classmethod
     def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:

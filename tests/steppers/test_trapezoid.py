@@ -60,7 +60,7 @@ def test_acceleration_finds_the_same_solution_in_fewer_iterations():
     np.testing.assert_allclose(mixed.state["position"], plain.state["position"], rtol=0, atol=1e-9)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_acceleration_of_grains_that_turn():
     """Torques are mixed along with forces: the solution of plain iteration."""
     plain, mixed = (

@@ -1,0 +1,46 @@
+"""The case of Z16: numbers of its start, and what the field does to the cloud, on a small ball."""
+
+import numpy as np
+import pytest
+
+from cases.blast import ENERGY, FLUX, NUMBER, SPECIFIC_CHARGE, SPEED, half_axes, scene
+from tests.scenes import simulate
+
+SMALL = 200
+
+
+def test_start_has_the_speed_and_the_energy_of_the_paper():
+    made = scene(number=SMALL)
+    start = made.particles.arrays(made.domain, 0)
+    speed = np.linalg.norm(start["velocity"], axis=1)
+    np.testing.assert_allclose(speed, SPEED, rtol=1e-12)
+    assert (start["mass"] * speed**2).sum() / 2 == pytest.approx(ENERGY * SMALL / NUMBER)
+    np.testing.assert_allclose(start["charge"], SPECIFIC_CHARGE * start["mass"])
+
+
+def test_the_field_makes_an_ellipsoid_of_the_sphere():
+    """Across the field particles circle and get nowhere; along it they fly as if there were none."""
+    still, field = simulate(
+        [scene(flux, number=SMALL, duration=0.3) for flux in (0.0, FLUX)], worlds=2, capacity=SMALL
+    )
+    assert still.status.ok
+    assert field.status.ok
+    a, b = half_axes(still), half_axes(field)
+    assert a.max() / a.min() < 1.15
+    assert b[0] == pytest.approx(a[0], rel=1e-3)
+    assert b[0] > 1.4 * b[1:].max()
+    across = np.linalg.norm((field.state["position"] - field.start["position"])[:, 1:], axis=1)
+    rate = SPECIFIC_CHARGE * FLUX
+    assert across.max() == pytest.approx(2 * SPEED / rate * abs(np.sin(rate * 0.3 / 2)), rel=2e-3)
+
+
+def test_contact_conserves_momentum_and_takes_energy():
+    """Without air and field: touching spheres exchange momentum, and dissipate."""
+    made = scene(0.0, contact=True, number=60, duration=0.02)
+    (result,) = simulate([made.without("chow_drag")], worlds=1, capacity=60)
+    assert result.status.ok, result.status.reason
+    start, end = result.start, result.state
+    impulse = (start["mass"][:, None] * (end["velocity"] - start["velocity"])).sum(axis=0)
+    assert np.abs(impulse).max() < 1e-9 * start["mass"].sum() * SPEED
+    energy = [(s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum() / 2 for s in (start, end)]
+    assert energy[1] <= energy[0] * (1 + 1e-6)
