@@ -109,7 +109,7 @@ class Alone(PerParticle):
         return verdict, k - 1
 
 
-class Close(Phase):
+class EndWindow(Phase):
     """The window is done."""
 
     def __init__(self, s) -> None:

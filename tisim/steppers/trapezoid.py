@@ -10,7 +10,7 @@ from tisim.program import Item
 from tisim.spec import parameter
 from tisim.state import Field
 from tisim.steppers.acceleration import accelerated, memory_of_iterates
-from tisim.steppers.alone import Alone, Close, Window
+from tisim.steppers.alone import Alone, EndWindow, Window
 from tisim.steppers.implicit_control import IterationControl
 from tisim.steppers.implicit_phases import (
     Advance,
@@ -76,7 +76,7 @@ class Trapezoid(Stepper):
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, solve = parts.s, Solve(parts, self.phi)
         if parts.independent:
-            return (Window(s, parts.control, self.window), Alone(parts, solve), Close(s))
+            return (Window(s, parts.control, self.window), Alone(parts, solve), EndWindow(s))
         listen = (Listen(parts),) if parts.near else ()
         sums = BlockSums(s, 4)
         parts.owned.append((sums, "sums of the iteration", self.kind()))
