@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.scenes import by_id, scene
+from tests.scenes import by_id, compiled, scene, simulate
 from tisim import Box, Simulation, checkpoint
 from tisim._taichi import ti
 from tisim.effect import PairForce, parameter
@@ -167,7 +167,7 @@ def twin(start, steps, stiffness, grip):
 def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
     made = grains()
-    simulation = Simulation(made, schedule=schedule)
+    simulation = compiled(made, capacity=160, schedule=schedule)
     simulation.load([made])
     simulation.run(steps=70)
     checkpoint.save(simulation, tmp_path / "half")
@@ -187,7 +187,6 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     checkpoint.restore(simulation, tmp_path / "half")
     simulation.run()
     (again,) = simulation.results()
-    simulation.close()
     for name in ("position", "velocity", "spin"):
         np.testing.assert_array_equal(again.state[name], result.state[name])
 
@@ -196,11 +195,7 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
 def test_what_is_remembered_is_bounded_and_forgotten():
     """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
     made = grains()
-    simulation = Simulation(made)
-    simulation.load([made])
-    simulation.run()
-    (result,) = simulation.results()
-    simulation.close()
+    (result,) = simulate([made], capacity=160, schedule="world")
     state = by_id(result)
     d = state["position"][None] - state["position"][:, None]
     d -= SIDE * np.round(d / SIDE)

@@ -144,13 +144,12 @@ def test_its_parameters_may_differ_per_world_and_are_written_to_files():
     assert a.work["corrections"] < b.work["corrections"] / 2
 
 
-@pytest.mark.parametrize("schedule", ["world", "particle"])
-def test_lists_and_forces_in_an_iteration(schedule):
+def test_lists_and_forces_in_an_iteration():
     """Short-ranged forces over lists that are made anew within it, and the same over all pairs."""
     results = []
     for kind in (SoftShell, SoftShellOfAll):
         made = implicit(shells(kind, np.random.default_rng(3), True), tolerance=1e-13)
-        results += simulate([made], capacity=300, schedule=schedule)
+        results += simulate([made], capacity=300, schedule="particle")
     listed, everyone = results
     assert listed.status.ok
     assert np.abs(listed.state["velocity"] - listed.start["velocity"]).max() > 0.1
