@@ -7,7 +7,7 @@ from tisim.forces import FORCE
 from tisim.program import Item, PerParticle, Phase
 from tisim.state import Field
 from tisim.steppers.controller import Controller
-from tisim.steppers.phases import Clock, Listen, Operate, advance_clock, arrive
+from tisim.steppers.phases import Arrive, Clock, Listen, Operate, arrive
 from tisim.steppers.solve import summed_jacobian, with_jacobian
 from tisim.steppers.stepper import Parts, Stepper
 
@@ -37,7 +37,7 @@ class Boris(Stepper):
         first, second = (Drift(parts), *listen), (Drift(parts), *listen)
         kick = (*parts.lists, *parts.remember, *parts.forces, Rotate(parts))
         operate = (Operate(parts), *listen) if parts.operators else ()
-        return (Clock(s, parts.control, near), Middle(s), *first, *kick, *second, *operate, End(s))
+        return (Clock(s, parts.control, near), Middle(s), *first, *kick, *second, *operate, Arrive(s))
 
 
 class Middle(Phase):
@@ -90,15 +90,3 @@ class Rotate(PerParticle):
             s.velocity[w, i] += 2.0 * half * s.force[w, i]
         if ti.static(self.turning):
             s.spin[w, i] += dt / (0.4 * m * s.radius[w, i] ** 2) * s.torque[w, i]
-
-
-class End(Phase):
-    """The step is done."""
-
-    def __init__(self, s) -> None:
-        self.s = s
-
-    @ti.func
-    def run(self, w, _k):
-        self.s.time[w] = self.s.time_before[w]
-        advance_clock(self.s, w)

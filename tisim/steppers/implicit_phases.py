@@ -4,7 +4,7 @@ from tisim._taichi import ti
 from tisim.blocks import PerBlock
 from tisim.program import PerParticle, Phase, Repeat
 from tisim.state import STUCK
-from tisim.steppers.phases import advance_clock, note_stride
+from tisim.steppers.phases import note_stride
 
 TRIED, ACCEPTED, HOPELESS = range(3)
 """Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
@@ -213,15 +213,3 @@ class Decide(Phase):
         if s.verdict[w] == HOPELESS:
             s.failed[w] = STUCK
         s.attempting[w] = ti.select(s.verdict[w] == TRIED, 1.0, 0.0)
-
-
-class Advance(Phase):
-    """The step is done."""
-
-    def __init__(self, s) -> None:
-        self.s = s
-
-    @ti.func
-    def run(self, w, _k):
-        self.s.time[w] = self.s.time_before[w]
-        advance_clock(self.s, w)

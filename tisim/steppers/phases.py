@@ -99,6 +99,18 @@ class Operate(PerParticle):
         arrive(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)
 
 
+class Arrive(Phase):
+    """The step is done: time, which was that of a trial state, moves on from where the step began."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.time[w] = self.s.time_before[w]
+        advance_clock(self.s, w)
+
+
 class Finish(Phase):
     """A world that has reached its end stops."""
 

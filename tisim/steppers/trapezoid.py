@@ -13,7 +13,6 @@ from tisim.steppers.acceleration import accelerated, memory_of_iterates
 from tisim.steppers.alone import Alone, EndWindow, Window
 from tisim.steppers.implicit_control import IterationControl
 from tisim.steppers.implicit_phases import (
-    Advance,
     Attempt,
     Begin,
     Correct,
@@ -25,7 +24,7 @@ from tisim.steppers.implicit_phases import (
     Predict,
     Try,
 )
-from tisim.steppers.phases import Listen, Operate
+from tisim.steppers.phases import Arrive, Listen, Operate
 from tisim.steppers.solve import Solve
 from tisim.steppers.stepper import Parts, Stepper
 
@@ -86,4 +85,4 @@ class Trapezoid(Stepper):
         iteration = Iteration(s, (*forces, Correct(parts, sums, solve), *listen, Judge(parts, sums)))
         attempt = (Try(parts), Predict(solve), *listen, iteration, GiveUp(solve), *listen, Decide(parts))
         operate = (Operate(parts), *listen) if parts.operators else ()
-        return (Begin(s), Keep(solve), Attempt(s, attempt), *parts.remember, *operate, Advance(s))
+        return (Begin(s), Keep(solve), Attempt(s, attempt), *parts.remember, *operate, Arrive(s))
