@@ -1,4 +1,4 @@
-"""What the core promises operators: rules 6 and 10 of tisim/effect.py."""
+"""What the core promises operators: rules 8 and 12 of tisim/effect.py."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tests.scenes import by_id, scene
+from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation, run
 from tisim._taichi import ti
-from tisim.effect import Operator, PairForce, parameter
+from tisim.effect import Operator
 from tisim.effects.impact import Impact
 from tisim.operators.agglomeration import Agglomeration
 from tisim.state import Field
@@ -34,26 +35,6 @@ class Stepping(Operator):
     @ti.func
     def particle(self, s, w, i, dt):
         s.position[w, i] += s.leap[w, i]
-
-
-class Shell(PairForce):
-    """Repulsion of near neighbours, over the list or over all pairs."""
-
-    short_ranged = True
-    width: float = parameter("m", gt=0)
-
-    @ti.func
-    def reach(self, w):
-        return self.width(w)
-
-    @ti.func
-    def pair_force(self, s, w, i, j, separation, distance, t):
-        depth = self.width(w) - (distance - s.radius[w, i] - s.radius[w, j])
-        return -ti.max(depth, 0.0) / distance * separation
-
-
-class ShellOfAll(Shell):
-    short_ranged = False
 
 
 class Growing(Operator):
@@ -90,7 +71,7 @@ def test_an_operator_sees_every_world_once_a_step():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", [Shell, ShellOfAll])
+@pytest.mark.parametrize("kind", [SoftShell, SoftShellOfAll])
 def test_lists_follow_particles_that_operators_move(kind):
     """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
     grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -98,9 +79,15 @@ def test_lists_follow_particles_that_operators_move(kind):
     leap = np.zeros_like(position)
     leap[0, 0] = 0.05
     wanted = scene(
-        position, np.zeros_like(position), (kind(width=0.3), Stepping()), radius=0.2, mass=1.0, dt=1e-3,
-        steps=160, quantities={"leap": leap},
-    )  # fmt: skip
+        position,
+        np.zeros_like(position),
+        (kind(stiffness=1.0, width=0.3), Stepping()),
+        radius=0.2,
+        mass=1.0,
+        dt=1e-3,
+        steps=160,
+        quantities={"leap": leap},
+    )
     velocity = np.zeros_like(position)
     for _ in range(160):
         position = position + 1e-3 * velocity + leap
@@ -123,7 +110,7 @@ def test_lists_follow_particles_that_grow(rng):
             scene(
                 position,
                 0 * position,
-                (kind(width=0.02), Growing()),
+                (kind(stiffness=1.0, width=0.02), Growing()),
                 radius=0.04,
                 mass=1.0,
                 dt=1e-3,
@@ -131,7 +118,7 @@ def test_lists_follow_particles_that_grow(rng):
                 quantities={"growth": growth},
             )
         )
-        for kind in (Shell, ShellOfAll)
+        for kind in (SoftShell, SoftShellOfAll)
     )
     assert np.abs(everyone.state["velocity"]).max() > 1e-3
     np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
@@ -142,9 +129,14 @@ def test_lists_follow_particles_that_grow(rng):
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
     """More particles than look at all pairs; the bad one belongs to no cell."""
     wanted = scene(
-        rng.uniform(0, 1, (300, 3)), rng.normal(size=(300, 3)), (Shell(width=0.05), Poison(axis=axis)),
-        radius=0.01, dt=1e-4, steps=40, domain=Box(low=(0, 0, 0), high=(1, 1, 1), images=images),
-    )  # fmt: skip
+        rng.uniform(0, 1, (300, 3)),
+        rng.normal(size=(300, 3)),
+        (SoftShell(stiffness=1.0, width=0.05), Poison(axis=axis)),
+        radius=0.01,
+        dt=1e-4,
+        steps=40,
+        domain=Box(low=(0, 0, 0), high=(1, 1, 1), images=images),
+    )
     simulation = Simulation(wanted, schedule=schedule)
     simulation.load([wanted])
     simulation.run()
@@ -158,10 +150,14 @@ def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images,
 def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
     """Two grains bond in the last step, one just outside the other's side of the box."""
     wanted = scene(
-        [[0.9993, 0.5, 0.5], [0.0011, 0.5, 0.5]], [[10.0, 0, 0], [-10.0, 0, 0]],
-        (Impact(hardness=1.0), Agglomeration()), radius=1e-3, dt=1e-6, steps=1,
+        [[0.9993, 0.5, 0.5], [0.0011, 0.5, 0.5]],
+        [[10.0, 0, 0], [-10.0, 0, 0]],
+        (Impact(hardness=1.0), Agglomeration()),
+        radius=1e-3,
+        dt=1e-6,
+        steps=1,
         domain=Box(low=(0, 0, 0), high=(1, 1, 1)),
-    )  # fmt: skip
+    )
     state = run(wanted).state
     assert len(state["mass"]) == 1
     assert ((state["position"] >= 0) & (state["position"] < 1)).all()
@@ -182,11 +178,11 @@ def test_lists_follow_what_operators_do_to_the_world(rng):
     """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
     results = []
     position, velocity = rng.uniform(0.0, 1.0, (200, 3)), rng.normal(size=(200, 3))
-    for kind in (Shell, ShellOfAll):
+    for kind in (SoftShell, SoftShellOfAll):
         made = scene(
             position,
             velocity,
-            (kind(width=0.05), Teleport()),
+            (kind(stiffness=1.0, width=0.05), Teleport()),
             radius=0.03,
             dt=1e-3,
             steps=45,

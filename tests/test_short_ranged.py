@@ -1,35 +1,13 @@
-"""Pair forces over the list: what contact laws need of the core. The effects are defined here only."""
+"""Pair forces over the list: what contact laws need of the core. Grip is defined here only."""
 
 import numpy as np
 import pytest
 
 from tests.scenes import by_id, compiled, scene, simulate
+from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation, checkpoint
 from tisim._taichi import ti
 from tisim.effect import PairForce, parameter
-
-
-class SoftShell(PairForce):
-    """Linear repulsion within a gap: what a contact law needs of the core. Listed pairs only."""
-
-    short_ranged = True
-    stiffness: float = parameter("N/m", gt=0)
-    width: float = parameter("m", gt=0)
-
-    @ti.func
-    def reach(self, w):
-        return self.width(w)
-
-    @ti.func
-    def pair_force(self, s, w, i, j, separation, distance, t):
-        depth = self.width(w) - (distance - s.radius[w, i] - s.radius[w, j])
-        return -self.stiffness(w) * ti.max(depth, 0.0) / distance * separation
-
-
-class SoftShellOfAll(SoftShell):
-    """The same, summed over all pairs."""
-
-    short_ranged = False
 
 
 def shells(kind, rng, images):

@@ -5,8 +5,8 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tests.test_mutual import cloud
-from tests.test_short_ranged import SoftShell, SoftShellOfAll, shells
-from tests.throwaway import Trap
+from tests.test_short_ranged import shells
+from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import Scene
 from tisim._taichi import ti
 from tisim.effect import parameter

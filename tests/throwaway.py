@@ -54,6 +54,29 @@ class RandomKicks(Operator):
         ti.atomic_add(s.kicks[w], 1)
 
 
+class SoftShell(PairForce):
+    """Linear repulsion within a gap: what a contact law needs of the core. Listed pairs only."""
+
+    short_ranged = True
+    stiffness: float = parameter("N/m", gt=0)
+    width: float = parameter("m", gt=0)
+
+    @ti.func
+    def reach(self, w):
+        return self.width(w)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        depth = self.width(w) - (distance - s.radius[w, i] - s.radius[w, j])
+        return -self.stiffness(w) * ti.max(depth, 0.0) / distance * separation
+
+
+class SoftShellOfAll(SoftShell):
+    """The same, summed over all pairs."""
+
+    short_ranged = False
+
+
 WORLDS, CAPACITY = 40, 32
 
 

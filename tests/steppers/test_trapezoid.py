@@ -5,8 +5,8 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tests.steppers.charged import charged, equal_steps
-from tests.test_short_ranged import SoftShell, grains, shells
-from tests.throwaway import Trap
+from tests.test_short_ranged import grains, shells
+from tests.throwaway import SoftShell, Trap
 from tisim import Simulation
 from tisim.errors import InputError
 from tisim.steppers.controller import FixedStep
