@@ -7,7 +7,7 @@ through a window in steps of its own.
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
 from tisim.state import STUCK
-from tisim.steppers.implicit_phases import ACCEPTED, HOPELESS, SHORTER, TRIED
+from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.phases import advance_clock
 
 
@@ -75,7 +75,7 @@ class Alone(PerParticle):
         s, solve = self.s, self.solve
         step, end = ti.cast(dt, s.real), t + dt
         v = solve.velocity(w, i, step, end)
-        if not solve.sound(w, i, v, step):
+        if not solve.bearable(w, i, v, step):
             v = s.velocity_before[w, i]
         solve.advance(w, i, v, step)
         k, verdict, iterating = 1, TRIED, 1
@@ -84,7 +84,7 @@ class Alone(PerParticle):
             new = solve.velocity(w, i, step, end)
             k += 1
             change, error = ti.cast(ti.math.inf, s.real), ti.cast(0.0, s.real)
-            if solve.sound(w, i, new, step):
+            if solve.bearable(w, i, new, step):
                 change = solve.phi(w) * step * (new - v).norm()
                 v = new
                 change += solve.advance(w, i, v, step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -12,25 +12,14 @@ from tisim.spec import parameter
 from tisim.steppers.controller import StepControl
 
 
-class IterationControl(StepControl):
-    """Steps such that the fixed-point iteration meets its tolerance in the desired number of iterations.
+class ImplicitControl(StepControl):
+    """What control of implicit steppers has in common: the limits of a step.
 
-    With w_K the change of the last iteration over the displacement in the step, Lambda_K =
-    (TOL / w_0)^(1/(p K_d)) / (w_K / w_0)^(1/(p K)) and w_0 = 1, as the first iterate is compared with
-    the place where the step began (Z13 A9, Z16 C.5). The step is accepted when w_K <= TOL within K_d
-    iterations; the next one is Lambda_K times as long, or a rejected one is tried again so.
-
-    This bounds the error of the iteration only. That of the trapezoidal rule itself is not seen, and is left
-    to ``longest``. What the papers leave open: the step never changes by more than ``most`` or less than
-    ``least`` times in one go, and a step that fails at ``shortest`` stops the world, with time, particle and
-    force.
-
-    tolerance : TOL. iterations : K_d. order : p. first : dt_0. longest : dt_lim. Source: Z16 section 8.1.
+    first : step that is tried first. longest, shortest : one that fails at the shortest stops its world, with
+    time, particle and force. most, least : factors by which the step changes in one go at most.
     """
 
-    tolerance: float = parameter("", 5e-4, gt=0)
-    iterations: int = Field(10, ge=2)
-    order: float = parameter("", 2.0, gt=0)
+    contract: ClassVar[bool] = True
     first: float = parameter("s", 1e-5, gt=0)
     longest: float = parameter("s", 2.5e-4, gt=0)
     shortest: float = parameter("s", 1e-12, gt=0)
@@ -53,6 +42,41 @@ class IterationControl(StepControl):
         )
 
     @ti.func
+    def hopeless(self, w, dt):
+        """Whether a step of this length (s) that has failed must not be made shorter."""
+        return dt <= ti.cast(self.shortest(w), ti.f64) * (1.0 + 1e-9)
+
+    @ti.func
+    def limited(self, w, wanted, reached):
+        """wanted / reached, between ``least`` and ``most``; the least for a NaN."""
+        least, most = ti.cast(self.least(w), ti.f64), ti.cast(self.most(w), ti.f64)
+        factor = least
+        if wanted >= least * reached:
+            factor = ti.min(most, wanted / ti.max(reached, wanted / most))
+        return factor
+
+
+class IterationControl(ImplicitControl):
+    """Steps such that the fixed-point iteration meets its tolerance in the desired number of iterations.
+
+    With w_K the change of the last iteration over the displacement in the step, Lambda_K =
+    (TOL / w_0)^(1/(p K_d)) / (w_K / w_0)^(1/(p K)) and w_0 = 1, as the first iterate is compared with
+    the place where the step began (Z13 A9, Z16 C.5). The step is accepted when w_K <= TOL within K_d
+    iterations; the next one is Lambda_K times as long, or a rejected one is tried again so.
+
+    This bounds the error of the iteration only. That of the trapezoidal rule itself is not seen, and is left
+    to ``longest``. What the papers leave open: the step never changes by more than ``most`` or less than
+    ``least`` times in one go, and a step that fails at ``shortest`` stops the world, with time, particle and
+    force.
+
+    tolerance : TOL. iterations : K_d. order : p. first : dt_0. longest : dt_lim. Source: Z16 section 8.1.
+    """
+
+    tolerance: float = parameter("", 5e-4, gt=0)
+    iterations: int = Field(10, ge=2)
+    order: float = parameter("", 2.0, gt=0)
+
+    @ti.func
     def solved(self, w, change):
         """Whether the iteration may end, its last relative change having been this."""
         return change <= self.tolerance(w)
@@ -68,25 +92,11 @@ class IterationControl(StepControl):
         return moved
 
     @ti.func
-    def hopeless(self, w, dt):
-        """Whether a step of this length (s) that has failed must not be made shorter."""
-        return dt <= ti.cast(self.shortest(w), ti.f64) * (1.0 + 1e-9)
-
-    @ti.func
     def factor(self, w, change, k, error):
         """What the next step is to be multiplied by, after K = k iterations."""
         p = ti.cast(self.order(w), ti.f64)
         wanted = ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / (p * self.iterations))
         return self.limited(w, wanted, ti.pow(change, 1.0 / (p * k)))
-
-    @ti.func
-    def limited(self, w, wanted, reached):
-        """wanted / reached, between ``least`` and ``most``; the least for a NaN."""
-        least, most = ti.cast(self.least(w), ti.f64), ti.cast(self.most(w), ti.f64)
-        factor = least
-        if wanted >= least * reached:
-            factor = ti.min(most, wanted / ti.max(reached, wanted / most))
-        return factor
 
 
 class ErrorControl(IterationControl):

@@ -1,60 +1,10 @@
-"""The phases of an implicit step: attempts of some length, each an iteration, until one is accepted."""
+"""The phases of an attempt at a step of the trapezoidal rule: an iteration, and the verdict on it."""
 
 from tisim._taichi import ti
 from tisim.blocks import PerBlock
 from tisim.program import PerParticle, Phase, Repeat
-from tisim.state import STUCK
+from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse, length
 from tisim.steppers.phases import note_stride
-
-TRIED, ACCEPTED, HOPELESS = range(3)
-"""Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
-
-SHORTER = 0.8
-"""The longest that a second attempt may be, in lengths of the first."""
-
-
-class Begin(Phase):
-    """A step begins."""
-
-    def __init__(self, s) -> None:
-        self.s = s
-
-    @ti.func
-    def run(self, w, _k):
-        s = self.s
-        s.time_before[w] = s.time[w]
-        s.attempting[w] = 1.0
-        s.approach_time[w] = ti.math.inf
-        s.fastest[w] = 0.0
-        s.events[w] = 0
-        s.steps[w] += 1
-        s.particle_steps[w] += s.count[w]
-        for k in ti.static(range(3)):
-            s.stride[w, k] = 0.0
-
-
-class Keep(PerParticle):
-    """Keep the state at the beginning of the step."""
-
-    def __init__(self, solve) -> None:
-        super().__init__(solve.s)
-        self.solve = solve
-
-    @ti.func
-    def run(self, w, i):
-        self.solve.keep(w, i)
-
-
-class Attempt(Repeat):
-    """Attempts at a step, until one is accepted or all hope is lost."""
-
-    def __init__(self, s, items) -> None:
-        super().__init__(items)
-        self.s = s
-
-    @ti.func
-    def pending(self, w):
-        return ti.cast(self.s.attempting[w], ti.i32)
 
 
 class Iteration(Repeat):
@@ -78,11 +28,7 @@ class Try(Phase):
     @ti.func
     def run(self, w, _k):
         s = self.s
-        dt = self.control.step(w, s.next_dt[w])
-        left = s.end[w] - s.time_before[w]
-        # A remainder as small as rounding leaves is not worth a step of its own.
-        if dt * (1.0 + 1e-6) >= left:
-            dt = left
+        dt = length(s, self.control, w)
         s.dt[w] = dt
         s.time[w] = s.time_before[w] + dt
         s.iterating[w], s.solver_iteration[w] = 1.0, 1.0
@@ -100,7 +46,7 @@ class Predict(PerParticle):
         s, solve = self.s, self.solve
         dt = ti.cast(s.dt[w], s.real)
         v = solve.velocity(w, i, dt, s.time[w])
-        if not solve.sound(w, i, v, dt):
+        if not solve.bearable(w, i, v, dt):
             v = s.velocity_before[w, i]
         solve.advance(w, i, v, dt)
         moved = ti.cast(solve.displacement(w, i, v, dt), ti.f64)
@@ -121,7 +67,7 @@ class Correct(PerBlock):
         last = s.velocity[w, i]
         v = solve.velocity(w, i, dt, s.time[w])
         change = ti.cast(ti.math.inf, s.real)
-        if solve.sound(w, i, v, dt):
+        if solve.bearable(w, i, v, dt):
             step = solve.phi(w) * dt * (v - last)
             change = step.norm() + solve.advance(w, i, v, dt)
             note_stride(s, w, ti.cast(step, ti.f64))
@@ -159,57 +105,8 @@ class Judge(Phase):
                 s.verdict[w] = ACCEPTED
             elif self.control.hopeless(w, s.dt[w]):
                 s.verdict[w] = HOPELESS
-                self.accuse(w)
+                accuse(s, self.summed, w)
             factor = self.control.factor(w, change, k, error)
             # A step that was not accepted would fail again in the same way if it were as long.
             s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))
             s.iterating[w] = 0.0
-
-    @ti.func
-    def accuse(self, w):
-        """The particle whose last iterate changed most, and the largest force on it."""
-        s = self.s
-        worst, most = 0, s.iterate_change[w, 0]
-        for i in range(s.count[w]):
-            if s.iterate_change[w, i] > most:
-                worst, most = i, s.iterate_change[w, i]
-        s.culprit[w] = s.id[w, worst]
-        s.blame[w] = self.summed.largest(w, worst)
-
-
-class GiveUp(PerParticle):
-    """An attempt that has failed leaves everything as it was."""
-
-    conditional = True
-
-    def __init__(self, solve) -> None:
-        super().__init__(solve.s)
-        self.solve = solve
-
-    @ti.func
-    def when(self, w):
-        return ti.select(self.s.verdict[w] == ACCEPTED, 0, 1)
-
-    @ti.func
-    def run(self, w, i):
-        s = self.s
-        back = self.solve.domain.nearest(w, s.position[w, i], s.position_before[w, i])
-        note_stride(s, w, ti.cast(back, ti.f64))
-        self.solve.give_up(w, i)
-
-
-class Decide(Phase):
-    """Try again, or not."""
-
-    def __init__(self, parts) -> None:
-        self.s = parts.s
-
-    @ti.func
-    def run(self, w, _k):
-        s = self.s
-        if s.verdict[w] != ACCEPTED:
-            s.rejections[w] += 1
-            s.time[w] = s.time_before[w]
-        if s.verdict[w] == HOPELESS:
-            s.failed[w] = STUCK
-        s.attempting[w] = ti.select(s.verdict[w] == TRIED, 1.0, 0.0)

@@ -5,6 +5,7 @@ compared by their velocities, and positions may be wrapped into a box in between
 """
 
 from tisim._taichi import ti
+from tisim.steppers.kept import Kept
 
 
 def with_jacobian(forces):
@@ -22,11 +23,12 @@ def summed_jacobian(forces: ti.template(), s, w, i, t):  # type: ignore[valid-ty
 
 
 @ti.data_oriented
-class Solve:
+class Solve(Kept):
     """One iterate of a particle, given the force at the last one."""
 
     def __init__(self, parts, phi) -> None:
-        self.s, self.domain, self.phi, self.turning = parts.s, parts.domain, phi, parts.turning
+        super().__init__(parts)
+        self.phi = phi
         self.linear = with_jacobian(parts.singles)
 
     @ti.func
@@ -77,26 +79,6 @@ class Solve:
         return dt * dt / self.s.mass[w, i] * total.norm()
 
     @ti.func
-    def sound(self, w, i, v, dt):
+    def bearable(self, w, i, v, dt):
         """Whether a particle with v' gets to a place that numbers can tell."""
-        r = self.s.position_before[w, i] + self.displacement(w, i, v, dt)
-        # Below infinity: not true of NaN.
-        return r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
-
-    @ti.func
-    def keep(self, w, i):
-        """Keep the state of a particle at the beginning of a step."""
-        s = self.s
-        s.position_before[w, i], s.velocity_before[w, i] = s.position[w, i], s.velocity[w, i]
-        s.force_before[w, i] = s.force[w, i]
-        if ti.static(self.turning):
-            s.spin_before[w, i], s.torque_before[w, i] = s.spin[w, i], s.torque[w, i]
-
-    @ti.func
-    def give_up(self, w, i):
-        """Back to the beginning of the step."""
-        s = self.s
-        s.position[w, i], s.velocity[w, i] = s.position_before[w, i], s.velocity_before[w, i]
-        s.force[w, i] = s.force_before[w, i]
-        if ti.static(self.turning):
-            s.spin[w, i], s.torque[w, i] = s.spin_before[w, i], s.torque_before[w, i]
+        return self.sound(w, self.s.position_before[w, i] + self.displacement(w, i, v, dt))

@@ -11,30 +11,14 @@ from tisim.spec import parameter
 from tisim.state import Field
 from tisim.steppers.acceleration import accelerated, memory_of_iterates
 from tisim.steppers.alone import Alone, EndWindow, Window
+from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
 from tisim.steppers.implicit_control import IterationControl
-from tisim.steppers.implicit_phases import (
-    Attempt,
-    Begin,
-    Correct,
-    Decide,
-    GiveUp,
-    Iteration,
-    Judge,
-    Keep,
-    Predict,
-    Try,
-)
+from tisim.steppers.implicit_phases import Correct, Iteration, Judge, Predict, Try
+from tisim.steppers.kept import CHANGE, kept
 from tisim.steppers.phases import Arrive, Listen, Operate
 from tisim.steppers.solve import Solve
 from tisim.steppers.stepper import Parts, Stepper
 
-BEFORE = (
-    Field("position_before", "m", 3, "keep"),
-    Field("velocity_before", "m/s", 3, "keep"),
-    Field("force_before", "N", 3, "keep"),
-)
-TURNING_BEFORE = (Field("spin_before", "rad/s", 3, "keep"), Field("torque_before", "N m", 3, "keep"))
-CHANGE = Field("iterate_change", "m", 1, "keep")
 OWN_STEP = Field("own_dt", "s", 1, "keep")
 
 
@@ -66,8 +50,7 @@ class Trapezoid(Stepper):
         accelerated = self.acceleration == "anderson" and not independent
         return (
             FORCE,
-            *BEFORE,
-            *(TURNING_BEFORE if turning else ()),
+            *kept(turning),
             *(memory_of_iterates(turning) if accelerated else ()),
             OWN_STEP if independent else CHANGE,
         )

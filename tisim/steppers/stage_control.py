@@ -1,0 +1,58 @@
+"""Step control of the collocation stepper: by an estimate of its error, and by how its sweeps converge."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from tisim._taichi import ti
+from tisim.spec import parameter
+from tisim.steppers.implicit_control import ImplicitControl
+
+CONTRACTION = 0.25
+"""What a sweep is to multiply the error by, at most, where convergence limits the step."""
+
+
+class StageControl(ImplicitControl):
+    """Steps whose error, and that of the sweeps that solve them, is that asked for.
+
+    error : of a step over the displacement in it, both summed over the particles. sweeps : as many as a step
+    may take. part : what may be left of the error when sweeps end. safety : how much of the error the next
+    step aims at. resolution : part of its radius that is added to a particle's displacement: for one that
+    starts from rest the ratio of error and displacement has no limit.
+
+    Sweeps end once the change in the last one, times the factor by which a sweep makes the error smaller, is
+    below ``part`` of the error. The factor is that of the last two sweeps; in the first, that of the last
+    steps for the present length. Source: as for implicit Runge-Kutta methods, E. Hairer, G. Wanner, Solving
+    Ordinary Differential Equations II, Eq. (IV.8.10) and (IV.8.11).
+    """
+
+    error: float = parameter("", 1e-6, gt=0)
+    part: float = parameter("", 0.3, gt=0)
+    sweeps: int = Field(10, ge=2)
+    safety: float = parameter("", 0.9, gt=0, lt=1)
+    resolution: float = parameter("", 1e-3, ge=0)
+    first: float = parameter("s", 1e-6, gt=0)
+    longest: float = parameter("s", 1.0, gt=0)
+
+    @ti.func
+    def scale(self, s, w, i, moved):
+        """What the error of a particle that has moved so far is compared with. m."""
+        return moved + self.resolution(w) * s.radius[w, i]
+
+    @ti.func
+    def solved(self, w, left):
+        """Whether sweeps may end, with this much error left."""
+        return left <= ti.cast(self.part(w) * self.error(w), ti.f64)
+
+    @ti.func
+    def accepts(self, w, error):
+        """Whether a solved step is accurate enough."""
+        return error <= ti.cast(self.error(w), ti.f64)
+
+    @ti.func
+    def factor(self, w, contraction, error, order):
+        """What the next step is to be multiplied by: the error falls as dt^order, the contraction as dt^2."""
+        asked = ti.cast(self.error(w), ti.f64)
+        wanted = ti.cast(self.safety(w), ti.f64) * ti.pow(asked, 1.0 / order)
+        by_error = self.limited(w, wanted, ti.pow(error, 1.0 / order))
+        return ti.min(by_error, self.limited(w, ti.sqrt(CONTRACTION), ti.sqrt(contraction)))
