@@ -1,0 +1,248 @@
+"""Error against time of the case ``vibration`` beside scipy's steppers, all in one run.
+
+    python tests/benchmarks/vibration_precision.py [--repeats 5] [--threads 2] [--out out/vibration_precision]
+
+343 particles, the printed parameters, 0.005 s, Omega = 0.8 w (Z13 section 4; beyond some 0.01 s single paths
+are chaotic). Peers: DOP853 and RK45 of scipy.integrate.solve_ivp, on a right-hand side of vectorised NumPy and
+on one compiled by numba, parallel and with all freedom to vectorise. Error: the root of the mean square
+distance of particles from those of a reference, over that of their displacements. The reference is DOP853 at
+rtol 1e-13; our own at 1e-12 says how good it is. Time: the median of runs that alternate, without compilation.
+Prints a table, and for every decade of error the fastest of each; writes work_precision.png and .csv.
+"""
+
+import argparse
+import csv
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numba
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from cases import vibration
+from tisim import Simulation, runtime
+from tisim.steppers.collocation import Collocation
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.stage_control import StageControl
+from tisim.steppers.stepper import Stepper
+from tisim.steppers.trapezoid import Trapezoid
+
+RATIO, DURATION = 0.8, 0.005
+OMEGA = RATIO * vibration.CYCLOTRON
+DECADES = range(3, 9)
+"""Errors of 1e-3 to 1e-8."""
+
+
+def by_numpy(x: np.ndarray) -> np.ndarray:
+    """Sum of the near field over all pairs; x is (3, n), m; N."""
+    d = x[:, :, None] - x[:, None, :]
+    square = (d * d).sum(axis=0)
+    np.fill_diagonal(square, 1.0)
+    push = (vibration.REPULSION / np.sqrt(square) - vibration.ATTRACTION) / square
+    return (push * d).sum(axis=2)
+
+
+@numba.njit(parallel=True, fastmath=True, error_model="numpy")
+def by_numba(x):
+    """The same."""
+    n = x.shape[1]
+    out = np.empty_like(x)
+    attraction, repulsion = vibration.ATTRACTION, vibration.REPULSION
+    for i in numba.prange(n):
+        fx, fy, fz = 0.0, 0.0, 0.0
+        xi, yi, zi = x[0, i], x[1, i], x[2, i]
+        for j in range(n):
+            dx, dy, dz = xi - x[0, j], yi - x[1, j], zi - x[2, j]
+            square = dx * dx + dy * dy + dz * dz
+            # The particle itself: its distance components are 0.
+            square += 1.0 if square == 0.0 else 0.0
+            push = (repulsion / np.sqrt(square) - attraction) / square
+            fx += push * dx
+            fy += push * dy
+            fz += push * dz
+        out[0, i], out[1, i], out[2, i] = fx, fy, fz
+    return out
+
+
+def rates(near: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> Callable:
+    """Right-hand side for scipy: near field, tether, and Lorentz force (Z13 1, 12, 23)."""
+    n = start.size
+
+    def evaluate(t: float, y: np.ndarray) -> np.ndarray:
+        x, v = y[:n].reshape(3, -1), y[n:].reshape(3, -1)
+        force = near(x) - vibration.STIFFNESS * (x - start)
+        force[0] += vibration.CHARGE * (vibration.FIELD * np.sin(OMEGA * t) + vibration.FLUX * v[1])
+        force[1] -= vibration.CHARGE * vibration.FLUX * v[0]
+        return np.concatenate([y[n:], force.ravel() / vibration.MASS])
+
+    return evaluate
+
+
+@dataclass
+class Point:
+    """One setting of one method, and what it found."""
+
+    method: str
+    setting: str
+    run: Callable[[], tuple[np.ndarray, int, float]]
+    seconds: list[float] = field(default_factory=list)
+    error: float = np.nan
+    work: int = 0
+
+    def measure(self, truth: np.ndarray, start: np.ndarray) -> None:
+        """Run once more."""
+        found, self.work, taken = self.run()
+        self.seconds.append(taken)
+        self.error = distance(found, truth) / distance(truth, start)
+
+    def median(self) -> float:
+        """Of the wall seconds."""
+        return float(np.median(self.seconds))
+
+
+def distance(a: np.ndarray, b: np.ndarray) -> float:
+    """Root of the mean square distance of particles, m."""
+    return float(np.sqrt(((a - b) ** 2).sum(axis=0).mean()))
+
+
+def scipy_point(method: str, near: Callable, name: str, start: np.ndarray, rtol: float) -> Point:
+    """A run of solve_ivp; atol is that part of a micrometre-sized displacement."""
+    y, evaluate = np.concatenate([start.ravel(), np.zeros(start.size)]), rates(near, start)
+
+    def run() -> tuple[np.ndarray, int, float]:
+        began = time.perf_counter()
+        found = solve_ivp(
+            evaluate, (0.0, DURATION), y, method, t_eval=[DURATION], rtol=rtol, atol=rtol * 1e-2
+        )
+        taken = time.perf_counter() - began
+        return found.y[: start.size, -1].reshape(3, -1), int(found.nfev), taken
+
+    return Point(f"{method}, {name}", f"rtol={rtol:.0e}", run)
+
+
+_compiled: dict[object, Simulation] = {}
+
+
+def tisim_point(name: str, stepper: Stepper, setting: str) -> Point:
+    """A run of the case; simulations are compiled once for each structure."""
+    scene = vibration.scene(RATIO, duration=DURATION).model_copy(update={"stepper": stepper})
+    if scene.structure() not in _compiled:
+        _compiled[scene.structure()] = Simulation(scene)
+    simulation = _compiled[scene.structure()]
+
+    def run() -> tuple[np.ndarray, int, float]:
+        simulation.load([scene])
+        began = time.perf_counter()
+        simulation.run()
+        taken = time.perf_counter() - began
+        (result,) = simulation.results()
+        assert result.status.ok, result.status.reason
+        places = result.state["position"][np.argsort(result.state["id"])].T
+        return places, result.work["force_evaluations"], taken
+
+    return Point(name, setting, run)
+
+
+def points(start: np.ndarray) -> list[Point]:
+    """Every method over its settings."""
+    found = []
+    for exponent in np.arange(2.0, 11.0):
+        for method in ("DOP853", "RK45"):
+            found.append(scipy_point(method, by_numba, "numba", start, 10.0**-exponent))
+            found.append(scipy_point(method, by_numpy, "NumPy", start, 10.0**-exponent))
+    for stages in (3, 4, 5, 6):
+        for exponent in np.arange(1.0, 10.0, 0.5):
+            error = float(10.0**-exponent)
+            stepper = Collocation(stages=stages, control=StageControl(error=error))
+            found.append(tisim_point(f"Collocation, {stages} stages", stepper, f"error={error:.1e}"))
+    for exponent in np.arange(1.0, 6.0, 0.5):
+        error = float(10.0**-exponent)
+        control = ErrorControl(error=error, tolerance=error / 10, first=1e-6, longest=1e-3)
+        found.append(tisim_point("Trapezoid", Trapezoid(control=control), f"error={error:.1e}"))
+    return found
+
+
+def fastest(found: list[Point], ours: bool, error: float) -> Point | None:
+    """The fastest with at most this error, among ours or the others."""
+    good = [p for p in found if (", n" in p.method.lower()) != ours and p.error <= error]
+    return min(good, key=Point.median, default=None)
+
+
+def draw(found: list[Point], path: Path) -> None:
+    """Error against time, a line for each method."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), sharey=True)
+    for method in dict.fromkeys(p.method for p in found):
+        line = [p for p in found if p.method == method and p.error < 0.3]
+        style = "o-" if ", n" not in method.lower() else "s--"
+        axes[0].loglog([p.median() for p in line], [p.error for p in line], style, ms=3, label=method)
+        axes[1].loglog([p.work for p in line], [p.error for p in line], style, ms=3)
+    axes[0].set(xlabel="wall time, s", ylabel="error of positions", title="vibration, 343 particles, 0.005 s")
+    axes[1].set(xlabel="sums of forces", title="the same against work")
+    axes[0].legend(fontsize=7)
+    for a in axes:
+        a.grid(alpha=0.3)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--threads", type=int, default=os.cpu_count())
+    parser.add_argument("--out", type=Path, default=Path("out/vibration_precision"))
+    asked = parser.parse_args()
+    runtime.start(threads=asked.threads)
+    numba.set_num_threads(asked.threads)
+    arrays = vibration.scene(RATIO).particles.arrays(vibration.scene(RATIO).domain, 0)
+    start = np.ascontiguousarray(arrays["position"].T)
+    truth, _, _ = scipy_point("DOP853", by_numba, "reference", start, 1e-13).run()
+    second, _, _ = tisim_point(
+        "reference", Collocation(stages=6, control=StageControl(error=1e-12, sweeps=20)), ""
+    ).run()
+    print(f"references apart: {distance(truth, second) / distance(truth, start):.1e}")
+    for near, name in ((by_numpy, "NumPy"), (by_numba, "numba")):
+        began = time.perf_counter()
+        for _ in range(20):
+            near(start)
+        print(f"one sum of forces by {name}: {(time.perf_counter() - began) / 20 * 1e6:.0f} us")
+    found = points(start)
+    for _ in range(asked.repeats + 1):
+        for point in found:
+            point.measure(truth, start)
+    for point in found:
+        # The first run of a numba function compiles it.
+        del point.seconds[0]
+        spread = max(point.seconds) - min(point.seconds)
+        print(
+            f"{point.method:24s} {point.setting:14s} error {point.error:.1e}  {point.median() * 1e3:8.2f} ms "
+            f"(spread {spread * 1e3:.2f})  {point.work:6d} sums of forces"
+        )
+    for decade in DECADES:
+        ours, theirs = fastest(found, True, 10.0**-decade), fastest(found, False, 10.0**-decade)
+        if ours and theirs:
+            print(
+                f"1e-{decade}: {ours.method} ({ours.setting}) {ours.median() * 1e3:.2f} ms; {theirs.method} "
+                f"({theirs.setting}) {theirs.median() * 1e3:.2f} ms; they take "
+                f"{theirs.median() / ours.median():.2f} times the time, {theirs.work / ours.work:.2f} the sums"
+            )
+    asked.out.mkdir(parents=True, exist_ok=True)
+    draw(found, asked.out / "work_precision.png")
+    with (asked.out / "work_precision.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(("method", "setting", "error", "seconds", "sums_of_forces"))
+        table.writerows((p.method, p.setting, p.error, p.median(), p.work) for p in found)
+
+
+if __name__ == "__main__":
+    main()
