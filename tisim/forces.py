@@ -43,12 +43,14 @@ class SumForces(PairSum):
         super().__init__(s, domain, pair_forces, halves)
         self.forces, self.pair_forces = forces, pair_forces
         self.turning = turning(forces, pair_forces)
-        self.wrench = _both if self.turning else _force
+        self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
 
     @ti.func
-    def run(self, w, i):
-        t = self.s.time[w]
-        total = self.summed(self.singles(w, i, t), w, i, t)
+    def start(self, w, i, t):
+        return self.singles(w, i, t)
+
+    @ti.func
+    def finish(self, w, i, total, t):
         self.write(w, i, total)
         self.check(w, i, total)
 
@@ -97,13 +99,12 @@ class SumForces(PairSum):
         """Say which force it was."""
         s = self.s
         t = s.time[w]
-        nothing = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         for effect in ti.static(self.forces):
             if not (self.single(effect, w, i, t).norm_sqr() < ti.math.inf):
                 s.fault(w, i, effect.index)
         for effect in ti.static(self.pair_forces):
             for j in range(s.count[w]):
-                if not (self.of((effect,), nothing, w, i, j, t).norm_sqr() < ti.math.inf):
+                if not (self.of((effect,), w, i, j, t).norm_sqr() < ti.math.inf):
                     s.fault(w, i, effect.index)
 
     @ti.func
@@ -111,16 +112,15 @@ class SumForces(PairSum):
         """Index of the effect whose force on i is largest, or not finite."""
         s = self.s
         t = s.time[w]
-        nothing = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
         most, found = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces):
             size = self.single(effect, w, i, t).norm()
             if not (size <= most):
                 most, found = size, effect.index
         for effect in ti.static(self.pair_forces):
-            total = nothing
+            total = ti.Vector.zero(s.real, self.components)
             for j in range(s.count[w]):
-                total += self.of((effect,), nothing, w, i, j, t)
+                total += self.of((effect,), w, i, j, t)
             if not (total.norm() <= most):
                 most, found = total.norm(), effect.index
         return found

@@ -21,6 +21,21 @@ def _magnitude(value):
     return ti.abs(value)
 
 
+@ti.func
+def _packed(number):
+    return ti.Vector([number])
+
+
+@ti.func
+def _unpacked(vector):
+    return vector[0]
+
+
+@ti.func
+def _same(vector):
+    return vector
+
+
 @ti.data_oriented
 class Settling:
     """One mutual quantity on its way: the values of the next sweep, and whether there must be one."""
@@ -99,17 +114,17 @@ class Sweep(PairSum):
 
     def __init__(self, settling: Settling) -> None:
         super().__init__(settling.s, settling.domain, (settling.effect,), settling.halves)
-        self.settling, self.effect = settling, settling.effect
+        self.settling, self.effect, self.components = settling, settling.effect, settling.components
+        self.packed, self.unpacked = (_packed, _unpacked) if self.components == 1 else (_same, _same)
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        return effect.influence(self.s, w, i, j, separation, distance, t)
+        influence = effect.influence(self.s, w, i, j, separation, distance, t)
+        return self.packed(influence)
 
     @ti.func
-    def run(self, w, i):
-        t = self.s.time[w]
-        total = self.summed(0.0 * self.settling.next[w, i], w, i, t)
-        new = self.effect.response(self.s, w, i, total, t)
+    def finish(self, w, i, total, t):
+        new = self.effect.response(self.s, w, i, self.unpacked(total), t)
         self.settling.next[w, i] = new
         size = self.settling.size(new)
         if size > self.settling.largest[w]:
