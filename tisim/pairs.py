@@ -70,16 +70,19 @@ class PairSum(PerParticle):
         n = self.s.count[w]
         first, end = ti.min(begin, self.s.capacity - LANES), ti.min(begin + LANES, n)
         sums = ti.Matrix([[0.0] * LANES] * self.components, self.s.real)
+        # Numbers of lanes as wide as the sums: comparing integers of 64 bits would halve the lanes in f32.
+        number = ti.Vector([float(lane) for lane in range(LANES)], self.s.real)
         for i in range(begin, end):
             total = self.start(w, i, t)
             for c in ti.static(range(self.components)):
                 sums[c, i - first] = total[c]
         for j in range(n):
+            itself = ti.cast(j - first, self.s.real)
             for lane in range(LANES):
-                i = first + lane
-                terms = self.terms(self.long_ranged, w, i, j, t)
+                terms = self.terms(self.long_ranged, w, first + lane, j, t)
                 for c in ti.static(range(self.components)):
-                    sums[c, lane] += ti.select(i != j, terms[c], 0.0)
+                    total = sums[c, lane]
+                    sums[c, lane] = ti.select(number[lane] != itself, total + terms[c], total)
         for i in range(begin, end):
             total = ti.Vector.zero(self.s.real, self.components)
             for c in ti.static(range(self.components)):
@@ -107,7 +110,7 @@ class PairSum(PerParticle):
         """Terms of j for i, which are not the same."""
         d = self.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
         distance = d.norm()
-        total = ti.Vector.zero(self.s.real, self.components)
-        for effect in ti.static(effects):
+        total = self.term(effects[0], w, i, j, d, distance, t)
+        for effect in ti.static(effects[1:]):
             total += self.term(effect, w, i, j, d, distance, t)
         return total

@@ -20,12 +20,19 @@ def power(x, exponent: ti.template()):  # type: ignore[valid-type]
 @ti.func
 def whole_power(x, exponent: ti.template()):  # type: ignore[valid-type]
     """x ** exponent by repeated squaring."""
-    result, square = 1.0 + 0.0 * x, x
+    square = x
     if ti.static(exponent < 0):
         square = 1.0 / x
+    result = square
+    if ti.static(exponent == 0):
+        result = 1.0 + 0.0 * x
     for bit in ti.static(range(abs(exponent).bit_length())):
         if ti.static(bit > 0):
             square *= square
+        # The first factor is taken as it is: compilers must not leave out a product with one.
         if ti.static(abs(exponent) >> bit & 1):
-            result *= square
+            if ti.static(abs(exponent) & ((1 << bit) - 1)):
+                result *= square
+            else:
+                result = square
     return result

@@ -49,7 +49,7 @@ class NearField(PairForce):
     @ti.func
     def own(self, s, w, i):
         """c_i s_i."""
-        size = 1.0 + 0.0 * s.radius[w, i]
+        size = ti.cast(1.0, s.real)
         if ti.static(self.strength == "mass"):
             size = s.mass[w, i]
         elif ti.static(self.strength == "area"):
@@ -69,9 +69,10 @@ class NearField(PairForce):
     @ti.func
     def between(self, s, w, i, j, separation, distance):
         """Force on i by j. N."""
-        attraction = self.alpha1(w) * power(distance, -self.beta1)
-        repulsion = self.alpha2(w) * power(distance, -self.beta2)
-        return self.own(s, w, i) * self.own(s, w, j) * (attraction - repulsion) / distance * separation
+        # Each over d once more, for n_ij = separation / d; one division serves both whole powers.
+        attraction = self.alpha1(w) * power(distance, -1 - self.beta1)
+        repulsion = self.alpha2(w) * power(distance, -1 - self.beta2)
+        return self.own(s, w, i) * self.own(s, w, j) * (attraction - repulsion) * separation
 
 
 class TruncatedNearField(NearField):
