@@ -3,8 +3,8 @@
     python tests/benchmarks/vibration_precision.py [--repeats 5] [--threads 2] [--out out/vibration_precision]
 
 343 particles, the printed parameters, 0.005 s, Omega = 0.8 w (Z13 section 4; beyond some 0.01 s single paths
-are chaotic). Peers: DOP853 and RK45 of scipy.integrate.solve_ivp, on a right-hand side of vectorised NumPy and
-on ones compiled by numba with all freedom to vectorise, on one thread and on all. Error: the root of the mean
+are chaotic). Peers: DOP853 and RK45 of scipy.integrate.solve_ivp, on a right-hand side of vectorised NumPy,
+and on ones compiled by numba with all freedom to vectorise, on one thread and on all. Error: root of the mean
 square distance of particles from those of a reference, over that of their displacements. The reference is
 DOP853 at rtol 1e-13; our own at 1e-12 says how good it is. Time: the median of runs that alternate, without
 compilation. Prints a table, and for every decade of error the fastest of each; writes work_precision.png and
@@ -242,8 +242,8 @@ def main() -> None:
         if ours and theirs:
             print(
                 f"1e-{decade}: {ours.method} ({ours.setting}) {ours.median() * 1e3:.2f} ms; {theirs.method} "
-                f"({theirs.setting}) {theirs.median() * 1e3:.2f} ms, {theirs.median() / ours.median():.2f} times "
-                f"the time, {theirs.work / ours.work:.2f} times the sums"
+                f"({theirs.setting}) {theirs.median() * 1e3:.2f} ms, {theirs.median() / ours.median():.2f} "
+                f"times the time, {theirs.work / ours.work:.2f} times the sums"
             )
     asked.out.mkdir(parents=True, exist_ok=True)
     draw(found, asked.out / "work_precision.png")
