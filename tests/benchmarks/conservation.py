@@ -1,0 +1,85 @@
+"""How well each stepper keeps energy and momentum of particles that attract and repel each other.
+
+    python tests/benchmarks/conservation.py [--sites 7]
+
+The cubic array of Z13 section 4 with the near field as printed, and nothing else: no tether, no field. For
+0.005 s it is thrown apart. For each stepper: sums of forces, the change of the energy over the kinetic energy at
+the end, and of the momentum over the sum of the particles' momenta.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numpy as np
+
+from cases.vibration import ATTRACTION, REPULSION, scene
+from tisim import Result, run, runtime
+from tisim.effects.near_field import NearField
+from tisim.steppers.collocation import Collocation
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.implicit_control import ErrorControl, IterationControl
+from tisim.steppers.stage_control import StageControl
+from tisim.steppers.stepper import Stepper
+from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.verlet import Verlet
+
+
+def trapezoid(error: float) -> Trapezoid:
+    return Trapezoid(control=ErrorControl(error=error, tolerance=error / 10, first=1e-7, longest=1e-3))
+
+
+STEPPERS: dict[str, Stepper] = {
+    "Verlet, 500 steps": Verlet(control=FixedStep(dt=1e-5)),
+    "Trapezoid, as Z16 section 8.1": Trapezoid(control=IterationControl()),
+    "Trapezoid, error=1e-3": trapezoid(1e-3),
+    "Trapezoid, error=1e-5": trapezoid(1e-5),
+    "Collocation, error=1e-4": Collocation(control=StageControl(error=1e-4)),
+    "Collocation, error=1e-8": Collocation(control=StageControl(error=1e-8)),
+}
+
+
+def energy(mass: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> tuple[float, float]:
+    """Kinetic energy, and that of the pairs: alpha_1 ln d + alpha_2/d. J."""
+    a, b = np.triu_indices(len(mass), 1)
+    d = np.linalg.norm(position[a] - position[b], axis=1)
+    kinetic = 0.5 * float((mass * (velocity**2).sum(axis=1)).sum())
+    return kinetic, float((ATTRACTION * np.log(d) + REPULSION / d).sum())
+
+
+def drift(result: Result) -> tuple[float, float]:
+    """Of energy and of momentum, relative."""
+    names = ("mass", "position", "velocity")
+    before, after = ([state[n] for n in names] for state in (result.start, result.state))
+    kinetic, pairs = energy(*after)
+    momentum = [m[:, None] * v for m, _, v in (before, after)]
+    change = np.linalg.norm(momentum[1].sum(axis=0) - momentum[0].sum(axis=0))
+    size = np.linalg.norm(momentum[1], axis=1).sum()
+    return (kinetic + pairs - sum(energy(*before))) / kinetic, float(change / size)
+
+
+def measure(stepper: Stepper, sites: int) -> Result:
+    """A run of the bare array."""
+    effects = (NearField(alpha1=ATTRACTION, beta1=1, alpha2=REPULSION, beta2=2),)
+    return run(scene(sites=sites).model_copy(update={"effects": effects, "stepper": stepper}))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--sites", type=int, default=7)
+    asked = parser.parse_args()
+    runtime.start()
+    for name, stepper in STEPPERS.items():
+        result = measure(stepper, asked.sites)
+        sums = result.work.get("force_evaluations", result.work["steps"])
+        of_energy, of_momentum = drift(result)
+        print(
+            f"{name:32s} {sums:6d} sums of forces  "
+            f"energy off by {of_energy:+.1e}  momentum by {of_momentum:.1e}"
+        )
+
+
+if __name__ == "__main__":
+    main()
