@@ -3,8 +3,8 @@
     python tests/benchmarks/conservation.py [--sites 7]
 
 The cubic array of Z13 section 4 with the near field as printed, and nothing else: no tether, no field. For
-0.005 s it is thrown apart. For each stepper: sums of forces, the change of the energy over the kinetic energy at
-the end, and of the momentum over the sum of the particles' momenta.
+0.005 s it is thrown apart. For each stepper: sums of forces, change of the energy over the kinetic energy at
+the end, and change of the momentum over the sum of the particles' momenta.
 """
 
 import argparse
