@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from cases.agglomeration_accuracy import quantities
 from cases.agglomeration_strings import designs
 from cases.case import Case, Check, Size
 from optimize.genome import Gene, Genome
@@ -158,6 +159,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
+    quantities=quantities,
     problem=problem,
     variants=tuple(SURFACE_ENERGY),
 )

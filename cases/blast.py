@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from cases.blast_accuracy import half_axes, quantities
 from cases.case import Case, Check, Size
 from tisim import Cloud, Result, Scene, run
 from tisim.effect import Effect
@@ -101,12 +102,6 @@ def scene_for(size: str, seed: int) -> Scene:
     return scene(seed=seed, **CASE.size(size).scene)
 
 
-def half_axes(result: Result) -> np.ndarray:
-    """Of the ellipsoid, along x, y and z, that has the second moments of the cloud: sqrt(5 <r_k^2>). m."""
-    r = result.state["position"] - np.average(result.state["position"], axis=0, weights=result.state["mass"])
-    return np.sqrt(5.0 * np.average(r**2, axis=0, weights=result.state["mass"]))
-
-
 def check() -> Iterator[Check]:
     """Numbers of Z16, energy at the start, and what the field does to the cloud."""
     drag = 0.5 * AIR * 1.0 * SPEED * np.pi * RADIUS**2
@@ -140,4 +135,5 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
+    quantities=quantities,
 )

@@ -10,6 +10,7 @@ from typing import Any
 
 import cases
 from optimize.problem import Problem
+from tisim.accuracy.quantity import Quantity
 from tisim.errors import must
 from tisim.scene import Scene
 
@@ -43,6 +44,7 @@ class Case:
 
     name : of the module. title, source : for people. sizes : by name; "default" is among them.
     scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
+    quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
     problem : (size, variant) -> Problem; variants : its names, the first the default.
     """
 
@@ -54,6 +56,7 @@ class Case:
     check: Callable[[], Iterator[Check]]
     problem: Callable[[str, str], Problem] | None = None
     variants: tuple[str, ...] = ()
+    quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None
 
     def size(self, name: str) -> Size:
         """A size by name; InputError when there is none of that name."""

@@ -19,6 +19,7 @@ import numpy as np
 
 from cases.case import Case, Check, Size
 from cases.charged_closed_forms import resonances, response
+from cases.vibration_accuracy import quantities
 from tisim import Cloud, Result, Scene, run
 from tisim.effects.lorentz import Lorentz
 from tisim.effects.near_field import NearField, TruncatedNearField
@@ -146,4 +147,5 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
+    quantities=quantities,
 )

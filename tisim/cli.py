@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from tisim import __version__, cli_search, cli_watch, request, runtime
+from tisim import __version__, cli_cost, cli_search, cli_watch, request, runtime
 from tisim.errors import InputError, RunError
 from tisim.interrupt import Interrupt
 from tisim.options import (
@@ -225,6 +225,7 @@ def doctor() -> None:
     out().print(table)
 
 
+app.command()(cli_cost.cost)
 app.command()(cli_search.optimize)
 app.command()(cli_search.cache)
 app.command()(cli_watch.plot)

@@ -37,6 +37,7 @@ import numpy as np
 from pydantic import Field as Option
 
 from tisim._taichi import ti
+from tisim.knob import Knob
 from tisim.spec import Spec, parameter
 from tisim.state import Field
 
@@ -74,6 +75,11 @@ class Effect(Spec):
     def capacity(self, masses: np.ndarray) -> int:
         """Particles that may ever live at once, given those of the start (kg); their number by default."""
         return len(masses)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        """Cheaper laws that ``tisim cost`` tries in its place, the coarsest first, for particles that are up
+        to ``extent`` (m) apart; none by default."""
+        return ()
 
     @classmethod
     def offers(cls, hook: str) -> bool:
@@ -174,6 +180,11 @@ class Mutual(Pairwise):
 
     tolerance: float = parameter("", 1e-8, gt=0)
     sweeps: int = Option(100, ge=0)
+
+    knobs = (Knob(tolerance=1),)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        return (self.model_copy(update={"sweeps": 0}),) if self.sweeps else ()
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):

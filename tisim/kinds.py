@@ -53,7 +53,7 @@ def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:
 
 def toml(table: Mapping[str, Any], path: str = "") -> str:
     """TOML text of nested tables of numbers, text, flags and lists."""
-    lines = [f"{key} = {_value(value)}" for key, value in table.items() if not isinstance(value, Mapping)]
+    lines = [f"{key} = {inline(value)}" for key, value in table.items() if not isinstance(value, Mapping)]
     text = "\n".join(lines) + "\n" if lines else ""
     for key, value in table.items():
         if isinstance(value, Mapping):
@@ -62,7 +62,10 @@ def toml(table: Mapping[str, Any], path: str = "") -> str:
     return text
 
 
-def _value(value: Any) -> str:
+def inline(value: Any) -> str:
+    """A value as TOML on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {inline(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "[" + ", ".join(inline(item) for item in value) + "]"
     return json.dumps(value)

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from tisim._taichi import DEVICE_FUNCTION
 from tisim.errors import InputError, must
+from tisim.knob import Knob
 
 Vector = tuple[float, float, float]
 """Three Cartesian components."""
@@ -85,6 +86,8 @@ class Spec(Checked):
     """Set by a class that is no part of a scene itself, only what parts are made after."""
     requires: ClassVar[tuple[type[Spec], ...]] = ()
     """Effects without which this one means nothing."""
+    knobs: ClassVar[tuple[Knob, ...]] = ()
+    """Settings that trade accuracy for time."""
 
 
 def _descendants(cls: type[Any]) -> Iterator[type[Any]]:

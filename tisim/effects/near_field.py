@@ -17,9 +17,12 @@ from typing import Literal
 from pydantic import Field as Option
 
 from tisim._taichi import ti
-from tisim.effect import PairForce, parameter
+from tisim.effect import Effect, PairForce, parameter
 from tisim.powers import Exponent, power
 from tisim.state import Field
+
+CUTS = (0.1, 0.2, 0.5, 1.0)
+"""Cut-offs worth a try, as parts of the largest distance."""
 
 
 class NearField(PairForce):
@@ -41,6 +44,10 @@ class NearField(PairForce):
     beta2: Exponent = Option(2, ge=0)
     strength: Literal["plain", "mass", "area", "volume", "charge"] = "plain"
     signed: bool = False
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        own = {name: getattr(self, name) for name in NearField.model_fields}
+        return tuple(TruncatedNearField(**own, cutoff=float(f"{part * extent:.3g}")) for part in CUTS)
 
     def needed(self) -> tuple[str | Field, ...]:
         charge, polarity = self.needs
@@ -84,6 +91,9 @@ class TruncatedNearField(NearField):
     short_ranged = True
 
     cutoff: float = parameter("m", gt=0)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        return ()
 
     @ti.func
     def reach(self, w):

@@ -105,7 +105,7 @@ class Alone(PerParticle):
                     factor = ti.min(factor, SHORTER)
                     verdict = ti.select(self.control.hopeless(w, dt), HOPELESS, TRIED)
                     solve.give_up(w, i)
-                s.own_dt[w, i] = dt * factor
+                s.own_dt[w, i] = ti.cast(dt * factor, s.real)
         return verdict, k - 1
 
 

@@ -1,12 +1,14 @@
 """Boris' stepper, the standard of charged particles in magnetic fields."""
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import ClassVar, Self
 
 from tisim._taichi import ti
+from tisim.effect import Effect, Force
 from tisim.forces import FORCE
 from tisim.program import Item, PerParticle, Phase
 from tisim.state import Field
-from tisim.steppers.controller import Controller
+from tisim.steppers.controller import Controller, FixedStep
 from tisim.steppers.phases import Arrive, Clock, Listen, Operate, arrive
 from tisim.steppers.solve import summed_jacobian, with_jacobian
 from tisim.steppers.stepper import Parts, Stepper
@@ -27,6 +29,11 @@ class Boris(Stepper):
     control: Controller
 
     keeps: ClassVar = ("time_before",)
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        linear = any(effect.offers("velocity_jacobian") for effect in effects if isinstance(effect, Force))
+        return (cls(control=FixedStep(dt=dt)),) if linear else ()
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         return (FORCE,)

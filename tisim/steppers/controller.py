@@ -8,6 +8,7 @@ from pydantic import model_validator
 
 from tisim._taichi import ti
 from tisim.errors import must
+from tisim.knob import Knob
 from tisim.spec import Spec, parameter
 
 TOUCH = 1.0 + 1e-6
@@ -50,6 +51,8 @@ class FixedStep(Controller):
 
     dt: float = parameter("s", gt=0)
 
+    knobs = (Knob(dt=2),)
+
     @ti.func
     def next(self, s, w, horizon):
         return ti.cast(self.dt(w), ti.f64)
@@ -65,6 +68,8 @@ class ApproachTime(Controller):
     shortest: float = parameter("s", 1e-6, gt=0)
     longest: float = parameter("s", 1e-3, gt=0)
     watches_pairs: ClassVar[bool] = True
+
+    knobs = (Knob(shortest=1, longest=1), Knob(shortest=1, converges=False), Knob(longest=1, converges=False))
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from tisim._taichi import ti
 from tisim.errors import must
+from tisim.knob import Knob
 from tisim.spec import parameter
 from tisim.steppers.controller import StepControl
 
@@ -25,6 +26,12 @@ class ImplicitControl(StepControl):
     shortest: float = parameter("s", 1e-12, gt=0)
     most: float = parameter("", 4.0, ge=1)
     least: float = parameter("", 0.1, gt=0, lt=1)
+
+    knobs: ClassVar[tuple[Knob, ...]] = (
+        Knob(longest=2, tolerance=1),
+        Knob(longest=2, converges=False),
+        Knob(tolerance=1, converges=False),
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -112,6 +119,8 @@ class ErrorControl(IterationControl):
     error: float = parameter("", 1e-4, gt=0)
     safety: float = parameter("", 0.8, gt=0, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
+
+    knobs = (Knob(error=1, tolerance=1),)
 
     @ti.func
     def scale(self, s, w, i, moved):

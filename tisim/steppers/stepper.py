@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
+from tisim.effect import Effect
 from tisim.program import Item
 from tisim.spec import Spec
 from tisim.state import Field, State
@@ -56,6 +58,22 @@ class Stepper(Spec):
     counts: ClassVar[tuple[str, ...]] = ()
     keeps: ClassVar[tuple[str, ...]] = ()
     control: StepControl
+
+    @property
+    def order(self) -> int:
+        """Of its error in dt, for smooth forces."""
+        return 2
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        """Those of this kind that ``tisim cost`` tries in a scene of these effects, with steps of about dt
+        (s); none by default."""
+        return ()
+
+    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
+        """Forces summed for a particle, the mean over particles, from the counts of a run; one a step by
+        default."""
+        return work["particle_steps"] / particles
 
     def structure(self) -> tuple[Any, ...]:
         own = tuple(option for option in super().structure() if option != ("control", self.control))

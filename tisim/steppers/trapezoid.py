@@ -1,10 +1,12 @@
 """The adaptive implicit stepper of Z13 (appendix) and Z16 (section 8, appendix C)."""
 
-from typing import ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field as Option
 
 from tisim.blocks import BlockSums
+from tisim.effect import Effect, Force, PairForce
 from tisim.forces import FORCE
 from tisim.program import Item
 from tisim.spec import parameter
@@ -12,7 +14,7 @@ from tisim.state import Field
 from tisim.steppers.acceleration import accelerated, memory_of_iterates
 from tisim.steppers.alone import Alone, EndWindow, Window
 from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
-from tisim.steppers.implicit_control import IterationControl
+from tisim.steppers.implicit_control import ErrorControl, IterationControl
 from tisim.steppers.implicit_phases import Correct, Iteration, Judge, Predict, Try
 from tisim.steppers.kept import CHANGE, kept
 from tisim.steppers.phases import Arrive, Listen, Operate
@@ -45,6 +47,24 @@ class Trapezoid(Stepper):
 
     counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     keeps: ClassVar = ("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt")
+
+    @property
+    def order(self) -> int:
+        return 2 if self.phi == 0.5 else 1
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        if not any(isinstance(effect, Force | PairForce) for effect in effects):
+            return ()
+        limits = {"first": dt, "longest": dt, "shortest": 1e-9 * dt}
+        papers = IterationControl(tolerance=1e-6, **limits)
+        own = ErrorControl(error=1e-4, tolerance=1e-5, **{**limits, "longest": 1e3 * dt})
+        together = any(isinstance(effect, PairForce) for effect in effects)
+        accelerated = (cls(control=own, acceleration="anderson"),) if together else ()
+        return (cls(control=own), *accelerated, cls(control=papers), cls(phi=1.0, control=papers))
+
+    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
+        return work["force_evaluations"] / (particles if independent else 1)
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         accelerated = self.acceleration == "anderson" and not independent

@@ -4,9 +4,13 @@ Forces are kicked half before and half after the drift (L. Verlet 1967; W. C. Sw
 without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c), and has no kick at all.
 """
 
+from collections.abc import Sequence
+from typing import Self
+
 from tisim._taichi import ti
+from tisim.effect import Effect, Force, PairEvent
 from tisim.program import Item, PerParticle, Phase
-from tisim.steppers.controller import ApproachTime, Controller
+from tisim.steppers.controller import ApproachTime, Controller, FixedStep
 from tisim.steppers.phases import Clock, advance_clock, arrive
 from tisim.steppers.stepper import Parts, Stepper
 
@@ -15,6 +19,14 @@ class Verlet(Stepper):
     """Explicit stepper with step control. Second order in dt for forces that depend on position only."""
 
     control: Controller = ApproachTime()
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        # Its kicks take velocities of other times than the forces': of first order where they matter.
+        if any(effect.offers("velocity_jacobian") for effect in effects if isinstance(effect, Force)):
+            return ()
+        events = any(isinstance(effect, PairEvent) for effect in effects)
+        return (cls(control=FixedStep(dt=dt)), *((cls(),) if events else ()))
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, near, forced = parts.s, parts.near, parts.forced

@@ -1,0 +1,16 @@
+"""What accuracy is of in the flow of Z04: the mean radius at the end, over random starts."""
+
+from __future__ import annotations
+
+from tisim import Result, Scene
+from tisim.accuracy.quantity import Quantity
+
+
+def mean_radius(result: Result) -> float:
+    """m."""
+    return float(result.state["radius"].mean())
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Impacts are chaotic: one more digit anywhere gives other agglomerates, and the same mean."""
+    return (Quantity("mean radius", mean_radius, random=True),)

@@ -1,0 +1,22 @@
+"""What accuracy is of in the blast of Z16: where the particles are; where they touch, the cloud's shape."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tisim import Result, Scene
+from tisim.accuracy.quantity import Quantity, displacement
+from tisim.effect import PairForce
+
+
+def half_axes(result: Result) -> np.ndarray:
+    """Of the ellipsoid, along x, y and z, that has the second moments of the cloud: sqrt(5 <r_k^2>). m."""
+    r = result.state["position"] - np.average(result.state["position"], axis=0, weights=result.state["mass"])
+    return np.sqrt(5.0 * np.average(r**2, axis=0, weights=result.state["mass"]))
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Paths can be followed as long as particles do not touch; then it is the mean over random starts."""
+    if any(isinstance(effect, PairForce) for effect in scene.effects):
+        return (Quantity("half-axes of the cloud", half_axes, random=True),)
+    return (Quantity("positions", displacement),)

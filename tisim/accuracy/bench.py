@@ -1,0 +1,84 @@
+"""Runs that are timed: compiled first, and again and again without."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tisim.composition import independent
+from tisim.errors import RunError
+from tisim.result import Result
+from tisim.scene import Scene
+from tisim.simulation import Simulation
+
+Watch = Callable[[float], None]
+"""Called about four times a second with the fraction of a run that is done; may raise to stop it."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Results of a run of one or more starts, and the wall seconds of all, without set-up and compilation."""
+
+    results: list[Result]
+    seconds: float
+
+    @property
+    def work(self) -> tuple[float, float, float]:
+        """Steps, sums of forces and rejections, per particle and start."""
+        steps, sums, rejections = 0.0, 0.0, 0.0
+        for result in self.results:
+            n, alone = len(result.start["mass"]), independent(result.scene.effects)
+            steps += result.work["particle_steps"] / n
+            sums += result.scene.stepper.evaluations(result.work, n, alone)
+            rejections += result.work.get("rejections", 0) / (n if alone else 1)
+        starts = len(self.results)
+        return steps / starts, sums / starts, rejections / starts
+
+
+class Bench:
+    """Compiled simulations, one of each structure."""
+
+    def __init__(self) -> None:
+        self.made: dict[Any, Simulation] = {}
+
+    def ready(self, scene: Scene, worlds: int) -> Simulation:
+        """Compiled for as many worlds or more."""
+        key, capacity = scene.structure(), scene.capacity()
+        old = self.made.get(key)
+        if old is None or old.worlds < worlds or old.s.capacity < capacity:
+            if old is not None:
+                old.close()
+            self.made[key] = Simulation(scene, worlds, capacity)
+        return self.made[key]
+
+    def run(self, scenes: Sequence[Scene], watch: Watch | None = None) -> Timed:
+        """RunError, with the reason, when one of them fails."""
+        simulation = self.ready(scenes[0], len(scenes))
+        simulation.load(scenes)
+        simulation.run(watch)
+        results = simulation.results()
+        for result in results:
+            if not result.status.ok:
+                raise RunError(result.status.reason)
+        return Timed(results, simulation.wall_s)
+
+    def close(self) -> None:
+        """Give the memory back."""
+        for simulation in self.made.values():
+            if not simulation.s.stale:
+                simulation.close()
+        self.made.clear()
+
+
+class Limit:
+    """Stops a run that takes too long: a watch that raises RunError."""
+
+    def __init__(self, seconds: float, then: Watch) -> None:
+        self.seconds, self.then, self.began = seconds, then, time.monotonic()
+
+    def __call__(self, fraction: float) -> None:
+        if time.monotonic() - self.began > self.seconds and fraction < 1.0:
+            raise RunError(f"stopped at {fraction:.0%}, after {self.seconds:.3g} s")
+        self.then(fraction)

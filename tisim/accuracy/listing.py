@@ -1,0 +1,66 @@
+"""A study in text: its table, and the answer to how to get an error for the least time."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from tisim.accuracy.row import Row
+from tisim.accuracy.study import Study
+
+
+def table(study: Study) -> RenderableType:
+    """Every setting by method, with its median time, work and errors; which is the cheapest for what."""
+    names = [quantity.name for quantity in study.quantities]
+    heads = ["", "seconds", "spread", "steps", "forces", "rejected", *names, ""]
+    best = study.decades()
+    cells = {row.key: _cells(row, best) for row in study.rows}
+    columns = zip(heads, *(line for line in cells.values() if len(line) == len(heads)), strict=True)
+    widths = [max(map(len, column)) for column in columns]
+    blocks: list[RenderableType] = [_grid([heads], widths, "bold")]
+    for method in dict.fromkeys(row.method for row in study.rows):
+        blocks += [Text(method, "bold"), _grid([cells[row.key] for row in study.line(method)], widths)]
+    return Group(*blocks)
+
+
+def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for k, width in enumerate(widths):
+        inner = 0 < k < len(widths) - 1
+        grid.add_column(justify="right" if inner else "left", min_width=width, no_wrap=inner, style=style)
+    for line in lines:
+        grid.add_row(*line)
+    return grid
+
+
+def _cells(row: Row, best: dict[float, Row]) -> list[str]:
+    if row.failed:
+        return [f"  {row.setting}: {row.failed}"]
+    least = min((error for error, chosen in best.items() if chosen is row), default=None)
+    errors = [
+        f"{row.errors[k][0]:.1e}" if row.trusted(k) else f"< {row.at_most(k):.0e}"
+        for k in range(len(row.errors))
+    ]
+    work = [f"{value:.0f}" for value in (row.steps, row.sums, row.rejections)]
+    note = f"cheapest for {least:.0e}" if least is not None else ""
+    return [f"  {row.setting}", f"{row.median:.3g}", f"{row.spread:.1g}", *work, *errors, note]
+
+
+def sources(study: Study) -> list[str]:
+    """Where the true values are from, and how good they are; a line for each quantity."""
+    lines = []
+    for quantity, truth in zip(study.quantities, study.truths, strict=False):
+        own = f"; its own error at most {truth.error:.1e}" if truth.error else ""
+        lines.append(f"error of {quantity.name}: against {truth.source}{own}")
+    return lines
+
+
+def recipe(row: Row, target: str) -> str:
+    """How to run a setting: as Python in a scene, and as words of ``tisim run`` for a case or file."""
+    starts = f", over {row.starts} random starts" if row.starts > 1 else ""
+    return (
+        f"{row.method}: {row.setting}{starts}: {row.median:.3g} s, error {row.at_most():.1e}\n"
+        f"  stepper={row.python}\n"
+        f"  tisim run {target} {row.options}".rstrip()
+    )

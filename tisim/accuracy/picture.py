@@ -1,0 +1,95 @@
+"""Error against time, a line for each method."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+
+from tisim.accuracy.row import Row, decades
+from tisim.accuracy.study import Study
+from tisim.durable import replace_file
+
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
+"""P. Tol's bright set, and one of his light one."""
+MARKERS = "osD^vP<>X"
+
+
+def save(study: Study, path: Path) -> Path:
+    """The picture as a PNG file, in place of any before. RunError on a full disk."""
+    image = io.BytesIO()
+    picture(study).savefig(image, dpi=150, format="png")
+    replace_file(path, image.getvalue())
+    return path
+
+
+def picture(study: Study) -> Figure:
+    """A panel for each quantity: wall seconds across, error up, both logarithmic.
+
+    An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
+    larger. Rings are the cheapest setting for each power of ten of the error. Below the shaded edge, the
+    error of the reference itself, nothing can be told.
+    """
+    wide = len(study.quantities)
+    lines = list(dict.fromkeys(row.method for row in study.rows))
+    figure = Figure(figsize=(5.6 * wide + 0.4, 4.6 + 0.24 * (len(lines) + 1)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(1, wide, squeeze=False)[0]
+    for k, axis in enumerate(axes):
+        _panel(axis, study, lines, k)
+    axes[0].set_ylabel("relative error")
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles, names, loc="outside lower center", ncols=1 if wide == 1 else 2, frameon=False, fontsize=8.5
+    )
+    return figure
+
+
+def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
+    for at, method in enumerate(lines):
+        rows = [row for row in study.line(method) if row.errors and row.at_most(k) > 0]
+        colour, marker = COLOURS[at % len(COLOURS)], MARKERS[at % len(MARKERS)]
+        style = "-" if all(row.precision == "f64" for row in rows) else "--"
+        times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
+        axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
+        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=method)
+        for row in rows:
+            _mark(axis, row, k, colour, marker)
+    chosen = decades(study.rows, k)
+    best = {id(row): row for row in chosen.values()}.values()
+    axis.scatter(
+        [row.median for row in best], [row.at_most(k) for row in best], s=130, facecolors="none",
+        edgecolors="black", linewidths=1.1, zorder=4, label="cheapest for a power of ten of the error",
+    )  # fmt: skip
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    low, high = axis.get_ylim()
+    own = study.truths[k].error if k < len(study.truths) else 0.0
+    if own > 0:
+        low = min(low, own / 2)
+        axis.axhspan(low, own, color="0.9", zorder=0)
+    axis.set_ylim(low, min(high, 30.0))
+    axis.set_title(study.quantities[k].name, fontsize=10.5)
+    left, right = axis.get_xlim()
+    narrow = right < 300 * left
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
+    axis.xaxis.set_major_formatter(EngFormatter("s"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel(f"wall time{' of all starts' if study.random else ''}")
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.grid(color="0.93", lw=0.8)
+    axis.set_axisbelow(True)
+
+
+def _mark(axis: Axes, row: Row, k: int, colour: str, marker: str) -> None:
+    face = colour if row.trusted(k) else "white"
+    spread = np.array([[row.median - min(row.seconds)], [max(row.seconds) - row.median]])
+    axis.errorbar(
+        [row.median], [row.at_most(k)], xerr=spread, fmt=marker, ms=5, mfc=face, mec=colour, color=colour,
+        lw=1, zorder=3,
+    )  # fmt: skip

@@ -1,0 +1,89 @@
+"""What a study compares: a quantity of a result, and what is known of its true value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from tisim.effect import Operator, PairEvent
+from tisim.errors import must
+from tisim.result import Result
+from tisim.scene import Scene
+
+Value = Callable[[Result], "np.ndarray | float"]
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a result; its error is |measured - true| / |true|, with the root of the sum of squares.
+
+    value : of a result, any shape; zero means that nothing has happened, as for a displacement.
+    exact : the true value in closed form, of the scene of a result; None where there is none.
+    random : whether it is the mean over random starts that counts. Then ``exact`` is of that mean.
+    """
+
+    name: str
+    value: Value
+    exact: Value | None = None
+    random: bool = False
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value, and how far it may be off: half the width of its 95 % interval, or a bound; 0 if exact."""
+
+    value: np.ndarray
+    uncertainty: float = 0.0
+
+    def error(self, truth: Estimate) -> tuple[float, float]:
+        """Relative distance from the truth, and how far that may be off."""
+        size = float(np.linalg.norm(truth.value))
+        off = float(np.linalg.norm(self.value - truth.value))
+        return off / size, float(np.hypot(self.uncertainty, truth.uncertainty)) / size
+
+
+def estimate(quantity: Quantity, results: Sequence[Result]) -> Estimate:
+    """Of one result, or the mean over those of random starts."""
+    values = np.array([np.ravel(np.asarray(quantity.value(result))) for result in results])
+    if not quantity.random:
+        return Estimate(values[0])
+    return mean(values)
+
+
+def mean(values: np.ndarray) -> Estimate:
+    """Mean over the first axis and its interval by Student's t; values of shape (n, components), n > 1."""
+    n = len(values)
+    spread = float(np.linalg.norm(values.std(axis=0, ddof=1)))
+    return Estimate(
+        values.mean(axis=0), float(student.ppf(0.5 + CONFIDENCE / 2, n - 1)) * spread / float(np.sqrt(n))
+    )
+
+
+def displacement(result: Result) -> np.ndarray:
+    """Of every particle, in the order of their ids, m, shape (n, 3)."""
+    order = np.argsort(result.state["id"])
+    return result.state["position"][order] - result.start["position"]
+
+
+def kinetic_energy(result: Result) -> float:
+    """J."""
+    return 0.5 * float((result.state["mass"] * (result.state["velocity"] ** 2).sum(axis=1)).sum())
+
+
+def usual(scene: Scene) -> tuple[Quantity, ...]:
+    """What is compared unless something else is asked for: where particles have moved to.
+
+    Impacts and operators may remove particles, and after some impacts no path can be followed: there it is
+    the mean kinetic energy over random starts. InputError where there is nothing random.
+    """
+    if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
+        return (Quantity("displacement", displacement),)
+    starts = [scene.particles.arrays(scene.domain, scene.seed + k) for k in (0, 1)]
+    differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))
+    rule = "given for a scene with impacts or operators whose start is not random"
+    must(differ, "quantities", rule, "none")
+    return (Quantity("mean kinetic energy", kinetic_energy, random=True),)

@@ -1,0 +1,130 @@
+"""What accuracy costs in time: a study of a scene, and what it has found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tisim import runtime
+from tisim.accuracy.driver import Progress, Run
+from tisim.accuracy.quantity import Quantity, usual
+from tisim.accuracy.reference import Truth
+from tisim.accuracy.row import Row, cheapest, decades
+from tisim.errors import must
+from tisim.scene import Scene
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+class Study:
+    """Settings of a scene, what they cost and how accurate they are.
+
+    quantities : what errors are of; by default ``quantity.usual``. coarser, finer : decades of error on
+    either side of what the scene asks for. repeats : of each timing. precisions : "f64" and others to try.
+    starts : numbers of random starts, for quantities that are random. budget : wall seconds; what would not
+    fit is left out. rows, truths : what is known so far, in order; a truth for each quantity.
+
+    To measure another precision, tisim starts anew: simulations made before must not be used afterwards.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        quantities: Sequence[Quantity] = (),
+        *,
+        coarser: int = 3,
+        finer: int = 0,
+        repeats: int = 3,
+        precisions: Sequence[str] = ("f64", "f32"),
+        starts: Sequence[int] = (8, 32, 128),
+        budget: float = math.inf,
+    ) -> None:
+        must(repeats >= 1, "repeats", "at least 1", repeats)
+        must(coarser + finer >= 0, "coarser + finer", "at least 0", coarser + finer)
+        must(len(precisions) > 0 and precisions[0] == "f64", "precisions", "f64 and others", precisions)
+        for precision in precisions:
+            must(precision in runtime.PRECISIONS, "precision", "f64 or f32", precision)
+        must(list(starts) == sorted(set(starts)), "starts", "given from few to many", list(starts))
+        must(len(starts) > 0 and starts[0] > 1, "starts", "at least 2", list(starts))
+        must(budget > 0, "budget", "greater than 0", budget)
+        self.scene = scene
+        self.quantities = tuple(quantities) or usual(scene)
+        kinds = {quantity.random for quantity in self.quantities}
+        must(len(kinds) == 1, "quantities", "all random, or none", sorted(kinds))
+        self.random = kinds == {True}
+        self.levels = tuple(float(k) for k in range(coarser, -finer - 1, -1))
+        self.repeats, self.precisions, self.budget = repeats, tuple(precisions), budget
+        self.starts = tuple(starts) if self.random else (1,)
+        self.rows: list[Row] = []
+        self.truths: tuple[Truth, ...] = ()
+        self.complete = False
+
+    def identity(self) -> dict[str, Any]:
+        """What must agree for rows of an earlier study to be of use."""
+        return {
+            "scene": self.scene.digest(),
+            "quantities": [quantity.name for quantity in self.quantities],
+            "finest": self.levels[-1],
+            "starts": list(self.starts),
+            "device": runtime.current().device,
+            "threads": runtime.current().threads,
+            "backend": runtime.backend(),
+        }
+
+    def run(self, progress: Progress | None = None, finished: Callable[[], object] | None = None) -> None:
+        """Measure all that is not known yet. finished : called when a row, or the truth, has become known.
+
+        InputError when the scene cannot be run at all or has nothing to turn. Rows that were finished are
+        kept when anything is raised.
+        """
+        before = runtime.current()
+        try:
+            Run(self, progress or (lambda fraction, what: None), finished or (lambda: None)).all()
+        finally:
+            runtime.start(before.device, before.precision, before.threads)
+
+    def cheapest(self, error: float, quantity: str | None = None) -> Row | None:
+        """The cheapest setting whose error is at most this; None where there is none."""
+        return cheapest(self.rows, error, self.index(quantity))
+
+    def decades(self, quantity: str | None = None) -> dict[float, Row]:
+        """The cheapest setting for each power of ten of the error."""
+        return decades(self.rows, self.index(quantity))
+
+    def index(self, quantity: str | None) -> int:
+        """Of a quantity by its name, or of the first."""
+        names = [q.name for q in self.quantities]
+        must(quantity is None or quantity in names, "quantity", f"one of {', '.join(names)}", quantity)
+        return names.index(quantity) if quantity is not None else 0
+
+    def table(self) -> RenderableType:
+        """Every setting with its time, work and errors, for rich."""
+        from tisim.accuracy.listing import table
+
+        return table(self)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write cost.csv and cost.h5 (see files.py) into a folder, made if missing; returns their paths."""
+        from tisim.accuracy.files import write
+
+        return write(self, Path(folder))
+
+    def picture(self, path: str | Path) -> Path:
+        """Draw error against time, a line for each method, as a PNG file."""
+        from tisim.accuracy.picture import save
+
+        return save(self, Path(path))
+
+    def line(self, method: str) -> list[Row]:
+        """The rows of a method, in the order of its settings."""
+        return [row for row in self.rows if row.method == method]
+
+
+def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) -> Study:
+    """What accuracy costs in time for a scene: a ``Study`` with its settings, run to its end."""
+    made = Study(scene, quantities, **settings)
+    made.run()
+    return made
