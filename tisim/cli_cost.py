@@ -119,7 +119,7 @@ def _measure(study: Study, place: Path) -> bool:
         task = bar.add_task("", total=1.0)
 
         def progress(fraction: float, what: str) -> None:
-            bar.update(task, completed=fraction, description=what)
+            bar.update(task, completed=fraction, description=what[:48])
             ctrl_c.check()
 
         try:

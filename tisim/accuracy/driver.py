@@ -30,6 +30,8 @@ Progress = Callable[[float, str], None]
 """Called with the fraction of the study that is done, 0..1, and what is being run."""
 OTHERS = 1_000_000
 """Between the seeds of a random quantity's reference and those of its rows: they share no start."""
+REFERENCES = 4
+"""Starts of the reference for each of the largest number that is tried: half as wide an interval."""
 
 
 class Run:
@@ -79,31 +81,27 @@ class Run:
         return self.base * weight * setting.starts * self.study.repeats
 
     def _truths(self, base: Timed, found: Sequence[Method], rest: float) -> None:
-        study = self.study
-        needed = [q for q in study.quantities if q.exact is None]
+        """The true values, where they are not known yet; ``rest``: seconds planned for all that follows."""
+        study, self.planned = self.study, rest
         if study.truths:
-            self.planned = rest
             return
-        runs: list[Timed] = []
-        if needed:
-            pair = reference.pair(found, study.levels[-1])
-            n = 2 * study.starts[-1] if study.random else 1
-            finer = 10.0 ** (reference.TIGHTER - study.levels[-1])
-            costs = [n * self.base * finer ** (1 / m.base.stepper.order) for m in pair.methods]
-            self.planned = rest + sum(costs)
-            for name, scene, cost in zip(("reference", "its check"), pair.scenes, costs, strict=True):
-                self.what = name
-                runs.append(self._run(self._starts(scene, n, OTHERS), cost))
-        else:
-            self.planned = rest
-        study.truths = tuple(
-            reference.closed_form(q, base.results[0])
-            if q.exact
-            else reference.compared(q, runs[0].results, runs[1].results, pair)
-            for q in study.quantities
-        )
-        for q, truth in zip(study.quantities, study.truths, strict=True):
-            must(bool(np.any(truth.estimate.value)), q.name, "one that is not zero at the end", 0.0)
+        runs, made = [], []
+        if any(quantity.exact is None for quantity in study.quantities):
+            made = reference.attempts(found, study.levels[-1])
+            n = REFERENCES * study.starts[-1] if study.random else 1
+            costs = [n * self.base * 10.0 ** (-a.decades / a.method.base.stepper.order) for a in made]
+            self.planned += sum(costs)
+            for attempt, cost in zip(made, costs, strict=True):
+                self.what = f"{'reference' if attempt is made[0] else 'its check'}: {attempt.name}"
+                runs.append(self._run(self._starts(attempt.scene, n, OTHERS), cost).results)
+        truths = []
+        for q in study.quantities:
+            if q.exact is None:
+                truths.append(reference.compared(q, runs, made))
+            else:
+                truths.append(reference.closed_form(q, base.results[0]))
+            must(bool(np.any(truths[-1].estimate.value)), q.name, "other than zero at the end", 0.0)
+        study.truths = tuple(truths)
         self.finished()
 
     def _starts(self, scene: Scene, n: int, first: int = 0) -> list[Scene]:

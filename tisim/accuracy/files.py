@@ -63,7 +63,7 @@ def _image(study: Study) -> bytes:
         file.attrs.update({
             "format": FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
             "settings": json.dumps(runtime.current().settings), "versions": json.dumps(versions()),
-            "complete": study.complete,
+            "complete": json.dumps(study.asked() if study.complete else None),
         })  # fmt: skip
         rows = file.create_group("rows")
         for name in _TEXTS:
@@ -107,6 +107,7 @@ def resume(study: Study, folder: Path) -> None:
             rule = "without the study of another scene, machine or depth (or give --overwrite)"
             must(same, "output folder", rule, str(folder))
             study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
+            study.complete = file.attrs["complete"] == json.dumps(study.asked())
     except (OSError, KeyError) as fault:
         raise InputError(f"{HDF5} must be a whole HDF5 file; received {str(path)!r} ({fault})") from None
 

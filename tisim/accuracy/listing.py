@@ -11,9 +11,9 @@ from tisim.accuracy.study import Study
 
 
 def table(study: Study) -> RenderableType:
-    """Every setting by method, with its median time, work and errors; which is the cheapest for what."""
+    """Every setting by method, with its median time, work and errors; for what error it is the cheapest."""
     names = [quantity.name for quantity in study.quantities]
-    heads = ["", "seconds", "spread", "steps", "forces", "rejected", *names, ""]
+    heads = ["", "seconds", "spread", "steps", "forces", "rejected", *names, "best for"]
     best = study.decades()
     cells = {row.key: _cells(row, best) for row in study.rows}
     columns = zip(heads, *(line for line in cells.values() if len(line) == len(heads)), strict=True)
@@ -25,10 +25,9 @@ def table(study: Study) -> RenderableType:
 
 
 def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
-    grid = Table.grid(padding=(0, 2, 0, 0))
+    grid = Table.grid(padding=(0, 1, 0, 0))
     for k, width in enumerate(widths):
-        inner = 0 < k < len(widths) - 1
-        grid.add_column(justify="right" if inner else "left", min_width=width, no_wrap=inner, style=style)
+        grid.add_column(justify="right" if k else "left", min_width=width, no_wrap=k > 0, style=style)
     for line in lines:
         grid.add_row(*line)
     return grid
@@ -43,7 +42,7 @@ def _cells(row: Row, best: dict[float, Row]) -> list[str]:
         for k in range(len(row.errors))
     ]
     work = [f"{value:.0f}" for value in (row.steps, row.sums, row.rejections)]
-    note = f"cheapest for {least:.0e}" if least is not None else ""
+    note = f"{least:.0e}" if least is not None else ""
     return [f"  {row.setting}", f"{row.median:.3g}", f"{row.spread:.1g}", *work, *errors, note]
 
 

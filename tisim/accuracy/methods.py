@@ -117,7 +117,9 @@ def methods(
     for effect in scene.effects:
         laws = effect.approximations(extent)
         if laws:
-            found.append(_laws(scene, effect.kind(), laws, starts))
+            # As accurate otherwise as anything here, so that what is seen is the error of the law.
+            accurate = found[0].settings[-1].scene if found else scene
+            found.append(_laws(accurate, effect.kind(), laws, starts))
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in _within("stepper", stepper):

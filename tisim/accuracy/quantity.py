@@ -69,6 +69,11 @@ def displacement(result: Result) -> np.ndarray:
     return result.state["position"][order] - result.start["position"]
 
 
+def velocity(result: Result) -> np.ndarray:
+    """Of every particle, in the order of their ids, m/s, shape (n, 3)."""
+    return result.state["velocity"][np.argsort(result.state["id"])]
+
+
 def kinetic_energy(result: Result) -> float:
     """J."""
     return 0.5 * float((result.state["mass"] * (result.state["velocity"] ** 2).sum(axis=1)).sum())
@@ -81,7 +86,9 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     the mean kinetic energy over random starts. InputError where there is nothing random.
     """
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
-        return (Quantity("displacement", displacement),)
+        # Where opposite faces are joined a place jumps; a velocity does not.
+        jumps = scene.domain.joined()
+        return (Quantity("velocity", velocity) if jumps else Quantity("displacement", displacement),)
     starts = [scene.particles.arrays(scene.domain, scene.seed + k) for k in (0, 1)]
     differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))
     rule = "given for a scene with impacts or operators whose start is not random"

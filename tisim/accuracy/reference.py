@@ -1,9 +1,10 @@
-"""The true value of a quantity: in closed form, or by a run much tighter, checked by another.
+"""The true value of a quantity: in closed form, or by a run much tighter, checked by others.
 
 The reference is the stepper of highest order, the scene's own among equals, turned to errors two decades
-below the finest of the sweep, and with it whatever else converges. The check is a stepper of another kind,
-turned as far, or the same one a decade short of it where no other suits. How far the two are apart bounds the
-error of the better one, and is taken for that of the reference.
+below the finest of the sweep, and with it whatever else converges. It is checked by itself a decade short of
+that, and by a stepper of another kind turned as far, where there is one. The largest distance of the checks
+is taken for the error of the reference. Another stepper alone would not do: on a rotation the trapezoidal
+rule and Boris' stepper make the same error.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 from tisim.accuracy.methods import Method, finest
 from tisim.accuracy.quantity import Estimate, Quantity, estimate
-from tisim.errors import InputError
+from tisim.errors import must
 from tisim.result import Result
 from tisim.scene import Scene
 
@@ -36,41 +37,50 @@ class Truth:
         return self.estimate.uncertainty / float(np.linalg.norm(self.estimate.value))
 
 
+@dataclass(frozen=True)
+class Attempt:
+    """A run that a truth is made of: a method, and the decades of error that it is turned by."""
+
+    method: Method
+    decades: float
+
+    @property
+    def scene(self) -> Scene:
+        """What is run."""
+        return finest(self.method.at(self.decades), -TIGHTER)
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        stepper = self.method.base.stepper
+        return f"{type(stepper).__name__}, {type(stepper.control).__name__}"
+
+
+def attempts(methods: Sequence[Method], level: float) -> list[Attempt]:
+    """The reference and then its checks, for methods whose finest setting is at this level.
+
+    InputError when no method converges.
+    """
+    able = [m for m in methods if m.converges and all(s.precision == "f64" for s in m.settings)]
+    must(bool(able), "stepper", "one with a knob that its error vanishes with", "none")
+    best = max(able, key=lambda method: method.base.stepper.order)
+    others = [
+        m for m in able if type(m.base.stepper) is not type(best.base.stepper) and m.base.stepper.order > 1
+    ]
+    tight = level - TIGHTER
+    return [Attempt(best, tight), Attempt(best, tight + 1), *(Attempt(m, tight) for m in others[:1])]
+
+
 def closed_form(quantity: Quantity, result: Result) -> Truth:
     """For the scene of a result."""
     assert quantity.exact is not None
-    return Truth(Estimate(np.ravel(np.asarray(quantity.exact(result)))), "closed form")
+    return Truth(Estimate(np.ravel(np.asarray(quantity.exact(result)))), "its closed form")
 
 
-@dataclass(frozen=True)
-class Pair:
-    """A reference and its check: a method and a scene each."""
-
-    methods: tuple[Method, Method]
-    scenes: tuple[Scene, Scene]
-
-
-def pair(methods: Sequence[Method], level: float) -> Pair:
-    """Chosen among methods whose finest setting is at this level; InputError when nothing converges."""
-    able = [m for m in methods if m.converges and all(s.precision == "f64" for s in m.settings)]
-    if not able:
-        raise InputError("stepper must have a knob that its error vanishes with; received none")
-    able.sort(key=lambda m: -m.base.stepper.order)
-    best = able[0]
-    others = [m for m in able if type(m.base.stepper) is not type(best.base.stepper)]
-    others = [m for m in others if m.base.stepper.order > 1] or [best]
-    short = 1.0 if others[0] is best else 0.0
-    scenes = (
-        finest(best.at(level - TIGHTER), -TIGHTER),
-        finest(others[0].at(level - TIGHTER + short), -TIGHTER),
-    )
-    return Pair((best, others[0]), scenes)
-
-
-def compared(quantity: Quantity, reference: Sequence[Result], check: Sequence[Result], found: Pair) -> Truth:
-    """The truth from the runs of a reference and its check."""
-    value, other = estimate(quantity, reference), estimate(quantity, check)
-    apart = float(np.linalg.norm(value.value - other.value))
-    names = [f"{m.base.stepper.kind()}, {m.base.stepper.control.kind()}" for m in found.methods]
-    source = f"{names[0]}, {TIGHTER:g} decades tighter; checked by {names[1]}"
-    return Truth(Estimate(value.value, max(apart, value.uncertainty)), source)
+def compared(quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequence[Attempt]) -> Truth:
+    """The truth from the runs of a reference and its checks."""
+    best, *others = (estimate(quantity, results) for results in runs)
+    apart = max(float(np.linalg.norm(other.value - best.value)) for other in others)
+    source = f"{made[0].name} at {made[0].decades:+g} decades of error, checked by itself"
+    source += "".join(f" and by {attempt.name}" for attempt in made[2:])
+    return Truth(Estimate(best.value, max(apart, best.uncertainty)), source)

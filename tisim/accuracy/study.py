@@ -26,6 +26,7 @@ class Study:
     either side of what the scene asks for. repeats : of each timing. precisions : "f64" and others to try.
     starts : numbers of random starts, for quantities that are random. budget : wall seconds; what would not
     fit is left out. rows, truths : what is known so far, in order; a truth for each quantity.
+    complete : nothing is left to measure.
 
     To measure another precision, tisim starts anew: simulations made before must not be used afterwards.
     """
@@ -62,6 +63,10 @@ class Study:
         self.truths: tuple[Truth, ...] = ()
         self.complete = False
 
+    def asked(self) -> dict[str, Any]:
+        """Which settings are measured."""
+        return {"levels": self.levels, "precisions": self.precisions}
+
     def identity(self) -> dict[str, Any]:
         """What must agree for rows of an earlier study to be of use."""
         return {
@@ -80,6 +85,8 @@ class Study:
         InputError when the scene cannot be run at all or has nothing to turn. Rows that were finished are
         kept when anything is raised.
         """
+        if self.complete:
+            return
         before = runtime.current()
         try:
             Run(self, progress or (lambda fraction, what: None), finished or (lambda: None)).all()
