@@ -6,6 +6,7 @@ next and repeats in turns, so that a machine that drifts, a budget that ends and
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,7 +16,7 @@ import numpy as np
 
 from tisim import runtime
 from tisim.accuracy import reference
-from tisim.accuracy.bench import Bench, Limit, Timed
+from tisim.accuracy.bench import Bench, Limit, OutOfTime, Timed
 from tisim.accuracy.methods import Method, Setting, ensembles, methods
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.row import Row
@@ -40,13 +41,12 @@ class Run:
     def __init__(self, study: Study, progress: Progress, finished: Callable[[], object]) -> None:
         self.study, self.progress, self.finished = study, progress, finished
         self.bench, self.began = Bench(), time.monotonic()
-        self.done, self.planned = 0.0, 1.0
+        self.done, self.planned, self.what = 0.0, 1.0, "the scene as it is"
 
     def all(self) -> None:
         study = self.study
         where = runtime.current()
         runtime.start(where.device, "f64", where.threads)
-        self.progress(0.0, "the scene as it is")
         base = self._run([study.scene], 0.0)
         found = self._methods(base)
         self.base = base.seconds
@@ -91,6 +91,8 @@ class Run:
             n = REFERENCES * study.starts[-1] if study.random else 1
             costs = [n * self.base * 10.0 ** (-a.decades / a.method.base.stepper.order) for a in made]
             self.planned += sum(costs)
+            if sum(costs) > self._left():
+                raise RunError(f"the reference takes about {sum(costs):.0f} s, which is more than the budget")
             for attempt, cost in zip(made, costs, strict=True):
                 self.what = f"{'reference' if attempt is made[0] else 'its check'}: {attempt.name}"
                 runs.append(self._run(self._starts(attempt.scene, n, OTHERS), cost).results)
@@ -124,7 +126,9 @@ class Run:
                         continue
                     try:
                         scenes = self._starts(setting.scene, setting.starts)
-                        runs[at].append(self._run(scenes, cost))
+                        runs[at].append(self._run(scenes, cost, self._left()))
+                    except OutOfTime:
+                        self.done += cost
                     except (RunError, InputError) as error:
                         failed[at] = str(error)
         finally:
@@ -136,18 +140,15 @@ class Run:
     def _left(self) -> float:
         return self.study.budget - (time.monotonic() - self.began)
 
-    def _run(self, scenes: Sequence[Scene], cost: float) -> Timed:
-        """Run and time; ``cost`` is what was planned for it, s."""
+    def _run(self, scenes: Sequence[Scene], cost: float, limit: float = math.inf) -> Timed:
+        """Run and time; ``cost`` is what was planned for it, s; OutOfTime after ``limit`` (s)."""
         begun = self.done
 
         def watch(fraction: float) -> None:
-            if cost:
-                self.progress(min((begun + cost * fraction) / self.planned, 1.0), self.what)
-            else:
-                self.progress(0.0, "the scene as it is")
+            self.progress(min((begun + cost * fraction) / self.planned, 1.0), self.what)
 
         watch(0.0)
-        timed = self.bench.run(scenes, Limit(self._left(), watch))
+        timed = self.bench.run(scenes, Limit(limit, watch))
         self.done = begun + cost
         return timed
 

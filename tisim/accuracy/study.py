@@ -54,6 +54,8 @@ class Study:
         self.scene = scene
         self.quantities = tuple(quantities) or usual(scene)
         kinds = {quantity.random for quantity in self.quantities}
+        names = [quantity.name for quantity in self.quantities]
+        must(len(set(names)) == len(names), "quantities", "of different names", names)
         must(len(kinds) == 1, "quantities", "all random, or none", sorted(kinds))
         self.random = kinds == {True}
         self.levels = tuple(float(k) for k in range(coarser, -finer - 1, -1))

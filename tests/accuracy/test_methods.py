@@ -1,0 +1,163 @@
+"""How a study finds what to turn: from what the parts of a scene say of themselves."""
+
+from typing import ClassVar
+
+import pytest
+
+from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
+from tests.steppers.charged import accurate, charged
+from tests.throwaway import Trap
+from tisim.accuracy import Quantity, Study
+from tisim.accuracy.methods import exchanged, finest, methods, parts
+from tisim.accuracy.reference import attempts, compared
+from tisim.accuracy.words import expression, options
+from tisim.effects.near_field import NearField, TruncatedNearField
+from tisim.effects.tether import Tether
+from tisim.errors import InputError
+from tisim.knob import Knob
+from tisim.spec import parameter
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.stepper import Stepper
+from tisim.steppers.verlet import Verlet
+
+LEVELS = (2.0, 1.0, 0.0)
+
+
+class Pace(FixedStep):
+    """A step control with a setting of its own."""
+
+    error: float = parameter("", 1e-4, gt=0)
+    knobs = (Knob(error=1),)
+
+
+class Sharp(Stepper):
+    """A stepper of high order that nobody has told the study of."""
+
+    control: Pace
+    wanted: ClassVar[bool] = False
+
+    @property
+    def order(self):
+        return 8
+
+    @classmethod
+    def alternatives(cls, effects, dt):
+        return (cls(control=Pace(dt=dt, error=1e-6)),) if cls.wanted else ()
+
+
+class Patchy(Trap):
+    """A force that is as good as its setting."""
+
+    grain: float = parameter("m", 1e-3, gt=0)
+    knobs = (Knob(grain=2),)
+
+
+def found(scene, precisions=("f64",)):
+    return {m.name: m for m in methods(scene, 0.1, 1.0, LEVELS, precisions, 1)}
+
+
+def test_a_new_stepper_and_its_control_say_themselves_what_to_turn(monkeypatch):
+    monkeypatch.setattr(Sharp, "wanted", True)
+    line = found(oscillator())["Sharp, Pace: error"]
+    assert [s.scene.stepper.control.error for s in line.settings] == [1e-4, 1e-5, 1e-6]
+    assert [s.scene.stepper.control.dt for s in line.settings] == [0.1] * 3
+    assert [s.words for s in line.settings] == ["error=0.0001", "error=1e-05", "error=1e-06"]
+    # It is the reference then, being of the highest order, and the scene's own is its check.
+    made = attempts(list(found(oscillator()).values()), 0.0)
+    assert [attempt.name for attempt in made] == ["Sharp, Pace"] * 2 + ["Verlet, FixedStep"] * 2
+    assert [attempt.scene.stepper.control.error for attempt in made[:2]] == [1e-8, 1e-7]
+    assert made[2].scene.stepper.control.dt == pytest.approx(oscillator().stepper.control.dt / 10)
+
+
+def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
+    scene = oscillator().model_copy(update={"effects": (Patchy(stiffness=1.0),)})
+    line = found(scene)["patchy: grain"]
+    assert [s.scene.effects[0].grain for s in line.settings] == [1e-2, 3.16e-3, 1e-3]
+    assert not line.converges
+    assert finest(scene, -2).effects[0].grain == pytest.approx(1e-4)
+    assert finest(scene, -2).stepper == scene.stepper
+
+
+def test_the_scenes_own_method_is_first_and_in_other_precisions_too():
+    names = list(found(oscillator(), ("f64", "f32")))
+    assert names[:2] == ["Verlet, FixedStep: dt", "Verlet, FixedStep: dt, f32"]
+    single = found(oscillator(), ("f64", "f32"))[names[1]].settings[0]
+    assert options(oscillator(), single.scene, single.precision)[-2:] == ["--precision", "f32"]
+
+
+def test_only_what_suits_a_scene_is_tried():
+    """No magnetic field: no Boris. A force of velocity: no Verlet. No force: nothing implicit."""
+    kinds = {type(m.base.stepper).__name__ for m in found(oscillator()).values()}
+    assert kinds == {"Verlet", "Trapezoid"}
+    kinds = {type(m.base.stepper).__name__ for m in found(charged(accurate(1e-3), 1.0)).values()}
+    assert kinds == {"Boris", "Trapezoid"}
+    assert {type(m.base.stepper).__name__ for m in found(drift()).values()} == {"Verlet"}
+
+
+def test_a_cut_off_is_tried_against_the_law_that_has_none():
+    law = NearField(alpha1=1.0, alpha2=2.0, beta2=3)
+    scene = oscillator().model_copy(update={"effects": (law,)})
+    cuts = [s.scene.effects[0] for s in found(scene)["TruncatedNearField"].settings]
+    assert all(type(cut) is TruncatedNearField for cut in cuts)
+    assert [cut.cutoff for cut in cuts] == [0.1, 0.2, 0.5, 1.0]
+    assert {(cut.alpha1, cut.alpha2, cut.beta2) for cut in cuts} == {(1.0, 2.0, 3)}
+    words = options(scene, found(scene)["TruncatedNearField"].settings[0].scene)
+    assert words[:2] == ["--without", "near_field"]
+    table = "{alpha1 = 1.0, alpha2 = 2.0, beta2 = 3, cutoff = 0.1}"
+    assert words[2:] == ["--set", f"effects.truncated_near_field={table}"]
+    changed = scene.without("near_field")
+    assert changed.replace({"effects.truncated_near_field": cuts[0].model_dump()}).effects == (cuts[0],)
+    # One that a scene asks for is its law.
+    assert "TruncatedNearField" not in found(scene.model_copy(update={"effects": (cuts[0],)}))
+
+
+def test_a_part_is_exchanged_in_its_place():
+    scene = oscillator()
+    assert dict(parts(scene))["stepper.control"] == scene.stepper.control
+    changed = exchanged(scene, "stepper.control", FixedStep(dt=0.5))
+    assert changed.stepper == Verlet(control=FixedStep(dt=0.5))
+    changed = exchanged(scene, "effects.tether", Tether(stiffness=(1.0, 2.0, 3.0)))
+    assert changed.effects == (Tether(stiffness=(1.0, 2.0, 3.0)),)
+    assert expression(changed.stepper) == f"Verlet(control=FixedStep(dt={scene.stepper.control.dt}))"
+
+
+def test_a_knob_is_turned_by_decades_of_error():
+    both = Knob(dt=2, error=1)
+    turned = both.turned(Pace(dt=1.0, error=1e-3), 1)
+    assert (turned.dt, turned.error) == (3.16, 1e-2)
+    assert both.turned(Pace(dt=0.123456, error=1e-3), 0).dt == 0.123456
+    with pytest.raises(InputError, match=r"pace.dt must be greater than 0.0; received 0.0"):
+        Knob(dt=0.01).turned(Pace(dt=1.0), -4)
+
+
+WRONG = [
+    ({"repeats": 0}, "repeats must be at least 1; received 0"),
+    ({"coarser": 1, "finer": -2}, "must be at least 0; received -1"),
+    ({"precisions": ("f32",)}, "precisions must be f64 and others"),
+    ({"precisions": ("f64", "f16")}, "precision must be f64 or f32; received 'f16'"),
+    ({"starts": (8, 4)}, "starts must be given from few to many"),
+    ({"starts": (1, 4)}, "starts must be at least 2"),
+    ({"budget": 0.0}, "budget must be greater than 0"),
+    ({"quantities": (KNOWN, type(KNOWN)("mean", KNOWN.value, random=True))}, "must be all random, or none"),
+    ({"quantities": (UNKNOWN, UNKNOWN)}, "quantities must be of different names"),
+]
+
+
+@pytest.mark.parametrize(("settings", "message"), WRONG, ids=[str(k) for k in range(len(WRONG))])
+def test_wrong_settings_are_refused_before_anything_runs(settings, message):
+    with pytest.raises(InputError, match=message):
+        Study(oscillator(), **settings)
+
+
+def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatch):
+    monkeypatch.setattr(Sharp, "wanted", True)
+    made = attempts(list(found(oscillator()).values()), 0.0)
+    number = Quantity("number", lambda result: result)
+
+    def own(*values):
+        return compared(number, [[value] for value in values], made[: len(values)]).error
+
+    assert own(1.0, 1.01) == pytest.approx(0.01)
+    # The other one is as far off as its own two settings are apart.
+    assert own(1.0, 1.01, 1.2, 1.4) == pytest.approx(0.01)
+    assert own(1.0, 1.01, 1.2, 1.21) == pytest.approx(0.2)

@@ -1,0 +1,81 @@
+"""Random scenes: the mean over starts, its confidence interval, and how many starts an error takes."""
+
+import numpy as np
+import pytest
+
+from tests.accuracy.scenes import DEVIATION, ENERGY, GRAIN, GRAINS, MEAN, drift, energy
+from tests.scenes import head_on, simulate
+from tisim import Box
+from tisim.accuracy import Quantity, Study
+from tisim.accuracy.methods import methods
+from tisim.accuracy.quantity import displacement, estimate, kinetic_energy, mean, usual
+from tisim.accuracy.reference import attempts, compared
+from tisim.accuracy.row import TRUSTED
+from tisim.effects.impact import Impact
+from tisim.errors import InputError
+
+ENSEMBLES, STARTS = 60, 8
+
+
+@pytest.fixture(scope="module")
+def drifts():
+    """Results of many random starts."""
+    scenes = [drift(seed) for seed in range(ENSEMBLES * STARTS)]
+    return simulate(scenes, worlds=len(scenes), capacity=GRAINS)
+
+
+def test_the_interval_covers_the_true_mean_as_often_as_it_says(drifts):
+    """95 % of 60: fewer than 51 happens once in 2000 times, all 60 in 5 % of them."""
+    groups = [drifts[k : k + STARTS] for k in range(0, len(drifts), STARTS)]
+    found = [estimate(ENERGY, group) for group in groups]
+    covered = sum(abs(one.value[0] - energy()) <= one.uncertainty for one in found)
+    assert 51 <= covered < ENSEMBLES
+    # Student's t for 7 degrees of freedom is 2.365; v^2 = (m + d x)^2 has the variance below.
+    variance = 4 * MEAN**2 * DEVIATION**2 / 3 + 4 * DEVIATION**4 / 45
+    half = 2.365 * 0.5 * GRAIN * np.sqrt(GRAINS * variance / STARTS)
+    assert np.mean([one.uncertainty for one in found]) == pytest.approx(half, rel=0.1)
+
+
+def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
+    values = np.array([[r.state["velocity"][0, 0], r.state["velocity"][1, 0]] for r in drifts])
+    both, one = mean(values), mean(values[:, :1])
+    assert both.value.shape == (2,)
+    assert both.uncertainty == pytest.approx(np.sqrt(2) * one.uncertainty, rel=0.1)
+
+
+@pytest.mark.long
+def test_more_starts_buy_a_smaller_error(drifts):
+    """The error that is certain falls as the square root of the starts, and bounds the true one."""
+    found = Study(drift(), (ENERGY,), precisions=("f64",), repeats=1, starts=(8, len(drifts)), coarser=0)
+    found.run()
+    rows = found.line("random starts")
+    assert [row.starts for row in rows] == [8, 64, 512]
+    for row, result in zip(rows, (8, 64, 512), strict=True):
+        error, uncertainty = row.errors[0]
+        assert error < 2 * uncertainty
+        assert uncertainty * np.sqrt(result) == pytest.approx(rows[0].errors[0][1] * np.sqrt(8), rel=0.35)
+    assert found.truths[0].estimate.value[0] == pytest.approx(energy())
+    wanted = rows[2].at_most()
+    assert found.cheapest(wanted).starts == 512
+    # Other settings are run from the largest number of starts, the same ones.
+    assert [row.errors for row in found.line("Verlet, FixedStep: dt")] == [rows[2].errors]
+
+
+def test_a_random_reference_is_no_better_than_its_starts(drifts):
+    """The interval of its own mean counts, though the runs that check it agree to the last digit."""
+    unknown = Quantity("kinetic energy", kinetic_energy, random=True)
+    made = attempts(methods(drift(), 0.05, 1.0, (0.0,), ("f64",), 1), 0.0)
+    truth = compared(unknown, [drifts, drifts], made[:2])
+    assert truth.estimate.uncertainty == estimate(unknown, drifts).uncertainty > 0
+    error, off = estimate(unknown, drifts[:STARTS]).error(truth.estimate)
+    assert error < TRUSTED * off
+
+
+def test_what_is_compared_unless_asked_for():
+    impacts = (Impact(hardness=1e5),)
+    assert [q.name for q in usual(drift())] == ["velocity"]
+    assert usual(drift().model_copy(update={"effects": impacts}))[0].random
+    free = drift().model_copy(update={"domain": type(drift()).model_fields["domain"].default})
+    assert usual(free)[0].value is displacement
+    with pytest.raises(InputError, match="quantities must be given for a scene with impacts"):
+        usual(head_on(1.0, impacts, domain=Box(low=(-1.0,) * 3, high=(1.0,) * 3)))

@@ -1,0 +1,226 @@
+"""What a study finds, whatever the machine: orders, work, the error of its reference, and files."""
+
+import csv
+import io
+import itertools
+import json
+import shlex
+
+import h5py
+import numpy as np
+import pytest
+from rich.console import Console
+
+from tests.accuracy.scenes import DURATION, KNOWN, STEP, UNKNOWN, oscillator
+from tests.steppers.charged import charged
+from tisim import request, runtime
+from tisim.accuracy import Quantity, Study, files, study
+from tisim.accuracy.bench import Bench
+from tisim.accuracy.quantity import displacement
+from tisim.errors import InputError, RunError
+from tisim.steppers.boris import Boris
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.implicit_control import ErrorControl, IterationControl
+from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.verlet import Verlet
+
+pytestmark = pytest.mark.long
+STEPPERS = {
+    "Verlet, FixedStep: dt": 2,
+    "Trapezoid, ErrorControl: error, tolerance": 2,
+    "Trapezoid, IterationControl: longest, tolerance": 2,
+    "Trapezoid(phi=1.0), IterationControl: longest, tolerance": 1,
+}
+"""All methods for the oscillator, and the orders of their steppers."""
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """The oscillator, its place compared with the closed form and with a reference."""
+    found = Study(oscillator(), (KNOWN, UNKNOWN), precisions=("f64",), repeats=2)
+    found.run()
+    return found
+
+
+def order(rows):
+    """Of the error in the number of steps, by regression."""
+    return -np.polyfit(np.log([r.steps for r in rows]), np.log([r.errors[0][0] for r in rows]), 1)[0]
+
+
+def test_every_stepper_shows_its_order_along_its_line(measured):
+    assert {row.method for row in measured.rows} == set(STEPPERS)
+    for method, expected in STEPPERS.items():
+        # From the second level on, where the error is small enough to go as a power of the step.
+        rows = measured.line(method)[1:]
+        assert len(rows) == 3
+        assert order(rows) == pytest.approx(expected, abs=0.12), method
+
+
+@pytest.mark.parametrize("method", STEPPERS)
+def test_errors_fall_and_work_rises_with_what_is_asked_for(measured, method):
+    rows = measured.line(method)
+    assert not any(row.failed for row in rows)
+    for coarse, fine in itertools.pairwise(rows):
+        assert fine.errors[0][0] < coarse.errors[0][0] / 2
+        assert fine.steps > 1.5 * coarse.steps
+        assert fine.sums > 1.5 * coarse.sums
+
+
+def test_work_is_that_of_the_steppers(measured):
+    """One sum of forces a step for Verlet, one for each iteration for the implicit one."""
+    for row in measured.line("Verlet, FixedStep: dt"):
+        dt = float(row.setting.removeprefix("dt="))
+        assert row.steps == np.ceil(DURATION / dt - 1e-9)
+        assert row.sums == row.steps
+        assert row.rejections == 0
+    for row in measured.line("Trapezoid, IterationControl: longest, tolerance"):
+        assert row.sums >= row.steps
+    assert measured.line("Verlet, FixedStep: dt")[-1].setting == f"dt={STEP}"
+
+
+def test_the_reference_is_no_worse_than_it_says(measured):
+    """Its own error bounds how far it is from the closed form, and is small beside all that is trusted."""
+    exact, own = (truth.estimate.value for truth in measured.truths)
+    off = np.linalg.norm(own - exact) / np.linalg.norm(exact)
+    assert measured.truths[0].error == 0.0
+    assert 0 < off <= measured.truths[1].error
+    for row in measured.rows:
+        (true, sure), (found, unsure) = row.errors
+        assert sure == 0.0
+        assert unsure == pytest.approx(measured.truths[1].error, rel=1e-3)
+        assert abs(true - found) <= unsure
+        assert row.trusted(1)
+    assert measured.truths[1].error < 20 * off
+
+
+def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypatch):
+    """On a rotation the trapezoidal rule with equal steps and Boris' stepper agree, at any step."""
+    limits = {"first": 0.02, "longest": 0.02, "shortest": 1e-9, "tolerance": 1e-4}
+    own = Trapezoid(control=IterationControl(**limits))
+    circle = charged(own, 2.0, velocity=(1.0, 0.0, 0.0))
+    monkeypatch.setattr(Trapezoid, "alternatives", classmethod(lambda cls, effects, dt: ()))
+
+    def exact(result):
+        w, t = 3.0, result.time
+        return np.array([[np.sin(w * t), np.cos(w * t) - 1.0, 0.0]]) / w
+
+    known = type(KNOWN)("known", displacement, exact)
+    found = Study(circle, (known, UNKNOWN), precisions=("f64",), repeats=1, coarser=1)
+    found.run()
+    off = np.linalg.norm(found.truths[1].estimate.value - found.truths[0].estimate.value)
+    off /= np.linalg.norm(found.truths[0].estimate.value)
+    assert off <= found.truths[1].error < 100 * off
+    # Those that go far in one line: the paper's control turned one setting at a time.
+    names = {row.method.partition(": ")[2] for row in found.rows}
+    assert names == {"longest, tolerance", "longest", "tolerance", "dt"}
+    # The tolerance alone does not take the error of the rule away: dt_lim bounds it.
+    bounded = [row.errors[0][0] for row in found.line("Trapezoid, IterationControl: tolerance")]
+    assert bounded[1] > bounded[0] / 2
+    assert order(found.line("Boris, FixedStep: dt")) == pytest.approx(2, abs=0.05)
+
+
+def test_the_cheapest_setting_is_the_cheapest(measured):
+    for quantity, name in enumerate(("known", "unknown")):
+        for error in (1e-1, 1e-2, 1e-3, 1e-4):
+            good = [row for row in measured.rows if sum(row.errors[quantity]) <= error]
+            chosen = measured.cheapest(error, name)
+            assert chosen in good
+            assert chosen.median == min(row.median for row in good)
+        assert measured.cheapest(1e-30, name) is None
+    for error, row in measured.decades().items():
+        assert row == measured.cheapest(error)
+    with pytest.raises(InputError, match="quantity must be one of known, unknown; received 'speed'"):
+        measured.cheapest(1e-3, "speed")
+
+
+def test_words_and_python_of_a_row_make_its_scene(measured):
+    """Pasted into a command line or a scene, they give the stepper that was measured."""
+    names = {kind.__name__: kind for kind in (Boris, Verlet, Trapezoid, FixedStep, ErrorControl)}
+    names["IterationControl"] = IterationControl
+    for row in measured.rows:
+        stepper = eval(row.python, names)
+        words = shlex.split(row.options)
+        assert words[::2] == ["--set"] * (len(words) // 2)
+        assert measured.scene.replace(request.assignments(words[1::2])).stepper == stepper
+        asked = row.setting.split(", ")[0].split("=")
+        assert getattr(stepper.control, asked[0]) == pytest.approx(float(asked[1]), rel=5e-3)
+
+
+def test_files_are_read_back(measured, tmp_path):
+    measured.write(tmp_path)
+    measured.picture(tmp_path / "cost.png")
+    with (tmp_path / "cost.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["method"], row["setting"]) for row in rows] == [row.key for row in measured.rows]
+    assert [float(row["seconds"]) for row in rows] == [row.median for row in measured.rows]
+    assert [float(row["error of unknown"]) for row in rows] == [r.errors[1][0] for r in measured.rows]
+    with h5py.File(tmp_path / "cost.h5") as file:
+        assert "numpy" in json.loads(file.attrs["versions"])
+        assert json.loads(file.attrs["settings"])["device"] == "cpu"
+        assert file.attrs["scene"] == measured.scene.to_toml()
+        assert file["truths/unknown"].attrs["uncertainty"] == measured.truths[1].estimate.uncertainty
+    again = Study(measured.scene, (KNOWN, UNKNOWN), precisions=("f64",))
+    files.resume(again, tmp_path)
+    assert again.rows == measured.rows
+    assert again.complete
+    again.run(progress=lambda fraction, what: pytest.fail("nothing is left to measure"))
+    other = Study(oscillator(dt=0.02), (KNOWN, UNKNOWN))
+    with pytest.raises(InputError, match="output folder must be without the study of another scene"):
+        files.resume(other, tmp_path)
+    assert (tmp_path / "cost.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture
+def verlet_only(monkeypatch):
+    """Takes one compilation."""
+    monkeypatch.setattr(Trapezoid, "alternatives", classmethod(lambda cls, effects, dt: ()))
+
+
+def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
+    run = Bench.run
+
+    def brittle(self, scenes, watch=None):
+        if scenes[0].stepper.control.dt > 0.02:
+            raise RunError("a quantity is not finite")
+        return run(self, scenes, watch)
+
+    monkeypatch.setattr(Bench, "run", brittle)
+    found = study(oscillator(), (KNOWN,), precisions=("f64",))
+    assert [row.failed for row in found.rows] == ["a quantity is not finite", "", "", ""]
+    assert [len(row.seconds) for row in found.rows] == [0, 3, 3, 3]
+    assert found.complete
+    assert found.cheapest(1.0) in found.rows[1:]
+    assert "not finite" in printed(found)
+
+
+def printed(found):
+    console = Console(width=120, file=io.StringIO())
+    console.print(found.table())
+    return console.file.getvalue()
+
+
+def test_what_does_not_fit_the_budget_is_left_out(verlet_only):
+    found = study(oscillator(), (KNOWN,), precisions=("f64",), budget=1e-6)
+    assert found.rows == []
+    assert not found.complete
+    with pytest.raises(RunError, match=r"the reference takes about \d+ s, which is more than the budget"):
+        study(oscillator(), (UNKNOWN,), precisions=("f64",), budget=1e-6)
+
+
+def test_nothing_to_compare_is_told(verlet_only):
+    still = Quantity("place across", lambda result: displacement(result)[:, 1])
+    with pytest.raises(InputError, match=r"place across must be other than zero at the end; received 0.0"):
+        study(oscillator(), (still,), precisions=("f64",), coarser=0)
+
+
+@pytest.mark.slow
+def test_single_precision_is_a_line_of_its_own_and_the_runtime_as_before(verlet_only):
+    before = runtime.current()
+    found = study(oscillator(), (KNOWN,), precisions=("f64", "f32"), repeats=1, finer=2)
+    assert runtime.current() == before
+    single, double = found.line("Verlet, FixedStep: dt, f32"), found.line("Verlet, FixedStep: dt")
+    assert [row.precision for row in single] == ["f32"] * 6
+    # Rounding of f32 is met on the way to 1e-8, and not by f64.
+    assert single[0].errors[0][0] == pytest.approx(double[0].errors[0][0], rel=1e-3)
+    assert single[-1].errors[0][0] > 10 * double[-1].errors[0][0]
+    assert single[-1].options.endswith("--precision f32")

@@ -1,0 +1,99 @@
+"""tisim cost: what it writes and answers, how it is stopped and goes on, and what it refuses."""
+
+import csv
+import os
+import signal
+
+import pytest
+
+from tests.accuracy.scenes import oscillator
+from tisim.accuracy import files
+from tisim.steppers.trapezoid import Trapezoid
+
+WRONG = [
+    (["nosuch"], "case must be one of agglomeration, blast, vibration, or a scene file ending in"),
+    (["vibration", "--size", "huge"], "size must be one of alone, default, equilibrium"),
+    (["vibration", "--set", "effects.warp.speed=9"], "effects.warp.speed must be a setting of this scene"),
+    (["vibration", "--without", "warp"], "effect to leave out must be one of"),
+    (["vibration", "--error", "0"], "--error must be greater than 0; received 0.0"),
+    (["vibration", "--repeats", "0"], "repeats must be at least 1; received 0"),
+    (["vibration", "--coarser", "-2"], "coarser + finer must be at least 0; received -2"),
+    (["vibration", "--budget", "-1"], "budget must be greater than 0; received -60.0"),
+    (["agglomeration", "--starts", "4,x"], "--starts must be whole numbers with commas between; received"),
+    (["agglomeration", "--starts", "1"], "starts must be at least 2; received [1]"),
+    (["agglomeration", "--device", "abacus"], "device must be one of cpu, cuda; received 'abacus'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG, ids=[" ".join(w[0][:2]) for w in WRONG])
+def test_wrong_input_is_told_and_nothing_written(tisim, tmp_path, arguments, message):
+    code, out, err = tisim("cost", *arguments)
+    assert code == 2
+    assert message in " ".join(err.split())
+    assert "Traceback" not in err
+    assert out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def swing(tmp_path, monkeypatch):
+    """The oscillator as a file; only its own stepper is tried, which takes one compilation."""
+    monkeypatch.setattr(Trapezoid, "alternatives", classmethod(lambda cls, effects, dt: ()))
+    (tmp_path / "swing.toml").write_text(oscillator().to_toml())
+    return "swing.toml"
+
+
+def rows(folder):
+    with (folder / files.CSV).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.long
+def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
+    command = ("cost", swing, "--no-f32", "--quick", "--error")
+    code, out, _ = tisim(*command, "1e-3")
+    assert code == 0
+    folder = tmp_path / "out" / "swing-cost"
+    assert {path.name for path in folder.iterdir()} == {files.CSV, files.HDF5, files.PICTURE}
+    # dt = 0.0316 and 0.01 come before: their errors are 7e-3 and 7e-4.
+    assert [row["setting"] for row in rows(folder)] == ["dt=0.0316", "dt=0.01", "dt=0.00316"]
+    (answer,) = [line for line in out.splitlines() if line.startswith("  tisim run")]
+    assert answer.split("--set")[0].strip() == "tisim run swing.toml"
+    chosen = answer.split("dt=")[1]
+    errors = {row["setting"]: float(row["error of displacement"]) for row in rows(folder)}
+    assert errors[f"dt={chosen}"] < 1e-3
+    before = (folder / files.HDF5).read_bytes()
+    code, again, _ = tisim(*command, "1e-3")
+    assert code == 0
+    assert [line for line in again.splitlines() if line.startswith("  tisim run")] == [answer]
+    code, _, err = tisim(*command, "1e-9")
+    assert code == 1
+    assert "no setting that was measured has an error of at most 1e-09" in " ".join(err.split())
+    assert (folder / files.HDF5).read_bytes() == before
+    code, _, err = tisim(*command[:-1], "--set", "duration=1.0")
+    assert code == 2
+    assert "output folder must be without the study of another scene" in " ".join(err.split())
+
+
+@pytest.mark.long
+def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch):
+    command = ("cost", swing, "--no-f32", "--repeats", "1", "--out", "cut")
+    with monkeypatch.context() as patch:
+        write, pressed = files.write, []
+
+        def press(study, folder):
+            if len(study.rows) == 2 and not pressed:
+                pressed.append(True)
+                os.kill(os.getpid(), signal.SIGINT)
+            return write(study, folder)
+
+        patch.setattr(files, "write", press)
+        code, out, err = tisim(*command)
+    assert code == 130
+    assert "To go on, give the same command again" in " ".join(err.split())
+    assert "dt=0.01 " in out
+    cut = rows(tmp_path / "cut")
+    assert [row["setting"] for row in cut] == ["dt=0.0316", "dt=0.01"]
+    assert tisim(*command)[0] == 0
+    assert rows(tmp_path / "cut")[:2] == cut
+    assert len(rows(tmp_path / "cut")) == 4
