@@ -28,6 +28,10 @@ def cost(
     error: Annotated[
         float | None, typer.Option(help="Print the cheapest settings with an error of at most this.")
     ] = None,
+    quantity: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="What --error is of; first of the table by default."),
+    ] = None,
     size: Size = None,
     seed: Seed = None,
     absent: Absent = None,
@@ -73,6 +77,7 @@ def cost(
         starts=((4, 16, 64) if quick else (8, 32, 128)) if starts is None else _numbers(starts),
         budget=60 * budget,
     )
+    which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
     if not overwrite:
         files.resume(study, place)
@@ -86,15 +91,15 @@ def cost(
         err().print(f"stopped; {place / files.HDF5} has what is done. To go on, give the same command again.")
         raise typer.Exit(130)
     if error is not None:
-        row = study.cheapest(error)
+        row = study.cheapest(error, quantity)
         if row is None:
-            least = min((row.at_most() for row in study.rows), default=math.inf)
+            least = min((row.at_most(which) for row in study.rows), default=math.inf)
             raise RunError(
                 f"no setting that was measured has an error of at most {error:g}; the least is {least:.1e}. "
                 "--finer goes further"
             )
         words = f"{target} --size {size}" if size else target
-        print(f"cheapest with an error of at most {error:g}:\n{listing.recipe(row, words)}")
+        print(f"cheapest with an error of at most {error:g}:\n{listing.recipe(row, words, which)}")
 
 
 def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:

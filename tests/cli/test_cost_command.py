@@ -16,6 +16,7 @@ WRONG = [
     (["vibration", "--set", "effects.warp.speed=9"], "effects.warp.speed must be a setting of this scene"),
     (["vibration", "--without", "warp"], "effect to leave out must be one of"),
     (["vibration", "--error", "0"], "--error must be greater than 0; received 0.0"),
+    (["vibration", "--quantity", "speed"], "quantity must be one of positions, centre of gravity; received"),
     (["vibration", "--repeats", "0"], "repeats must be at least 1; received 0"),
     (["vibration", "--coarser", "-2"], "coarser + finer must be at least 0; received -2"),
     (["vibration", "--budget", "-1"], "budget must be greater than 0; received -60.0"),

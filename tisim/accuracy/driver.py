@@ -50,6 +50,7 @@ class Run:
         base = self._run([study.scene], 0.0)
         found = self._methods(base)
         self.base = base.seconds
+        must(bool(found), "scene", "one that has something to turn", study.scene.stepper.kind())
         rounds = max(len(method.settings) for method in found)
         known = {row.key for row in study.rows}
         plan = [
@@ -63,7 +64,8 @@ class Run:
                 runtime.start(where.device, precision, where.threads)
             for items in plan:
                 self._round([(m, k) for m, k in items if m.settings[k].precision == precision])
-        study.complete = all(len(study.line(m.name)) == len(m.settings) for m in found)
+        known = {row.key for row in study.rows}
+        study.complete = all((m.name, setting.words) in known for m in found for setting in m.settings)
         self.bench.close()
 
     def _methods(self, base: Timed) -> list[Method]:
@@ -75,10 +77,13 @@ class Run:
         return [ensembles(study.scene, study.starts), *found] if study.random else found
 
     def _cost(self, method: Method, k: int) -> float:
-        """Guess of the seconds that a setting takes, all repeats."""
-        setting = method.settings[k]
-        weight = method.weights[k] if method.knob else 1.0
-        return self.base * weight * setting.starts * self.study.repeats
+        """Guess of the seconds that a setting takes, all repeats, from another of its method if known."""
+        weights, repeats = method.weights, self.study.repeats
+        guesses = dict(zip((setting.words for setting in method.settings), weights, strict=True))
+        for row in self.study.line(method.name):
+            if row.seconds and row.setting in guesses:
+                return repeats * row.median * weights[k] / guesses[row.setting]
+        return repeats * self.base * method.settings[k].starts * (weights[k] if method.knob else 1.0)
 
     def _truths(self, base: Timed, found: Sequence[Method], rest: float) -> None:
         """The true values, where they are not known yet; ``rest``: seconds planned for all that follows."""
@@ -116,12 +121,13 @@ class Run:
         """Settings of one level, repeats in turns; then their rows."""
         runs: dict[int, list[Timed]] = {at: [] for at in range(len(items))}
         failed: dict[int, str] = {}
+        costs = [self._cost(method, k) for method, k in items]
         try:
             for repeat in range(self.study.repeats):
                 for at, (method, k) in enumerate(items):
-                    cost, setting = self._cost(method, k) / self.study.repeats, method.settings[k]
+                    cost, setting = costs[at] / self.study.repeats, method.settings[k]
                     self.what = f"{method.name}, {setting.words}"
-                    if at in failed or (repeat == 0 and self._left() < self._cost(method, k)):
+                    if at in failed or (repeat == 0 and self._left() < costs[at]):
                         self.done += cost
                         continue
                     try:

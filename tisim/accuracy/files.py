@@ -62,7 +62,7 @@ def _image(study: Study) -> bytes:
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
         file.attrs.update({
             "format": FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
-            "settings": json.dumps(runtime.current().settings), "versions": json.dumps(versions()),
+            "settings": json.dumps(_settings(study)), "versions": json.dumps(versions()),
             "complete": json.dumps(study.asked() if study.complete else None),
         })  # fmt: skip
         rows = file.create_group("rows")
@@ -83,6 +83,11 @@ def _image(study: Study) -> bytes:
             value.attrs.update({"uncertainty": truth.estimate.uncertainty, "source": truth.source})
         file.flush()
         return bytes(file.id.get_file_image())
+
+
+def _settings(study: Study) -> dict[str, Any]:
+    where = runtime.current()
+    return {"device": where.device, "threads": where.threads, "precisions": list(study.precisions)}
 
 
 def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:

@@ -55,11 +55,11 @@ def sources(study: Study) -> list[str]:
     return lines
 
 
-def recipe(row: Row, target: str) -> str:
+def recipe(row: Row, target: str, quantity: int = 0) -> str:
     """How to run a setting: as Python in a scene, and as words of ``tisim run`` for a case or file."""
     starts = f", over {row.starts} random starts" if row.starts > 1 else ""
     return (
-        f"{row.method}: {row.setting}{starts}: {row.median:.3g} s, error {row.at_most():.1e}\n"
+        f"{row.method}: {row.setting}{starts}: {row.median:.3g} s, error {row.at_most(quantity):.1e}\n"
         f"  stepper={row.python}\n"
         f"  tisim run {target} {row.options}".rstrip()
     )
