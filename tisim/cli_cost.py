@@ -96,7 +96,7 @@ def cost(
             least = min((row.at_most(which) for row in study.rows), default=math.inf)
             raise RunError(
                 f"no setting that was measured has an error of at most {error:g}; the least is {least:.1e}. "
-                "--finer goes further"
+                f"{'More --starts go' if study.random else '--finer goes'} further"
             )
         words = f"{target} --size {size}" if size else target
         print(f"cheapest with an error of at most {error:g}:\n{listing.recipe(row, words, which)}")

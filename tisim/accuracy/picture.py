@@ -43,6 +43,8 @@ def picture(study: Study) -> Figure:
     for k, axis in enumerate(axes):
         _panel(axis, study, lines, k)
     axes[0].set_ylabel("relative error")
+    if any(row.errors and not row.trusted(k) for row in study.rows for k in range(wide)):
+        axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: no more than this")
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(
         handles, names, loc="outside lower center", ncols=1 if wide == 1 else 2, frameon=False, fontsize=8.5
@@ -73,6 +75,10 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     if own > 0:
         low = min(low, own / 2)
         axis.axhspan(low, own, color="0.9", zorder=0)
+        axis.annotate(
+            "error of the reference", (0.99, own), (0, -3), xycoords=("axes fraction", "data"),
+            textcoords="offset points", ha="right", va="top", fontsize=8,
+        )  # fmt: skip
     axis.set_ylim(low, min(high, 30.0))
     axis.set_title(study.quantities[k].name, fontsize=10.5)
     left, right = axis.get_xlim()
