@@ -10,6 +10,7 @@ from tests.throwaway import Trap
 from tisim.accuracy import Quantity, Study
 from tisim.accuracy.methods import exchanged, finest, methods, parts
 from tisim.accuracy.reference import attempts, compared
+from tisim.accuracy.row import Row, cheapest, decades
 from tisim.accuracy.words import expression, options
 from tisim.effects.near_field import NearField, TruncatedNearField
 from tisim.effects.tether import Tether
@@ -76,6 +77,9 @@ def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
     assert not line.converges
     assert finest(scene, -2).effects[0].grain == pytest.approx(1e-4)
     assert finest(scene, -2).stepper == scene.stepper
+    reference, *_ = attempts(list(found(scene).values()), 0.0)
+    assert reference.scene.effects[0].grain == pytest.approx(1e-4)
+    assert reference.scene.stepper.control.dt == pytest.approx(scene.stepper.control.dt / 10)
 
 
 def test_the_scenes_own_method_is_first_and_in_other_precisions_too():
@@ -161,3 +165,17 @@ def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatc
     # The other one is as far off as its own two settings are apart.
     assert own(1.0, 1.01, 1.2, 1.4) == pytest.approx(0.01)
     assert own(1.0, 1.01, 1.2, 1.21) == pytest.approx(0.2)
+
+
+def row(name, seconds, error, off):
+    return Row(name, "", "", "", "f64", 1, seconds=(seconds,), errors=((error, off),))
+
+
+def test_what_an_error_may_be_off_by_counts_in_the_choice():
+    rows = [row("sure", 2.0, 5e-4, 1e-5), row("unsure", 1.0, 9e-4, 5e-4), row("slow", 3.0, 1e-6, 0.0)]
+    assert cheapest(rows, 1e-3).method == "sure"
+    assert cheapest(rows, 2e-3).method == "unsure"
+    assert cheapest(rows, 1e-7) is None
+    chosen = {error: best.method for error, best in decades(rows).items()}
+    assert chosen == {1e-2: "unsure", 1e-3: "sure", 1e-4: "slow", 1e-5: "slow", 1e-6: "slow"}
+    assert [r.trusted() for r in rows] == [True, False, True]

@@ -193,6 +193,23 @@ def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
     assert "not finite" in printed(found)
 
 
+def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
+    run, runs = Bench.run, []
+
+    def stopped(self, scenes, watch=None):
+        runs.append(scenes[0].stepper.control.dt)
+        if runs.count(0.01) == 2:
+            raise KeyboardInterrupt
+        return run(self, scenes, watch)
+
+    monkeypatch.setattr(Bench, "run", stopped)
+    found = Study(oscillator(), (KNOWN,), precisions=("f64",))
+    with pytest.raises(KeyboardInterrupt):
+        found.run()
+    assert [(row.setting, len(row.seconds)) for row in found.rows] == [("dt=0.0316", 3), ("dt=0.01", 1)]
+    assert not found.complete
+
+
 def printed(found):
     console = Console(width=120, file=io.StringIO())
     console.print(found.table())

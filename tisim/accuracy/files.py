@@ -48,7 +48,7 @@ def table(study: Study) -> str:
     writer = csv.writer(text)
     names = [q.name for q in study.quantities]
     errors = [f"{what} of {name}" for name in names for what in ("error", "uncertainty")]
-    writer.writerow([*_TEXTS, *_NUMBERS, "seconds", "shortest", "longest", "repeats", *errors])
+    writer.writerow([*_TEXTS, *_NUMBERS, "seconds", "least seconds", "most seconds", "repeats", *errors])
     for row in study.rows:
         times = [row.median, min(row.seconds), max(row.seconds)] if row.seconds else [math.nan] * 3
         found = [x for pair in row.errors for x in pair] or [math.nan] * len(errors)

@@ -1,0 +1,59 @@
+"""What each case compares in a study."""
+
+import numpy as np
+import pytest
+
+from cases import agglomeration, blast, vibration
+from cases.case import every
+from tests.scenes import simulate
+from tisim.accuracy.quantity import estimate
+from tisim.accuracy.reference import closed_form
+from tisim.sources.uniform import ElectricField
+
+
+@pytest.mark.parametrize("name", sorted(every()))
+def test_every_size_of_every_case_says_what_is_compared(name):
+    case = every()[name]
+    for size in case.sizes:
+        found = case.quantities(case.scene(size, 0))
+        assert found
+        assert len({quantity.random for quantity in found}) == 1
+        assert len({quantity.name for quantity in found}) == len(found)
+
+
+def test_paths_that_are_chaotic_are_not_compared():
+    assert [q.random for q in blast.CASE.quantities(blast.scene())] == [False]
+    assert [q.random for q in blast.CASE.quantities(blast.scene(contact=True))] == [True]
+    assert [q.random for q in agglomeration.CASE.quantities(agglomeration.scene_for("small", 0))] == [True]
+
+
+@pytest.mark.long
+def test_the_array_follows_its_closed_form():
+    """Of a single particle, and of the array's centre whatever the near field."""
+    scene = vibration.scene(near_field="none", sites=2, duration=0.004)
+    positions, centre = vibration.CASE.quantities(scene)
+    (result,) = simulate([scene], capacity=8)
+    for quantity in (positions, centre):
+        truth = closed_form(quantity, result)
+        error, off = estimate(quantity, [result]).error(truth.estimate)
+        assert error < 1e-5
+        assert off == 0.0
+    assert truth.estimate.value[2] == 0.0
+    assert np.linalg.norm(truth.estimate.value) > 1e-5
+
+
+def test_a_closed_form_is_claimed_only_where_it_holds():
+    def known(scene):
+        return [q.exact is not None for q in vibration.CASE.quantities(scene)]
+
+    assert known(vibration.scene(near_field="none")) == [True, True]
+    assert known(vibration.scene()) == [False, True]
+    for change in (
+        {"effects.electric_field.constant": [1.0, 0.0, 0.0]},
+        {"effects.electric_field.amplitude": [0.1, 0.1, 0.0]},
+        {"effects.magnetic_field.constant": [1.0, 0.0, 1.0]},
+        {"effects.tether.stiffness": [0.5, 0.0, 0.5]},
+    ):
+        assert known(vibration.scene().replace(change)) == [False, False], change
+    bare = vibration.scene().model_copy(update={"effects": (ElectricField(),)})
+    assert known(bare) == [False, False]
