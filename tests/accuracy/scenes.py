@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from tests.scenes import scene
-from tisim import Box, Cloud, Scene
+from tisim import Box, Cloud, Scene, steppers
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import displacement, kinetic_energy
 from tisim.effects.tether import Tether
+from tisim.kinds import load
 from tisim.steppers.controller import FixedStep
+from tisim.steppers.stepper import Stepper
 from tisim.steppers.verlet import Verlet
 
 RATE, SPEED, DURATION, STEP = 3.0, 1.0, 2.0, 0.001
@@ -56,3 +58,11 @@ def energy(result=None):
 
 
 ENERGY = Quantity("kinetic energy", kinetic_energy, energy, random=True)
+
+
+def only(patch, *kinds):
+    """From now on, only steppers of these kinds are tried in place of a scene's own: each is compiled."""
+    load(steppers)
+    for kind in Stepper.known().values():
+        if kind not in kinds:
+            patch.setattr(kind, "alternatives", classmethod(lambda cls, effects, dt: ()))

@@ -6,9 +6,8 @@ import signal
 
 import pytest
 
-from tests.accuracy.scenes import oscillator
+from tests.accuracy.scenes import only, oscillator
 from tisim.accuracy import files
-from tisim.steppers.trapezoid import Trapezoid
 
 WRONG = [
     (["nosuch"], "case must be one of agglomeration, blast, vibration, or a scene file ending in"),
@@ -39,7 +38,7 @@ def test_wrong_input_is_told_and_nothing_written(tisim, tmp_path, arguments, mes
 @pytest.fixture
 def swing(tmp_path, monkeypatch):
     """The oscillator as a file; only its own stepper is tried, which takes one compilation."""
-    monkeypatch.setattr(Trapezoid, "alternatives", classmethod(lambda cls, effects, dt: ()))
+    only(monkeypatch)
     (tmp_path / "swing.toml").write_text(oscillator().to_toml())
     return "swing.toml"
 

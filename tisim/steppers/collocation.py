@@ -1,10 +1,12 @@
 """The implicit stepper of high order: Lobatto's collocation, of which the papers' trapezoid is the first."""
 
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Self
 
 from pydantic import Field as Option
 
 from tisim.blocks import BlockSums
+from tisim.effect import Effect, Force, PairForce
 from tisim.forces import FORCE
 from tisim.program import Item
 from tisim.state import Field
@@ -52,6 +54,18 @@ class Collocation(Stepper):
             "measured_dt",
         ),
     )
+
+    @property
+    def order(self) -> int:
+        return 2 * self.stages - 2
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        forced = any(isinstance(effect, Force | PairForce) for effect in effects)
+        return (cls(control=StageControl(first=dt, shortest=1e-9 * dt)),) if forced else ()
+
+    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
+        return work["force_evaluations"]
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         return (FORCE, *kept(turning), CHANGE, *Stages.fields(self.stages, turning))

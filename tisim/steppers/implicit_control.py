@@ -27,12 +27,6 @@ class ImplicitControl(StepControl):
     most: float = parameter("", 4.0, ge=1)
     least: float = parameter("", 0.1, gt=0, lt=1)
 
-    knobs: ClassVar[tuple[Knob, ...]] = (
-        Knob(longest=2, tolerance=1),
-        Knob(longest=2, converges=False),
-        Knob(tolerance=1, converges=False),
-    )
-
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         name = self.kind()
@@ -82,6 +76,12 @@ class IterationControl(ImplicitControl):
     tolerance: float = parameter("", 5e-4, gt=0)
     iterations: int = Field(10, ge=2)
     order: float = parameter("", 2.0, gt=0)
+
+    knobs: ClassVar[tuple[Knob, ...]] = (
+        Knob(longest=2, tolerance=1),
+        Knob(longest=2, converges=False),
+        Knob(tolerance=1, converges=False),
+    )
 
     @ti.func
     def solved(self, w, change):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from tisim._taichi import ti
+from tisim.knob import Knob
 from tisim.spec import parameter
 from tisim.steppers.implicit_control import ImplicitControl
 
@@ -33,6 +34,8 @@ class StageControl(ImplicitControl):
     resolution: float = parameter("", 1e-3, ge=0)
     first: float = parameter("s", 1e-6, gt=0)
     longest: float = parameter("s", 1.0, gt=0)
+
+    knobs = (Knob(error=1),)
 
     @ti.func
     def scale(self, s, w, i, moved):
