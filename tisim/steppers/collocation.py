@@ -62,7 +62,7 @@ class Collocation(Stepper):
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         forced = any(isinstance(effect, Force | PairForce) for effect in effects)
-        return (cls(control=StageControl(first=dt, shortest=1e-9 * dt)),) if forced else ()
+        return (cls(control=StageControl(first=dt, shortest=min(1e-12, 1e-3 * dt))),) if forced else ()
 
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"]

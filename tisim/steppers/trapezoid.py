@@ -56,7 +56,7 @@ class Trapezoid(Stepper):
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         if not any(isinstance(effect, Force | PairForce) for effect in effects):
             return ()
-        limits = {"first": dt, "longest": dt, "shortest": 1e-9 * dt}
+        limits = {"first": dt, "longest": dt, "shortest": min(1e-12, 1e-3 * dt)}
         papers = IterationControl(tolerance=1e-6, **limits)
         own = ErrorControl(error=1e-4, tolerance=1e-5, **{**limits, "longest": 1e3 * dt})
         together = any(isinstance(effect, PairForce) for effect in effects)
