@@ -153,6 +153,8 @@ def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
     table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
     for name, n in result.work.items():
         table.add_row(name.replace("_", " "), str(n))
+    for name, value in result.measures.items():
+        table.add_row(name.replace("_", " "), f"{value:.6g}")
     table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
     table.add_row("written", "\n".join(map(str, paths)))
     return table

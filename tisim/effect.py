@@ -8,7 +8,7 @@ Rules
    A field that no other effect has ever needed is declared by putting a ``Field`` there. Where the
    effect's options decide, ``needed`` returns those of this one.
 4. ``counts`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
-   ``keeps`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start.
+   ``keeps`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them back.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
    are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them by
    the driver, and changed by ``remember`` only, once a step.

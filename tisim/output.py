@@ -1,8 +1,9 @@
 """What a run leaves in its folder: result.h5, scene.toml, versions.json, cloud.png; trajectory.h5 if asked.
 
 result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
-one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts; the attributes
-say how the run ended and under which settings, and hold the scene as TOML.
+one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts, ``measures``
+what effects keep of the world; the attributes say how the run ended and under which settings, and hold the
+scene as TOML.
 """
 
 from __future__ import annotations
@@ -109,6 +110,7 @@ def _image(result: Result) -> bytes:
         for name, arrays in (("start", result.start), ("end", result.state)):
             _write_arrays(file.create_group(name), arrays, units)
         file.create_group("work").attrs.update(result.work)
+        file.create_group("measures").attrs.update(result.measures)
         file.flush()
         return bytes(file.id.get_file_image())
 

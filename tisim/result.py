@@ -22,7 +22,8 @@ class Result:
 
     state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, the
         last good state. start : the same at the start.
-    time : s. work : counts (steps, particle_steps, and what the effects count). wall_s : wall seconds of
+    time : s. work : counts (steps, particle_steps, and what the effects count). measures : quantities of the
+        world that its effects keep, at the end. wall_s : wall seconds of
         the batch that this world was part of, per world; set-up and compilation are not in it.
     """
 
@@ -34,3 +35,4 @@ class Result:
     status: Status
     wall_s: float
     settings: dict[str, str] = field(default_factory=dict)
+    measures: dict[str, float] = field(default_factory=dict)

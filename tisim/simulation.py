@@ -183,6 +183,7 @@ class Simulation:
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
         """Loaded worlds read back: those asked for, or all of them, in order."""
         tallies = {name: self.s.read(name) for name in self.s.counters}
+        kept = {name: self.s.read(name) for e in self.scenes[0].effects for name in e.keeps}
         status, good = self.s.read("status"), self.watch.good
         found = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
@@ -197,6 +198,7 @@ class Simulation:
                     status=self.watch.status(w, int(status[w])),
                     wall_s=self.wall_s / len(self.scenes),
                     settings=self.runtime.settings,
+                    measures={name: float(values[w]) for name, values in kept.items()},
                 )
             )
         return found

@@ -1,0 +1,44 @@
+"""The observer of a cloud's centre of gravity, and that a Result and its file give back what it keeps."""
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.scenes import scene, simulate
+from tisim import output
+from tisim.effects.tether import Tether
+from tisim.operators.peak_displacement import PeakDisplacement
+
+
+def swinging(periods, speed):
+    """Two masses of 1 kg on springs of 1 N/m: their centre of gravity swings too."""
+    return scene(
+        [[0.0, 0, 0], [0.1, 0, 0]], [[0.0, speed, 0], [0, speed, 0]],
+        (Tether(stiffness=(1.0, 1.0, 1.0)), PeakDisplacement()),
+        mass=1.0, dt=1e-3, steps=round(periods * 2 * np.pi / 1e-3),
+    )  # fmt: skip
+
+
+def test_the_largest_displacement_is_kept_and_not_the_last(tmp_path):
+    """After half a swing it is back at the start, having been v/w away; before a quarter it is on its way."""
+    speeds = (0.3, 2.0)
+    results = simulate([swinging(p, v) for p in (0.5, 0.125) for v in speeds], worlds=4, capacity=4)
+    peaks = [result.measures["peak_displacement"] for result in results]
+    expected = [v * factor for factor in (1.0, np.sin(np.pi / 4)) for v in speeds]
+    np.testing.assert_allclose(peaks, expected, rtol=1e-3)
+    end = results[0].state["position"] - results[0].start["position"]
+    assert np.abs(end).max() < 1e-2 * peaks[0]
+    folder = output.Folder(tmp_path)
+    output.write(results[1], folder)
+    with h5py.File(folder.result) as file:
+        assert file["measures"].attrs["peak_displacement"] == peaks[1]
+
+
+def test_masses_weigh():
+    """Only the light one of 1 kg and 3 kg moves: the centre of gravity moves a quarter as far."""
+    made = scene(
+        [[0.0, 0, 0], [1.0, 0, 0]], [[1.0, 0, 0], [0, 0, 0]],
+        (Tether(stiffness=(0.0, 0.0, 0.0)), PeakDisplacement()), mass=[1.0, 3.0], dt=1e-3, steps=100,
+    )  # fmt: skip
+    (result,) = simulate([made], worlds=4, capacity=4)
+    assert result.measures["peak_displacement"] == pytest.approx(0.1 / 4, rel=1e-12)

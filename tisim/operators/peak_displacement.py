@@ -1,0 +1,29 @@
+"""The farthest that a cloud's centre of gravity has been from where it began: an observer."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim._taichi import ti
+from tisim.effect import Operator
+from tisim.state import Field
+
+
+class PeakDisplacement(Operator):
+    """max over steps of |sum_i m_i (r_i - r_i(0))| / sum_i m_i; a Result's ``measures["peak_displacement"]``, m.
+
+    r(0) is the field ``origin`` (m), the position at the start. It changes nothing, but particles that do not
+    feel each other then take common steps. In a box with joined faces distances are still those of open space.
+    """
+
+    needs: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
+    keeps: ClassVar = ("peak_displacement",)
+
+    @ti.func
+    def world(self, s, w):
+        shift, mass = 0.0 * s.position[w, 0], 0.0 * s.mass[w, 0]
+        for i in range(s.count[w]):
+            shift += s.mass[w, i] * (s.position[w, i] - s.origin[w, i])
+            mass += s.mass[w, i]
+        farthest = ti.cast(shift.norm() / mass, ti.f64)
+        s.peak_displacement[w] = ti.max(s.peak_displacement[w], farthest)
