@@ -6,13 +6,17 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cases
 from optimize.problem import Problem
 from tisim.accuracy.quantity import Quantity
 from tisim.errors import must
+from tisim.frames import Frames
 from tisim.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Case:
     scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
     quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
     problem : (size, variant) -> Problem; variants : its names, the first the default.
+    pictures : what the case is about, drawn from a run's trajectory; by name of file.
+    study : (size) -> what takes many runs: figures, and tables as text; by name of file.
     """
 
     name: str
@@ -57,6 +63,8 @@ class Case:
     problem: Callable[[str, str], Problem] | None = None
     variants: tuple[str, ...] = ()
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None
+    pictures: Callable[[Frames], Mapping[str, Figure]] | None = None
+    study: Callable[[str], Mapping[str, Figure | str]] | None = None
 
     def size(self, name: str) -> Size:
         """A size by name; InputError when there is none of that name."""

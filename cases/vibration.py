@@ -13,21 +13,28 @@ balance with its neighbours, in which the slow frequencies that the paper speaks
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cases.case import Case, Check, Size
 from cases.charged_closed_forms import resonances, response
 from cases.vibration_accuracy import quantities
+from optimize.problem import Problem
 from tisim import Cloud, Result, Scene, run
 from tisim.effects.lorentz import Lorentz
 from tisim.effects.near_field import NearField, TruncatedNearField
 from tisim.effects.tether import Tether
+from tisim.frames import Frames
+from tisim.operators.peak_displacement import PeakDisplacement
 from tisim.packing.placement import Lattice
 from tisim.sources.uniform import ElectricField, MagneticField
 from tisim.steppers.implicit_control import ErrorControl
 from tisim.steppers.trapezoid import Trapezoid
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CUBE, SITES = 0.2, 7
 """Side of the array, m, and particles along it (Z13 section 4)."""
@@ -45,14 +52,23 @@ CYCLOTRON = CHARGE * FLUX / MASS
 """w = q B/m: 954.930 1/s. Z13 prints 1819.385 1/s for the same data, which is wrong."""
 SPACING = CUBE / (SITES - 1)
 
+VARIANTS = ("resonate", "avoid")
+"""The inverse problems: the largest response to a given drive, and the smallest."""
+SEARCH = {
+    "population": 24, "parents": 8, "generations": 16,
+    # Nothing is random: a second start is the first.
+    "ensemble": {"min_starts": 2, "block": 2, "max_starts": 2},
+}  # fmt: skip
+
 SIZES = {
     "alone": Size(
-        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}
+        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}, SEARCH
     ),
-    "default": Size("343 particles, the near field as printed, 0.005 s", {}),
+    "default": Size("343 particles, the near field as printed, 0.005 s", {}, SEARCH),
     "equilibrium": Size(
         "343 particles, near field in balance with the six neighbours, 0.05 s",
         {"near_field": "equilibrium", "duration": 0.05},
+        SEARCH,
     ),
 }
 
@@ -74,8 +90,13 @@ def scene(
     sites: int = SITES,
     error: float = 1e-6,
     seed: int = 0,
+    flux: float = FLUX,
+    stiffness: float = STIFFNESS,
+    longest: float = 1e-4,
+    observed: bool = False,
 ) -> Scene:
-    """The array, driven at Omega = ratio w; ``error`` is asked of a step, over the displacement in it."""
+    """The array, driven at Omega = ratio w, w that of the paper's B. ``error`` is asked of a step, over the
+    displacement in it. observed : keep the largest displacement of the centre of gravity."""
     return Scene(
         name="vibration",
         particles=Cloud(
@@ -87,11 +108,14 @@ def scene(
         effects=(
             Lorentz(),
             ElectricField(amplitude=(FIELD, 0.0, 0.0), omega=(ratio * CYCLOTRON, 0.0, 0.0)),
-            MagneticField(constant=(0.0, 0.0, FLUX)),
-            Tether(stiffness=(STIFFNESS,) * 3),
+            MagneticField(constant=(0.0, 0.0, flux)),
+            Tether(stiffness=(stiffness,) * 3),
             *near_fields(near_field),
+            *((PeakDisplacement(),) if observed else ()),
         ),
-        stepper=Trapezoid(control=ErrorControl(error=error, tolerance=error / 10, first=1e-7, longest=1e-3)),
+        stepper=Trapezoid(
+            control=ErrorControl(error=error, tolerance=error / 10, first=1e-7, longest=longest), window=1
+        ),
         duration=duration,
         seed=seed,
     )
@@ -140,6 +164,28 @@ def check() -> Iterator[Check]:
         yield Check(f"centre of gravity along z, {name}, m", drift, 0.0, 1e-12)
 
 
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """What is drawn of a trajectory."""
+    # Imported late, as the others: these run scenes of this module.
+    from cases import vibration_pictures
+
+    return vibration_pictures.pictures(found)
+
+
+def study(size: str) -> Mapping[str, Figure | str]:
+    """The resonance curve and beats."""
+    from cases import vibration_pictures
+
+    return vibration_pictures.study(size)
+
+
+def problem(size: str, variant: str) -> Problem:
+    """The field and the binder that answer a drive the most, or the least."""
+    from cases import vibration_design
+
+    return vibration_design.problem(size, variant)
+
+
 CASE = Case(
     name="vibration",
     title="Electromagnetically induced vibration of particles in a binder",
@@ -148,4 +194,8 @@ CASE = Case(
     scene=scene_for,
     check=check,
     quantities=quantities,
+    pictures=pictures,
+    study=study,
+    problem=problem,
+    variants=VARIANTS,
 )

@@ -5,6 +5,7 @@ best.csv          the best designs, all digits
 convergence.png   (and .pdf) best and mean fitness by generation
 best_scene.toml   the best design from the first random start, for ``tisim run``
 best_cloud.png    that run at start and end, where the problem says how to draw it
+best_run.csv      what that run shows beside what was wanted, where the problem says what
 """
 
 from __future__ import annotations
@@ -22,7 +23,14 @@ from tisim.durable import locked
 from tisim.errors import InputError, must
 
 FILE = "search.h5"
-BESIDE = ("best.csv", "convergence.png", "convergence.pdf", "best_scene.toml", "best_cloud.png")
+BESIDE = (
+    "best.csv",
+    "convergence.png",
+    "convergence.pdf",
+    "best_scene.toml",
+    "best_cloud.png",
+    "best_run.csv",
+)
 
 
 def clear(folder: Path, overwrite: bool) -> None:

@@ -29,6 +29,7 @@ class Problem:
     symbol : heading of the fitness in tables and plots.
     derived : extra report columns computed from the fitness, heading -> function.
     picture : (Scene, Result) -> figure of a run, for the report.
+    details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
     Raises InputError for an empty name.
     """
 
@@ -42,6 +43,7 @@ class Problem:
     symbol: str = "fitness"
     derived: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
     picture: Callable[[Scene, Result], Figure] | None = None
+    details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
 
     def __post_init__(self) -> None:
         must(

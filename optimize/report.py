@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,23 @@ def best_table(outcome: Outcome) -> RenderableType:
             table.add_row(Text(name), *cells[first - 1 : first - 1 + designs])
         blocks += ["", table]
     return Group(*blocks)
+
+
+def details_table(details: Mapping[str, float]) -> RenderableType:
+    """What the run of the best design shows, for the terminal."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, show_header=False)
+    for name, value in details.items():
+        table.add_row(name, _text(value))
+    return Group("", Text("the best design, run once more", "italic"), table)
+
+
+def details_csv(details: Mapping[str, float]) -> bytes:
+    """The same as CSV, all digits."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["quantity", "value"])
+    writer.writerows(details.items())
+    return text.getvalue().encode()
 
 
 def _widest(rows: Sequence[Sequence[str]]) -> int:

@@ -47,7 +47,7 @@ def session(
             say.print(report.best_table(outcome))
             paths += report.write(outcome, folder).values()
             if not outcome.interrupted:
-                paths += _show_best(outcome.best, outcome, evaluator, folder)
+                paths += _show_best(outcome.best, outcome, evaluator, folder, say)
     finally:
         evaluator.close()
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
@@ -72,17 +72,26 @@ def _shown(
         return search(problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step)
 
 
-def _show_best(best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path) -> list[Path]:
-    """Run the best design once more, from the first start, for its picture."""
+def _show_best(
+    best: Individual, outcome: Outcome, evaluator: Evaluator, folder: Path, say: Console
+) -> list[Path]:
+    """Run the best design once more, from the first start, for its picture and what else it shows."""
     problem, settings = outcome.problem, outcome.settings
     design = problem.genome.decode(best)
     own = None if settings.ensemble.common_starts else design
     scene = problem.scene(design, start_seed(settings.seed, 0, own))
     text = folder / "best_scene.toml"
     replace_file(text, scene.to_toml().encode())
-    if problem.picture is None:
-        return [text]
+    paths = [text]
+    if problem.picture is None and problem.details is None:
+        return paths
     _, result = next(evaluator.evaluate([scene]))
-    image = folder / "best_cloud.png"
-    replace_file(image, report.drawn(problem.picture(scene, result), "png", dpi=150))
-    return [text, image]
+    if problem.details is not None:
+        details = problem.details(design, result)
+        say.print(report.details_table(details))
+        paths.append(folder / "best_run.csv")
+        replace_file(paths[-1], report.details_csv(details))
+    if problem.picture is not None:
+        paths.append(folder / "best_cloud.png")
+        replace_file(paths[-1], report.drawn(problem.picture(scene, result), "png", dpi=150))
+    return paths

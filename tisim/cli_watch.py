@@ -1,4 +1,4 @@
-"""The commands that show what a run has left: ``tisim plot``, ``tisim movie`` and ``tisim export``."""
+"""The commands that show what a run has left: ``tisim plot``, ``movie``, ``export``; and ``tisim study``."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tisim import runtime
+from tisim.errors import InputError
+from tisim.options import CaseName, Device, Out, Precision, Size, Threads
 from tisim.terminal import err, progress_bar
 
 if TYPE_CHECKING:
@@ -27,7 +30,8 @@ Into = Annotated[
 
 
 def plot(file: File, world: World = 0, folder: Into = None) -> None:
-    """Draw the cloud at its start and end, and energy, centre of gravity and number of particles in time."""
+    """Draw the cloud, energy, centre of gravity and number of particles in time, and what its case shows."""
+    from cases.case import every
     from tisim import plots
     from tisim.frames import frames
     from tisim.output import writable
@@ -36,9 +40,39 @@ def plot(file: File, world: World = 0, folder: Into = None) -> None:
     place = folder or file.parent
     with frames(file, world) as found:
         pictures = {"cloud.png": plots.clouds(found), "courses.png": plots.courses(found)}
+        case = every().get(found.scene.name)
+        if case and case.pictures:
+            pictures |= case.pictures(found)
     writable(place)
     for name, figure in pictures.items():
         print(_saved(figure, place / name))
+
+
+def study(
+    case: CaseName, size: Size = None, folder: Out = None,
+    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
+) -> None:  # fmt: skip
+    """Make the figures of a case that take many runs, and the numbers in them."""
+    from cases.case import find
+    from tisim.durable import replace_file
+    from tisim.output import writable
+
+    found = find(case)
+    chosen = size or "default"
+    found.size(chosen)
+    if found.study is None:
+        raise InputError(f"case must be one with a study; received {case!r}")
+    runtime.start(device, precision, threads)
+    place = folder or Path("out") / f"{case}-study"
+    writable(place)
+    with err().status("running"):
+        made = found.study(chosen)
+    for name, what in made.items():
+        if isinstance(what, str):
+            replace_file(place / name, what.encode())
+            print(place / name)
+        else:
+            print(_saved(what, place / name))
 
 
 def movie(

@@ -10,10 +10,10 @@ from tisim.state import Field
 
 
 class PeakDisplacement(Operator):
-    """max over steps of |sum_i m_i (r_i - r_i(0))| / sum_i m_i; a Result's ``measures["peak_displacement"]``, m.
+    """max over steps of |sum_i m_i (r_i - r_i(0))| / sum_i m_i: ``measures["peak_displacement"]``, m.
 
     r(0) is the field ``origin`` (m), the position at the start. It changes nothing, but particles that do not
-    feel each other then take common steps. In a box with joined faces distances are still those of open space.
+    feel each other then take common steps. In a box with joined faces distances are those of open space.
     """
 
     needs: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)

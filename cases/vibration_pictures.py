@@ -1,0 +1,176 @@
+"""Figures of the case vibration: of one run, and of its study."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
+
+from cases import vibration
+from cases.charged_closed_forms import resonances, response
+from cases.vibration_response import (
+    DRIVE,
+    FAST,
+    SLOW,
+    Course,
+    Sweep,
+    beats,
+    fast_scenes,
+    slow_scenes,
+)
+from tisim.errors import must
+from tisim.frames import Frames
+from tisim.scene import Scene
+
+FOUND, EXACT, MARK, OTHER = "#4477aa", "0.25", "#cc6677", "#228833"
+
+
+def constants(scene: Scene) -> dict[str, float] | None:
+    """w, k_m, push and omega of ``charged_closed_forms.response``; None where that does not describe it."""
+    have: dict[str, Any] = {effect.kind(): effect for effect in scene.effects}
+    if not {"lorentz", "electric_field", "magnetic_field", "tether"} <= have.keys():
+        return None
+    start = scene.particles.arrays(scene.domain, scene.seed)
+    ratio = float((start["charge"] / start["mass"]).mean())
+    b, e = have["magnetic_field"].constant, have["electric_field"]
+    k = have["tether"].stiffness
+    along = b[:2] == (0.0, 0.0) and e.amplitude[1:] == (0.0, 0.0) and k[0] == k[1] > 0
+    if not along:
+        return None
+    mass = float(start["mass"].mean())
+    return {
+        "w": ratio * b[2], "k_m": k[0] / mass, "push": ratio * e.amplitude[0], "omega": e.omega[0],
+    }  # fmt: skip
+
+
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """response.png: the centre of gravity of a run in time, beside its closed form, and its spectrum."""
+    must(len(found) > 8, "trajectory", "one with 9 frames or more for a spectrum", f"{len(found)} frames")
+    course, known = Course.of(found), constants(found.scene)
+    figure = made((7.2, 6.8))
+    above, below = figure.subplots(2, 1)
+    for part, name, colour in ((np.real, "x", FOUND), (np.imag, "y", MARK)):
+        above.plot(course.time, part(course.place), color=colour, lw=1.6, label=f"{name}, as run")
+        if known:
+            closed = part(response(course.time, **known))
+            label = "closed form" if name == "x" else None
+            above.plot(course.time, closed, ":", color=EXACT, lw=1.4, label=label)
+    above.set_ylabel("centre of gravity")
+    above.legend(frameon=False, ncols=3, loc="upper left", fontsize=9)
+    above.margins(y=0.18)
+    engineering(above, "s", "m")
+    above.set_xlabel("time")
+    spectrum(below, course, known)
+    return {"response.png": figure}
+
+
+def spectrum(axis: Axes, course: Course, known: Mapping[str, float] | None) -> None:
+    """Amplitudes of circular motion against its angular frequency, with the lines that are to be expected."""
+    omega, lines = course.spectrum()
+    axis.semilogy(omega, lines, color=FOUND, lw=1.4)
+    reach = omega.max()
+    if known:
+        slow, fast = resonances(known["w"], known["k_m"])
+        marks = (
+            (slow, "resonances", OTHER), (-fast, None, OTHER),
+            (known["omega"], r"$\pm\Omega$", MARK), (-known["omega"], None, MARK),
+        )  # fmt: skip
+        for at, label, colour in marks:
+            axis.axvline(at, color=colour, ls="--" if colour == MARK else ":", lw=1.2, label=label, zorder=0)
+        axis.legend(frameon=False, fontsize=9, loc="upper right")
+        reach = min(reach, 3.0 * max(fast, known["omega"]))
+    axis.set_xlim(-reach, reach)
+    shown = lines[np.abs(omega) <= reach]
+    axis.set_ylim(max(shown.min(), 1e-5 * shown.max()) / 2, 6 * shown.max())
+    axis.set_xlabel("angular frequency (1/s), anticlockwise > 0")
+    axis.set_ylabel("amplitude (m)")
+    plain(axis)
+
+
+def study(size: str) -> Mapping[str, Figure | str]:
+    """resonance.png, resonance.csv: the resonance curve and beats. Circles of the size's near field."""
+    settings = vibration.CASE.size(size).scene
+    near = str(settings.get("near_field", "printed"))
+    ratios = np.linspace(0.04, 2.0, 99)
+    around = np.linspace(0.9, 1.1, 41)
+    fast = Sweep.of(fast_scenes(np.unique(np.round(np.concatenate([ratios, around]), 6))))
+    slow = Sweep.of(slow_scenes(np.linspace(0.05, 1.0, 96)))
+    arrays = Sweep.of(fast_scenes(vibration.RATIOS, near, sites=3))
+    return {
+        "resonance.png": drawn(slow, fast, arrays, near, beats()),
+        "resonance.csv": table(
+            ("one particle", slow), ("one particle", fast), (f"27, near field {near}", arrays)
+        ),
+    }
+
+
+def table(*sweeps: tuple[str, Sweep]) -> str:
+    """All of the sweeps as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["particles", "duration_s", "omega_1_s", "omega_over_w", "peak_m", "closed_form_m"])
+    for what, sweep in sweeps:
+        for row in zip(sweep.omega, sweep.omega / vibration.CYCLOTRON, sweep.found, sweep.exact, strict=True):
+            writer.writerow([what, sweep.duration, *map(float, row)])
+    return text.getvalue()
+
+
+def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, course: Course) -> Figure:
+    """Resonance curves over both resonances, beats beside their closed form, and their spectrum."""
+    figure = made((10.4, 7.4))
+    (left, right), (below, lines) = figure.subplots(2, 2)
+    known = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
+             "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
+    for axis, sweep, at, name in ((left, slow, SLOW, "slow"), (right, fast, FAST, "fast")):
+        axis.semilogy(sweep.omega, sweep.exact, color=EXACT, lw=1.0, label="closed form")
+        axis.semilogy(sweep.omega, sweep.found, ".", color=FOUND, ms=5, label="one particle, as run")
+        axis.axvline(at, color=OTHER, ls=":", lw=1.2, label=f"{name} resonance, {at:.4g} 1/s", zorder=0)
+        axis.set_title(f"largest displacement within {sweep.duration:g} s", fontsize=10)
+        axis.set_xlabel(r"drive frequency $\Omega$ (1/s)")
+        axis.set_ylabel("centre of gravity (m)")
+        plain(axis)
+    label = f"27 particles, near field {near}:\nthe ratios of Z13 Fig. 3"
+    right.semilogy(arrays.omega, arrays.found, "o", mfc="none", color=MARK, ms=8, label=label)
+    for axis in (left, right):
+        axis.legend(framealpha=1, edgecolor="none", fontsize=8)
+    below.plot(1e3 * course.time, np.abs(course.velocity), color=FOUND, lw=0.9)
+    expected, period = 2 * np.pi / (FAST * (1 - DRIVE)), course.beat_period()
+    for k in range(int(course.time[-1] / expected + 0.5) + 1):
+        below.axvline(1e3 * k * expected, color=OTHER, ls=":", lw=1.2, zorder=0)
+    below.set_title(
+        rf"beats at $\Omega$ = {DRIVE:g} of the fast resonance: {1e3 * period:.2f} ms as run;"
+        f"\ndotted, $2\\pi/|\\Omega - \\omega|$ = {1e3 * expected:.2f} ms", fontsize=10,
+    )  # fmt: skip
+    below.set_ylabel("speed (m/s)")
+    below.set_xlabel("time (ms)")
+    plain(below)
+    spectrum(lines, course, {**known, "omega": DRIVE * FAST})
+    lines.set_title("its spectrum", fontsize=10)
+    return figure
+
+
+def made(size: tuple[float, float]) -> Figure:
+    """An empty figure, inches."""
+    figure = Figure(figsize=size, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def plain(axis: Axes) -> None:
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.grid(color="0.92", lw=0.8)
+    axis.set_axisbelow(True)
+
+
+def engineering(axis: Axes, x: str, y: str) -> None:
+    """Units with prefixes."""
+    axis.xaxis.set_major_formatter(EngFormatter(x))
+    axis.yaxis.set_major_formatter(EngFormatter(y))
+    plain(axis)
