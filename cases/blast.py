@@ -10,13 +10,15 @@ paper states, 1.225 kg/m^3, it is 46126.3 (56504.8 is that of 1 kg/m^3).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cases.blast_accuracy import half_axes, quantities
 from cases.case import Case, Check, Size
+from optimize.problem import Problem
 from tisim import Cloud, Result, Scene, run
 from tisim.effect import Effect
 from tisim.effects.contact import Contact
@@ -25,12 +27,17 @@ from tisim.effects.contact_friction import ContactFriction
 from tisim.effects.contact_softening import ContactSoftening
 from tisim.effects.drag import ChowDrag
 from tisim.effects.lorentz import Lorentz
-from tisim.effects.near_field import NearField
+from tisim.effects.near_field import NearField, TruncatedNearField
+from tisim.errors import must
+from tisim.frames import Frames
 from tisim.packing.placement import RandomInBall
 from tisim.pulses import Blast
 from tisim.sources.uniform import MagneticField
 from tisim.steppers.implicit_control import IterationControl
 from tisim.steppers.trapezoid import Trapezoid
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 NUMBER, RADIUS, DENSITY, BALL = 2000, 0.05, 7000.0, 1.0
 """Particles, their radius (m) and density (kg/m^3), radius of the ball at the start (m) (Z16 section 6.1)."""
@@ -42,16 +49,34 @@ MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
 SPEED = float(np.sqrt(2 * ENERGY / (NUMBER * MASS)))
 """Of every particle at the start, m/s (Z16 3.4)."""
 
+NEIGHBOURS = 3 * RADIUS
+"""Distance within which the size "clumps" has a near field, m: half a diameter between surfaces."""
+
+SEARCH = {
+    "population": 20, "generations": 12,
+    "ensemble": {"tolerance": 1e-2, "min_starts": 2, "block": 2, "max_starts": 4, "confirm": 8},
+}  # fmt: skip
+
 SIZES = {
-    "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}),
-    "no_field": Size("the same without the field", {"flux": 0.0}),
-    "contact": Size("2000 particles in contact, 1 s", {"contact": True}),
-    "near_field": Size("2000 particles in contact and with near field, 1 s", {"contact": True, "near": True}),
+    "small": Size("500 particles that do not feel each other, 1 s", {"number": 500}, SEARCH),
+    "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}, SEARCH),
+    "no_field": Size("the same without the field", {"flux": 0.0}, SEARCH),
+    "contact": Size("2000 particles in contact, 1 s", {"contact": True}, SEARCH),
+    "near_field": Size(
+        "2000 in contact and with the near field as printed, between all; some minutes",
+        {"contact": True, "near": True},
+        SEARCH,
+    ),
+    "clumps": Size(
+        "2000 in contact and with the near field of neighbours only",
+        {"contact": True, "near": True, "cutoff": NEIGHBOURS},
+        SEARCH,
+    ),
 }
 
 
-def interaction(contact: bool, near: bool) -> tuple[Effect, ...]:
-    """Contact and near field of Z16 section 9.
+def interaction(contact: bool, near: bool, cutoff: float | None = None) -> tuple[Effect, ...]:
+    """Contact and near field of Z16 section 9; the latter of pairs within ``cutoff`` (m) only, if given.
 
     Bonds (7.16) are left out, as the paper gives no strain at which they form; ``contact_bond`` adds them.
     """
@@ -61,20 +86,26 @@ def interaction(contact: bool, near: bool) -> tuple[Effect, ...]:
         ContactDissipation(damping=1e5),
         ContactFriction(stiffness=1e7, static=0.4, dynamic=0.3),
     )
-    field = NearField(alpha1=0.5, beta1=1, alpha2=0.01, beta2=2, strength="mass")
+    law: dict[str, Any] = {"alpha1": 0.5, "beta1": 1, "alpha2": 0.01, "beta2": 2, "strength": "mass"}
+    field = NearField(**law) if cutoff is None else TruncatedNearField(**law, cutoff=cutoff)
     return (*(touching if contact else ()), *((field,) if near else ()))
 
 
 def scene(
-    flux: float = FLUX,
+    flux: float | ArrayLike = FLUX,
     contact: bool = False,
     near: bool = False,
+    cutoff: float | None = None,
     number: int = NUMBER,
     duration: float = 1.0,
     seed: int = 0,
     **control: Any,
 ) -> Scene:
-    """The blast; ``control`` goes to the papers' step control. A smaller number has the same speed."""
+    """The blast. flux : along x, or of shape (3,), T. A smaller number has the same speed and density.
+
+    ``control`` goes to the papers' step control.
+    """
+    b = np.asarray(flux, float)
     return Scene(
         name="blast",
         particles=Cloud(
@@ -87,11 +118,11 @@ def scene(
         ),
         effects=(
             Lorentz(),
-            MagneticField(constant=(flux, 0.0, 0.0)),
+            MagneticField(constant=tuple(b.tolist()) if b.ndim else (float(b), 0.0, 0.0)),
             ChowDrag(density=AIR, viscosity=VISCOSITY),
-            *interaction(contact, near),
+            *interaction(contact, near, cutoff),
         ),
-        stepper=Trapezoid(control=IterationControl(**control)),
+        stepper=Trapezoid(control=IterationControl(**control), window=4),
         duration=duration,
         seed=seed,
     )
@@ -104,6 +135,8 @@ def scene_for(size: str, seed: int) -> Scene:
 
 def check() -> Iterator[Check]:
     """Numbers of Z16, energy at the start, and what the field does to the cloud."""
+    from cases.blast_shape import ellipsoid
+
     drag = 0.5 * AIR * 1.0 * SPEED * np.pi * RADIUS**2
     ratio = SPECIFIC_CHARGE * MASS * FLUX / drag
     yield Check("magnetic force over drag, C_D = 1 (printed: 56504.7)", float(ratio), 46126.3, 0.1)
@@ -111,21 +144,51 @@ def check() -> Iterator[Check]:
     still, field = (run(scene(flux, duration=duration)) for flux in (0.0, FLUX))
     kinetic = 0.5 * float((field.start["mass"] * (field.start["velocity"] ** 2).sum(axis=1)).sum())
     yield Check("kinetic energy at the start, J", kinetic, ENERGY, 1e-8 * ENERGY)
-    a, b = half_axes(still), half_axes(field)
+    a, b = half_axes(still.state), half_axes(field.state)
     yield Check("no field: longest axis over shortest", float(a.max() / a.min()), 1.0, 0.05)
     # Drag takes about 1 part in 1000 of the speed in this time.
     yield Check("along the field, m: the field makes no difference", float(b[0] / a[0]), 1.0, 2e-3)
     # The chord of a circle of radius v/w, w = q B/m, after the angle w t.
     rate = SPECIFIC_CHARGE * FLUX
     chord = 2 * SPEED / rate * abs(np.sin(rate * duration / 2))
+    w, start = np.array([FLUX, 0.0, 0.0]), float(half_axes(field.start).mean())
+    exact = np.sqrt(5 * np.diag(ellipsoid(w, duration, start)))
+    yield Check("half axes over their closed form: off by", float(np.abs(b / exact - 1).max()), 0.0, 5e-3)
     reach = np.linalg.norm((field.state["position"] - field.start["position"])[:, 1:], axis=1).max()
     yield Check("farthest across the field, over the chord of its circle", float(reach / chord), 1.0, 5e-3)
     speed = np.linalg.norm(field.state["velocity"], axis=1)
+    touching = run(scene(contact=True, duration=0.1))
+    free = run(scene(duration=0.1))
+    minimal = half_axes(touching.state) / half_axes(free.state)
+    yield Check("half axes with contact over without: off by", float(np.abs(minimal - 1).max()), 0.0, 1e-3)
     yield Check("speed at the end over that without field", float(speed.mean() / _speed(still)), 1.0, 1e-3)
 
 
 def _speed(result: Result) -> float:
     return float(np.linalg.norm(result.state["velocity"], axis=1).mean())
+
+
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """What is drawn of a trajectory."""
+    # Imported late, as the others: these run scenes of this module.
+    from cases import blast_pictures
+
+    return blast_pictures.pictures(found)
+
+
+def study(size: str) -> Mapping[str, Figure | str]:
+    """The cloud without interaction, with contact, and with near field."""
+    from cases import blast_pictures
+
+    return blast_pictures.study(size)
+
+
+def problem(size: str, variant: str) -> Problem:
+    """The field that gives a wanted ellipsoid."""
+    from cases import blast_design
+
+    must(variant in CASE.variants, "variant", f"one of {', '.join(CASE.variants)}", variant)
+    return blast_design.problem(size)
 
 
 CASE = Case(
@@ -136,4 +199,8 @@ CASE = Case(
     scene=scene_for,
     check=check,
     quantities=quantities,
+    problem=problem,
+    variants=("ellipsoid",),
+    pictures=pictures,
+    study=study,
 )

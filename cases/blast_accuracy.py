@@ -7,16 +7,22 @@ import numpy as np
 from tisim import Result, Scene
 from tisim.accuracy.quantity import Quantity, displacement
 from tisim.effect import PairForce
+from tisim.particles import Arrays
 
 
-def half_axes(result: Result) -> np.ndarray:
+def half_axes(state: Arrays) -> np.ndarray:
     """Of the ellipsoid, along x, y and z, that has the second moments of the cloud: sqrt(5 <r_k^2>). m."""
-    r = result.state["position"] - np.average(result.state["position"], axis=0, weights=result.state["mass"])
-    return np.sqrt(5.0 * np.average(r**2, axis=0, weights=result.state["mass"]))
+    r = state["position"] - np.average(state["position"], axis=0, weights=state["mass"])
+    return np.sqrt(5.0 * np.average(r**2, axis=0, weights=state["mass"]))
+
+
+def of_the_end(result: Result) -> np.ndarray:
+    """Half axes at the end, m."""
+    return half_axes(result.state)
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Paths can be followed as long as particles do not touch; then it is the mean over random starts."""
     if any(isinstance(effect, PairForce) for effect in scene.effects):
-        return (Quantity("half-axes of the cloud", half_axes, random=True),)
+        return (Quantity("half-axes of the cloud", of_the_end, random=True),)
     return (Quantity("positions", displacement),)

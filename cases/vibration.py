@@ -147,21 +147,38 @@ def deviation(results: list[Result], ratios: tuple[float, ...]) -> float:
 
 
 def check() -> Iterator[Check]:
-    """Z13's numbers, its slip among them, and the centre of gravity against its closed form."""
+    """Z13's numbers and slip; the centre of gravity, resonances and beats against their closed forms."""
     slow, fast = resonances(CYCLOTRON, STIFFNESS / MASS)
     yield Check("w = q B/m, 1/s (printed: 1819.385)", CYCLOTRON, 954.930, 1e-3)
     yield Check("sqrt(k/m), 1/s", float(np.sqrt(STIFFNESS / MASS)), 21.851, 1e-3)
     pair = float(np.sqrt(ATTRACTION * (ATTRACTION / REPULSION) ** 2 / MASS))
     yield Check("sqrt(alpha_1 (alpha_1/alpha_2)^2/m), 1/s", pair, 87.404, 1e-3)
     yield Check("product of the two resonances, k/m, 1/s^2", slow * fast, STIFFNESS / MASS, 1e-9)
-    alone = run([scene(r, "none", duration=0.05, sites=1) for r in RATIOS])
+    alone = run([scene(r, "none", duration=0.05, sites=1, observed=True) for r in RATIOS])
     yield Check("one particle, 0.05 s, all of Fig. 3: off by", deviation(alone, RATIOS), 0.0, 1e-3)
     some = (0.1, 0.8, 1.8)
     for name, duration in (("printed", 0.005), ("equilibrium", 0.02)):
-        cloud = run([scene(r, name, duration, error=1e-5) for r in some])
-        yield Check(f"centre of gravity, {name}, {duration} s: off by", deviation(cloud, some), 0.0, 1e-3)
+        cloud = run([scene(r, name, duration, sites=5, error=1e-5) for r in some])
+        yield Check(
+            f"centre of gravity, 125 particles, {name}, {duration} s: off by",
+            deviation(cloud, some),
+            0.0,
+            1e-3,
+        )
         drift = max(float(np.abs(np.average(r.state["position"], axis=0)[2])) for r in cloud)
         yield Check(f"centre of gravity along z, {name}, m", drift, 0.0, 1e-12)
+    from cases import vibration_response as of
+
+    around = of.Sweep.of(of.fast_scenes(np.linspace(0.9, 1.1, 21)))
+    yield Check("largest displacement within 0.1 s, 0.9 to 1.1 w: off by", around.deviation, 0.0, 1e-3)
+    yield Check("Omega of the largest over the fast resonance", around.top() / of.FAST, 1.0, 5e-3)
+    slowly = of.Sweep.of(of.slow_scenes(np.linspace(0.3, 0.7, 21)))
+    yield Check("largest displacement within 60 s, 0.3 to 0.7 1/s: off by", slowly.deviation, 0.0, 1e-4)
+    yield Check("Omega of the largest over the slow resonance", slowly.top() / of.SLOW, 1.0, 2e-2)
+    beat = of.FAST * (1 - of.DRIVE)
+    yield Check(
+        "beat period at 0.9 of the fast resonance, s", of.beats().beat_period(), 2 * np.pi / beat, 3e-4
+    )
 
 
 def pictures(found: Frames) -> Mapping[str, Figure]:

@@ -1,7 +1,7 @@
 """The inverse problem of vibration: the field and the binder that answer a given drive the most, or least.
 
-The centre of gravity moves as one particle does (see ``vibration``), so one particle is what is run. Where the
-answer must lie is known: a drive at Omega is in resonance with the fast or the slow motion when
+The centre of gravity moves as one particle does (see ``vibration``), so one particle is what is run. Where
+the answer must lie is known: a drive at Omega is in resonance with the fast or the slow motion when
 k/m = Omega^2 -+ w Omega, so the best designs lie on these two lines of the plane of B and k.
 """
 

@@ -25,7 +25,7 @@ def test_the_field_makes_an_ellipsoid_of_the_sphere():
     )
     assert still.status.ok
     assert field.status.ok
-    a, b = half_axes(still), half_axes(field)
+    a, b = half_axes(still.state), half_axes(field.state)
     assert a.max() / a.min() < 1.15
     assert b[0] == pytest.approx(a[0], rel=1e-3)
     assert b[0] > 1.4 * b[1:].max()
