@@ -148,7 +148,7 @@ def beside(courses: Mapping[str, Course], ends: Mapping[str, Frame]) -> Figure:
         axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"), fontsize=8)
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
-    for (name, course), colour in zip(courses.items(), colours, strict=True):
+    for (name, course), colour in zip(courses.items(), colours, strict=False):
         for axis, values in (
             (along, course.axes[:, 0]),
             (across, np.sqrt((course.axes[:, 1:] ** 2).mean(axis=1))),

@@ -1,0 +1,129 @@
+"""The ellipsoid of a blast in closed form, and the inverse problem that asks for one."""
+
+import numpy as np
+import pytest
+
+from cases import blast
+from cases.blast_design import DURATION, FLUX, details, field, misfit, problem
+from cases.blast_pictures import SHOWN, Course, beside, pictures, table
+from cases.blast_shape import contacts, ellipsoid, extents, half_axes, moments
+from optimize.cache import Cache
+from optimize.evaluator import Evaluator
+from optimize.search import search
+from optimize.settings import Settings
+from tests.scenes import simulate
+from tisim import Recording, run
+from tisim.errors import InputError
+from tisim.frames import frames
+from tisim.result import Result, Status
+
+
+def shell(rng, number=200_000):
+    """Start of an evenly filled ball of 1 m: place and unit direction."""
+    n = rng.standard_normal((number, 3))
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    return n * np.cbrt(rng.random((number, 1))), n
+
+
+def flown(r, n, flux, t):
+    """Where those particles are at t without drag: Rodrigues' turn of what is across the field."""
+    w, v = blast.SPECIFIC_CHARGE * np.linalg.norm(flux), blast.SPEED * n
+    b = flux / np.linalg.norm(flux)
+    along = (v @ b)[:, None] * b
+    across = v - along
+    return r + along * t + across * np.sin(w * t) / w + np.cross(across, b) * (1 - np.cos(w * t)) / w
+
+
+@pytest.mark.parametrize("t", [0.1, 0.3, 0.7])
+def test_ellipsoid_is_that_of_particles_that_circle(rng, t):
+    r, n = shell(rng)
+    state = {"position": flown(r, n, FLUX, t), "mass": np.ones(len(r))}
+    exact = ellipsoid(FLUX, t, 1.0)
+    assert misfit(moments(state), exact) < 5e-3
+    axes, directions = half_axes(exact), np.linalg.eigh(exact)[1]
+    assert axes[0] > 1.005 * axes[1]
+    assert abs(directions[:, -1] @ FLUX) / np.linalg.norm(FLUX) == pytest.approx(1.0, abs=1e-12)
+    along, across = extents(blast.SPECIFIC_CHARGE * np.linalg.norm(FLUX), t, 1.0)
+    np.testing.assert_allclose(axes, np.sqrt(5 * np.array([along, across, across])), rtol=1e-12)
+
+
+def test_moments_weigh_by_mass_and_contacts_count_pairs():
+    state = {
+        "position": np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 0.3, 0]]),
+        "mass": np.array([2.0, 1.0, 1.0]), "radius": np.full(3, 0.16),
+    }  # fmt: skip
+    np.testing.assert_allclose(moments(state)[0, 0], 0.25)
+    np.testing.assert_allclose(moments(state)[0, 1], (2 * 0.5 * 0.075 - 0.5 * 0.075 + 0.5 * 0.225) / 4)
+    assert contacts(state) == 1
+
+
+def test_details_say_what_was_wanted_and_reached(rng):
+    r, n = shell(rng, 2000)
+    state = {"position": flown(r, n, FLUX, DURATION), "mass": np.ones(2000)}
+    result = Result(None, state, state, DURATION, {}, Status(True, ""), 0.0)
+    turned = dict(zip(("flux_x", "flux_y", "flux_z"), -FLUX, strict=True))
+    shown = details(turned, result, ellipsoid(FLUX, DURATION, 1.0))
+    assert shown["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
+    assert shown["strength of the field, T"] == pytest.approx(0.7)
+    for k in (1, 2, 3):
+        assert shown[f"half axis {k} reached, m"] == pytest.approx(
+            shown[f"half axis {k} wanted, m"], rel=0.05
+        )
+
+
+def test_no_other_variant_than_the_ellipsoid():
+    with pytest.raises(InputError, match="variant must be one of ellipsoid; received 'torus'"):
+        blast.CASE.problem("default", "torus")
+
+
+@pytest.mark.long
+def test_search_recovers_the_field_up_to_sign(tmp_path):
+    """500 particles, 10 generations: within 15 % of 0.7 T, and 8 degrees."""
+    evaluator = Evaluator()
+    with Cache(tmp_path / "search.h5") as cache:
+        outcome = search(problem("small"), evaluator, cache, Settings(**{**blast.SEARCH, "generations": 10}))
+    evaluator.close()
+    best = outcome.logbook.select("best")
+    assert best[-1] < best[0] / 2
+    found = field(outcome.problem.genome.decode(outcome.best))
+    strength = np.linalg.norm(found)
+    assert strength == pytest.approx(np.linalg.norm(FLUX), rel=0.15)
+    cosine = abs(found @ FLUX) / strength / np.linalg.norm(FLUX)
+    assert np.degrees(np.arccos(cosine)) < 8.0
+
+
+@pytest.mark.long
+def test_pictures_of_a_run(tmp_path):
+    path = tmp_path / "trajectory.h5"
+    made = blast.scene(number=60, duration=0.06)
+    run(made, record=Recording(path, frames=3))
+    with frames(path) as found, pytest.raises(InputError, match="trajectory must be one with 6 frames"):
+        pictures(found)
+    run(made, record=Recording(path, frames=24))
+    with frames(path) as found:
+        figures, course = pictures(found), Course.of(found)
+        last = found[-1]
+    assert len(figures["sequence.png"].axes) == SHOWN
+    left, right, *_ = figures["envelope.png"].axes
+    np.testing.assert_array_equal(left.lines[0].get_ydata(), course.axes[:, 0])
+    assert course.axes[-1, 0] > 1.1 * course.axes[0, 0]
+    assert right.lines[0].get_linestyle() == "-"
+    assert not Course(
+        course.time, course.axes, course.touching, course.paths[::6], course.velocities[::6]
+    ).dense(0)
+    figure = beside({"default": course}, {"default": last})
+    np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), course.axes[:, 0])
+    assert len(table({"default": course}).splitlines()) == 1 + len(course.time)
+
+
+@pytest.mark.long
+def test_neighbours_agglomerate_where_contact_alone_does_not():
+    """Z16 Fig. 9: clumps, while the cloud goes on growing along the field."""
+    made = blast.scene(number=100, duration=0.1, contact=True, near=True, cutoff=blast.NEIGHBOURS)
+    law = "effects.truncated_near_field"
+    without = made.replace({f"{law}.alpha1": 0.0, f"{law}.alpha2": 0.0})
+    alone, clumped = simulate([without, made], worlds=2, capacity=100)
+    assert clumped.status.ok, clumped.status.reason
+    assert contacts(clumped.state) > 5 * contacts(alone.state)
+    assert contacts(clumped.state) > 40
+    assert blast.half_axes(clumped.state)[0] > 1.1 * blast.half_axes(clumped.start)[0]

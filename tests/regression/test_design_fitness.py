@@ -1,0 +1,68 @@
+"""The fitness functions of vibration and blast do not change by accident.
+
+Nothing in these runs is chaotic, so their values are stored as numbers: to the accuracy that other compilers
+keep in f64, and that f32 has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tisim
+from cases import blast_design, vibration_design
+from tisim import runtime
+
+VIBRATION = {
+    (1.0, 1.0): -0.7005773424878275,
+    (0.785, 11.8): -12.379667822859995,
+    (0.2, 765.0): -5.549151949409214,
+    (2.0, 630.0): -0.1307905496542935,
+}
+"""Flux (T) and stiffness (N/m) of a design -> its fitness: off, at the fast resonance, the slow one, off."""
+
+BLAST = {
+    ((0.6, 0.3, -0.2), 0): 0.029783699335775855,
+    ((0.6, 0.3, -0.2), 1): 0.024558677419157952,
+    ((-0.6, -0.3, 0.2), 0): 0.02897434591334642,
+    ((0.0, 0.0, 0.0), 0): 0.38308604982089967,
+    ((0.7, 0.0, 0.0), 0): 0.19361337365256195,
+    ((0.3, 0.15, -0.1), 1): 0.27187104724877964,
+}
+"""Field (T) and seed of a start -> misfit, with 500 particles."""
+
+
+def tolerance():
+    return 1e-6 if runtime.current().precision == "f64" else 2e-3
+
+
+def values(scale=1.0):
+    """Of both, with all fields scaled."""
+    wave = vibration_design.problem()
+    shape = blast_design.problem("small")
+    waves = [wave.scene({"flux": scale * b, "stiffness": k}, 0) for b, k in VIBRATION]
+    shapes = [
+        shape.scene({f"flux_{axis}": scale * b for axis, b in zip("xyz", field, strict=True)}, seed)
+        for field, seed in BLAST
+    ]
+    return (
+        [wave.objective(result) for result in tisim.run(waves)],
+        [shape.objective(result) for result in tisim.run(shapes)],
+    )
+
+
+@pytest.mark.long
+def test_fitness_of_vibration_and_blast_is_that_of_the_record():
+    waves, shapes = values()
+    np.testing.assert_allclose(waves, list(VIBRATION.values()), rtol=tolerance())
+    np.testing.assert_allclose(shapes, list(BLAST.values()), rtol=tolerance())
+    # A field 1 % stronger shows in each that depends on it.
+    waves, shapes = values(1.01)
+    changed = [
+        not np.isclose(a, b, rtol=2 * tolerance()) for a, b in zip(waves, VIBRATION.values(), strict=True)
+    ]
+    assert all(changed)
+    changed = [
+        not np.isclose(a, b, rtol=2 * tolerance()) for a, b in zip(shapes, BLAST.values(), strict=True)
+    ]
+    assert changed == [any(field) for field, _ in BLAST]
