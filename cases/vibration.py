@@ -8,7 +8,9 @@ The near field that is printed is far from equilibrium: attraction and repulsion
 0.5 m, and neighbours are 1/30 m apart. It throws the array apart, and single paths are chaotic after some
 0.01 s. The centre of gravity does not care: forces between particles cancel, tether and Lorentz force are
 linear, so it follows ``charged_closed_forms.response`` exactly. The size "equilibrium" has a near field in
-balance with its neighbours, in which the slow frequencies that the paper speaks of can be seen.
+balance between neighbours. Particles that are alike in uniform fields move as one, so that it does nothing
+unless the start disturbs it: the frequencies of the near field, of which the paper speaks, are none of those
+of the centre of gravity.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ def test_the_readme_script_runs(capsys):
     assert "grains, mean radius" in printed
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/agglomeration.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/agglomeration.md", "docs/blast.md", "docs/vibration.md"])
 def test_what_documents_point_to_is_there(page):
     text = (ROOT / page).read_text()
     links = re.findall(r"\]\(([^)#:]+)\)", text)

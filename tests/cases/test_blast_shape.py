@@ -97,8 +97,8 @@ def test_pictures_of_a_run(tmp_path):
     path = tmp_path / "trajectory.h5"
     made = blast.scene(number=60, duration=0.06)
     run(made, record=Recording(path, frames=3))
-    with frames(path) as found, pytest.raises(InputError, match="trajectory must be one with 6 frames"):
-        pictures(found)
+    with frames(path) as found:
+        assert pictures(found) == {}
     run(made, record=Recording(path, frames=24))
     with frames(path) as found:
         figures, course = pictures(found), Course.of(found)

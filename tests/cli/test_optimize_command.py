@@ -1,5 +1,7 @@
 """tisim optimize and tisim cache, on a problem that takes seconds."""
 
+import csv
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,10 @@ def toy_problem(size, variant):
         symbol="R",
         derived={"2 R": lambda r: 2 * r},
         picture=lambda scene, result: cloud(result),
+        details=lambda design, result: {
+            "half side, m": design["half_side"],
+            "R of one run, m": spread(result),
+        },
     )
 
 
@@ -68,6 +74,7 @@ def test_optimize_ends_with_all_its_files_and_resumes(tisim, tmp_path, monkeypat
     code, out, err = tisim(*SEARCH)
     assert code == 0
     assert "2 R" in out
+    assert "half side, m" in out
     names = {
         "search.h5",
         "best.csv",
@@ -75,8 +82,13 @@ def test_optimize_ends_with_all_its_files_and_resumes(tisim, tmp_path, monkeypat
         "convergence.pdf",
         "best_scene.toml",
         "best_cloud.png",
+        "best_run.csv",
     }
     assert names <= {path.name for path in (tmp_path / "s").iterdir()}
+    heading, (name, side), (_, distance) = csv.reader((tmp_path / "s/best_run.csv").read_text().splitlines())
+    assert (heading, name) == (["quantity", "value"], "half side, m")
+    assert 0.01 < float(side) < 0.1
+    assert 0 < float(distance) < 2 * float(side)
     assert "generation   1  best R" in err
     ran = len(Cache(tmp_path / "s/search.h5"))
     assert tisim(*SEARCH)[0] == 0
