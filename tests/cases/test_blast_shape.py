@@ -61,9 +61,10 @@ def test_details_say_what_was_wanted_and_reached(rng):
     r, n = shell(rng, 2000)
     state = {"position": flown(r, n, FLUX, DURATION), "mass": np.ones(2000)}
     result = Result(None, state, state, DURATION, {}, Status(True, ""), 0.0)
-    turned = dict(zip(("flux_x", "flux_y", "flux_z"), -FLUX, strict=True))
-    shown = details(turned, result, ellipsoid(FLUX, DURATION, 1.0))
-    assert shown["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
+    for sign in (1.0, -1.0):
+        turned = dict(zip(("flux_x", "flux_y", "flux_z"), sign * FLUX, strict=True))
+        shown = details(turned, result, ellipsoid(FLUX, DURATION, 1.0))
+        assert shown["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
     assert shown["strength of the field, T"] == pytest.approx(0.7)
     for k in (1, 2, 3):
         assert shown[f"half axis {k} reached, m"] == pytest.approx(
