@@ -19,6 +19,7 @@ def swinging(periods, speed):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_the_largest_displacement_is_kept_and_not_the_last(tmp_path):
     """After half a swing it is back at the start, having been v/w away; before a quarter it is on its way."""
     speeds = (0.3, 2.0)
