@@ -1,0 +1,93 @@
+"""Particle-steps per second of the blast without interaction, beside a numba program of the same scheme.
+
+    python tests/benchmarks/blast.py [--numbers 2000 100000] [--duration 0.2] [--repeats 7] [--threads 2]
+
+Runs of the two alternate, after both have compiled; the ratio is the median over pairs of runs.
+TISIM_BACKEND=quadrants chooses the other kernel compiler.
+"""
+
+import argparse
+import platform
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import blast_numba as peer
+import numba
+import numpy as np
+
+from cases.blast import AIR, FLUX, VISCOSITY, scene
+from tisim import Scene, Simulation, runtime
+
+
+def peer_control(made: Scene) -> tuple[tuple[float, ...], int, int]:
+    """What the numba program is given of the stepper of a scene."""
+    stepper, control = made.stepper, made.stepper.control
+    names = ("tolerance", "order", "first", "longest", "shortest", "most", "least")
+    return (
+        (stepper.phi, *(getattr(control, name) for name in names)),
+        control.iterations,
+        stepper.window,
+    )
+
+
+def spread(values: list[float]) -> str:
+    """Median, and least and greatest."""
+    return f"{np.median(values):.3g} ({min(values):.3g} .. {max(values):.3g})"
+
+
+def compare(number: int, duration: float, repeats: int) -> None:
+    """One size."""
+    made = scene(number=number, duration=duration)
+    start = made.particles.arrays(made.domain, made.seed)
+    control, limit, steps = peer_control(made)
+    fixed = ((FLUX, 0.0, 0.0), (AIR, VISCOSITY), control, limit, steps)
+    simulation = Simulation(made)
+    simulation.load([made])
+    simulation.run(steps=1)
+    peer.simulate(start, *fixed, 1e-3)
+    ours, theirs = [], []
+    for _ in range(repeats):
+        simulation.load([made])
+        began = time.perf_counter()
+        simulation.run()
+        ours.append(time.perf_counter() - began)
+        began = time.perf_counter()
+        position, velocity, counts = peer.simulate(start, *fixed, duration)
+        theirs.append(time.perf_counter() - began)
+    (result,) = simulation.results()
+    work, done = result.work, counts.sum(axis=0)
+    print(f"{number} particles, {duration} s, schedule '{simulation.schedule}', {repeats} pairs of runs: median (range)")  # fmt: skip
+    print(f"  tisim  {spread([work['particle_steps'] / t / 1e6 for t in ours])} M particle-steps/s")
+    print(f"  numba  {spread([done[0] / t / 1e6 for t in theirs])}")
+    rates = [work["particle_steps"] / a / (done[0] / b) for a, b in zip(ours, theirs, strict=True)]
+    print(f"  tisim / numba {spread(rates)}")
+    moved = np.abs(result.state["position"] - start["position"]).max()
+    gap = np.abs(result.state["position"] - position).max() / moved
+    print(
+        f"  steps {work['particle_steps']}, {done[0]}; iterations {work['solver_iterations']}, {done[1]};"
+        f" positions differ by {gap:.1e} of the distance moved"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--numbers", type=int, nargs="+", default=[2000, 100_000])
+    parser.add_argument("--duration", type=float, default=0.2)
+    parser.add_argument("--repeats", type=int, default=7)
+    parser.add_argument("--threads", type=int, default=2)
+    args = parser.parse_args()
+    runtime.start(threads=args.threads)
+    numba.set_num_threads(args.threads)
+    for number in args.numbers:
+        compare(number, args.duration * min(1.0, 5000 / number), args.repeats)
+    print(f"{platform.machine()}, {args.threads} threads ({runtime.cores()} cores); {runtime.backend()},"
+          f" numba {numba.__version__} ({numba.threading_layer()})")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
