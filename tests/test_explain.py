@@ -7,6 +7,7 @@ from rich.console import Console
 
 from cases.agglomeration import BEST
 from cases.agglomeration import scene as agglomeration
+from cases.vibration import scene as vibration
 from tisim import Simulation
 from tisim.explain import explain, known_effects, render
 
@@ -69,3 +70,26 @@ def test_parameters_have_units_and_sources():
     assert "Z04 Eq. (6.9)" in shown
     assert "Rounds" not in shown
     assert "Resolve*" in shown
+
+
+@pytest.mark.long
+def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
+    """Z13: forces on charges, and nothing else; no fields, lists or phases of anything more."""
+    found = explain(vibration(sites=2))
+    named = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
+    assert {part.name for part in found.effects} == named
+    absent = {part.name for part in found.absent_effects}
+    assert absent == {kind.kind() for kind in known_effects()} - named
+    assert {"contact", "contact_friction", "impact", "heating", "cooling", "agglomeration"} <= absent
+    core = {"position", "velocity", "mass", "radius", "id"}
+    before = {"position_before", "velocity_before", "force_before", "iterate_change"}
+    more = {"parameter table", "sums of the iteration"}
+    assert {item.name for item in found.memory} == core | before | more | {"charge", "anchor", "force"}
+    fields = dict(found.absent_fields)
+    assert "heating" in fields["temperature"]
+    forbidden = ("list", "contact", "touch", "spin", "torque", "temperature", "heat")
+    allocated = " ".join(item.name for item in found.memory)
+    assert not [word for word in forbidden if word in allocated]
+    iteration = ["SumTrialForces**", "Correct**", "Judge**"]
+    step = ["Begin", "Keep", "Try*", "Predict*", *iteration, "GiveUp*", "Decide*", "Arrive", "Finish"]
+    assert list(found.phases) == step

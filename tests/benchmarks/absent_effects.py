@@ -1,10 +1,11 @@
 """What the effects that a scene leaves out cost it: memory and time, with and without them in the package.
 
-    python tests/benchmarks/absent_effects.py [--repeats 5]
+    python tests/benchmarks/absent_effects.py [--scene impacts] [--repeats 5]
 
-A scene of impact and agglomeration alone is run in fresh processes, in turn in a package whose other effects
-cannot be imported and in the whole one. Prints the bytes of its fields and the time of its kernels in both,
-and then, for comparison, the same scene with all effects.
+A scene - "impacts": of impact and agglomeration alone; "vibration": charged particles in a binder - is run in
+fresh processes, in turn in a package whose other effects cannot be imported and in the whole one. Prints the
+bytes of its fields and the time of its kernels in both, and then, for comparison, those of impacts with all
+effects.
 """
 
 from __future__ import annotations
@@ -17,27 +18,15 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-OTHERS = ("effects.softening", "effects.reaction", "operators.cooling", "operators.fragmentation")
 
-WORKER = """
-import json, sys, time
-sys.path.insert(0, {root!r})
-absent = {absent!r}
-for name in absent:
-    sys.modules[name] = None  # importing it is an ImportError
-import tisim
-from tisim import runtime, Box, Cloud, Scene
+IMPACTS = """
+from tisim import Box, Cloud, Scene
 from tisim.effects.impact import Impact
 from tisim.operators.agglomeration import Agglomeration
-runtime.start(threads=1)
 effects = [Impact(hardness=1e6), Agglomeration()]
-if not absent:
-    from tisim import effects as laws, kinds, operators
-    kinds.load(laws)
-    kinds.load(operators)
-if {full!r}:
+if full:
     from cases import agglomeration
-    effects = agglomeration.scene({{**agglomeration.BEST, "hardness": 1e6}}, 0).effects
+    effects = agglomeration.scene({**agglomeration.BEST, "hardness": 1e6}, 0).effects
 scenes = [
     Scene(
         particles=Cloud(number=1000, radius=7e-4, density=5e3, deviation=(60.0, 60.0, 60.0)), effects=effects,
@@ -45,6 +34,42 @@ scenes = [
     )
     for seed in range(8)
 ]
+"""
+VIBRATION = """
+from cases.vibration import RATIOS, scene
+scenes = [scene(ratio, duration=1e-4) for ratio in RATIOS]
+"""
+CONTACT = ("", "_bond", "_dissipation", "_friction", "_softening")
+SCENES = {
+    "impacts": (
+        IMPACTS,
+        ("effects.softening", "effects.reaction", "operators.cooling", "operators.fragmentation"),
+    ),
+    "vibration": (
+        VIBRATION,
+        (
+            *(f"effects.contact{law}" for law in CONTACT),
+            *(f"effects.{name}" for name in ("impact", "friction", "heating", "softening", "reaction")),
+            *(f"operators.{name}" for name in ("agglomeration", "cooling", "fragmentation")),
+        ),
+    ),
+}
+"""Scenes, and what is left out of the package: what has to do with contact, spin and temperature."""
+
+WORKER = """
+import json, sys, time
+sys.path.insert(0, {root!r})
+absent, full = {absent!r}, {full!r}
+for name in absent:
+    sys.modules[name] = None  # importing it is an ImportError
+import tisim
+from tisim import runtime
+runtime.start(threads=1)
+if not absent:
+    from tisim import effects as laws, kinds, operators
+    kinds.load(laws)
+    kinds.load(operators)
+{scenes}
 simulation = tisim.Simulation(scenes[0], worlds=8, capacity=1000)
 simulation.load(scenes)
 simulation.run(steps=1)
@@ -58,10 +83,11 @@ print(json.dumps({{"bytes": simulation.s.bytes(), "seconds": min(times)}}))
 """
 
 
-def measure(absent: bool, full: bool = False) -> dict:
+def measure(scene: str, absent: bool, full: bool = False) -> dict:
     """Bytes by field and CPU seconds of all steps, from a fresh process."""
-    names = [f"tisim.{name}" for name in OTHERS] if absent else []
-    source = WORKER.format(root=str(ROOT), absent=names, full=full)
+    scenes, others = SCENES[scene]
+    names = [f"tisim.{name}" for name in others] if absent else []
+    source = WORKER.format(root=str(ROOT), absent=names, full=full, scenes=scenes)
     done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -69,9 +95,11 @@ def measure(absent: bool, full: bool = False) -> dict:
 def main() -> None:
     """Measure in turn and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--scene", choices=SCENES, default="impacts")
     parser.add_argument("--repeats", type=int, default=5)
-    repeats = parser.parse_args().repeats
-    pairs = [(measure(absent=False), measure(absent=True)) for _ in range(repeats)]
+    args = parser.parse_args()
+    scene, repeats = args.scene, args.repeats
+    pairs = [(measure(scene, absent=False), measure(scene, absent=True)) for _ in range(repeats)]
     whole, bare = pairs[0]
     ratios = [a["seconds"] / b["seconds"] for a, b in pairs]
     print(f"fields of the scene, bytes: {bare['bytes']}")
@@ -80,10 +108,10 @@ def main() -> None:
         f"time in the whole package over time without the other effects: "
         f"median {statistics.median(ratios):.3f} of {repeats} ({min(ratios):.3f}..{max(ratios):.3f})"
     )
-    full = measure(absent=False, full=True)
-    print(
-        f"with all effects: {sum(full['bytes'].values()) / sum(bare['bytes'].values()):.2f} times the bytes"
-    )
+    if scene == "impacts":
+        full = measure(scene, absent=False, full=True)
+        ratio = sum(full["bytes"].values()) / sum(bare["bytes"].values())
+        print(f"with all effects: {ratio:.2f} times the bytes")
 
 
 if __name__ == "__main__":

@@ -55,11 +55,12 @@ def compare(number: int, duration: float, repeats: int) -> None:
         simulation.run()
         ours.append(time.perf_counter() - began)
         began = time.perf_counter()
-        position, velocity, counts = peer.simulate(start, *fixed, duration)
+        position, _, counts = peer.simulate(start, *fixed, duration)
         theirs.append(time.perf_counter() - began)
     (result,) = simulation.results()
     work, done = result.work, counts.sum(axis=0)
-    print(f"{number} particles, {duration} s, schedule '{simulation.schedule}', {repeats} pairs of runs: median (range)")  # fmt: skip
+    what = f"{number} particles, {duration:g} s, schedule '{simulation.schedule}'"
+    print(f"{what}, {repeats} pairs of runs: median (range)")
     print(f"  tisim  {spread([work['particle_steps'] / t / 1e6 for t in ours])} M particle-steps/s")
     print(f"  numba  {spread([done[0] / t / 1e6 for t in theirs])}")
     rates = [work["particle_steps"] / a / (done[0] / b) for a, b in zip(ours, theirs, strict=True)]

@@ -158,8 +158,10 @@ def main() -> None:
     numba.set_num_threads(args.threads)
     for n in args.numbers:
         compare(n, np.float64 if args.precision == "f64" else np.float32, args)
-    print(f"{platform.machine()}, {args.precision}, {args.threads} threads ({runtime.cores()} cores);"
-          f" {runtime.backend()}, numba {numba.__version__} ({numba.threading_layer()}, {peer.widest()})")  # fmt: skip
+    print(
+        f"{platform.machine()}, {args.precision}, {args.threads} threads ({runtime.cores()} cores);"
+        f" {runtime.backend()}, numba {numba.__version__} ({numba.threading_layer()}, {peer.widest()})"
+    )
 
 
 if __name__ == "__main__":

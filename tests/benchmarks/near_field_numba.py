@@ -1,7 +1,7 @@
 """The near field of all pairs as a numba program, and how fast this machine takes roots and multiplies.
 
-Structure of arrays, one loop over particles in parallel, and in it one over the others that the compiler turns
-into vector instructions: the peer of tests/benchmarks/near_field.py.
+Structure of arrays, one loop over particles in parallel, and in it one over the others that the compiler
+turns into vector instructions: the peer of tests/benchmarks/near_field.py.
 """
 
 from __future__ import annotations
