@@ -40,7 +40,7 @@ def usual():
 
 
 def test_forces_in_every_tile_are_their_numpy_twin(usual):
-    for n, result in zip(NUMBERS, usual, strict=True):
+    for result in usual:
         expected = forces(result.state)
         np.testing.assert_allclose(
             result.state["force"], expected, rtol=0, atol=1e-12 * max(np.abs(expected).max(), 1.0)

@@ -32,7 +32,7 @@ class Phase:
     """
 
     conditional: ClassVar[bool] = False
-    long: ClassVar[bool] = False
+    long: bool = False
     extent: int = 1
 
     @ti.func

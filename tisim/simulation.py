@@ -13,7 +13,7 @@ from tisim.binding import Table, connect
 from tisim.composition import Composition, declared, needed_fields
 from tisim.errors import must
 from tisim.particles import Arrays
-from tisim.program import Phase, Program
+from tisim.program import Nest, Program
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.starts import check_start, laid_out, volume
@@ -68,7 +68,7 @@ class Simulation:
         return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
 
     def _choose(self, capacity: int) -> str:
-        if any(phase.long for phase in self.made.step if isinstance(phase, Phase)):
+        if any(phase.long for phase, _ in Nest().phases(self.made.step)):
             return "particle"
         # A world per thread needs as many worlds as threads; one small world is faster without launches.
         small = capacity * self.worlds <= 20_000
