@@ -21,8 +21,8 @@ loops over fewer are unrolled before they are vectorised."""
 
 
 MANY = 1000
-"""With so many others, all pairs of one world are work enough for all threads (measured: launches cost a step
-0.2 ms, as much as the pairs of 400)."""
+"""With so many others, the pairs of a world are work enough for more threads than one (measured on 2 cores:
+launches cost a step 0.2 ms, as much as the pairs of 400)."""
 
 
 class PairSum(PerParticle):
@@ -40,7 +40,8 @@ class PairSum(PerParticle):
         self.long_ranged = tuple(e for e in effects if not e.short_ranged)
         self.short_ranged = tuple(e for e in effects if e.short_ranged)
         # A tile may reach past the particles alive, but not past the slots that there are.
-        self.long = bool(self.long_ranged) and s.capacity >= MANY
+        idle = s.worlds < runtime.current().threads
+        self.long = bool(self.long_ranged) and idle and s.capacity >= MANY
         self.tiled = bool(self.long_ranged) and runtime.current().device == "cpu" and s.capacity >= LANES
 
     @ti.func
