@@ -122,7 +122,7 @@ def scene(
             ChowDrag(density=AIR, viscosity=VISCOSITY),
             *interaction(contact, near, cutoff),
         ),
-        stepper=Trapezoid(control=IterationControl(**control), window=4),
+        stepper=Trapezoid(control=IterationControl(**control)),
         duration=duration,
         seed=seed,
     )

@@ -116,7 +116,7 @@ def scene(
             *((PeakDisplacement(),) if observed else ()),
         ),
         stepper=Trapezoid(
-            control=ErrorControl(error=error, tolerance=error / 10, first=1e-7, longest=longest), window=1
+            control=ErrorControl(error=error, tolerance=error / 10, first=1e-7, longest=longest)
         ),
         duration=duration,
         seed=seed,

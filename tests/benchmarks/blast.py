@@ -21,6 +21,9 @@ import numpy as np
 from cases.blast import AIR, FLUX, VISCOSITY, scene
 from tisim import Scene, Simulation, runtime
 
+WINDOW = 64
+"""Steps of the numba program between two barriers, as many as ours at most."""
+
 
 def peer_control(made: Scene) -> tuple[tuple[float, ...], int, int]:
     """What the numba program is given of the stepper of a scene."""
@@ -29,7 +32,7 @@ def peer_control(made: Scene) -> tuple[tuple[float, ...], int, int]:
     return (
         (stepper.phi, *(getattr(control, name) for name in names)),
         control.iterations,
-        stepper.window,
+        WINDOW,
     )
 
 

@@ -91,8 +91,8 @@ def displaced(v, v0, dt, phi):
 
 
 @numba.njit(parallel=True, fastmath=FAST, error_model="numpy")
-def window(r, v, f, own_dt, counts, length, mass, charge, radius, b, air, control, limit):
-    """Every particle through ``length`` seconds; adds its steps and iterations to ``counts``."""
+def stretch(r, v, f, own_dt, counts, begins, mass, charge, radius, b, air, control, limit):
+    """Every particle through windows that begin so; adds its steps and iterations to ``counts``."""
     density, viscosity = air
     phi, tolerance, order, first, longest, shortest, most, least = control
     wanted = tolerance ** (1.0 / (order * limit))
@@ -102,49 +102,52 @@ def window(r, v, f, own_dt, counts, length, mass, charge, radius, b, air, contro
         vi = (v[i, 0], v[i, 1], v[i, 2])
         fi = (f[i, 0], f[i, 1], f[i, 2])
         dt_next = own_dt[i]
-        elapsed, carry = 0.0, 0.0
         steps, iterations = 0, 0
-        while elapsed < length:
-            dt = max(shortest, min(dt_next if dt_next > 0.0 else first, longest))
-            last = dt * (1.0 + 1e-6) >= length - elapsed
-            if last:
-                dt = length - elapsed
-            v0, f0 = vi, fi
-            vk, fk = iterate(v0, v0, f0, f0, dt, phi, m, q, b, size, density, viscosity)
-            k, going, accepted = 1, True, False
-            while going:
-                fk = force(vk, q, b, size, density, viscosity)
-                new, fk = iterate(vk, v0, fk, f0, dt, phi, m, q, b, size, density, viscosity)
-                k += 1
-                d = displaced(new, v0, dt, phi)
-                moved = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-                e = (new[0] - vk[0], new[1] - vk[1], new[2] - vk[2])
-                change = phi * dt * math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-                if change > 0.0:
-                    change /= moved
-                vk = new
-                solved = change <= tolerance
-                if solved or k >= limit or not change < np.inf:
-                    reached = change ** (1.0 / (order * k))
-                    factor = least
-                    if wanted >= least * reached:
-                        factor = min(most, wanted / max(reached, wanted / most))
-                    going, accepted = False, solved
-                    if not solved:
-                        factor = min(factor, 0.8)
-                    dt_next = dt * factor
-            iterations += k - 1
-            if accepted:
-                d = displaced(vk, v0, dt, phi)
-                ri = (ri[0] + d[0], ri[1] + d[1], ri[2] + d[2])
-                vi, fi = vk, fk
-                step = dt - carry
-                total = elapsed + step
-                carry = (total - elapsed) - step
-                elapsed = length if last else total
-                steps += 1
-            elif dt <= shortest:
-                break
+        for k_window in range(len(begins) - 1):
+            length = begins[k_window + 1] - begins[k_window]
+            elapsed, carry = 0.0, 0.0
+            while elapsed < length:
+                wished = max(shortest, min(dt_next if dt_next > 0.0 else first, longest))
+                last = wished * (1.0 + 1e-6) >= length - elapsed
+                dt = length - elapsed if last else wished
+                v0, f0 = vi, fi
+                vk, fk = iterate(v0, v0, f0, f0, dt, phi, m, q, b, size, density, viscosity)
+                k, going, accepted = 1, True, False
+                while going:
+                    fk = force(vk, q, b, size, density, viscosity)
+                    new, fk = iterate(vk, v0, fk, f0, dt, phi, m, q, b, size, density, viscosity)
+                    k += 1
+                    d = displaced(new, v0, dt, phi)
+                    moved = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+                    e = (new[0] - vk[0], new[1] - vk[1], new[2] - vk[2])
+                    change = phi * dt * math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+                    if change > 0.0:
+                        change /= moved
+                    vk = new
+                    solved = change <= tolerance
+                    if solved or k >= limit or not change < np.inf:
+                        reached = change ** (1.0 / (order * k))
+                        factor = least
+                        if wanted >= least * reached:
+                            factor = min(most, wanted / max(reached, wanted / most))
+                        going, accepted = False, solved
+                        if not solved:
+                            factor = min(factor, 0.8)
+                        dt_next = dt * factor
+                iterations += k - 1
+                if accepted:
+                    d = displaced(vk, v0, dt, phi)
+                    ri = (ri[0] + d[0], ri[1] + d[1], ri[2] + d[2])
+                    vi, fi = vk, fk
+                    step = dt - carry
+                    total = elapsed + step
+                    carry = (total - elapsed) - step
+                    elapsed = length if last else total
+                    steps += 1
+                    if last:
+                        dt_next = max(dt_next, wished)
+                elif dt <= shortest:
+                    break
         for c in range(3):
             r[i, c], v[i, c], f[i, c] = ri[c], vi[c], fi[c]
         own_dt[i] = dt_next
@@ -167,12 +170,9 @@ def simulate(start: dict[str, Any], b: Any, air: Any, control: Any, limit: int, 
     f, own_dt = np.zeros_like(v), np.zeros(len(v))
     counts = np.zeros((len(v), 2), np.int64)
     first_forces(v, f, start["charge"], start["radius"], b, air)
-    t, longest = 0.0, control[4]
-    while t < duration:
-        length = steps * longest
-        if length * (1.0 + 1e-6) >= duration - t:
-            length = duration - t
+    longest = control[4]
+    begins = np.append(np.arange(0.0, duration / longest - 1e-6) * longest, duration)
+    for k in range(0, len(begins) - 1, steps):
         given = (start["mass"], start["charge"], start["radius"], b, air, control, limit)
-        window(r, v, f, own_dt, counts, length, *given)
-        t += length
+        stretch(r, v, f, own_dt, counts, begins[k : k + steps + 1], *given)
     return r, v, counts

@@ -1,35 +1,49 @@
 """Particles that do not feel each other: each takes its own implicit steps, many of them in one go.
 
-There is no norm over all of them and nothing to wait for. The world moves in windows, and each particle
-through a window in steps of its own.
+There is no norm over all of them and nothing to wait for. They meet at every multiple of the longest step, a
+window; how many windows a launch takes them through makes no difference to what they do.
 """
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
 from tisim.state import STUCK
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
-from tisim.steppers.phases import advance_clock
+
+WINDOWS, STEPS = 64, 2**16
+"""Windows of a launch at least, and steps of all particles together in it."""
+NEARLY = 1.0 + 1e-6
+"""A remainder as small as rounding leaves is not worth a step of its own."""
 
 
-class Window(Phase):
-    """The time that the world moves on by; the last window ends exactly on time."""
+class Stretch(Phase):
+    """The windows of a launch: up to the end, or to the next time at which somebody looks.
 
-    def __init__(self, s, control, steps: int) -> None:
-        self.s, self.control, self.steps = s, control, steps
+    The world's time is counted in windows, so that it does not drift.
+    """
+
+    def __init__(self, s, control) -> None:
+        self.s, self.control = s, control
+        self.most = max(WINDOWS, STEPS // (s.worlds * s.capacity))
 
     @ti.func
     def run(self, w, _k):
         s = self.s
-        dt = self.steps * ti.cast(self.control.longest(w), ti.f64)
-        left = s.end[w] - s.time[w]
-        if dt * (1.0 + 1e-6) >= left:
-            dt = left
-        s.dt[w] = dt
-        s.steps[w] += 1
+        window = ti.cast(self.control.longest(w), ti.f64)
+        until = ti.min(s.hold[w], s.end[w])
+        wanted = ti.ceil(until / window / NEARLY) - s.windows[w]
+        s.stretch_windows[w] = ti.max(1.0, ti.min(wanted, ti.cast(self.most, ti.f64)))
+        s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
+
+
+@ti.func
+def beginning(s, control: ti.template(), w, window):  # type: ignore[valid-type]
+    """When a window begins; none does after the end. s, f64."""
+    time = window * ti.cast(control.longest(w), ti.f64)
+    return ti.select(time * NEARLY >= s.end[w], s.end[w], time)
 
 
 class Alone(PerParticle):
-    """A particle from the beginning of the window to its end."""
+    """A particle through the windows of a launch."""
 
     long = True
 
@@ -40,18 +54,39 @@ class Alone(PerParticle):
     @ti.func
     def run(self, w, i):
         s = self.s
-        elapsed, carry, window = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64), s.dt[w]
-        steps, tries, iterations = 0, 0, 0
-        verdict = ACCEPTED
-        while elapsed < window and verdict != HOPELESS:
+        steps, tries, iterations, going = 0, 0, 0, 1
+        aim = self.control.aim(w)
+        for k in range(ti.cast(s.stretch_windows[w], ti.i32)):
+            if going > 0:
+                begin = beginning(s, self.control, w, s.windows[w] + k)
+                length = beginning(s, self.control, w, s.windows[w] + k + 1) - begin
+                more_steps, more_tries, more_iterations, verdict = self.window(w, i, begin, length, aim)
+                steps += more_steps
+                tries += more_tries
+                iterations += more_iterations
+                if verdict == HOPELESS:
+                    going = 0
+                    s.fail(w, STUCK, i)
+                    ti.atomic_min(s.blame[w], self.summed.largest(w, i))
+        ti.atomic_add(s.particle_steps[w], steps)
+        ti.atomic_add(s.rejections[w], tries - steps)
+        ti.atomic_add(s.solver_iterations[w], iterations)
+        ti.atomic_add(s.force_evaluations[w], iterations)
+
+    @ti.func
+    def window(self, w, i, begin, length, aim):
+        """A particle from the beginning of a window to its end: steps, attempts, iterations, last verdict."""
+        s = self.s
+        elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+        steps, tries, iterations, verdict = 0, 0, 0, ACCEPTED
+        while elapsed < length and verdict != HOPELESS:
             self.solve.keep(w, i)
             verdict = TRIED
             while verdict == TRIED:
-                dt = self.control.step(w, s.own_dt[w, i])
-                last = dt * (1.0 + 1e-6) >= window - elapsed
-                if last:
-                    dt = window - elapsed
-                verdict, k = self.attempt(w, i, s.time[w] + elapsed, dt)
+                wanted = self.control.step(w, s.own_dt[w, i])
+                last = wanted * NEARLY >= length - elapsed
+                dt = ti.select(last, length - elapsed, wanted)
+                verdict, k = self.attempt(w, i, begin + elapsed, dt, aim)
                 iterations += k
                 tries += 1
                 if verdict == ACCEPTED:
@@ -59,29 +94,27 @@ class Alone(PerParticle):
                     step = dt - carry
                     total = elapsed + step
                     carry = (total - elapsed) - step
-                    elapsed = ti.select(last, window, total)
+                    elapsed = ti.select(last, length, total)
                     steps += 1
-        if verdict == HOPELESS:
-            s.fail(w, STUCK, i)
-            ti.atomic_min(s.blame[w], self.summed.largest(w, i))
-        ti.atomic_add(s.particle_steps[w], steps)
-        ti.atomic_add(s.rejections[w], tries - steps)
-        ti.atomic_add(s.solver_iterations[w], iterations)
-        ti.atomic_add(s.force_evaluations[w], iterations)
+                    # That a step has been cut short says nothing about the next one.
+                    s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, wanted, 0.0), s.real))
+        return steps, tries, iterations, verdict
 
     @ti.func
-    def attempt(self, w, i, t, dt):
+    def attempt(self, w, i, t, dt, aim):
         """One step of this length; the verdict on it, and how many iterations it took."""
         s, solve = self.s, self.solve
         step, end = ti.cast(dt, s.real), t + dt
-        v = solve.velocity(w, i, step, end)
+        v = solve.velocity(w, i, step, solve.jacobian(w, i, end))
         if not solve.bearable(w, i, v, step):
             v = s.velocity_before[w, i]
         solve.advance(w, i, v, step)
         k, verdict, iterating = 1, TRIED, 1
         while iterating > 0:
+            # Before the force is written, so that what both depend on is computed once.
+            jacobian = solve.jacobian(w, i, end)
             self.summed.alone(w, i, end)
-            new = solve.velocity(w, i, step, end)
+            new = solve.velocity(w, i, step, jacobian)
             k += 1
             change, error = ti.cast(ti.math.inf, s.real), ti.cast(0.0, s.real)
             if solve.bearable(w, i, new, step):
@@ -98,7 +131,7 @@ class Alone(PerParticle):
             # Not below infinity: also true of NaN.
             if solved or k >= self.control.iterations or not (ratio < ti.math.inf):
                 iterating = 0
-                factor = self.control.factor(w, ratio, ti.cast(k, ti.f64), off)
+                factor = self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
                 if solved and self.control.accepts(w, off):
                     verdict = ACCEPTED
                 else:
@@ -109,12 +142,15 @@ class Alone(PerParticle):
         return verdict, k - 1
 
 
-class EndWindow(Phase):
-    """The window is done."""
+class EndStretch(Phase):
+    """The windows are done."""
 
-    def __init__(self, s) -> None:
-        self.s = s
+    def __init__(self, s, control) -> None:
+        self.s, self.control = s, control
 
     @ti.func
     def run(self, w, _k):
-        advance_clock(self.s, w)
+        s = self.s
+        s.windows[w] += s.stretch_windows[w]
+        before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
+        s.dt[w] = s.time[w] - before

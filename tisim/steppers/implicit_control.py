@@ -99,11 +99,15 @@ class IterationControl(ImplicitControl):
         return moved
 
     @ti.func
-    def factor(self, w, change, k, error):
-        """What the next step is to be multiplied by, after K = k iterations."""
+    def aim(self, w):
+        """TOL^(1/(p K_d)), the same for all particles."""
         p = ti.cast(self.order(w), ti.f64)
-        wanted = ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / (p * self.iterations))
-        return self.limited(w, wanted, ti.pow(change, 1.0 / (p * k)))
+        return ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / (p * self.iterations))
+
+    @ti.func
+    def factor(self, w, aim, change, k, error):
+        """What the next step is to be multiplied by, after K = k iterations."""
+        return self.limited(w, aim, ti.pow(change, 1.0 / (ti.cast(self.order(w), ti.f64) * k)))
 
 
 class ErrorControl(IterationControl):
@@ -131,7 +135,7 @@ class ErrorControl(IterationControl):
         return error <= self.error(w)
 
     @ti.func
-    def factor(self, w, change, k, error):
-        by_iteration = IterationControl.factor(self, w, change, k, error)
+    def factor(self, w, aim, change, k, error):
+        by_iteration = IterationControl.factor(self, w, aim, change, k, error)
         wanted = ti.cast(self.safety(w), ti.f64) * ti.sqrt(ti.cast(self.error(w), ti.f64))
         return ti.min(by_iteration, self.limited(w, wanted, ti.sqrt(error)))

@@ -45,7 +45,7 @@ class Predict(PerParticle):
     def run(self, w, i):
         s, solve = self.s, self.solve
         dt = ti.cast(s.dt[w], s.real)
-        v = solve.velocity(w, i, dt, s.time[w])
+        v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
         if not solve.bearable(w, i, v, dt):
             v = s.velocity_before[w, i]
         solve.advance(w, i, v, dt)
@@ -65,7 +65,7 @@ class Correct(PerBlock):
         s, solve = self.s, self.solve
         dt = ti.cast(s.dt[w], s.real)
         last = s.velocity[w, i]
-        v = solve.velocity(w, i, dt, s.time[w])
+        v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
         change = ti.cast(ti.math.inf, s.real)
         if solve.bearable(w, i, v, dt):
             step = solve.phi(w) * dt * (v - last)
@@ -106,7 +106,7 @@ class Judge(Phase):
             elif self.control.hopeless(w, s.dt[w]):
                 s.verdict[w] = HOPELESS
                 accuse(s, self.summed, w)
-            factor = self.control.factor(w, change, k, error)
+            factor = self.control.factor(w, self.control.aim(w), change, k, error)
             # A step that was not accepted would fail again in the same way if it were as long.
             s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))
             s.iterating[w] = 0.0

@@ -37,14 +37,18 @@ class Solve(Kept):
         return dt * (self.phi(w) * v + (1.0 - self.phi(w)) * self.s.velocity_before[w, i])
 
     @ti.func
-    def velocity(self, w, i, dt, t):
+    def jacobian(self, w, i, t):
+        """J, the derivative of the force by velocity where effects give it, at the present v. N s/m."""
+        return summed_jacobian(self.linear, self.s, w, i, t)
+
+    @ti.func
+    def velocity(self, w, i, dt, jacobian):
         """v' of m v' = m v + dt (phi (F' + J (v' - v_K)) + (1 - phi) F), with F' and J those at v_K. m/s."""
         s, phi = self.s, self.phi(w)
         m, v = s.mass[w, i], s.velocity_before[w, i]
         total = phi * s.force[w, i] + (1.0 - phi) * s.force_before[w, i]
         new = v + dt / m * total
         if ti.static(len(self.linear) > 0):
-            jacobian = summed_jacobian(self.linear, s, w, i, t)
             matrix = m * ti.Matrix.identity(s.real, 3) - phi * dt * jacobian
             new = matrix.inverse() @ (m * v + dt * (total - phi * (jacobian @ s.velocity[w, i])))
             s.force[w, i] += jacobian @ (new - s.velocity[w, i])

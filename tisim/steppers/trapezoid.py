@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal, Self
 
-from pydantic import Field as Option
-
 from tisim.blocks import BlockSums
 from tisim.effect import Effect, Force, PairForce
 from tisim.forces import FORCE
@@ -12,7 +10,7 @@ from tisim.program import Item
 from tisim.spec import parameter
 from tisim.state import Field
 from tisim.steppers.acceleration import accelerated, memory_of_iterates
-from tisim.steppers.alone import Alone, EndWindow, Window
+from tisim.steppers.alone import Alone, EndStretch, Stretch
 from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
 from tisim.steppers.implicit_control import ErrorControl, IterationControl
 from tisim.steppers.implicit_phases import Correct, Iteration, Judge, Predict, Try
@@ -35,7 +33,8 @@ class Trapezoid(Stepper):
     The part of the force that is linear in velocity, of effects that give ``velocity_jacobian``, is solved
     exactly with each iterate. ``acceleration`` makes iterates from the last two (see acceleration.py), which
     converges in fewer of them, and where plain iteration does not. Particles that do not feel each other
-    take their own steps, within windows of ``window`` longest steps; a step of the world is then a window.
+    take their own steps and meet at every multiple of ``longest``; a step of the world is then from one to
+    the next.
 
     Source: Z13 (A1)-(A10); Z16 (8.4), (C.1)-(C.5).
     """
@@ -43,10 +42,12 @@ class Trapezoid(Stepper):
     phi: float = parameter("", 0.5, ge=0, le=1)
     control: IterationControl = IterationControl()
     acceleration: Literal["none", "anderson"] = "none"
-    window: int = Option(64, ge=1)
 
     counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
-    keeps: ClassVar = ("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt")
+    keeps: ClassVar = (
+        *("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt"),
+        *("windows", "stretch_windows"),
+    )
 
     @property
     def order(self) -> int:
@@ -78,7 +79,7 @@ class Trapezoid(Stepper):
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, solve = parts.s, Solve(parts, self.phi)
         if parts.independent:
-            return (Window(s, parts.control, self.window), Alone(parts, solve), EndWindow(s))
+            return (Stretch(s, parts.control), Alone(parts, solve), EndStretch(s, parts.control))
         listen = (Listen(parts),) if parts.near else ()
         sums = BlockSums(s, 4)
         parts.owned.append((sums, "sums of the iteration", self.kind()))
