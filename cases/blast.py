@@ -20,6 +20,7 @@ from cases.blast_accuracy import half_axes, quantities
 from cases.case import Case, Check, Size
 from optimize.problem import Problem
 from tisim import Cloud, Result, Scene, run
+from tisim.batches import Progress
 from tisim.effect import Effect
 from tisim.effects.contact import Contact
 from tisim.effects.contact_dissipation import ContactDissipation
@@ -176,11 +177,11 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
     return blast_pictures.pictures(found)
 
 
-def study(size: str) -> Mapping[str, Figure | str]:
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """The cloud without interaction, with contact, and with near field."""
     from cases import blast_pictures
 
-    return blast_pictures.study(size)
+    return blast_pictures.figures(size, progress)
 
 
 def problem(size: str, variant: str) -> Problem:
@@ -202,5 +203,5 @@ CASE = Case(
     problem=problem,
     variants=("ellipsoid",),
     pictures=pictures,
-    study=study,
+    figures=figures,
 )

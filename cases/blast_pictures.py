@@ -1,4 +1,4 @@
-"""Figures of the case blast: of one run, and of its study, which sets the runs of Z16 side by side."""
+"""Figures of the case blast: of one run, and of the runs of Z16 side by side."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from cases import blast
 from cases.blast_shape import contacts, extents
 from tisim import Recording, run
+from tisim.batches import Progress, share
 from tisim.errors import RunError
 from tisim.frames import Frame, Frames, frames
 from tisim.particles import Arrays
@@ -34,7 +35,7 @@ RUNS = {
     "near_field": "contact and near field as printed (Fig. 9)",
     "clumps": "contact and near field of neighbours",
 }
-"""Of the study, by size."""
+"""Set side by side, by size."""
 
 
 @dataclass(frozen=True)
@@ -125,15 +126,19 @@ def envelope(course: Course) -> Figure:
     return figure
 
 
-def study(size: str) -> Mapping[str, Figure | str]:
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """blast.png, blast.csv: the runs of Z16 side by side, of 500 particles at size small, else of 2000."""
     number = int(blast.CASE.size(size).scene.get("number", blast.NUMBER))
     courses, ends = {}, {}
-    for name in RUNS:
+    for done, name in enumerate(RUNS):
         settings = {**blast.CASE.size(name).scene, "number": number}
         with TemporaryDirectory() as folder:
             path = Path(folder) / "trajectory.h5"
-            result = run(blast.scene(**settings), record=Recording(path, frames=50))
+            result = run(
+                blast.scene(**settings),
+                share(progress, done, len(RUNS)),
+                Recording(path, frames=50),
+            )
             if not result.status.ok:
                 raise RunError(f"{name}: {result.status.reason}")
             with frames(path) as found:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import cases
 from optimize.problem import Problem
 from tisim.accuracy.quantity import Quantity
+from tisim.batches import Progress
 from tisim.errors import must
 from tisim.frames import Frames
 from tisim.scene import Scene
@@ -51,7 +52,7 @@ class Case:
     quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
     problem : (size, variant) -> Problem; variants : its names, the first the default.
     pictures : what the case is about, drawn from a run's trajectory; by name of file.
-    study : (size) -> what takes many runs: figures, and tables as text; by name of file.
+    figures : (size, progress) -> what takes many runs: figures, and tables as text; by name of file.
     """
 
     name: str
@@ -64,7 +65,7 @@ class Case:
     variants: tuple[str, ...] = ()
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None
     pictures: Callable[[Frames], Mapping[str, Figure]] | None = None
-    study: Callable[[str], Mapping[str, Figure | str]] | None = None
+    figures: Callable[[str, Progress], Mapping[str, Figure | str]] | None = None
 
     def size(self, name: str) -> Size:
         """A size by name; InputError when there is none of that name."""

@@ -25,6 +25,7 @@ from cases.charged_closed_forms import resonances, response
 from cases.vibration_accuracy import quantities
 from optimize.problem import Problem
 from tisim import Cloud, Result, Scene, run
+from tisim.batches import Progress
 from tisim.effects.lorentz import Lorentz
 from tisim.effects.near_field import NearField, TruncatedNearField
 from tisim.effects.tether import Tether
@@ -186,11 +187,11 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
     return vibration_pictures.pictures(found)
 
 
-def study(size: str) -> Mapping[str, Figure | str]:
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """The resonance curve and beats."""
     from cases import vibration_pictures
 
-    return vibration_pictures.study(size)
+    return vibration_pictures.figures(size, progress)
 
 
 def problem(size: str, variant: str) -> Problem:
@@ -209,7 +210,7 @@ CASE = Case(
     check=check,
     quantities=quantities,
     pictures=pictures,
-    study=study,
+    figures=figures,
     problem=problem,
     variants=VARIANTS,
 )

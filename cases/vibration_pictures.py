@@ -1,4 +1,4 @@
-"""Figures of the case vibration: of one run, and of its study."""
+"""Figures of the case vibration: of one run, and of many."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from cases.vibration_response import (
     fast_scenes,
     slow_scenes,
 )
+from tisim.batches import Progress, share
 from tisim.frames import Frames
 from tisim.scene import Scene
 
@@ -99,15 +100,20 @@ def spectrum(axis: Axes, course: Course, known: Mapping[str, float] | None) -> N
     plain(axis)
 
 
-def study(size: str) -> Mapping[str, Figure | str]:
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """resonance.png, resonance.csv: the resonance curve and beats. Circles of the size's near field."""
     settings = vibration.CASE.size(size).scene
     near = str(settings.get("near_field", "printed"))
     ratios = np.linspace(0.04, 2.0, 99)
     around = np.linspace(0.9, 1.1, 41)
-    fast = Sweep.of(fast_scenes(np.unique(np.round(np.concatenate([ratios, around]), 6))))
-    slow = Sweep.of(slow_scenes(np.linspace(0.05, 1.0, 96)))
-    arrays = Sweep.of(fast_scenes(vibration.RATIOS, near, sites=3))
+    lots = (
+        fast_scenes(np.unique(np.round(np.concatenate([ratios, around]), 6))),
+        slow_scenes(np.linspace(0.05, 1.0, 96)),
+        fast_scenes(vibration.RATIOS, near, sites=3),
+    )
+    fast, slow, arrays = (
+        Sweep.of(scenes, share(progress, done, len(lots))) for done, scenes in enumerate(lots)
+    )
     return {
         "resonance.png": drawn(slow, fast, arrays, near, beats()),
         "resonance.csv": table(

@@ -19,6 +19,7 @@ from cases import vibration
 from cases.charged_closed_forms import resonances, response
 from cases.vibration import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS
 from tisim import Recording, Scene, run
+from tisim.batches import Progress
 from tisim.errors import RunError
 from tisim.frames import Frames, frames
 from tisim.plots import history
@@ -51,9 +52,9 @@ class Sweep:
     exact: np.ndarray
 
     @classmethod
-    def of(cls, scenes: Sequence[Scene]) -> Sweep:
+    def of(cls, scenes: Sequence[Scene], progress: Progress | None = None) -> Sweep:
         """Run scenes of the case with an observer, which differ in their drive frequency only."""
-        results = run(scenes)
+        results = run(scenes, progress)
         for result in results:
             if not result.status.ok:
                 raise RunError(f"{result.scene.name}: {result.status.reason}")

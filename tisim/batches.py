@@ -21,6 +21,11 @@ KEPT = 8
 Progress = Callable[[float], None]
 
 
+def share(progress: Progress, done: int, parts: int) -> Progress:
+    """For one of several parts of equal length, ``done`` of which are over: reports of it as of the whole."""
+    return lambda fraction: progress((done + fraction) / parts)
+
+
 class Batches:
     """Scenes to results. Scenes of one structure (effects, options, domain, stepper) run side by side.
 

@@ -1,4 +1,4 @@
-"""The commands that show what a run has left: ``tisim plot``, ``movie``, ``export``; and ``tisim study``."""
+"""The commands that show what runs have left: ``tisim plot``, ``movie``, ``export``, ``figures``."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def plot(file: File, world: World = 0, folder: Into = None) -> None:
         print(_saved(figure, place / name))
 
 
-def study(
+def figures(
     case: CaseName, size: Size = None, folder: Out = None,
     device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
 ) -> None:  # fmt: skip
@@ -60,13 +60,13 @@ def study(
     found = find(case)
     chosen = size or "default"
     found.size(chosen)
-    if found.study is None:
-        raise InputError(f"case must be one with a study; received {case!r}")
+    if found.figures is None:
+        raise InputError(f"case must be one with figures; received {case!r}")
     runtime.start(device, precision, threads)
-    place = folder or Path("out") / f"{case}-study"
+    place = folder or Path("out") / f"{case}-figures"
     writable(place)
-    with err().status("running"):
-        made = found.study(chosen)
+    with _bar("running") as progress:
+        made = found.figures(chosen, progress)
     for name, what in made.items():
         if isinstance(what, str):
             replace_file(place / name, what.encode())

@@ -66,8 +66,8 @@ def test_a_run_without_frames_leaves_none_of_an_earlier_run(tisim, toml, tmp_pat
     assert not (tmp_path / "out/flow/trajectory.h5").exists()
 
 
-def test_a_case_draws_its_own_pictures_and_studies(tisim, toml, tmp_path, monkeypatch):
-    """plot finds the case by the scene's name; study writes figures and tables."""
+def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkeypatch):
+    """plot finds the case by the scene's name; figures writes figures and tables."""
     seen = []
 
     def figure():
@@ -79,29 +79,30 @@ def test_a_case_draws_its_own_pictures_and_studies(tisim, toml, tmp_path, monkey
         seen.append(len(found))
         return {"own.png": figure()}
 
-    def study(size):
+    def figures(size, progress):
+        progress(1.0)
         return {"many.png": figure(), "many.csv": f"size\n{size}\n"}
 
     text = (tmp_path / toml).read_text()
     (tmp_path / toml).write_text(text.replace('name = "scene"', 'name = "toy"'))
     sizes = {"default": Size("", {}), "small": Size("", {})}
     parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
-    toy = Case(*parts, pictures=pictures, study=study)
+    toy = Case(*parts, pictures=pictures, figures=figures)
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": toy})
     assert tisim("run", toml, "--frames", 3)[0] == 0
     assert tisim("plot", "out/flow", "--out", "p")[0] == 0
     assert {path.name for path in (tmp_path / "p").iterdir()} == {"cloud.png", "courses.png", "own.png"}
     assert seen == [4]
-    code, out, _ = tisim("study", "toy", "--size", "small")
-    assert (code, out.split()) == (0, ["out/toy-study/many.png", "out/toy-study/many.csv"])
-    assert (tmp_path / "out/toy-study/many.csv").read_text() == "size\nsmall\n"
-    code, _, err = tisim("study", "toy", "--size", "huge")
+    code, out, _ = tisim("figures", "toy", "--size", "small")
+    assert (code, out.split()) == (0, ["out/toy-figures/many.png", "out/toy-figures/many.csv"])
+    assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\nsmall\n"
+    code, _, err = tisim("figures", "toy", "--size", "huge")
     assert code == 2
     assert "size must be one of default, small; received 'huge'" in err
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": Case(*parts)})
-    code, _, err = tisim("study", "toy")
+    code, _, err = tisim("figures", "toy")
     assert code == 2
-    assert "case must be one with a study; received 'toy'" in err
+    assert "case must be one with figures; received 'toy'" in err
 
 
 def test_wrong_input(tisim, toml, tmp_path):
