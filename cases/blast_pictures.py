@@ -11,7 +11,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cases import blast
@@ -19,6 +18,7 @@ from cases.blast_shape import contacts, extents
 from tisim import Recording, run
 from tisim.batches import Progress, share
 from tisim.errors import RunError
+from tisim.figure import empty, plain
 from tisim.frames import Frame, Frames, frames
 from tisim.particles import Arrays
 from tisim.picture import corners, panel, view
@@ -80,7 +80,7 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
 
 def sequence(chosen: Sequence[Frame]) -> Figure:
     """The cloud from its start on, all on one scale, as in Z16 figures 5 to 9."""
-    figure = made((10.4, 7.2))
+    figure = empty(10.4, 7.2)
     square = common([frame.arrays for frame in chosen])
     for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
         snapshot(axis, frame.arrays, square)
@@ -100,7 +100,7 @@ def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> N
 
 def envelope(course: Course) -> Figure:
     """Half axes of the cloud in time; velocities across the field (Z16 Fig. 6); paths along and across it."""
-    figure = made((10.4, 7.4))
+    figure = empty(10.4, 7.4)
     (left, right), (along, across) = figure.subplots(2, 2)
     for k, colour in enumerate(COLOURS):
         left.plot(course.time, course.axes[:, k], "--" if k == 2 else "-", color=colour, label="xyz"[k])
@@ -148,7 +148,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 def beside(courses: Mapping[str, Course], ends: Mapping[str, Frame]) -> Figure:
     """The clouds at the end on one scale, and their half axes and contacts in time."""
-    figure = made((10.4, 5.8))
+    figure = empty(10.4, 5.8)
     grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
     square = common([frame.arrays for frame in ends.values()])
     for k, (name, frame) in enumerate(ends.items()):
@@ -190,16 +190,3 @@ def table(courses: Mapping[str, Course]) -> str:
         for time, axes, pairs in zip(course.time, course.axes, course.touching, strict=True):
             writer.writerow([name, float(time), *map(float, axes), int(pairs)])
     return text.getvalue()
-
-
-def made(size: tuple[float, float]) -> Figure:
-    """An empty figure, inches."""
-    figure = Figure(figsize=size, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def plain(axis: Axes) -> None:
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(color="0.92", lw=0.8)
-    axis.set_axisbelow(True)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
@@ -26,6 +25,7 @@ from cases.vibration_response import (
     slow_scenes,
 )
 from tisim.batches import Progress, share
+from tisim.figure import empty, plain
 from tisim.frames import Frames
 from tisim.scene import Scene
 
@@ -60,7 +60,7 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
     if len(found) < LEAST:
         return {}
     course, known = Course.of(found), constants(found.scene)
-    figure = made((7.2, 6.8))
+    figure = empty(7.2, 6.8)
     above, below = figure.subplots(2, 1)
     for part, name, colour in ((np.real, "x", FOUND), (np.imag, "y", MARK)):
         above.plot(course.time, part(course.place), color=colour, lw=1.6, label=f"{name}, as run")
@@ -135,7 +135,7 @@ def table(*sweeps: tuple[str, Sweep]) -> str:
 
 def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, course: Course) -> Figure:
     """Resonance curves over both resonances, beats beside their closed form, and their spectrum."""
-    figure = made((10.4, 7.4))
+    figure = empty(10.4, 7.4)
     (left, right), (below, lines) = figure.subplots(2, 2)
     known = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
              "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
@@ -165,19 +165,6 @@ def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, course: Course) ->
     spectrum(lines, course, {**known, "omega": DRIVE * FAST})
     lines.set_title("its spectrum", fontsize=10)
     return figure
-
-
-def made(size: tuple[float, float]) -> Figure:
-    """An empty figure, inches."""
-    figure = Figure(figsize=size, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def plain(axis: Axes) -> None:
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(color="0.92", lw=0.8)
-    axis.set_axisbelow(True)
 
 
 def engineering(axis: Axes, x: str, y: str) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group, RenderableType
@@ -19,6 +18,7 @@ from rich.text import Text
 from optimize.outcome import Outcome
 from optimize.tables import best_columns, logbook_columns
 from tisim.durable import replace_file
+from tisim.figure import empty
 
 WIDTH = 80
 """Of the table of the best designs; every terminal has as many columns."""
@@ -87,8 +87,7 @@ def convergence_figure(outcome: Outcome) -> Figure:
     log = logbook_columns(problem, outcome.logbook)
     derived = next(iter(problem.derived), None)
     panels = 2 if derived else 1
-    figure = Figure(figsize=(5.6, 2.7 * panels), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty(5.6, 2.7 * panels)
     axes = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
     if log:
         generation = np.array(log["gen"])

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from tisim.domain import Domain
+from tisim.figure import empty
 from tisim.particles import Arrays
 from tisim.result import Result
 
@@ -49,8 +48,7 @@ def start_and_end(states: tuple[Arrays, Arrays], times: tuple[float, float], dom
     Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
     In open space each panel has its own scale, which its bar gives.
     """
-    figure = Figure(figsize=(10.4, 5.0), layout=ConstrainedLayoutEngine(h_pad=0.1), facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
     norm = temperatures(states)
     seen = corners(*domain.bounds())

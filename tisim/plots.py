@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from tisim.errors import must
+from tisim.figure import empty, plain
 from tisim.frames import Frames
 from tisim.picture import start_and_end
 
@@ -61,8 +60,7 @@ def courses(found: Frames) -> Figure:
     """
     must(len(found) > 1, "file", "one with 2 frames or more to draw against time", f"{len(found)} frames")
     seen = history(found)
-    figure = Figure(figsize=(7.2, 7.6), layout=ConstrainedLayoutEngine(h_pad=0.08), facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = empty(7.2, 7.6, pad=0.08)
     energy, centre, number = figure.subplots(3, 1, sharex=True)
     # A dot for each frame where the eye can tell them apart.
     dots = {"marker": "o", "markersize": 3} if len(seen.time) <= 60 else {}
@@ -89,8 +87,6 @@ def courses(found: Frames) -> Figure:
     number.xaxis.set_major_formatter(EngFormatter("s"))
     number.set_xlim(seen.time[0], seen.time[-1])
     for axis in (energy, centre, number):
-        axis.spines[["top", "right"]].set_visible(False)
-        axis.grid(color="0.92", lw=0.8)
-        axis.set_axisbelow(True)
+        plain(axis)
     figure.align_ylabels()
     return figure

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from tisim.accuracy.row import Row, decades
 from tisim.accuracy.study import Study
 from tisim.durable import replace_file
+from tisim.figure import empty, plain
 
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
 """P. Tol's bright set, and one of his light one."""
@@ -37,8 +37,7 @@ def picture(study: Study) -> Figure:
     """
     wide = len(study.quantities)
     lines = list(dict.fromkeys(row.method for row in study.rows))
-    figure = Figure(figsize=(5.6 * wide + 0.4, 4.6 + 0.24 * (len(lines) + 1)), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty(5.6 * wide + 0.4, 4.6 + 0.24 * (len(lines) + 1))
     axes = figure.subplots(1, wide, squeeze=False)[0]
     for k, axis in enumerate(axes):
         _panel(axis, study, lines, k)
@@ -87,9 +86,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     axis.xaxis.set_major_formatter(EngFormatter("s"))
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel(f"wall time{' of all starts' if study.random else ''}")
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(color="0.93", lw=0.8)
-    axis.set_axisbelow(True)
+    plain(axis)
 
 
 def _mark(axis: Axes, row: Row, k: int, colour: str, marker: str) -> None:
