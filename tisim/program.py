@@ -110,6 +110,7 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(steps)
             return
+        self._allow(steps)
         for _ in range(steps):
             if not self._count_going_on():
                 return
@@ -144,8 +145,9 @@ class Program:
         for k in range(self.s.worlds * TASK):
             if k % TASK == 0:
                 w = k // TASK
+                self.s.until[w] = self.s.steps[w] + steps
                 step = 0
-                while self.s.status[w] == RUNNING and step < steps and self.s.time[w] < self.s.hold[w]:
+                while self.s.status[w] == RUNNING and step < steps and not self._waits(w):
                     self._run(self.items, w)
                     step += 1
 
@@ -177,6 +179,15 @@ class Program:
             self.s.status[w] = self.s.failed[w]
 
     @ti.func
+    def _waits(self, w):
+        return self.s.time[w] >= self.s.hold[w] or self.s.steps[w] >= self.s.until[w]
+
+    @ti.kernel
+    def _allow(self, steps: ti.i32):
+        for w in range(self.s.worlds):
+            self.s.until[w] = self.s.steps[w] + steps
+
+    @ti.func
     def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]
         active = self.s.status[w] == RUNNING and self.s.held[w] == 0
         for repeat in ti.static(nest.repeats):
@@ -196,7 +207,7 @@ class Program:
         """Between two steps: which worlds wait, and how many do not."""
         n = 0
         for w in range(self.s.worlds):
-            self.s.held[w] = ti.cast(self.s.time[w] >= self.s.hold[w], ti.i32)
+            self.s.held[w] = ti.cast(self._waits(w), ti.i32)
             if self._active(self.outside, w):
                 n += 1
         return n

@@ -117,9 +117,10 @@ class State:
                 setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
-        # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s).
-        self.hold, self.held = ti.field(ti.f64), ti.field(ti.i32)
-        builder.dense(ti.i, worlds).place(self.hold, self.held)
+        # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s), and at
+        # ``until`` steps.
+        self.hold, self.held, self.until = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.i64)
+        builder.dense(ti.i, worlds).place(self.hold, self.held, self.until)
         for name in MOTION:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
             column = ti.field(ti.f64)

@@ -1,7 +1,8 @@
 """Particles that do not feel each other: each takes its own implicit steps, many of them in one go.
 
 There is no norm over all of them and nothing to wait for. They meet at every multiple of the longest step, a
-window; how many windows a launch takes them through makes no difference to what they do.
+window, which is what counts as a step of the world; how many windows a launch takes them through makes no
+difference to what they do.
 """
 
 from tisim._taichi import ti
@@ -9,21 +10,23 @@ from tisim.program import PerParticle, Phase
 from tisim.state import STUCK
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 
-WINDOWS, STEPS = 64, 2**16
-"""Windows of a launch at least, and steps of all particles together in it."""
+LAUNCH = 2**16
+"""Windows of a launch at most, of all particles together, where more than WINDOWS of them."""
+WINDOWS = 64
 NEARLY = 1.0 + 1e-6
 """A remainder as small as rounding leaves is not worth a step of its own."""
 
 
 class Stretch(Phase):
-    """The windows of a launch: up to the end, or to the next time at which somebody looks.
+    """The windows of a launch: up to the end, to the next time at which somebody looks, or to as many as are
+    asked for.
 
     The world's time is counted in windows, so that it does not drift.
     """
 
     def __init__(self, s, control) -> None:
         self.s, self.control = s, control
-        self.most = max(WINDOWS, STEPS // (s.worlds * s.capacity))
+        self.most = max(WINDOWS, LAUNCH // (s.worlds * s.capacity))
 
     @ti.func
     def run(self, w, _k):
@@ -31,8 +34,9 @@ class Stretch(Phase):
         window = ti.cast(self.control.longest(w), ti.f64)
         until = ti.min(s.hold[w], s.end[w])
         wanted = ti.ceil(until / window / NEARLY) - s.windows[w]
-        s.stretch_windows[w] = ti.max(1.0, ti.min(wanted, ti.cast(self.most, ti.f64)))
-        s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
+        allowed = ti.cast(ti.min(s.until[w] - s.steps[w], self.most), ti.f64)
+        s.stretch_windows[w] = ti.max(1.0, ti.min(wanted, allowed))
+        s.stuck[w] = 0.0
 
 
 @ti.func
@@ -60,14 +64,14 @@ class Alone(PerParticle):
             if going > 0:
                 begin = beginning(s, self.control, w, s.windows[w] + k)
                 length = beginning(s, self.control, w, s.windows[w] + k + 1) - begin
-                more_steps, more_tries, more_iterations, verdict = self.window(w, i, begin, length, aim)
+                passed, more_steps, more_tries, more_iterations = self.window(w, i, begin, length, aim)
                 steps += more_steps
                 tries += more_tries
                 iterations += more_iterations
-                if verdict == HOPELESS:
+                s.own_time[w, i] = ti.cast(begin + passed, s.real)
+                if passed < length:
                     going = 0
-                    s.fail(w, STUCK, i)
-                    ti.atomic_min(s.blame[w], self.summed.largest(w, i))
+                    ti.atomic_max(s.stuck[w], 1.0)
         ti.atomic_add(s.particle_steps[w], steps)
         ti.atomic_add(s.rejections[w], tries - steps)
         ti.atomic_add(s.solver_iterations[w], iterations)
@@ -75,7 +79,8 @@ class Alone(PerParticle):
 
     @ti.func
     def window(self, w, i, begin, length, aim):
-        """A particle from the beginning of a window to its end: steps, attempts, iterations, last verdict."""
+        """A particle through a window: how far it gets (s), to the end unless stuck; its steps, attempts and
+        iterations."""
         s = self.s
         elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
         steps, tries, iterations, verdict = 0, 0, 0, ACCEPTED
@@ -98,7 +103,7 @@ class Alone(PerParticle):
                     steps += 1
                     # That a step has been cut short says nothing about the next one.
                     s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, wanted, 0.0), s.real))
-        return steps, tries, iterations, verdict
+        return elapsed, steps, tries, iterations
 
     @ti.func
     def attempt(self, w, i, t, dt, aim):
@@ -143,10 +148,10 @@ class Alone(PerParticle):
 
 
 class EndStretch(Phase):
-    """The windows are done."""
+    """The windows are done; or the first particle to be stuck is found."""
 
-    def __init__(self, s, control) -> None:
-        self.s, self.control = s, control
+    def __init__(self, parts) -> None:
+        self.s, self.control, self.summed = parts.s, parts.control, parts.summed
 
     @ti.func
     def run(self, w, _k):
@@ -154,3 +159,19 @@ class EndStretch(Phase):
         s.windows[w] += s.stretch_windows[w]
         before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
         s.dt[w] = s.time[w] - before
+        s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
+        if s.stuck[w] > 0.0:
+            self.accuse(w)
+
+    @ti.func
+    def accuse(self, w):
+        """The particle that got stuck first, when, and the largest force on it then."""
+        s = self.s
+        first = 0
+        for i in range(s.count[w]):
+            if s.own_time[w, i] < s.own_time[w, first]:
+                first = i
+        s.time[w] = ti.cast(s.own_time[w, first], ti.f64)
+        s.failed[w] = STUCK
+        s.culprit[w] = s.id[w, first]
+        s.blame[w] = self.summed.largest(w, first)

@@ -152,7 +152,8 @@ class Judge(Phase):
 
     def __init__(self, parts, sums, stages) -> None:
         self.s, self.control, self.sums, self.stages = parts.s, parts.control, sums, stages
-        self.summed, self.order = parts.summed, stages.number + 1
+        # Of the error, which falls as dt^(s + 1), over the displacement, which falls as dt.
+        self.summed, self.order = parts.summed, stages.number
 
     @ti.func
     def run(self, w, _k):

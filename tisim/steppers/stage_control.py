@@ -30,7 +30,7 @@ class StageControl(ImplicitControl):
     error: float = parameter("", 1e-6, gt=0)
     part: float = parameter("", 0.3, gt=0)
     sweeps: int = Field(10, ge=2)
-    safety: float = parameter("", 0.9, gt=0, lt=1)
+    safety: float = parameter("", 0.85, gt=0, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
     first: float = parameter("s", 1e-6, gt=0)
     longest: float = parameter("s", 1.0, gt=0)

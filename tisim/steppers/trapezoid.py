@@ -19,7 +19,8 @@ from tisim.steppers.phases import Arrive, Listen, Operate
 from tisim.steppers.solve import Solve
 from tisim.steppers.stepper import Parts, Stepper
 
-OWN_STEP = Field("own_dt", "s", 1, "keep")
+OWN = (Field("own_dt", "s", 1, "keep"), Field("own_time", "s", 1, "keep"))
+"""Of a particle alone: its next step, and how far it has come."""
 
 
 class Trapezoid(Stepper):
@@ -46,7 +47,7 @@ class Trapezoid(Stepper):
     counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     keeps: ClassVar = (
         *("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt"),
-        *("windows", "stretch_windows"),
+        *("windows", "stretch_windows", "stuck"),
     )
 
     @property
@@ -73,13 +74,13 @@ class Trapezoid(Stepper):
             FORCE,
             *kept(turning),
             *(memory_of_iterates(turning) if accelerated else ()),
-            OWN_STEP if independent else CHANGE,
+            *(OWN if independent else (CHANGE,)),
         )
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, solve = parts.s, Solve(parts, self.phi)
         if parts.independent:
-            return (Stretch(s, parts.control), Alone(parts, solve), EndStretch(s, parts.control))
+            return (Stretch(s, parts.control), Alone(parts, solve), EndStretch(parts))
         listen = (Listen(parts),) if parts.near else ()
         sums = BlockSums(s, 4)
         parts.owned.append((sums, "sums of the iteration", self.kind()))
