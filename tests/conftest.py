@@ -1,8 +1,10 @@
 """One runtime for the whole suite: cpu, f64 unless TISIM_TEST_PRECISION says otherwise."""
 
+import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -62,3 +64,20 @@ def elsewhere(tmp_path_factory):
     assert done.returncode == 0, done.stderr
     with np.load(file) as stored:
         return dict(stored)
+
+
+@pytest.fixture(scope="module")
+def single():
+    """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
+
+    def call(module, name):
+        code = (
+            "import json; from tisim import runtime; runtime.start(precision='f32'); "
+            f"from tests.{module} import {name}; print(json.dumps({name}()))"
+        )
+        command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]
+        root = Path(__file__).parents[1]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
+        return json.loads(done.stdout.splitlines()[-1])
+
+    return call

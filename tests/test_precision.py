@@ -1,10 +1,5 @@
 """Single precision: the same scenes as in test_schedules, in a process of their own."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -50,23 +45,6 @@ def test_single_and_double_precision_agree_on_how_much_merges(elsewhere):
     single, double = (elsewhere[f"{name}/left"] for name in ("single precision", "one thread"))
     assert (single != double).sum() <= 12
     assert single.sum() == pytest.approx(double.sum(), rel=0.01)
-
-
-@pytest.fixture(scope="module")
-def single():
-    """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
-
-    def call(module, name):
-        code = (
-            "import json; from tisim import runtime; runtime.start(precision='f32'); "
-            f"from tests.{module} import {name}; print(json.dumps({name}()))"
-        )
-        command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]
-        root = Path(__file__).parents[1]
-        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
-        return json.loads(done.stdout.splitlines()[-1])
-
-    return call
 
 
 def rebounds_of_cold_grains():

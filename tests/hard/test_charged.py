@@ -1,8 +1,8 @@
-"""Charged particles where it is hardest: rotation for long and in long steps, drift, release, and time reversed.
+"""Charged particles where it is hardest: rotation for long and in long steps, drift, release, reversed time.
 
 In uniform fields the steppers have closed forms of their own. Boris' and the trapezoidal rule are Lobatto's
 collocation of two stages, and a rotation by w dt = z is turned by the diagonal Pade approximant of exp(iz) of
-degree s - 1: by its phase, with the speed kept. All of them keep v + w b x r, so the radius is that of Larmor.
+degree s - 1: by its phase, with the speed kept. All of them keep v + w b x r, and so the radius.
 """
 
 from math import factorial
@@ -80,7 +80,10 @@ def angle(z, degree):
     """By which a step of w dt = z turns, rad: twice the phase of the numerator of the Pade approximant."""
     k = degree
     terms = [
-        factorial(2 * k - j) * factorial(k) / (factorial(2 * k) * factorial(j) * factorial(k - j)) * (1j * z) ** j
+        factorial(2 * k - j)
+        * factorial(k)
+        / (factorial(2 * k) * factorial(j) * factorial(k - j))
+        * (1j * z) ** j
         for j in range(k + 1)
     ]
     return 2 * np.angle(sum(terms))
@@ -151,7 +154,7 @@ def test_sweeps_that_cannot_follow_the_rotation_say_so():
 
 @pytest.mark.parametrize("name", DEGREES)
 def test_reversed_time_returns_to_the_start(name):
-    """Two like charges that B holds together: a thousand steps there, and back with velocities and B reversed."""
+    """Two like charges that B holds together: a thousand steps there; back with velocities and B reversed."""
     charge = np.sqrt(4.0 / K_E)
     place, speed = np.array([[1.0, 0, 0], [-1, 0, 0]]), np.array([[0, 0.7, 0.1], [0, -0.7, 0.2]])
     flux, more = 3.0 / charge, {"charge": charge, "mass": 1.0}
@@ -168,7 +171,9 @@ def test_reversed_time_returns_to_the_start(name):
 
 ADAPTIVE = {
     "trapezoid": lambda first: Trapezoid(
-        control=ErrorControl(error=1e-5, tolerance=1e-7, iterations=20, first=first, longest=1e-3, shortest=1e-22)
+        control=ErrorControl(
+            error=1e-5, tolerance=1e-7, iterations=20, first=first, longest=1e-3, shortest=1e-22
+        )
     ),
     "collocation": lambda first: Collocation(
         control=StageControl(error=1e-9, sweeps=40, first=first, longest=1e-3, shortest=1e-22)

@@ -1,0 +1,245 @@
+"""Laws of pairs where it is hardest: in one place, just touching, pressed, crowded, unlike, far out."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from tests.effects.loads import WORLDS, loads
+from tests.scenes import by_id, fixed, scene, simulate
+from tisim import Box
+from tisim._taichi import ti
+from tisim.effect import Operator, parameter
+from tisim.effects.contact import Contact
+from tisim.effects.hertz import Hertz
+from tisim.effects.near_field import NearField
+
+CROWD = 1000
+BOX = Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0))
+N = np.array([2.0, -3.0, 6.0]) / 7
+
+
+def grains(position, radius, young=1e3, stiffness=1e3, **more):
+    """At rest in a box with images, pressed by both laws of contact."""
+    effects = (Contact(stiffness=stiffness), Hertz(young=young, poisson=0.25))
+    n = len(position)
+    more = {"velocity": np.zeros((n, 3)), "mass": np.ones(n), "dt": 1e-4, **more}
+    return scene(position, effects=effects, radius=radius, domain=BOX, **more)
+
+
+def run_grains(scenes):
+    return simulate(scenes, worlds=WORLDS, capacity=CROWD)
+
+
+def stored(d, a, b, young=1e3, stiffness=1e3):
+    """Energy of a pair at a distance d under both laws of contact (Z16 7.3, B.5, B.7), by quadrature. J."""
+
+    def push(x):
+        overlap = a + b - x
+        area = np.pi * max(a**2 - (0.5 * (x - (b**2 - a**2) / x)) ** 2, 0.0)
+        modulus = young / (2 * (1 - 0.25**2))
+        return (
+            stiffness * (overlap / (a + b)) ** 2 * area
+            + 4 / 3 * modulus * np.sqrt(a * b / (a + b)) * overlap**1.5
+        )
+
+    return quad(push, d, a + b)[0] if d < a + b else 0.0
+
+
+def kinetic(state):
+    return 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
+
+
+def test_near_field_in_one_place_and_hardly_apart():
+    """In one point the force has neither direction nor size: a failure that names law and particle and keeps
+    the start, even if the law is of no strength. At 1e-12 of a radius it is as anywhere."""
+    law, place = NearField(alpha1=2.0, alpha2=1e-13), [[0, 0, 0], [1, 1, 1], [1, 1, 1]]
+    made = [scene(place, np.zeros((3, 3)), (effect,), mass=1.0) for effect in (law, NearField())]
+    close = scene([[0, 0, 0], 1e-13 * N], np.zeros((2, 3)), (law,), radius=0.1, mass=1.0, dt=1e-30)
+    # With room for so many, sums are made for a tile of particles at once.
+    *bad, good = simulate([*made, close], worlds=3, capacity=40)
+    for result in bad:
+        for word in ("at t = 0 s", "effects.near_field", "particle 1", "not finite"):
+            assert word in result.status.reason
+        np.testing.assert_array_equal(result.state["position"], result.start["position"])
+        np.testing.assert_array_equal(result.state["velocity"], 0.0)
+    assert good.status.ok
+    expected = (2.0 / 1e-13 - 1e-13 / 1e-26) * N
+    np.testing.assert_allclose(good.state["force"], [expected, -expected], rtol=1e-12)
+
+
+R = 0.125
+PLACES = {
+    "one place": 0.0,
+    "hardly apart": 1e-12 * R,
+    "touching": 2 * R,
+    "beyond": np.nextafter(2 * R, 1),
+    "pressed": 1.8 * R,
+}
+
+
+def couple(d, **more):
+    """Two of radius R at a distance, one of them on a face of the box."""
+    return grains(np.array([[0, 0.5, 0.5], [d, 0.5, 0.5]]), R, **more)
+
+
+@pytest.fixture(scope="module")
+def couples():
+    """All these distances, run until those that are pressed have parted."""
+    results = run_grains([couple(d, dt=2e-5, steps=10_000) for d in PLACES.values()])
+    return dict(zip(PLACES, results, strict=True))
+
+
+@pytest.mark.long
+def test_contact_in_one_place_says_so(couples):
+    """There is no line of centres: a failure that names the law and keeps the start."""
+    bad = couples["one place"]
+    for word in ("at t = 0 s", "effects.contact", "particle 0", "not finite"):
+        assert word in bad.status.reason
+    np.testing.assert_array_equal(bad.state["position"], bad.start["position"])
+
+
+@pytest.mark.long
+def test_energy_released_is_energy_stored(couples):
+    """From 10 % of overlap, and from 1e-12 radii between the centres: neither explosion nor loss."""
+    for name in ("pressed", "hardly apart"):
+        result = couples[name]
+        assert result.status.ok
+        state = by_id(result)
+        gap = state["position"][1] - state["position"][0]
+        left = stored(np.linalg.norm(gap - np.round(gap)), R, R)
+        before = stored(PLACES[name], R, R)
+        assert left < 0.5 * before
+        assert kinetic(state) + left == pytest.approx(before, rel=1e-6)
+        np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12)
+
+
+@pytest.mark.long
+def test_surfaces_that_just_touch_do_not_push(couples):
+    """At the sum of the radii, a number of binary digits, the force is zero; so it is beyond."""
+    for name in ("touching", "beyond"):
+        np.testing.assert_array_equal(couples[name].state["velocity"], 0.0)
+        assert couples[name].status.ok
+    inside, outside = loads([couple(np.nextafter(2 * R, side)) for side in (0, 1)], capacity=CROWD)
+    assert 0 < inside["force"][1, 0] < 1e-15
+    np.testing.assert_array_equal(outside["force"], 0.0)
+
+
+@pytest.mark.long
+def test_a_thousand_pressed_into_each_other(rng):
+    """Random places, a dozen overlaps each: the energy released is what was stored, momentum stays."""
+    place = rng.uniform(0, 1, (CROWD, 3))
+    radius = rng.uniform(0.05, 0.09, CROWD)
+    (result,) = run_grains([grains(place, radius, mass=np.full(CROWD, 1e-2), dt=2e-5, steps=400)])
+    assert result.status.ok
+
+    def potential(state):
+        gap = state["position"][None] - state["position"][:, None]
+        d = np.linalg.norm(gap - np.round(gap), axis=2)
+        reach = radius[:, None] + radius
+        near = np.argwhere(np.triu(d < reach, 1))
+        return sum(stored(d[i, j], radius[i], radius[j]) for i, j in near), len(near)
+
+    state = by_id(result)
+    (before, contacts), (after, _) = potential(by_id(result) | {"position": place}), potential(state)
+    assert contacts > 5 * CROWD
+    assert after < 0.9 * before
+    assert kinetic(state) + after == pytest.approx(before, rel=1e-4)
+    speeds = np.linalg.norm(state["velocity"], axis=1)
+    np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12 * speeds.sum())
+
+
+def worlds_of_lists(rng):
+    """What a cell list finds hard: name, places, radii."""
+    unlike = 2e-4 * 1e3 ** rng.uniform(0, 1, 300)
+    unlike[7], unlike[8] = 0.2, 2e-4
+    faces = rng.integers(0, 12, (300, 3)) / 12
+    yield "radii a thousandfold apart", rng.uniform(0, 1, (300, 3)), unlike
+    yield "on faces of cells and box", np.unique(faces, axis=0), 0.06
+    yield "in one cell", 0.3 + 1e-3 * rng.normal(size=(60, 3)), 1e-3
+    yield "in one corner", np.mod(1e-3 * rng.normal(size=(60, 3)), 1.0), 1e-3
+    yield "one", np.array([[0.0, 0.5, 0.5]]), 0.1
+    yield "two, across a face", np.array([[0.0, 0.5, 0.5], [0.95, 0.5, 0.5]]), 0.1
+
+
+@pytest.mark.long
+def test_forces_over_lists_are_those_over_all_pairs(rng):
+    """As by NumPy over all pairs, none twice and none left out; and they add up to nothing."""
+    made = [grains(place, np.broadcast_to(radius, len(place))) for _, place, radius in worlds_of_lists(rng)]
+    contacts = []
+    for state in loads(made, capacity=CROWD):
+        place, a = state["position"], state["radius"]
+        gap = place[None] - place[:, None]
+        gap -= np.round(gap)
+        d = np.linalg.norm(gap, axis=2) + np.eye(len(a))
+        b = a[:, None]
+        overlap = np.where(np.eye(len(a), dtype=bool), 0, np.maximum(a + b - d, 0))
+        area = np.pi * np.maximum(a**2 - (0.5 * (d - (b**2 - a**2) / d)) ** 2, 0)
+        size = 1e3 * (overlap / (a + b)) ** 2 * area
+        size += 4 / 3 * 1e3 / (2 * (1 - 0.25**2)) * np.sqrt(a * b / (a + b)) * overlap**1.5
+        expected = -(size[..., None] * gap / d[..., None]).sum(axis=1)
+        scale = max(np.abs(size).max(), 1e-300)
+        np.testing.assert_allclose(state["force"], expected, rtol=0, atol=1e-11 * scale)
+        np.testing.assert_allclose(state["force"].sum(axis=0), 0, atol=1e-12 * np.abs(size).sum())
+        contacts.append((overlap > 0).sum() // 2)
+    assert contacts[0] > 100
+    assert min(contacts[1:4]) > 60
+    assert contacts[4:] == [0, 1]
+
+
+class Vanish(Operator):
+    """Removes every particle at a step."""
+
+    at_step: float = parameter("", 3.0)
+
+    @ti.func
+    def particle(self, s, w, i, dt):
+        if s.steps[w] == self.at_step(w):
+            s.remove(w, i)
+
+
+@pytest.mark.long
+def test_a_world_that_loses_all_its_particles_runs_to_its_end():
+    """Nothing is left to sum over, nor to measure distances by: no hang, no NaN, time goes on."""
+    places = np.random.default_rng(2).uniform(0, 1, (60, 3))
+    made = [
+        scene(
+            places, np.zeros((60, 3)), (Hertz(young=1.0, poisson=0.0), Vanish(at_step=step)), radius=0.1, mass=1.0,
+            stepper=fixed(1e-3), duration=1.0, domain=BOX,
+        )
+        for step in (3.0, 1e9)
+    ]  # fmt: skip
+    gone, there = simulate(made, worlds=2, capacity=60)
+    for result, left in ((gone, 0), (there, 60)):
+        assert result.status.ok, result.status.reason
+        assert result.time == 1.0
+        assert len(result.state["mass"]) == left
+
+
+def far_out():
+    """In single precision, 1e3 m out: momentum, what was exchanged, distances and forces at the start."""
+    found = []
+    for gap in (1e-4, 1e-3, 1e-2):
+        place = np.array([1e3, -1e3, 1e3]) + np.array([[0, 0, 0], [gap, 0, 0], [0, gap, 0]])
+        effects = (NearField(alpha1=1e-3, alpha2=1e-3), Contact(stiffness=1e3))
+        made = scene(place, np.zeros((3, 3)), effects, radius=1e-2, mass=1.0, dt=1e-9, steps=50)
+        (result,) = simulate([made], worlds=1, capacity=4)
+        velocity = np.asarray(by_id(result)["velocity"], float)
+        there = np.asarray(place, np.float32).astype(float)
+        found.append([result.status.ok, velocity.tolist(), there.tolist()])
+    return found
+
+
+@pytest.mark.long
+def test_single_precision_far_from_the_origin(single):
+    """At 1e3 m the last digit of a place is 6e-5 m. Momentum is kept to rounding all the same, and forces are
+    those of the places as they are held: near field and contact by NumPy."""
+    for ok, velocity, place in single("hard.test_pair_laws", "far_out"):
+        assert ok
+        velocity, place = np.array(velocity), np.array(place)
+        np.testing.assert_allclose(velocity.sum(axis=0), 0, atol=3e-7 * np.abs(velocity).sum())
+        gap = place[None] - place[:, None]
+        d = np.linalg.norm(gap, axis=2) + np.eye(3)
+        contact = 1e3 * ((2e-2 - d) / 2e-2) ** 2 * np.pi * (1e-4 - d**2 / 4)
+        size = 1e-3 / d - 1e-3 / d**2 - contact
+        expected = (size[..., None] * gap / d[..., None]).sum(axis=1) * 50e-9
+        np.testing.assert_allclose(velocity, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
