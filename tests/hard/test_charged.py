@@ -22,8 +22,6 @@ from tisim.steppers.implicit_control import ErrorControl
 from tisim.steppers.stage_control import StageControl
 from tisim.steppers.trapezoid import Trapezoid
 
-pytestmark = pytest.mark.long
-
 WORLDS = 8
 W, DRIFT = 3.0, 0.75
 """1/s and m/s: of 3 C and 2 kg in 2 T and 1.5 V/m."""
@@ -34,6 +32,7 @@ ROTATIONS = {
     "trapezoid": [(0.3, 209_440), (20.0, 10_000), (2e3, 10_000), (0.3, 10.37), (0.3, 0.37)],
     "collocation": [(2.0, 31_416), (1.0, 10.37), (1.0, 0.37)],
 }
+NAMES = ["boris", "trapezoid", pytest.param("collocation", marks=pytest.mark.long)]
 ELECTRON = {"charge": 1.602e-19, "mass": 9.109e-31}
 
 
@@ -94,7 +93,7 @@ def plane(vector):
     return vector[..., 0] + 1j * vector[..., 1]
 
 
-@pytest.fixture(scope="module", params=DEGREES)
+@pytest.fixture(scope="module", params=NAMES)
 def rotations(request):
     """One charge in B, and one in E and B, from rest, for the same steps; with what they were asked for."""
     name = request.param
@@ -144,6 +143,7 @@ def test_drift_across_both_fields(rotations):
         assert abs(v + 1j * DRIFT) == pytest.approx(DRIFT, rel=1e-9)
 
 
+@pytest.mark.long
 def test_sweeps_that_cannot_follow_the_rotation_say_so():
     """Five stages of w dt = 20: not a wrong number but a failure, which keeps the start."""
     made = charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], equal_steps("collocation", 20.0 / W), 100.0)
@@ -152,7 +152,7 @@ def test_sweeps_that_cannot_follow_the_rotation_say_so():
     np.testing.assert_array_equal(result.state["velocity"], result.start["velocity"])
 
 
-@pytest.mark.parametrize("name", DEGREES)
+@pytest.mark.parametrize("name", NAMES)
 def test_reversed_time_returns_to_the_start(name):
     """Two like charges that B holds together: a thousand steps there; back with velocities and B reversed."""
     charge = np.sqrt(4.0 / K_E)
@@ -181,7 +181,9 @@ ADAPTIVE = {
 }
 
 
-@pytest.mark.parametrize(("name", "bound"), [("trapezoid", 1e-3), ("collocation", 1e-8)])
+@pytest.mark.parametrize(
+    ("name", "bound"), [("trapezoid", 1e-3), pytest.param("collocation", 1e-8, marks=pytest.mark.long)]
+)
 def test_like_charges_from_a_nanometre(name, bound):
     """Two electrons released at rest: k q^2/d comes out as kinetic energy, through six decades of distance,
     also where the first step is a million times too long for the start."""

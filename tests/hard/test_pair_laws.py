@@ -89,7 +89,6 @@ def couples():
     return dict(zip(PLACES, results, strict=True))
 
 
-@pytest.mark.long
 def test_contact_in_one_place_says_so(couples):
     """There is no line of centres: a failure that names the law and keeps the start."""
     bad = couples["one place"]
@@ -98,7 +97,6 @@ def test_contact_in_one_place_says_so(couples):
     np.testing.assert_array_equal(bad.state["position"], bad.start["position"])
 
 
-@pytest.mark.long
 def test_energy_released_is_energy_stored(couples):
     """From 10 % of overlap, and from 1e-12 radii between the centres: neither explosion nor loss."""
     for name in ("pressed", "hardly apart"):
@@ -113,7 +111,6 @@ def test_energy_released_is_energy_stored(couples):
         np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12)
 
 
-@pytest.mark.long
 def test_surfaces_that_just_touch_do_not_push(couples):
     """At the sum of the radii, a number of binary digits, the force is zero; so it is beyond."""
     for name in ("touching", "beyond"):
@@ -124,7 +121,6 @@ def test_surfaces_that_just_touch_do_not_push(couples):
     np.testing.assert_array_equal(outside["force"], 0.0)
 
 
-@pytest.mark.long
 def test_a_thousand_pressed_into_each_other(rng):
     """Random places, a dozen overlaps each: the energy released is what was stored, momentum stays."""
     place = rng.uniform(0, 1, (CROWD, 3))
@@ -161,7 +157,6 @@ def worlds_of_lists(rng):
     yield "two, across a face", np.array([[0.0, 0.5, 0.5], [0.95, 0.5, 0.5]]), 0.1
 
 
-@pytest.mark.long
 def test_forces_over_lists_are_those_over_all_pairs(rng):
     """As by NumPy over all pairs, none twice and none left out; and they add up to nothing."""
     made = [grains(place, np.broadcast_to(radius, len(place))) for _, place, radius in worlds_of_lists(rng)]
@@ -201,13 +196,9 @@ class Vanish(Operator):
 def test_a_world_that_loses_all_its_particles_runs_to_its_end():
     """Nothing is left to sum over, nor to measure distances by: no hang, no NaN, time goes on."""
     places = np.random.default_rng(2).uniform(0, 1, (60, 3))
-    made = [
-        scene(
-            places, np.zeros((60, 3)), (Hertz(young=1.0, poisson=0.0), Vanish(at_step=step)), radius=0.1, mass=1.0,
-            stepper=fixed(1e-3), duration=1.0, domain=BOX,
-        )
-        for step in (3.0, 1e9)
-    ]  # fmt: skip
+    laws = Hertz(young=1.0, poisson=0.0)
+    more = {"radius": 0.1, "mass": 1.0, "stepper": fixed(1e-3), "duration": 1.0, "domain": BOX}
+    made = [scene(places, np.zeros((60, 3)), (laws, Vanish(at_step=step)), **more) for step in (3.0, 1e9)]
     gone, there = simulate(made, worlds=2, capacity=60)
     for result, left in ((gone, 0), (there, 60)):
         assert result.status.ok, result.status.reason

@@ -16,8 +16,6 @@ from tisim.steppers.implicit_control import ErrorControl
 from tisim.steppers.stage_control import StageControl
 from tisim.steppers.trapezoid import Trapezoid
 
-pytestmark = pytest.mark.long
-
 WORLDS = 4
 TRAPEZOID, COLLOCATION = {"error": 1e-6, "tolerance": 1e-8}, {"error": 1e-8}
 STEPPERS = {
@@ -27,6 +25,9 @@ STEPPERS = {
     ),
     "collocation": lambda limits: Collocation(control=StageControl(**COLLOCATION, **limits)),
 }
+
+
+NAMES = ["trapezoid", *(pytest.param(name, marks=pytest.mark.long) for name in ("anderson", "collocation"))]
 
 
 def adaptive(name, first, longest, **more):
@@ -63,7 +64,7 @@ def kinetic(state):
 FACTORS = (1.0, 1e2, 1e6)
 
 
-@pytest.mark.parametrize("name", STEPPERS)
+@pytest.mark.parametrize("name", NAMES)
 def test_stiffness_beyond_what_the_steps_are_meant_for(name):
     """Springs 1, 1e2 and 1e6 times as stiff, with the same control: the first step is up to 20 radians long.
     After 3 1/4 periods each is in the middle, at full speed, in steps that are as many for all."""
@@ -103,7 +104,7 @@ def pull(x):
     return 2.0 / x - 1.0 / x**2
 
 
-@pytest.mark.parametrize("name", [*STEPPERS, "verlet"])
+@pytest.mark.parametrize("name", [*NAMES, "verlet"])
 def test_masses_a_million_apart(name):
     """1e-3 kg and 1e3 kg vibrate about d = 1/2, and the same with places exchanged: as the reduced mass does
     by scipy; momentum to a billionth of what is exchanged."""
@@ -136,7 +137,7 @@ def test_masses_a_million_apart(name):
         assert energy == pytest.approx(2 * np.log(0.6) + 1 / 0.6, rel=1e-7)
 
 
-@pytest.mark.parametrize("name", [*STEPPERS, "verlet"])
+@pytest.mark.parametrize("name", [*NAMES, "verlet"])
 def test_a_force_that_comes_out_of_nothing(name):
     """Two shells meet at 200 m/s after a flight in the longest steps, a tenth of the shell each: they rebound
     as a linear spring has it, v' = -v and half a period late, with no energy gained."""
@@ -162,7 +163,7 @@ def test_a_force_that_comes_out_of_nothing(name):
     np.testing.assert_allclose(state["position"][:, 0], [-place, place], rtol=2e-6)
 
 
-@pytest.mark.parametrize("name", STEPPERS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_fall_into_an_attraction_without_bottom(name):
     """1/d between two that fall head-on from rest, v^2 = 2 alpha ln(d_0/d)/m_reduced: while that goes, it is
     right; where it goes no more the run stops before numbers are wrong, names the force and keeps them."""

@@ -1,0 +1,104 @@
+"""Grains under all laws of contact of Z16 in one structure, and what these say of a pair, by quadrature."""
+
+import numpy as np
+from scipy.integrate import quad
+
+from tests.scenes import by_id, compiled, fixed, scene
+from tisim._taichi import ti
+from tisim.effect import Force, parameter
+from tisim.effects.contact import Contact
+from tisim.effects.contact_bond import ContactBond
+from tisim.effects.contact_dissipation import ContactDissipation
+from tisim.effects.contact_friction import ContactFriction
+from tisim.effects.contact_softening import ContactSoftening
+from tisim.effects.gravity import Gravity
+from tisim.effects.tether import Tether
+from tisim.spec import Vector
+
+WORLDS, CAPACITY = 6, 12
+K, R, SPRING = 1e6, 1.0, 1e5
+"""Stiffness (N/m^2) and radius (m) of all grains here, and of what holds them (N/m)."""
+
+
+class Held(Force):
+    """A spring to the place where it is slack, for the first ``number`` particles; a pull for the others."""
+
+    needs = Tether.needs
+    number: float = parameter("", 0.0, ge=0)
+    pull: Vector = parameter("N", (0.0, 0.0, 0.0))
+
+    @ti.func
+    def force(self, s, w, i, t):
+        total = SPRING * (s.anchor[w, i] - s.position[w, i])
+        if s.id[w, i] >= self.number(w):
+            total = self.pull(w)
+        return total
+
+
+def grains(position, velocity, dt, steps, mass=1.0, temperature=300.0, **laws):
+    """Grains of R; without ``laws`` there is nothing but contact. Bonds have an exponent of 1."""
+    friction, bond = laws.get("friction", (0, 0, 0)), laws.get("bond", (0, 0, 0.99))
+    position = np.asarray(position, float)
+    effects = (
+        Contact(stiffness=K),
+        ContactSoftening(sensitivity=laws.get("sensitivity", 0.0), reference_temperature=300.0),
+        ContactDissipation(damping=laws.get("damping", 0.0)),
+        ContactFriction(stiffness=friction[0], static=friction[1], dynamic=friction[2]),
+        ContactBond(stiffness=bond[0], exponent=1, grip_stiffness=bond[1], threshold=bond[2]),
+        Gravity(acceleration=(0, 0, -laws.get("gravity", 0.0))),
+        Held(number=laws.get("held", 0), pull=laws.get("pull", (0, 0, 0))),
+    )
+    quantities = {
+        "spin": np.array(laws.get("spin", np.zeros_like(position)), float),
+        "temperature": temperature,
+        "anchor": np.asarray(laws.get("anchor", position)),
+    }
+    more = {"quantities": quantities, "stepper": fixed(dt), "duration": dt * steps}
+    return scene(position, velocity, effects, R, mass=mass, **more)
+
+
+def watched(made, looks=1):
+    """Results, and the states of each world at the start and after each of so many equal parts of its run."""
+    simulation = compiled(made[0], WORLDS, CAPACITY)
+    simulation.load(made)
+    steps = max(round(m.duration / m.stepper.control.dt) for m in made)
+    seen = [[by_id(result)] for result in simulation.results()]
+    for _ in range(looks):
+        simulation.run(steps=-(-steps // looks))
+        for states, result in zip(seen, simulation.results(), strict=True):
+            states.append(by_id(result))
+    return simulation.results(), seen
+
+
+def run(made):
+    results, _ = watched(made)
+    for result in results:
+        assert result.status.ok, result.status.reason
+    return [by_id(result) for result in results]
+
+
+def area(d):
+    """Of contact, Z16 (B.5). m^2."""
+    return np.pi * max(R**2 - d**2 / 4, 0.0) * (d < 2 * R)
+
+
+def push(d):
+    """Z16 (7.3). N."""
+    return K * (1 - d / (2 * R)) ** 2 * area(d)
+
+
+def stored(d):
+    """Energy of contact, J."""
+    return quad(push, d, 2 * R)[0] if d < 2 * R else 0.0
+
+
+def kinetic(state):
+    """With spin, J."""
+    turning = 0.4 * state["mass"] * state["radius"] ** 2 * (state["spin"] ** 2).sum(axis=1)
+    return 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1) + turning).sum()
+
+
+def angular_momentum(state):
+    """About the origin, kg m^2/s."""
+    orbit = np.cross(state["position"], state["mass"][:, None] * state["velocity"])
+    return (orbit + 0.4 * (state["mass"] * state["radius"] ** 2)[:, None] * state["spin"]).sum(axis=0)
