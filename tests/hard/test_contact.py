@@ -157,8 +157,8 @@ def test_a_spinning_pair_never_gains_energy():
 
 
 def test_a_bonded_pair_under_torsion():
-    """Spins along the line of centres meet no resistance: Z16's grip acts on slip, and twisting is none.
-    Across it, both alike, decay into a rigid rotation of the pair with the angular momentum they had."""
+    """Spins along the line of centres meet no resistance, as twisting is no slip, which Z16's grip acts on.
+    Spins across it, both alike, decay into a rigid rotation of the pair with the same angular momentum."""
     place = [[-DEEP / 2, 0, 0], [DEEP / 2, 0, 0]]
     grip = {"bond": (1e5, 1e6, 0.05)}
     made = [
