@@ -17,7 +17,7 @@ from tisim.state import State
 
 LANES = 32
 """Particles of a tile. Measured best of 8 to 128 with AVX-512: the sums of more do not fit the registers, and
-loops over fewer are unrolled before they are vectorised."""
+loops over fewer are unrolled before they are vectorised. From 96 on some kernels are not vectorised."""
 
 
 MANY = 1000
@@ -76,24 +76,27 @@ class PairSum(PerParticle):
         """The same for particles from ``begin`` on; lanes without a particle compute what nobody reads."""
         n = self.s.count[w]
         first, end = ti.min(begin, self.s.capacity - LANES), ti.min(begin + LANES, n)
-        sums = ti.Matrix([[0.0] * LANES] * self.components, self.s.real)
+        # An array for each component: with one of 96 numbers for all, some kernels read parameters again for
+        # each pair and did not vectorise (presumably it has more uses than LLVM follows to see that nothing
+        # else points to it; each number it starts with is one).
+        sums = [ti.Vector([0.0] * LANES, self.s.real) for _ in ti.static(range(self.components))]
         # Numbers of lanes as wide as the sums: comparing integers of 64 bits would halve the lanes in f32.
         number = ti.Vector([float(lane) for lane in range(LANES)], self.s.real)
         for i in range(begin, end):
             total = self.start(w, i, t)
             for c in ti.static(range(self.components)):
-                sums[c, i - first] = total[c]
+                sums[c][i - first] = total[c]
         for j in range(n):
             itself = ti.cast(j - first, self.s.real)
             for lane in range(LANES):
                 terms = self.terms(self.long_ranged, w, first + lane, j, t)
                 for c in ti.static(range(self.components)):
-                    total = sums[c, lane]
-                    sums[c, lane] = ti.select(number[lane] != itself, total + terms[c], total)
+                    total = sums[c][lane]
+                    sums[c][lane] = ti.select(number[lane] != itself, total + terms[c], total)
         for i in range(begin, end):
             total = ti.Vector.zero(self.s.real, self.components)
             for c in ti.static(range(self.components)):
-                total[c] = sums[c, i - first]
+                total[c] = sums[c][i - first]
             self.finish(w, i, self.with_near(total, w, i, t), t)
 
     @ti.func
