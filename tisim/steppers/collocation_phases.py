@@ -212,8 +212,8 @@ class Judge(Phase):
         """The verdict, and how long the next step is to be."""
         s = self.s
         s.sweeping[w], s.verdict[w] = 0.0, TRIED
-        # A guess at the contraction, where none has been measured, is no reason for a shorter step.
-        known = ti.select(s.measured_dt[w] > 0.0 or not solved, contraction, 0.0)
+        # One that is only foreseen may be of long ago: it is no reason for a shorter step.
+        known = ti.select(s.sweep[w] > 1.0 or not solved, contraction, 0.0)
         factor = self.control.factor(w, known, error, self.order)
         if solved and self.control.accepts(w, error):
             s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
