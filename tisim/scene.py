@@ -63,6 +63,12 @@ class Scene(Spec):
                     f"used together with {' or '.join(_names(needed))}",
                     ", ".join(other.kind() for other in present),
                 )
+            must(
+                not isinstance(self.stepper.control, kind.unfit),
+                "stepper.control",
+                f"one that suits {kind.kind()}, such as fixed_step or that of an implicit stepper",
+                self.stepper.control.kind(),
+            )
             given = {other.quantity for other in present if issubclass(other, Source)}
             must(
                 not kind.feels or not given.isdisjoint(kind.feels),

@@ -11,7 +11,6 @@ from tisim.effects.contact_dissipation import ContactDissipation
 from tisim.effects.contact_friction import ContactFriction
 from tisim.effects.contact_softening import ContactSoftening
 from tisim.effects.hertz import Hertz
-from tisim.errors import InputError
 
 GRAINS, DT = 12, 1e-3
 
@@ -224,31 +223,3 @@ def test_an_absent_law_leaves_no_field():
     }
     for name, more in extra.items():
         assert fields_beside_the_core(heap(draw, COMBINATIONS[name])) == {"force"} | more
-
-
-WRONG = {
-    "contact.stiffness must be greater than 0.0; received 0": lambda: Contact(stiffness=0),
-    "contact.exponent must be greater than 0; received 0": lambda: Contact(stiffness=1, exponent=0),
-    "hertz.poisson must be at most 0.5; received 0.6": lambda: Hertz(young=1, poisson=0.6),
-    "contact_bond.threshold must be less than 1.0; received 1": lambda: ContactBond(stiffness=1, threshold=1),
-    "contact_friction.dynamic must be at most static; received 0.5": lambda: ContactFriction(
-        stiffness=1, static=0.4, dynamic=0.5
-    ),
-    "effects.contact_dissipation must be used together with effects.contact or effects.hertz; "
-    "received 'contact_dissipation'": lambda: scene(
-        [[0, 0, 0]], [[0, 0, 0]], (ContactDissipation(damping=1),)
-    ),
-    "effects.contact_softening must be used together with effects.contact; "
-    "received 'hertz, contact_softening'": lambda: scene(
-        [[0, 0, 0]],
-        [[0, 0, 0]],
-        (Hertz(young=1, poisson=0), ContactSoftening(sensitivity=1, reference_temperature=1)),
-    ),
-}
-
-
-@pytest.mark.parametrize("message", WRONG)
-def test_what_is_wrong_is_named(message):
-    with pytest.raises(InputError) as fault:
-        WRONG[message]()
-    assert str(fault.value) == message

@@ -20,6 +20,7 @@ from typing import ClassVar
 
 from tisim._taichi import ti
 from tisim.effect import PairForce
+from tisim.steppers.controller import ApproachTime
 
 LEAST_SPEED = 1e-30
 """m/s. Stands for a speed of zero where a direction is needed that then has no effect."""
@@ -67,6 +68,8 @@ class NormalContact(PairForce):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
+    # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
+    unfit: ClassVar = (ApproachTime,)
     needs = ("radius",)
 
     @ti.func
