@@ -185,7 +185,7 @@ def cloud_by_scipy(made, size=SIZE):
         d = places[None] - places[:, None]
         d -= size * np.round(d / size)
         distance = np.linalg.norm(d, axis=-1) + np.eye(len(places))
-        # Z16 (5.1): attraction alpha1/d, repulsion alpha2/d^2, along the line of centres.
+        # Z16 (7.23): attraction alpha1/d, repulsion alpha2/d^2, along the line of centres.
         push = (0.3 / distance - 0.2 / distance**2) / distance
         return np.concatenate([speeds.ravel(), (push[..., None] * d).sum(axis=1).ravel()])
 
