@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from cases.charged_closed_forms import response
-from tisim import Result, Scene
+from tisim import Open, Result, Scene
 from tisim.accuracy.quantity import Quantity, displacement
-from tisim.effect import Effect, PairForce
+from tisim.effect import PairForce
 from tisim.effects.lorentz import Lorentz
 from tisim.effects.tether import Tether
+from tisim.operators.peak_displacement import PeakDisplacement
+from tisim.particles import Arrays
 from tisim.sources.uniform import ElectricField, MagneticField
 
 
@@ -26,34 +28,43 @@ def centre(result: Result) -> np.ndarray:
 
 
 def exact(result: Result) -> np.ndarray:
-    """The same in closed form, for what the scene asks for."""
-    field, flux, tether = (_one(result.scene, k) for k in (ElectricField, MagneticField, Tether))
-    per_mass = float(result.start["charge"][0] / result.start["mass"][0])
-    place = response(
-        result.time, per_mass * flux.constant[2], tether.stiffness[0] / float(result.start["mass"][0]),
-        per_mass * field.amplitude[0], field.omega[0],
-    )  # fmt: skip
-    return np.array([complex(place).real, complex(place).imag, 0.0])
+    """The same in closed form, for a scene that has ``constants``."""
+    place = complex(response(result.time, **(constants(result.scene) or {})))
+    return np.array([place.real, place.imag, 0.0])
 
 
-def solvable(scene: Scene) -> bool:
-    """Whether the scene is one that ``exact`` knows: nothing but the array of Z13 in fields along x and z."""
-    single = {type(effect) for effect in scene.effects if not isinstance(effect, PairForce)}
-    if single != {Lorentz, ElectricField, MagneticField, Tether}:
-        return False
-    field, flux, tether = (_one(scene, k) for k in (ElectricField, MagneticField, Tether))
+def constants(scene: Scene) -> dict[str, float] | None:
+    """w, k_m, push and omega of ``response``; None where that does not describe the centre of gravity.
+
+    It does where nothing but pairs and an observer is added to the array of Z13, in a constant field along z
+    and one along x that oscillates, and all particles, alike, begin at rest at their anchors.
+    """
+    alone = (e for e in scene.effects if not isinstance(e, PairForce | PeakDisplacement))
+    have: dict[type, Any] = {type(effect): effect for effect in alone}
+    if have.keys() != {Lorentz, ElectricField, MagneticField, Tether} or not isinstance(scene.domain, Open):
+        return None
+    field, flux, k = have[ElectricField], have[MagneticField], have[Tether].stiffness
     along_x = not any((*field.constant, *field.amplitude[1:], field.phase[0])) and field.amplitude[0] != 0
     along_z = not any((*flux.constant[:2], *flux.amplitude))
-    return along_x and along_z and len(set(tether.stiffness)) == 1
+    start = scene.particles.arrays(scene.domain, scene.seed)
+    if not (along_x and along_z and len(set(k)) == 1 and k[0] > 0 and _alike_at_rest(start)):
+        return None
+    mass, charge = float(start["mass"][0]), float(start["charge"][0])
+    return {
+        "w": charge * flux.constant[2] / mass, "k_m": k[0] / mass,
+        "push": charge * field.amplitude[0] / mass, "omega": field.omega[0],
+    }  # fmt: skip
 
 
-def _one(scene: Scene, kind: type[Effect]) -> Any:
-    return next(effect for effect in scene.effects if isinstance(effect, kind))
+def _alike_at_rest(start: Arrays) -> bool:
+    alike = all(name in start and np.ptp(start[name]) == 0 for name in ("mass", "charge"))
+    anchored = np.array_equal(start.get("anchor", start["position"]), start["position"])
+    return alike and anchored and not start["velocity"].any()
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Where every particle is, and where their centre of gravity."""
-    known = solvable(scene)
+    known = constants(scene) is not None
     alone = known and not any(isinstance(effect, PairForce) for effect in scene.effects)
 
     def alike(result: Result) -> np.ndarray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +13,7 @@ from matplotlib.ticker import EngFormatter
 
 from cases import vibration
 from cases.charged_closed_forms import resonances, response
+from cases.vibration_accuracy import constants
 from cases.vibration_response import (
     DRIVE,
     FAST,
@@ -27,29 +27,10 @@ from cases.vibration_response import (
 from tisim.batches import Progress, share
 from tisim.figure import empty, plain
 from tisim.frames import Frames
-from tisim.scene import Scene
 
 LEAST = 9
 """Frames that make a spectrum."""
 FOUND, EXACT, MARK, OTHER = "#4477aa", "0.25", "#cc6677", "#228833"
-
-
-def constants(scene: Scene) -> dict[str, float] | None:
-    """w, k_m, push and omega of ``charged_closed_forms.response``; None where that does not describe it."""
-    have: dict[str, Any] = {effect.kind(): effect for effect in scene.effects}
-    if not {"lorentz", "electric_field", "magnetic_field", "tether"} <= have.keys():
-        return None
-    start = scene.particles.arrays(scene.domain, scene.seed)
-    ratio = float((start["charge"] / start["mass"]).mean())
-    b, e = have["magnetic_field"].constant, have["electric_field"]
-    k = have["tether"].stiffness
-    along = b[:2] == (0.0, 0.0) and e.amplitude[1:] == (0.0, 0.0) and k[0] == k[1] > 0
-    if not along:
-        return None
-    mass = float(start["mass"].mean())
-    return {
-        "w": ratio * b[2], "k_m": k[0] / mass, "push": ratio * e.amplitude[0], "omega": e.omega[0],
-    }  # fmt: skip
 
 
 def pictures(found: Frames) -> Mapping[str, Figure]:

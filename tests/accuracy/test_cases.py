@@ -6,6 +6,7 @@ import pytest
 from cases import agglomeration, blast, vibration
 from cases.case import every
 from tests.scenes import simulate
+from tisim import Box, Particles
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.reference import closed_form
 from tisim.sources.uniform import ElectricField
@@ -53,7 +54,23 @@ def test_a_closed_form_is_claimed_only_where_it_holds():
         {"effects.electric_field.amplitude": [0.1, 0.1, 0.0]},
         {"effects.magnetic_field.constant": [1.0, 0.0, 1.0]},
         {"effects.tether.stiffness": [0.5, 0.0, 0.5]},
+        {"particles.mean_velocity": [1.0, 0.0, 0.0]},
+        {"particles.deviation": [0.0, 1e-3, 0.0]},
     ):
         assert known(vibration.scene().replace(change)) == [False, False], change
+    rest = vibration.scene(near_field="none", sites=2)
+    arrays = rest.particles.arrays(rest.domain, 0)
+    for change, holds in (
+        ({}, True),
+        ({"charge": np.repeat([1.0, 2.0], 4)}, False),
+        ({"mass": np.repeat([1.0, 2.0], 4)}, False),
+        ({"anchor": arrays["position"] + 1e-3}, False),
+    ):
+        values = {**arrays, **change}
+        given = {name: values.pop(name) for name in ("position", "velocity", "radius", "mass")}
+        start = Particles(**given, quantities=values)
+        assert known(rest.model_copy(update={"particles": start})) == [holds, holds], change
+    around = Box(low=(-1.0,) * 3, high=(1.0,) * 3)
+    assert known(rest.model_copy(update={"domain": around})) == [False, False]
     bare = vibration.scene().model_copy(update={"effects": (ElectricField(),)})
     assert known(bare) == [False, False]

@@ -14,7 +14,7 @@ def test_centre_of_gravity_follows_the_closed_form(near_field):
         [scene(r, near_field, duration=0.004, sites=3, error=1e-5) for r in RATIOS], worlds=8, capacity=27
     )
     assert all(result.status.ok for result in results)
-    assert deviation(results, RATIOS) < 1e-3
+    assert deviation(results) < 1e-3
     spread = np.array([np.ptp(result.state["position"], axis=0).max() for result in results])
     if near_field == "printed":
         assert (spread > 2 * SPACING * 1.5).all()

@@ -5,8 +5,10 @@ import pytest
 
 from cases import vibration
 from cases.charged_closed_forms import response
-from cases.vibration_pictures import constants, drawn, table
+from cases.vibration_accuracy import constants
+from cases.vibration_pictures import drawn, table
 from cases.vibration_response import FAST, SLOW, Course, Sweep, fast_scenes, peak, slow_scenes, vertex
+from tisim.effects.gravity import Gravity
 
 CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
              "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
@@ -50,6 +52,13 @@ def test_constants_are_those_of_the_scene_or_none():
     assert found["omega"] == pytest.approx(0.3 * vibration.CYCLOTRON)
     assert constants(made.replace({"effects.magnetic_field.constant": [0.1, 0.0, 1.0]})) is None
     assert constants(made.without("tether")) is None
+    # Also what a picture could overlook.
+    assert constants(made.replace({"effects.electric_field.phase": [1.0, 0.0, 0.0]})) is None
+    assert constants(made.replace({"effects.electric_field.constant": [0.1, 0.0, 0.0]})) is None
+    assert constants(made.replace({"effects.magnetic_field.amplitude": [0.0, 0.0, 0.1]})) is None
+    falling = made.model_copy(update={"effects": (*made.effects, Gravity())})
+    assert constants(falling) is None
+    assert constants(made.replace({"particles.mean_velocity": [1.0, 0.0, 0.0]})) is None
 
 
 @pytest.mark.long
