@@ -67,6 +67,12 @@ def test_a_random_reference_is_no_better_than_its_starts(drifts):
     made = attempts(methods(drift(), 0.05, 1.0, (0.0,), ("f64",), 1), 0.0)
     truth = compared(unknown, [drifts, drifts], made[:2])
     assert truth.estimate.uncertainty == estimate(unknown, drifts).uncertainty > 0
+    # A stepper that errs, the same in every start, is not hidden by that interval.
+    half = drifts[: len(drifts) // 2]
+    bias = compared(unknown, [drifts, half], made[:2]).estimate.uncertainty - truth.estimate.uncertainty
+    apart = estimate(unknown, half).value - truth.estimate.value
+    assert bias == pytest.approx(np.linalg.norm(apart))
+    assert bias > 0
     error, off = estimate(unknown, drifts[:STARTS]).error(truth.estimate)
     assert error < TRUSTED * off
 

@@ -11,14 +11,17 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+import tisim
 from tests.accuracy.scenes import DURATION, KNOWN, STEP, UNKNOWN, only, oscillator
 from tests.steppers.charged import charged
 from tisim import request, runtime
 from tisim.accuracy import Quantity, Study, files, study
-from tisim.accuracy.bench import Bench
+from tisim.accuracy.bench import Bench, Timed
 from tisim.accuracy.quantity import displacement
 from tisim.errors import InputError, RunError
+from tisim.result import Result, Status
 from tisim.steppers.boris import Boris
+from tisim.steppers.collocation import Collocation
 from tisim.steppers.controller import FixedStep
 from tisim.steppers.implicit_control import ErrorControl, IterationControl
 from tisim.steppers.trapezoid import Trapezoid
@@ -78,6 +81,15 @@ def test_work_is_that_of_the_steppers(measured):
     for row in measured.line("Trapezoid, IterationControl: longest, tolerance"):
         assert row.sums >= row.steps
     assert measured.line("Verlet, FixedStep: dt")[-1].setting == f"dt={STEP}"
+
+
+def test_rejections_are_counted_as_the_sums_of_the_stepper_are():
+    """Steps that independent particles take by themselves are shared out; steps of all are not."""
+    for stepper, expected in ((Trapezoid(), 3.0), (Collocation(), 6.0)):
+        made = oscillator().model_copy(update={"stepper": stepper})
+        work = {"particle_steps": 20, "force_evaluations": 40, "rejections": 6}
+        pair = Result(made, {}, {"mass": np.ones(2)}, DURATION, work, Status(True, ""), 0.0)
+        assert Timed([pair], 1.0).work == (10.0, expected * 40 / 6, expected)
 
 
 def test_the_reference_is_no_worse_than_it_says(measured):
@@ -148,7 +160,7 @@ def test_words_and_python_of_a_row_make_its_scene(measured):
         assert getattr(stepper.control, asked[0]) == pytest.approx(float(asked[1]), rel=5e-3)
 
 
-def test_files_are_read_back(measured, tmp_path):
+def test_files_are_read_back(measured, tmp_path, monkeypatch):
     measured.write(tmp_path)
     measured.picture(tmp_path / "cost.png")
     with (tmp_path / "cost.csv").open(newline="") as file:
@@ -165,6 +177,10 @@ def test_files_are_read_back(measured, tmp_path):
     files.resume(again, tmp_path)
     assert again.rows == measured.rows
     assert again.complete
+    monkeypatch.setattr(tisim, "__version__", "0.0.1")
+    with pytest.raises(InputError, match="of another scene, version"):
+        files.resume(again, tmp_path)
+    monkeypatch.undo()
     again.run(progress=lambda fraction, what: pytest.fail("nothing is left to measure"))
     other = Study(oscillator(dt=0.02), (KNOWN, UNKNOWN))
     with pytest.raises(InputError, match="output folder must be without the study of another scene"):

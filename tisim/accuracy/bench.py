@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tisim.batches import Progress
 from tisim.composition import independent
 from tisim.errors import RunError
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.simulation import Simulation
-
-Watch = Callable[[float], None]
-"""Called about four times a second with the fraction of a run that is done; may raise to stop it."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +28,11 @@ class Timed:
         steps, sums, rejections = 0.0, 0.0, 0.0
         for result in self.results:
             n, alone = len(result.start["mass"]), independent(result.scene.effects)
+            evaluations = result.scene.stepper.evaluations
             steps += result.work["particle_steps"] / n
-            sums += result.scene.stepper.evaluations(result.work, n, alone)
-            rejections += result.work.get("rejections", 0) / (n if alone else 1)
+            sums += evaluations(result.work, n, alone)
+            # A rejection is of those that a sum of forces is of: of one particle, or of all.
+            rejections += evaluations(dict.fromkeys(result.work, result.work.get("rejections", 0)), n, alone)
         starts = len(self.results)
         return steps / starts, sums / starts, rejections / starts
 
@@ -50,11 +50,11 @@ class Bench:
             self.made[key] = Simulation(scene, worlds)
         return self.made[key]
 
-    def run(self, scenes: Sequence[Scene], watch: Watch | None = None) -> Timed:
+    def run(self, scenes: Sequence[Scene], progress: Progress | None = None) -> Timed:
         """RunError, with the reason, when one of them fails."""
         simulation = self.ready(scenes[0], len(scenes))
         simulation.load(scenes)
-        simulation.run(watch)
+        simulation.run(progress)
         results = simulation.results()
         for result in results:
             if not result.status.ok:
@@ -74,9 +74,9 @@ class OutOfTime(Exception):
 
 
 class Limit:
-    """A watch that stops a run after so many seconds with OutOfTime."""
+    """Progress that stops a run after so many seconds with OutOfTime."""
 
-    def __init__(self, seconds: float, then: Watch) -> None:
+    def __init__(self, seconds: float, then: Progress) -> None:
         self.end, self.then = time.monotonic() + seconds, then
 
     def __call__(self, fraction: float) -> None:

@@ -109,7 +109,7 @@ def resume(study: Study, folder: Path) -> None:
         with h5py.File(path) as file:
             must(file.attrs.get("format") == FORMAT, "output folder", "one of 'tisim cost'", str(folder))
             same = json.loads(file.attrs["identity"]) == study.identity()
-            rule = "without the study of another scene, machine or depth (or give --overwrite)"
+            rule = "without the study of another scene, version, machine or depth (or give --overwrite)"
             must(same, "output folder", rule, str(folder))
             study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
             study.complete = file.attrs["complete"] == json.dumps(study.asked())

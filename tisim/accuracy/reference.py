@@ -87,7 +87,8 @@ def compared(quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequenc
         off = off if apart <= off + _distance(*other) else apart
     source = f"{made[0].name} at {made[0].decades:+g} decades of error, checked by itself"
     source += "".join(f" and by {attempt.name}" for attempt in made[2:3])
-    return Truth(Estimate(best.value, max(off, best.uncertainty)), source)
+    # What the stepper does to every start, and what so few starts leave open.
+    return Truth(Estimate(best.value, off + best.uncertainty), source)
 
 
 def _distance(one: Estimate, other: Estimate) -> float:

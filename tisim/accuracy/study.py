@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import tisim
 from tisim import runtime
 from tisim.accuracy.driver import Progress, Run
 from tisim.accuracy.quantity import Quantity, usual
@@ -72,6 +73,7 @@ class Study:
     def identity(self) -> dict[str, Any]:
         """What must agree for rows of an earlier study to be of use."""
         return {
+            "tisim": tisim.__version__,
             "scene": self.scene.digest(),
             "quantities": [quantity.name for quantity in self.quantities],
             "finest": self.levels[-1],
