@@ -15,11 +15,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cases.blast import BALL, SPECIFIC_CHARGE, SPEED
+from cases.blast import SPECIFIC_CHARGE, SPEED
 from tisim.particles import Arrays
-
-START = 0.973 * BALL
-"""Half axis of the ball at the start, m: random addition fills it somewhat more towards its surface."""
 
 
 def moments(state: Arrays) -> np.ndarray:
@@ -29,12 +26,17 @@ def moments(state: Arrays) -> np.ndarray:
     return np.asarray((mass[:, None] * r).T @ r / mass.sum())
 
 
-def half_axes(tensor: np.ndarray) -> np.ndarray:
+def principal_half_axes(tensor: np.ndarray) -> np.ndarray:
     """Of the full ellipsoid with these second moments, longest first: sqrt(5 eigenvalue), m."""
     return np.sqrt(5.0 * np.linalg.eigvalsh(tensor)[::-1])
 
 
-def ellipsoid(flux: np.ndarray, time: float, start: float = START) -> np.ndarray:
+def ball(tensor: np.ndarray) -> float:
+    """Half axis (m) of the full ball with the trace of these second moments."""
+    return float(np.sqrt(5 / 3 * np.trace(tensor)))
+
+
+def ellipsoid(flux: np.ndarray, time: float, start: float) -> np.ndarray:
     """Second moments in closed form, m^2, shape (3, 3): a ball of half axis start, m, in a field, T, (3,)."""
     strength = float(np.linalg.norm(flux))
     along, across = extents(SPECIFIC_CHARGE * strength, time, start)
@@ -42,7 +44,7 @@ def ellipsoid(flux: np.ndarray, time: float, start: float = START) -> np.ndarray
     return across * np.eye(3) + (along - across) * np.outer(n, n)
 
 
-def extents(w: float, time: np.ndarray | float, start: float = START) -> tuple[np.ndarray, np.ndarray]:
+def extents(w: float, time: np.ndarray | float, start: float) -> tuple[np.ndarray, np.ndarray]:
     """Second moments along and across the field, m^2, as if the ball were filled evenly."""
     square, mean = 3 / 5 * start**2, 3 / 4 * start
     straight, half = SPEED * np.asarray(time, float), w * np.asarray(time, float) / 2
