@@ -29,7 +29,7 @@ GENES = (
     Gene("flux", "T", 0.2, 2.0),
     Gene("stiffness", "N/m", 1.0, 1000.0, "log"),
 )
-"""About the paper's 1 T and 0.5 N/m. sqrt(k/m) is 31 to 977 1/s."""
+"""About the paper's 1 T, and from twice its 0.5 N/m on: sqrt(k/m) is 31 to 977 1/s."""
 
 
 def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> Scene:
