@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from tisim._taichi import ti
 from tisim.effect import parameter
-from tisim.effects.normal_contact import LEAST_SPEED, NormalContact, area, slip
+from tisim.effects.normal_contact import NormalContact, area, slip
 from tisim.effects.surface_contact import SurfaceContact
 from tisim.errors import must
 
@@ -48,6 +48,6 @@ class ContactFriction(SurfaceContact):
         u = slip(s, w, i, j, separation, distance)
         speed, dt = u.norm(), ti.cast(s.dt[w], s.real)
         viscosity = self.stiffness(w) * area(s, w, i, j, distance) * dt
-        if viscosity * speed >= self.static(w) * pressed:
-            viscosity = self.dynamic(w) * pressed / ti.max(speed, LEAST_SPEED)
+        if viscosity * speed > self.static(w) * pressed:
+            viscosity = self.dynamic(w) * pressed / speed
         return viscosity * u

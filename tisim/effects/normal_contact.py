@@ -22,9 +22,6 @@ from tisim._taichi import ti
 from tisim.effect import PairForce
 from tisim.steppers.controller import ApproachTime
 
-LEAST_SPEED = 1e-30
-"""m/s. Stands for a speed of zero where a direction is needed that then has no effect."""
-
 
 @ti.func
 def overlap(s, w, i, j, distance):
