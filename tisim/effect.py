@@ -42,16 +42,8 @@ from tisim.spec import Spec, parameter
 from tisim.state import Field
 
 __all__ = [
-    "Effect",
-    "Force",
-    "Mutual",
-    "Operator",
-    "PairEvent",
-    "PairForce",
-    "Source",
-    "parameter",
-    "sources",
-]
+    "Effect", "Force", "Mutual", "Operator", "PairEvent", "PairForce", "Source", "parameter", "sources",
+]  # fmt: skip
 
 
 class Effect(Spec):

@@ -67,12 +67,9 @@ def in_numba(x):
         for j in range(n):
             dx, dy, dz = xi - x[0, j], yi - x[1, j], zi - x[2, j]
             square = dx * dx + dy * dy + dz * dz
-            # The particle itself: its distance components are 0.
-            square += 1.0 if square == 0.0 else 0.0
+            square += 1.0 if square == 0.0 else 0.0  # of the particle to itself
             push = (repulsion / np.sqrt(square) - attraction) / square
-            fx += push * dx
-            fy += push * dy
-            fz += push * dz
+            fx, fy, fz = fx + push * dx, fy + push * dy, fz + push * dz
         out[0, i], out[1, i], out[2, i] = fx, fy, fz
     return out
 
@@ -170,12 +167,10 @@ def points(start: np.ndarray) -> list[Point]:
             for name, near in SIDES.items():
                 found.append(scipy_point(method, near, name, start, 10.0**-exponent))
     for stages in (3, 4, 5, 6):
-        for exponent in np.arange(1.0, 10.0, 0.5):
-            error = float(10.0**-exponent)
+        for error in (10.0 ** -np.arange(1.0, 10.0, 0.5)).tolist():
             stepper = Collocation(stages=stages, control=StageControl(error=error))
             found.append(tisim_point(f"Collocation, {stages} stages", stepper, f"error={error:.1e}"))
-    for exponent in np.arange(1.0, 6.0, 0.5):
-        error = float(10.0**-exponent)
+    for error in (10.0 ** -np.arange(1.0, 6.0, 0.5)).tolist():
         control = ErrorControl(error=error, tolerance=error / 10, first=1e-6, longest=1e-3)
         found.append(tisim_point("Trapezoid", Trapezoid(control=control), f"error={error:.1e}"))
     return found
@@ -215,9 +210,8 @@ def main() -> None:
     arrays = vibration.scene(RATIO).particles.arrays(vibration.scene(RATIO).domain, 0)
     start = np.ascontiguousarray(arrays["position"].T)
     truth, _, _ = scipy_point("DOP853", by_numba, "reference", start, 1e-13).run()
-    second, _, _ = tisim_point(
-        "reference", Collocation(stages=6, control=StageControl(error=1e-12, sweeps=20)), ""
-    ).run()
+    finest = Collocation(stages=6, control=StageControl(error=1e-12, sweeps=20))
+    second, _, _ = tisim_point("reference", finest, "").run()
     print(f"references apart: {distance(truth, second) / distance(truth, start):.1e}")
     for name, near in SIDES.items():
         near(start)
@@ -230,8 +224,7 @@ def main() -> None:
         for point in found:
             point.measure(truth, start)
     for point in found:
-        # The first run of a numba function compiles it.
-        del point.seconds[0]
+        del point.seconds[0]  # The first run of a numba function compiles it.
         spread = max(point.seconds) - min(point.seconds)
         print(
             f"{point.method:24s} {point.setting:14s} error {point.error:.1e}  {point.median() * 1e3:8.2f} ms "
