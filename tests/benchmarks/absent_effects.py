@@ -39,7 +39,10 @@ VIBRATION = """
 from cases.vibration import RATIOS, scene
 scenes = [scene(ratio, duration=1e-4) for ratio in RATIOS]
 """
-CONTACT = ("", "_bond", "_dissipation", "_friction", "_softening")
+CONTACT = (
+    "contact", "contact_bond", "contact_dissipation", "contact_friction", "contact_softening", "hertz",
+    "normal_contact", "surface_contact",
+)  # fmt: skip
 SCENES = {
     "impacts": (
         IMPACTS,
@@ -48,13 +51,14 @@ SCENES = {
     "vibration": (
         VIBRATION,
         (
-            *(f"effects.contact{law}" for law in CONTACT),
+            *(f"effects.{name}" for name in CONTACT),
             *(f"effects.{name}" for name in ("impact", "friction", "heating", "softening", "reaction")),
             *(f"operators.{name}" for name in ("agglomeration", "cooling", "fragmentation")),
         ),
     ),
 }
-"""Scenes, and what is left out of the package: what has to do with contact, spin and temperature."""
+"""Scenes, and what is left out of the package: from vibration, all laws of contact, impact,
+friction, heat and reaction, and what agglomerates, cools and breaks."""
 
 WORKER = """
 import json, sys, time
