@@ -201,6 +201,21 @@ def test_friction_of_grains_that_roll_on_each_other():
     assert worse == pytest.approx(2 * sliding)
 
 
+def test_grains_that_just_touch_at_rest_rub_with_no_force():
+    """Neither pressure nor speed, so neither a direction nor a NaN; none either without friction at all."""
+    smooth = ContactFriction(stiffness=10.0, static=0.0, dynamic=0.0)
+    rough = ContactFriction(stiffness=10.0, static=1e3, dynamic=1.0)
+    law = Contact(stiffness=1e3)
+    made = [
+        pair((law, rough), 2.0, 1.0),
+        pair((law, smooth), 1.8, 1.0),
+        pair((law, rough), 2.0, 1.0, (1, -1)),
+    ]
+    for state in loads(made, dt=DT):
+        np.testing.assert_array_equal(state["force"][:, 1:], 0)
+        np.testing.assert_array_equal(state["torque"], 0)
+
+
 def test_stick_vanishes_with_the_time_step():
     """What the docstring says of the paper's regularisation."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))
