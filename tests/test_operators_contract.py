@@ -125,7 +125,10 @@ def test_lists_follow_particles_that_grow(rng):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("schedule", "axis", "images"), [("world", 0, True), ("particle", 2, False)])
+@pytest.mark.parametrize(
+    ("schedule", "axis", "images"),
+    [("world", 0, True), pytest.param("particle", 2, False, marks=pytest.mark.slow)],
+)
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
     """More particles than look at all pairs; the bad one belongs to no cell."""
     wanted = scene(

@@ -39,7 +39,7 @@ class Sharp(Stepper):
 
     @property
     def order(self):
-        return 8
+        return 20
 
     @classmethod
     def alternatives(cls, effects, dt):

@@ -107,6 +107,7 @@ def test_the_reference_is_no_worse_than_it_says(measured):
     assert measured.truths[1].error < 20 * off
 
 
+@pytest.mark.slow
 def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypatch):
     """On a rotation the trapezoidal rule with equal steps and Boris' stepper agree, at any step."""
     limits = {"first": 0.02, "longest": 0.02, "shortest": 1e-9, "tolerance": 1e-4}

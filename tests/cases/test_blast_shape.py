@@ -129,7 +129,7 @@ def test_pictures_of_a_run(tmp_path):
     assert len(table({"default": course}).splitlines()) == 1 + len(course.time)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_neighbours_agglomerate_where_contact_alone_does_not():
     """Z16 Fig. 9: clumps, while the cloud goes on growing along the field."""
     made = blast.scene(number=100, duration=0.1, contact=True, near=True, cutoff=blast.NEIGHBOURS)

@@ -21,6 +21,7 @@ def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):
     return np.array(seen)
 
 
+@pytest.mark.long
 def test_the_papers_own_iteration_never_settles_and_ours_does():
     """x = 1 - e -> p / x flips between 1 and p for ever; here the pair is solved: e = 1 - sqrt(p)."""
     seen = flip_flop(pressure=0.5)
@@ -61,6 +62,7 @@ def test_iterations_across_the_bond_threshold_settle():
     assert (np.diff(e) <= 1e-9).all()
 
 
+@pytest.mark.long
 def test_unsettled_impacts_are_bounded_and_counted():
     """With too few iterations allowed the run goes on, within its bound, and it is reported."""
     results = simulate(

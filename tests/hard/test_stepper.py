@@ -65,6 +65,7 @@ def kinetic(state):
 FACTORS = (1.0, 1e2, 1e6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_stiffness_beyond_what_the_steps_are_meant_for(name):
     """Springs 1, 1e2 and 1e6 times as stiff, with the same control: the first step is up to 20 radians long.

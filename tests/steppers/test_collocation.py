@@ -81,7 +81,7 @@ def test_order_of_five_stages(runs):
     assert order(ORDER_5, errors) == pytest.approx(8.0, abs=0.3)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("stages", "steps"), [(3, (16, 32, 64, 128)), (4, (8, 16, 32))])
 def test_order_of_fewer_stages(stages, steps):
     scenes = [charged(equal_steps(DURATION / n, stages), DURATION, **DRIVEN) for n in steps]

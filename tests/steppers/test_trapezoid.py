@@ -111,7 +111,7 @@ def test_what_cannot_be_solved_says_when_who_and_which_force():
     assert failed.time == 0.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_cannot_be_solved_together_says_so_too():
     """The same among particles that feel each other: the state is that of the last good step."""
     made = with_stepper(

@@ -138,7 +138,8 @@ def _steppers(scene: Scene, dt: float) -> list[Stepper]:
     kinds.load(steppers)
     asked = {_kind(scene.stepper)}
     found = []
-    for kind in Stepper.known().values():
+    # By name, whatever has been imported first.
+    for _, kind in sorted(Stepper.known().items()):
         for stepper in kind.alternatives(scene.effects, dt):
             if type(stepper.control) is type(scene.stepper.control):
                 stepper = stepper.model_copy(update={"control": scene.stepper.control})
