@@ -93,7 +93,7 @@ def plane(vector):
     return vector[..., 0] + 1j * vector[..., 1]
 
 
-@pytest.fixture(scope="module", params=[pytest.param(n, marks=pytest.mark.long) for n in NAMES])
+@pytest.fixture(scope="module", params=NAMES)
 def rotations(request):
     """One charge in B, and one in E and B, from rest, for the same steps; with what they were asked for."""
     name = request.param
