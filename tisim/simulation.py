@@ -20,8 +20,9 @@ from tisim.starts import check_start, laid_out, volume
 from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fields
 from tisim.watch import Watch
 
-CHUNK_SECONDS = 0.25
-"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite."""
+CHUNK_SECONDS, FIRST = 0.25, 2**16
+"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; before the first look,
+steps of all particles together."""
 
 
 class Simulation:
@@ -152,7 +153,8 @@ class Simulation:
         them may have taken fewer than ``steps`` steps at the end.
         """
         self.s.check()
-        done, chunk = 0, 8
+        # Short enough to be heard from soon, long enough that looking costs little.
+        done, chunk = 0, max(8, FIRST // (self.worlds * self.s.capacity))
         while (self.s.read("status") == RUNNING).any() and (steps is None or done < steps):
             n = chunk if steps is None else min(chunk, steps - done)
             began = time.perf_counter()
@@ -191,7 +193,7 @@ class Simulation:
             found.append(
                 Result(
                     scene=self.scenes[w],
-                    state={f.name: good[f.name][w, :n].copy() for f in self.s.fields},
+                    state={f.name: good[f.name][w, :n].copy() for f in self.s.told},
                     start=self.starts[w],
                     time=float(good["time"][w]),
                     work={name: int(tally[w]) for name, tally in tallies.items()},

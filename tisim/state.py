@@ -26,6 +26,7 @@ class Field:
     default : what a particle starts with where the start does not say: a number, or the name of a field of
         which it is a copy then, such as "position"; None where the start must say.
     minimum : the least value that a start may give.
+    scratch : of use to a stepper only: results do not have it.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Field:
     slots: int = 0
     default: float | str | None = 0.0
     minimum: float | None = None
+    scratch: bool = False
 
     def __post_init__(self) -> None:
         if self.slots and (self.merge != "keep" or self.components != 1):
@@ -105,6 +107,7 @@ class State:
     ) -> None:
         self.worlds, self.capacity = worlds, capacity
         self.fields, self.counters, self.keeps = fields, (*TALLIES, *counters), keeps
+        self.told = tuple(field for field in fields if not field.scratch)
         self.real = runtime.current().real
         self._generation = runtime.generation()
         builder = ti.FieldsBuilder()

@@ -33,7 +33,7 @@ class Watch:
         self.faults: dict[int, tuple[float, str]] = {}
 
     def _snapshot(self) -> dict[str, np.ndarray]:
-        return {name: self.s.read(name) for name in (*(f.name for f in self.s.fields), "time", "count")}
+        return {name: self.s.read(name) for name in (*(f.name for f in self.s.told), "time", "count")}
 
     def look(self) -> None:
         """Stop worlds in which something is not finite; keep the others' state as the last good one."""
@@ -41,7 +41,7 @@ class Watch:
         worlds = len(status)
         live = np.arange(self.s.capacity) < now["count"][:, None]
         found: dict[int, str] = {}
-        for f in self.s.fields:
+        for f in self.s.told:
             bad = live & ~np.isfinite(now[f.name].reshape(worlds, self.s.capacity, -1)).all(axis=2)
             for w in map(int, np.flatnonzero(bad.any(axis=1))):
                 found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")

@@ -17,7 +17,7 @@ def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
     """Force that an iterate was made with, that the last one gave, and its residual; and torques."""
     names = [("force", "N"), *([("torque", "N m")] if turning else [])]
     return tuple(
-        Field(f"{name}_{what}", unit, 3, "keep")
+        Field(f"{name}_{what}", unit, 3, "keep", scratch=True)
         for name, unit in names
         for what in ("used", "last", "residual")
     )

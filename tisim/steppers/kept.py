@@ -4,13 +4,16 @@ from tisim._taichi import ti
 from tisim.state import Field
 
 BEFORE = (
-    Field("position_before", "m", 3, "keep"),
-    Field("velocity_before", "m/s", 3, "keep"),
-    Field("force_before", "N", 3, "keep"),
+    Field("position_before", "m", 3, "keep", scratch=True),
+    Field("velocity_before", "m/s", 3, "keep", scratch=True),
+    Field("force_before", "N", 3, "keep", scratch=True),
 )
-CHANGE = Field("iterate_change", "m", 1, "keep")
+CHANGE = Field("iterate_change", "m", 1, "keep", scratch=True)
 """How much the last iterate differs from the one before."""
-TURNING_BEFORE = (Field("spin_before", "rad/s", 3, "keep"), Field("torque_before", "N m", 3, "keep"))
+TURNING_BEFORE = (
+    Field("spin_before", "rad/s", 3, "keep", scratch=True),
+    Field("torque_before", "N m", 3, "keep", scratch=True),
+)
 
 
 def kept(turning: bool) -> tuple[Field, ...]:

@@ -49,7 +49,7 @@ class Stages(Kept):
         """The rates of this step and of the last one."""
         names = [("acceleration", "m/s^2"), *([("turning", "rad/s^2")] if turning else [])]
         return tuple(
-            Field(f"{when}_{name}", unit, merge="keep", slots=3 * number)
+            Field(f"{when}_{name}", unit, merge="keep", slots=3 * number, scratch=True)
             for name, unit in names
             for when in ("stage", "last")
         )

@@ -19,7 +19,7 @@ from tisim.steppers.phases import Arrive, Listen, Operate
 from tisim.steppers.solve import Solve
 from tisim.steppers.stepper import Parts, Stepper
 
-OWN = (Field("own_dt", "s", 1, "keep"), Field("own_time", "s", 1, "keep"))
+OWN = (Field("own_dt", "s", 1, "keep", scratch=True), Field("own_time", "s", 1, "keep", scratch=True))
 """Of a particle alone: its next step, and how far it has come."""
 
 
