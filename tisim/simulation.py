@@ -21,8 +21,8 @@ from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fie
 from tisim.watch import Watch
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
-"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; before the first look,
-steps of all particles together."""
+"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; steps of all
+particles together before the first look."""
 
 
 class Simulation:
