@@ -215,7 +215,7 @@ def names(scenes: int) -> list[str]:
 def written(scene: Scene) -> tuple[Field, ...]:
     """The quantities in a trajectory of a scene: all but what particles remember of each other."""
     fields = resolve_fields(needed_fields(scene.effects, scene.stepper))
-    return tuple(field for field in fields if not field.slots)
+    return tuple(field for field in fields if not (field.slots or field.scratch))
 
 
 def _last(group: h5py.Group) -> float:

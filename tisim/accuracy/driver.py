@@ -149,6 +149,8 @@ class Run:
     def _run(self, scenes: Sequence[Scene], cost: float, limit: float = math.inf) -> Timed:
         """Run and time; ``cost`` is what was planned for it, s; OutOfTime after ``limit`` (s)."""
         begun = self.done
+        if limit <= 0.0:
+            raise OutOfTime
 
         def watch(fraction: float) -> None:
             self.progress(min((begun + cost * fraction) / self.planned, 1.0), self.what)
