@@ -42,18 +42,9 @@ class Collocation(Stepper):
 
     counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     keeps: ClassVar = (
-        *("time_before", "attempting", "verdict", "next_dt", "last_dt"),
-        *(
-            "sweeping",
-            "sweep",
-            "stage",
-            "unsound",
-            "sweep_change",
-            "last_change",
-            "contraction",
-            "measured_dt",
-        ),
-    )
+        "time_before", "attempting", "verdict", "next_dt", "last_dt", "sweeping", "sweep", "stage", "unsound",
+        "sweep_change", "last_change", "contraction", "measured_dt",
+    )  # fmt: skip
 
     @property
     def order(self) -> int:

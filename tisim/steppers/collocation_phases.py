@@ -41,12 +41,16 @@ class Try(Phase):
         s.time[w] = s.time_before[w] + dt * self.stages.c[1]
 
 
-class Predict(PerParticle):
-    """The rates at all stages, from the polynomial of the last step; at the first they are known."""
+class OfStages(PerParticle):
+    """A loop over particles that knows the stages."""
 
     def __init__(self, stages) -> None:
         super().__init__(stages.s)
         self.stages = stages
+
+
+class Predict(OfStages):
+    """The rates at all stages, from the polynomial of the last step; at the first they are known."""
 
     @ti.func
     def run(self, w, i):
@@ -76,12 +80,8 @@ class Sweep(Repeat):
         return ti.cast(self.s.sweeping[w], ti.i32)
 
 
-class Place(PerParticle):
+class Place(OfStages):
     """Put particles where they are at the stage, as far as is known."""
-
-    def __init__(self, stages) -> None:
-        super().__init__(stages.s)
-        self.stages = stages
 
     @ti.func
     def run(self, w, i):
@@ -226,14 +226,10 @@ class Judge(Phase):
         s.next_dt[w] = s.dt[w] * factor
 
 
-class Conclude(PerParticle):
+class Conclude(OfStages):
     """The velocity at the end, and what the next step is predicted from; positions are there already."""
 
     conditional = True
-
-    def __init__(self, stages) -> None:
-        super().__init__(stages.s)
-        self.stages = stages
 
     @ti.func
     def when(self, w):
