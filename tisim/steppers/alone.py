@@ -13,8 +13,8 @@ from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 LAUNCH = 2**16
 """Windows of a launch at most, of all particles together, where more than WINDOWS of them."""
 WINDOWS = 64
-NEARLY = 1.0 + 1e-6
-"""A remainder as small as rounding leaves is not worth a step of its own."""
+LITTLE = 1e-6
+"""Of a window or step: a remainder as small as rounding leaves is not worth one of its own."""
 
 
 class Stretch(Phase):
@@ -33,7 +33,7 @@ class Stretch(Phase):
         s = self.s
         window = ti.cast(self.control.longest(w), ti.f64)
         until = ti.min(s.hold[w], s.end[w])
-        wanted = ti.ceil(until / window / NEARLY) - s.windows[w]
+        wanted = ti.ceil(until / window - LITTLE) - s.windows[w]
         allowed = ti.cast(ti.min(s.until[w] - s.steps[w], self.most), ti.f64)
         s.stretch_windows[w] = ti.max(1.0, ti.min(wanted, allowed))
         s.stuck[w] = 0.0
@@ -42,8 +42,8 @@ class Stretch(Phase):
 @ti.func
 def beginning(s, control: ti.template(), w, window):  # type: ignore[valid-type]
     """When a window begins; none does after the end. s, f64."""
-    time = window * ti.cast(control.longest(w), ti.f64)
-    return ti.select(time * NEARLY >= s.end[w], s.end[w], time)
+    length = ti.cast(control.longest(w), ti.f64)
+    return ti.select((window + LITTLE) * length >= s.end[w], s.end[w], window * length)
 
 
 class Alone(PerParticle):
@@ -89,7 +89,7 @@ class Alone(PerParticle):
             verdict = TRIED
             while verdict == TRIED:
                 wanted = self.control.step(w, s.own_dt[w, i])
-                last = wanted * NEARLY >= length - elapsed
+                last = wanted * (1.0 + LITTLE) >= length - elapsed
                 dt = ti.select(last, length - elapsed, wanted)
                 verdict, k = self.attempt(w, i, begin + elapsed, dt, aim)
                 iterations += k
