@@ -60,7 +60,7 @@ class Drag(Force):
         u = self.approach(s, w, i, t)
         speed = u.norm()
         g, power = self.resistance(s, w, i, speed)
-        along = u / ti.max(speed, LEAST_SPEED)
+        along = (1.0 / ti.max(speed, LEAST_SPEED)) * u
         return -g * (ti.Matrix.identity(s.real, 3) + power * along.outer_product(along))
 
 
@@ -92,7 +92,7 @@ class ChowDrag(Drag):
     @ti.func
     def resistance(self, s, w, i, speed):
         radius = s.radius[w, i]
-        reynolds = 2.0 * radius * self.density(w) * speed / self.viscosity(w)
+        reynolds = 2.0 * radius * self.density(w) / self.viscosity(w) * speed
         # C_D Re and its power of |u|: C_D alone is infinite at rest.
         drag, power = 24.0 + 0.0 * reynolds, 0.0 * reynolds
         if reynolds > 2e6:

@@ -9,6 +9,8 @@ from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
 from tisim.state import STUCK
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
+from tisim.steppers.kept import kept
+from tisim.steppers.registers import Registers
 
 LAUNCH = 2**16
 """Windows of a launch at most, of all particles together, where more than WINDOWS of them."""
@@ -53,11 +55,17 @@ class Alone(PerParticle):
 
     def __init__(self, parts, solve) -> None:
         super().__init__(parts.s)
-        self.control, self.solve, self.summed = parts.control, solve, parts.summed
+        moving = tuple(field.name.removesuffix("_before") for field in kept(parts.turning))
+        before = tuple(field.name for field in kept(parts.turning))
+        self.registers = Registers(parts.s, ("own_dt", *moving), before)
+        self.own, self.control = self.registers.state, parts.control
+        self.solve, self.summed = self.registers.given(solve), self.registers.given(parts.summed)
 
     @ti.func
     def run(self, w, i):
         s = self.s
+        self.registers.load(w, i)
+        begin, passed = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
         steps, tries, iterations, going = 0, 0, 0, 1
         aim = self.control.aim(w)
         for k in range(ti.cast(s.stretch_windows[w], ti.i32)):
@@ -68,10 +76,12 @@ class Alone(PerParticle):
                 steps += more_steps
                 tries += more_tries
                 iterations += more_iterations
-                s.own_time[w, i] = ti.cast(begin + passed, s.real)
                 if passed < length:
                     going = 0
-                    ti.atomic_max(s.stuck[w], 1.0)
+        self.registers.store(w, i)
+        s.own_time[w, i] = ti.cast(begin + passed, s.real)
+        if going == 0:
+            ti.atomic_max(s.stuck[w], 1.0)
         ti.atomic_add(s.particle_steps[w], steps)
         ti.atomic_add(s.rejections[w], tries - steps)
         ti.atomic_add(s.solver_iterations[w], iterations)
@@ -81,7 +91,7 @@ class Alone(PerParticle):
     def window(self, w, i, begin, length, aim):
         """A particle through a window: how far it gets (s), to the end unless stuck; its steps, attempts and
         iterations."""
-        s = self.s
+        s = self.own
         elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
         steps, tries, iterations, verdict = 0, 0, 0, ACCEPTED
         while elapsed < length and verdict != HOPELESS:
@@ -108,7 +118,7 @@ class Alone(PerParticle):
     @ti.func
     def attempt(self, w, i, t, dt, aim):
         """One step of this length; the verdict on it, and how many iterations it took."""
-        s, solve = self.s, self.solve
+        s, solve = self.own, self.solve
         step, end = ti.cast(dt, s.real), t + dt
         v = solve.velocity(w, i, step, solve.jacobian(w, i, end))
         if not solve.bearable(w, i, v, step):
@@ -136,14 +146,18 @@ class Alone(PerParticle):
             # Not below infinity: also true of NaN.
             if solved or k >= self.control.iterations or not (ratio < ti.math.inf):
                 iterating = 0
-                factor = self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
-                if solved and self.control.accepts(w, off):
+                accepted = solved and self.control.accepts(w, off)
+                wanted = dt
+                # The longest step stays: a branch, as the next step then need not wait for the factor.
+                if not (accepted and self.control.stays(w, dt, aim, ratio, k, off)):
+                    wanted *= self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
+                if accepted:
                     verdict = ACCEPTED
                 else:
-                    factor = ti.min(factor, SHORTER)
+                    wanted = ti.min(wanted, SHORTER * dt)
                     verdict = ti.select(self.control.hopeless(w, dt), HOPELESS, TRIED)
                     solve.give_up(w, i)
-                s.own_dt[w, i] = ti.cast(dt * factor, s.real)
+                s.own_dt[w, i] = ti.cast(wanted, s.real)
         return verdict, k - 1
 
 

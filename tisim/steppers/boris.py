@@ -10,7 +10,7 @@ from tisim.program import Item, PerParticle, Phase
 from tisim.state import Field
 from tisim.steppers.controller import Controller, FixedStep
 from tisim.steppers.phases import Arrive, Clock, Listen, Operate, arrive
-from tisim.steppers.solve import summed_jacobian, with_jacobian
+from tisim.steppers.solve import solved, summed_jacobian, with_jacobian
 from tisim.steppers.stepper import Parts, Stepper
 
 
@@ -92,7 +92,7 @@ class Rotate(PerParticle):
             rest = half * (s.force[w, i] - jacobian @ s.velocity[w, i])
             one, turn = ti.Matrix.identity(s.real, 3), half * jacobian
             minus = s.velocity[w, i] + rest
-            s.velocity[w, i] = (one - turn).inverse() @ ((one + turn) @ minus) + rest
+            s.velocity[w, i] = solved(one - turn, (one + turn) @ minus) + rest
         else:
             s.velocity[w, i] += 2.0 * half * s.force[w, i]
         if ti.static(self.turning):

@@ -100,14 +100,23 @@ class IterationControl(ImplicitControl):
 
     @ti.func
     def aim(self, w):
-        """TOL^(1/(p K_d)), the same for all particles."""
-        p = ti.cast(self.order(w), ti.f64)
-        return ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / (p * self.iterations))
+        """TOL^(1/K_d), the same for all particles."""
+        return ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / self.iterations)
 
     @ti.func
     def factor(self, w, aim, change, k, error):
         """What the next step is to be multiplied by, after K = k iterations."""
-        return self.limited(w, aim, ti.pow(change, 1.0 / (ti.cast(self.order(w), ti.f64) * k)))
+        root = 1.0 / ti.cast(self.order(w), ti.f64)
+        return self.limited(w, ti.pow(aim, root), ti.pow(change, root / k))
+
+    @ti.func
+    def stays(self, w, dt, aim, change, k, error):
+        """Whether a step (s) is the longest that may be and ``factor`` is at least 1, so that the next one is
+        as long; without a root to take."""
+        reached = ti.cast(1.0, ti.f64)
+        for _ in range(k):
+            reached *= aim
+        return dt >= ti.cast(self.longest(w), ti.f64) and change <= reached
 
 
 class ErrorControl(IterationControl):
@@ -139,3 +148,8 @@ class ErrorControl(IterationControl):
         by_iteration = IterationControl.factor(self, w, aim, change, k, error)
         wanted = ti.cast(self.safety(w), ti.f64) * ti.sqrt(ti.cast(self.error(w), ti.f64))
         return ti.min(by_iteration, self.limited(w, wanted, ti.sqrt(error)))
+
+    @ti.func
+    def stays(self, w, dt, aim, change, k, error):
+        wanted = ti.cast(self.safety(w), ti.f64) ** 2 * ti.cast(self.error(w), ti.f64)
+        return error <= wanted and IterationControl.stays(self, w, dt, aim, change, k, error)

@@ -22,6 +22,14 @@ def summed_jacobian(forces: ti.template(), s, w, i, t):  # type: ignore[valid-ty
     return total
 
 
+@ti.func
+def solved(a, b):
+    """x of a x = b, by Cramer's rule; the division comes last, so that nothing waits for it."""
+    x, y, z = a[:, 0], a[:, 1], a[:, 2]
+    yz = y.cross(z)
+    return 1.0 / x.dot(yz) * ti.Vector([b.dot(yz), x.dot(b.cross(z)), x.dot(y.cross(b))])
+
+
 @ti.data_oriented
 class Solve(Kept):
     """One iterate of a particle, given the force at the last one."""
@@ -44,13 +52,13 @@ class Solve(Kept):
     @ti.func
     def velocity(self, w, i, dt, jacobian):
         """v' of m v' = m v + dt (phi (F' + J (v' - v_K)) + (1 - phi) F), with F' and J those at v_K. m/s."""
-        s, phi = self.s, self.phi(w)
-        m, v = s.mass[w, i], s.velocity_before[w, i]
-        total = phi * s.force[w, i] + (1.0 - phi) * s.force_before[w, i]
-        new = v + dt / m * total
+        s, phi, over_mass = self.s, self.phi(w), dt / self.s.mass[w, i]
+        v, total = s.velocity_before[w, i], phi * s.force[w, i] + (1.0 - phi) * s.force_before[w, i]
+        new = v + over_mass * total
         if ti.static(len(self.linear) > 0):
-            matrix = m * ti.Matrix.identity(s.real, 3) - phi * dt * jacobian
-            new = matrix.inverse() @ (m * v + dt * (total - phi * (jacobian @ s.velocity[w, i])))
+            # Divided by the mass: a determinant of kg^3 is nothing to f32.
+            matrix = ti.Matrix.identity(s.real, 3) - phi * over_mass * jacobian
+            new = solved(matrix, v + over_mass * (total - phi * (jacobian @ s.velocity[w, i])))
             s.force[w, i] += jacobian @ (new - s.velocity[w, i])
         return new
 

@@ -6,7 +6,7 @@ from tisim._taichi import ti
 from tisim.state import Field
 from tisim.steppers.kept import Kept
 from tisim.steppers.lobatto import highest, integrals, nodes
-from tisim.steppers.solve import summed_jacobian, with_jacobian
+from tisim.steppers.solve import solved, summed_jacobian, with_jacobian
 
 
 @ti.data_oriented
@@ -126,12 +126,12 @@ class Stages(Kept):
         """The acceleration that the force at a stage gives, m/s^2; what is linear in velocity solved exactly:
         m v' = F + J dt a_ii (v' - v'_last)."""
         s = self.s
-        m, new = s.mass[w, i], s.force[w, i] / s.mass[w, i]
+        m = s.mass[w, i]
+        new = s.force[w, i] / m
         if ti.static(len(self.linear) > 0):
-            jacobian = (
-                dt * ti.cast(self.speeds[stage, stage], s.real) * summed_jacobian(self.linear, s, w, i, t)
-            )
+            rate = summed_jacobian(self.linear, s, w, i, t) / m
+            implicit = dt * ti.cast(self.speeds[stage, stage], s.real) * rate
             last = self.at(s.stage_acceleration, w, i, stage)
-            new = (m * ti.Matrix.identity(s.real, 3) - jacobian).inverse() @ (s.force[w, i] - jacobian @ last)
+            new = solved(ti.Matrix.identity(s.real, 3) - implicit, new - implicit @ last)
             s.force[w, i] = m * new
         return new

@@ -69,13 +69,10 @@ class Trapezoid(Stepper):
         return work["force_evaluations"] / (particles if independent else 1)
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        accelerated = self.acceleration == "anderson" and not independent
-        return (
-            FORCE,
-            *kept(turning),
-            *(memory_of_iterates(turning) if accelerated else ()),
-            *(OWN if independent else (CHANGE,)),
-        )
+        if independent:
+            return (FORCE, *OWN)
+        accelerated = self.acceleration == "anderson"
+        return (FORCE, *kept(turning), CHANGE, *(memory_of_iterates(turning) if accelerated else ()))
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, solve = parts.s, Solve(parts, self.phi)
