@@ -70,7 +70,7 @@ def test_refuses_another_scene(simulation, saved, other):
     assert simulation.results()[0].work["steps"] == 0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_refuses_another_capacity(simulation, saved):
     larger = Simulation(flow(), worlds=2, capacity=120)
     larger.load([flow()])

@@ -192,7 +192,7 @@ def same(a, b):
         np.testing.assert_array_equal(values, b.state[name], err_msg=name)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_skin(rng, outcome):
     """Lists made in every step, and too short for most grains: the same bits, adaptive steps among them."""
     start = crowd(rng, Verlet())

@@ -100,7 +100,7 @@ def test_lists_follow_particles_that_operators_move(kind):
     assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_lists_follow_particles_that_grow(rng):
     """Grains at rest, out of each other's reach, that grow until they push each other apart."""
     grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)

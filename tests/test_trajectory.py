@@ -68,7 +68,7 @@ def states():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("schedule", ["world", "particle"])
+@pytest.mark.parametrize("schedule", [pytest.param("world", marks=pytest.mark.slow), "particle"])
 def test_a_run_is_the_same_to_the_last_bit_with_a_trajectory(tmp_path, schedule):
     made = simulation(schedule)
     made.load(FLOWS)

@@ -89,7 +89,7 @@ def test_no_other_variant_than_the_ellipsoid():
         blast.CASE.problem("default", "torus")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_search_recovers_the_field_up_to_sign(tmp_path):
     """500 particles, 10 generations: within 5 % of 0.7 T, and 4 degrees."""
     evaluator = Evaluator()

@@ -32,7 +32,7 @@ ROTATIONS = {
     "trapezoid": [(0.3, 209_440), (20.0, 10_000), (2e3, 10_000), (0.3, 10.37), (0.3, 0.37)],
     "collocation": [(2.0, 31_416), (1.0, 10.37), (1.0, 0.37)],
 }
-NAMES = ["boris", "trapezoid", pytest.param("collocation", marks=pytest.mark.long)]
+NAMES = ["boris", "trapezoid", pytest.param("collocation", marks=pytest.mark.slow)]
 ELECTRON = {"charge": 1.602e-19, "mass": 9.109e-31}
 
 

@@ -21,7 +21,7 @@ def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):
     return np.array(seen)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_papers_own_iteration_never_settles_and_ours_does():
     """x = 1 - e -> p / x flips between 1 and p for ever; here the pair is solved: e = 1 - sqrt(p)."""
     seen = flip_flop(pressure=0.5)
@@ -91,6 +91,7 @@ def test_extreme_temperatures(temperature):
     assert result.work["unsettled"] == 0
 
 
+@pytest.mark.slow
 def test_cold_grains_are_hard_and_hot_ones_as_hard_as_h0():
     """At 1 mK nothing bonds that would at room temperature; at 1e9 K the hardness is H_0."""
     q = 1000.0

@@ -28,7 +28,11 @@ STEPPERS = {
 }
 
 
-NAMES = ["trapezoid", *(pytest.param(name, marks=pytest.mark.long) for name in ("anderson", "collocation"))]
+NAMES = [
+    "trapezoid",
+    pytest.param("anderson", marks=pytest.mark.slow),
+    pytest.param("collocation", marks=pytest.mark.long),
+]
 
 
 def adaptive(name, first, longest, **more):

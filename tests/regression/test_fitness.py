@@ -60,13 +60,13 @@ def elsewhere(*options):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_single_precision_gives_the_same_fitness_in_the_mean():
     deviations = fitness_record.deviations(elsewhere("--precision", "f32"), fitness_record.stored())
     assert max(deviations.values()) < STANDARD_ERRORS
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_any_number_of_threads_gives_the_same_fitness_to_the_last_bit(values):
     assert elsewhere("--threads", "1") == values
     assert elsewhere("--threads", "3") == values
