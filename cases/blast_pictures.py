@@ -21,7 +21,7 @@ from tisim.errors import RunError
 from tisim.figure import empty, plain
 from tisim.frames import Frame, Frames, frames
 from tisim.particles import Arrays
-from tisim.picture import corners, panel, view
+from tisim.picture import SEEN, corners, panel, view
 from tisim.plots import COLOURS
 
 SHOWN = 6
@@ -68,14 +68,19 @@ class Course:
 
 
 def pictures(found: Frames) -> Mapping[str, Figure]:
-    """sequence.png: the cloud at six times; envelope.png: half axes, velocities and paths.
+    """sequence.png: the cloud at six times; velocities.png: its velocities then; envelope.png: half axes,
+    velocities of one particle, and paths.
 
     None of a file with fewer frames than SHOWN, such as a result.h5.
     """
     if len(found) < SHOWN:
         return {}
     chosen = [found[k] for k in np.linspace(0, len(found) - 1, SHOWN).round().astype(int)]
-    return {"sequence.png": sequence(chosen), "envelope.png": envelope(Course.of(found))}
+    return {
+        "sequence.png": sequence(chosen),
+        "velocities.png": velocities(chosen),
+        "envelope.png": envelope(Course.of(found)),
+    }
 
 
 def sequence(chosen: Sequence[Frame]) -> Figure:
@@ -84,6 +89,24 @@ def sequence(chosen: Sequence[Frame]) -> Figure:
     square = common([frame.arrays for frame in chosen])
     for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
         snapshot(axis, frame.arrays, square)
+        axis.set_title(f"t = {1e3 * frame.time:.0f} ms", fontsize=10)
+    return figure
+
+
+def velocities(chosen: Sequence[Frame]) -> Figure:
+    """Velocity vectors at the places of the particles, all on one scale (Z16 Fig. 6, left)."""
+    figure = empty(10.4, 7.2)
+    left, bottom, side = common([frame.arrays for frame in chosen])
+    fastest = max(np.linalg.norm(frame.arrays["velocity"], axis=1).max() for frame in chosen)
+    # The longest arrow is an eighth of the picture, and finds room at its edge.
+    left, bottom, side = left - side / 8, bottom - side / 8, 1.25 * side
+    scale = 8.0 * fastest / side
+    for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
+        (x, y), (u, v) = ((frame.arrays[name] @ SEEN)[:, :2].T for name in ("position", "velocity"))
+        axis.quiver(
+            x, y, u, v, angles="xy", scale_units="xy", scale=scale, color=COLOURS[0], width=0.0025, alpha=0.6
+        )
+        axis.set(xlim=(left, left + side), ylim=(bottom, bottom + side), aspect="equal", xticks=[], yticks=[])
         axis.set_title(f"t = {1e3 * frame.time:.0f} ms", fontsize=10)
     return figure
 

@@ -15,6 +15,7 @@ from tests.scenes import simulate
 from tisim import Recording, run
 from tisim.errors import InputError
 from tisim.frames import frames
+from tisim.picture import SEEN
 from tisim.result import Result, Status
 
 
@@ -117,6 +118,8 @@ def test_pictures_of_a_run(tmp_path):
         figures, course = pictures(found), Course.of(found)
         last = found[-1]
     assert len(figures["sequence.png"].axes) == SHOWN
+    arrows = figures["velocities.png"].axes[-1].collections[0]
+    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ SEEN)[:, 0])
     left, right, *_ = figures["envelope.png"].axes
     np.testing.assert_array_equal(left.lines[0].get_ydata(), course.axes[:, 0])
     assert course.axes[-1, 0] > 1.1 * course.axes[0, 0]
