@@ -150,19 +150,31 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
 
 
 def test_what_does_not_converge_is_a_clear_failure():
-    """Sweeps of too strong a coupling grow without bound: the world stops and says which effect it was."""
+    """Sweeps of too strong a coupling grow without bound: the world stops and says which effect it was, and
+    by how much they grow, which tends to the spectral radius: as in NumPy."""
     made = cloud(3, n=20, chi=60.0, spread=1.0, sweeps=20)
-    spread = np.abs(
-        np.linalg.eigvals(np.eye(60) - solved(made.particles.arrays(made.domain, 0), 60.0)[2])
-    ).max()
-    assert spread > 1
+    start = made.particles.arrays(made.domain, 0)
+    coupling = np.eye(60) - solved(start, 60.0)[2]
+    spread = np.abs(np.linalg.eigvals(coupling)).max()
+    alone = 60.0 * start["radius"][:, None] ** 3 * (FIELD + SLOPE * start["position"][:, :1])
+    m, changes = np.zeros(60), []
+    for _ in range(19):
+        m, last = alone.ravel() + coupling @ m, m
+        changes.append(np.linalg.norm((m - last).reshape(20, 3), axis=1).max())
     simulation = Simulation(made)
     simulation.load([made])
     simulation.run()
     (result,) = simulation.results()
     simulation.close()
     assert not result.status.ok
-    assert "does not converge, by effects.polarisation, at particle" in result.status.reason
+    factor = result.measures["sweep_factor"]
+    assert factor == pytest.approx(np.sqrt(changes[-1] / changes[-3]), rel=1e-9)
+    assert 0.8 * spread < factor < 1.2 * spread
+    for words in (
+        f"does not converge: a sweep multiplies the change by {factor:.3g}",
+        "by effects.polarisation, at particle",
+    ):
+        assert words in result.status.reason
     np.testing.assert_array_equal(result.state["position"], result.start["position"])
 
 

@@ -62,7 +62,7 @@ class SoftShell(PairForce):
     width: float = parameter("m", gt=0)
 
     @ti.func
-    def reach(self, w):
+    def reach(self, s, w, i):
         return self.width(w)
 
     @ti.func

@@ -27,25 +27,24 @@ class Bin(Phase):
     def run(self, w, _k):
         n, s = self.n, self.n.s
         count = s.count[w]
-        low, high, least = s.position[w, 0], s.position[w, 0], s.radius[w, 0]
+        low, high, smallest = s.position[w, 0], s.position[w, 0], 0
         for i in range(count):
             low, high = ti.min(low, s.position[w, i]), ti.max(high, s.position[w, i])
-            least = ti.min(least, s.radius[w, i])
+            smallest = ti.select(s.radius[w, i] < s.radius[w, smallest], i, smallest)
             # Not below infinity: also true of NaN, which belongs to no cell.
             if not (ti.abs(s.position[w, i]).sum() + s.radius[w, i] < ti.math.inf):
                 s.fail(w, NOT_FINITE, i)
         if ti.static(n.joined):
             low = n.domain.origin(w)
             high = low + n.domain.side(w)
+        least = s.radius[w, smallest]
         extent = ti.max(high - low, 1e-3 * least)
         # Root by root: in f32 a volume of 7000 million km cubed is infinite.
         roots = ti.pow(extent, 1.0 / 3.0)
         spacing = roots[0] * roots[1] * roots[2] / ti.pow(ti.cast(count, s.real), 1.0 / 3.0)
         n.skin[w] = ti.min(2.0 * n.ahead * ti.cast(s.axes(s.stride, w), s.real), spacing)
         n.gap[w] = n.horizon(w)
-        for effect in ti.static(n.short_ranged):
-            n.gap[w] = ti.max(n.gap[w], effect.reach(w))
-        width = ti.max(spacing, 2.0 * least + n.gap[w])
+        width = ti.max(spacing, 2.0 * least + n.reach(w, smallest))
         dims = ti.max(1, ti.floor(ti.min(extent / width, 1e3), ti.i32))
         while dims[0] * dims[1] * dims[2] > n.max_cells:
             dims = (dims + 1) // 2
@@ -91,7 +90,7 @@ class Search(PerParticle):
             # Copies: the compiler cannot know that writing a list does not change what it reads.
             r, radius, dims, skin = s.position[w, i], s.radius[w, i], n.dims[w], n.skin[w]
             side = n.domain.side(w)
-            near = radius + n.gap[w]
+            near = radius + n.reach(w, i)
             reach = near + radius + skin
             first = ti.floor((r - reach - n.corner[w]) / n.cell[w], ti.i32)
             last = ti.floor((r + reach - n.corner[w]) / n.cell[w], ti.i32)

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from tisim.cells import listing
-from tisim.effect import Effect, Force, Mutual, Operator, PairEvent, PairForce, Source
+from tisim.effect import Effect, Force, Mutual, Operator, PairEvent, PairForce, Settled, Source
 from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
 from tisim.forces import FORCE, TORQUE, SumForces, SumForcesAgain, SumTrialForces, turning
 from tisim.halves import Halves
 from tisim.history import History, Remember, memory_fields
 from tisim.neighbours import Neighbours
 from tisim.program import Item
-from tisim.settle import Settling
+from tisim.settle import settling
 from tisim.state import Field, State
 from tisim.steppers.phases import Finish
 from tisim.steppers.stepper import Parts, Stepper
@@ -25,7 +25,7 @@ def _of(effects: Sequence[Effect], kind: type) -> tuple[Any, ...]:
 
 def independent(effects: Sequence[Effect]) -> bool:
     """Whether particles feel nothing of each other, and only forces change them."""
-    return all(isinstance(effect, Force | Source) for effect in effects)
+    return all(isinstance(e, Force | Source | Settled) and not isinstance(e, Mutual) for e in effects)
 
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
@@ -73,14 +73,18 @@ class Composition:
         self.near = near = Neighbours(s, domain, short_ranged) if surveyed or short_ranged else None
         self.halves = Halves(near) if near and short_ranged else None
         self.contacts = contacts = Contacts(s, domain, events) if surveyed else None
-        self.settlings = tuple(Settling(s, domain, e, self.halves) for e in mutual)
+        self.settlings = tuple(settling(s, e, domain, self.halves) for e in _of(effects, Settled))
         self.memory: tuple[tuple[Any, str, str], ...] = tuple(
             (part, name, why)
             for part, name, why in (
                 (near, "pair list", "impacts, step control" if surveyed else "short-ranged forces"),
                 (self.halves, "other half of the pair list", "short-ranged forces"),
                 (contacts, "contact list", "impacts, step control"),
-                *((a, f"sweeps of {a.effect.quantity}", a.effect.kind()) for a in self.settlings),
+                *(
+                    (a, f"sweeps of {a.effect.quantity}", a.effect.kind())
+                    for a in self.settlings
+                    if isinstance(a.effect, Mutual)
+                ),
             )
             if part is not None
         )
@@ -132,13 +136,13 @@ class Composition:
         return tuple(found)
 
     def _summed(self, kind: type[SumForces]) -> tuple[Item, ...]:
-        """Settle what is mutual, then sum the forces."""
+        """Settle what is to be settled, then sum the forces."""
         items: list[Item] = []
-        for settling in self.settlings:
-            items += settling.phases(again=kind.conditional)
+        for part in self.settlings:
+            items += part.phases(again=kind.conditional, trial=kind.trial)
         if self.forces or self.pair_forces:
             items.append(self._sum(kind))
         return tuple(items)
 
     def _sum(self, kind: type[SumForces]) -> SumForces:
-        return kind(self.s, self.domain, self.forces, self.pair_forces, self.halves)
+        return kind(self.s, self.domain, self.forces, self.pair_forces, self.halves, self.settlings)

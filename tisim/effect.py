@@ -14,8 +14,9 @@ Rules
    the driver, and changed by ``remember`` only, once a step.
 6. A ``Source`` is an external field of place and time; whoever feels it finds it with ``sources``, and
    names in ``feels`` the quantities of which a scene must have at least one source.
-7. A ``Mutual`` quantity of a particle depends on that of all others, such as an induced dipole; the driver
-   settles it before forces are summed.
+7. A ``Settled`` quantity of a particle follows from the rest of the state, such as a moment along the field
+   where the particle is; the driver settles it before forces are summed. A ``Mutual`` one depends on that of
+   all others too, such as an induced dipole.
 8. An ``Operator`` changes the state between steps: ``particle`` for each particle on its own (it may write
    only that particle), then ``world`` once per world, serially (it may add particles and remove them).
 9. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
@@ -42,7 +43,8 @@ from tisim.spec import Spec, parameter
 from tisim.state import Field
 
 __all__ = [
-    "Effect", "Force", "Mutual", "Operator", "PairEvent", "PairForce", "Source", "parameter", "sources",
+    "Effect", "Force", "Mutual", "Operator", "PairEvent", "PairForce", "Settled", "Source", "parameter",
+    "sources",
 ]  # fmt: skip
 
 
@@ -119,8 +121,8 @@ class Pairwise(Effect):
     short_ranged: ClassVar[bool] = False
 
     @ti.func
-    def reach(self, w):
-        """Widest gap (m) at which it acts, when short-ranged."""
+    def reach(self, s, w, i):
+        """Widest gap (m) at which it acts between i and a particle that is no larger, when short-ranged."""
         return 0.0
 
 
@@ -157,21 +159,44 @@ class PairForce(Pairwise):
         return past
 
 
-class Mutual(Pairwise):
+class Settled(Effect):
+    """A quantity of each particle, the field ``quantity``, that follows from the rest of the state.
+
+    Set before forces are summed, whenever they are; of several, in scene order.
+    """
+
+    contract: ClassVar[bool] = True
+    quantity: ClassVar[str]
+
+    @ti.func
+    def response(self, s, w, i, total, t):
+        """The value of i, given the sum of what the others do to it: zero unless it is ``Mutual``."""
+        return total
+
+
+class Mutual(Settled, Pairwise):
     """A quantity of each particle that depends on that of the others: q_i = response(sum_j influence(q_j)).
 
     Settled by sweeps over all particles at once (the method of Jacobi), each starting from the last values,
     also those of the last step, until no particle changes by more than ``tolerance`` times the largest
     value. A world in which ``sweeps`` do not suffice fails, and says so; with ``sweeps`` of 0 there is one
-    sweep per step and no such test. Mind that sweeps need not converge: that takes weak coupling.
+    sweep per step and no such test.
+
+    relaxation : the part a of its way that a sweep goes, q = (1 - a) q + a response. Where the others act by
+    a linear law, with real eigenvalues L, sweeps converge if 1 - 2/a < L < 1 for all of them. There is no
+    solution to find where L exceeds 1; a < 1 helps where one is below -1, as in dense lattices.
+
+    ``sweep_factor`` of a world is what sweeps multiply the change by, from the last three; without end it
+    tends to the largest |1 - a + a L|.
     """
 
     contract: ClassVar[bool] = True
-    quantity: ClassVar[str]
     counts = ("mutual_sweeps",)
+    keeps = ("sweep_factor",)
 
     tolerance: float = parameter("", 1e-8, gt=0)
     sweeps: int = Option(100, ge=0)
+    relaxation: float = parameter("", 1.0, gt=0, le=1)
 
     knobs = (Knob(tolerance=1),)
 
@@ -182,11 +207,6 @@ class Mutual(Pairwise):
     def influence(self, s, w, i, j, separation, distance, t):
         """What j, with its present value, does at i."""
         return 0.0 * separation
-
-    @ti.func
-    def response(self, s, w, i, total, t):
-        """The value of i, given the sum of influences on it."""
-        return total
 
 
 class Source(Effect):

@@ -1,5 +1,7 @@
 """Force and torque on every particle."""
 
+from typing import Any, ClassVar
+
 from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import Force, PairForce
@@ -32,6 +34,8 @@ class SumForces(PairSum):
     Where an effect of the scene exerts torques these are summed along with it: one vector of six.
     """
 
+    trial: ClassVar[bool] = False
+
     def __init__(
         self,
         s: State,
@@ -39,9 +43,10 @@ class SumForces(PairSum):
         forces: tuple[Force, ...],
         pair_forces: tuple[PairForce, ...],
         halves: Halves | None,
+        settlings: tuple[Any, ...],
     ) -> None:
         super().__init__(s, domain, pair_forces, halves)
-        self.forces, self.pair_forces = forces, pair_forces
+        self.forces, self.pair_forces, self.settlings = forces, pair_forces, settlings
         self.turning = turning(forces, pair_forces)
         self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
 
@@ -57,6 +62,8 @@ class SumForces(PairSum):
     @ti.func
     def alone(self, w, i, t):
         """The force on i, at a time of its own, where particles do not feel each other."""
+        for settling in ti.static(self.settlings):
+            settling.set(w, i, t)
         self.write(w, i, self.singles(w, i, t))
 
     @ti.func
@@ -128,6 +135,8 @@ class SumForces(PairSum):
 
 class SumTrialForces(SumForces):
     """The same for a trial state, which may be one that is to be given up."""
+
+    trial = True
 
     @ti.func
     def check(self, w, i, total):

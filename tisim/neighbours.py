@@ -97,6 +97,14 @@ class Neighbours:
         return HORIZON * self.spacing(w)
 
     @ti.func
+    def reach(self, w, i):
+        """Widest gap (m) at which i is to list a particle that is no larger."""
+        gap = self.gap[w]
+        for effect in ti.static(self.short_ranged):
+            gap = ti.max(gap, effect.reach(self.s, w, i))
+        return gap
+
+    @ti.func
     def sure(self, w):
         """The same where only near pairs are offered; 0, for no limit, where all pairs are. m."""
         return ti.select(self.s.count[w] > self.small, self.horizon(w), 0.0)

@@ -1,13 +1,13 @@
-"""Sweeps that settle a quantity which particles give each other, such as induced dipoles (effect.Mutual)."""
+"""Quantities of particles that are settled before forces are summed (effect.Settled, effect.Mutual)."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tisim._taichi import ti
 from tisim.domain import Domain
-from tisim.effect import Mutual
+from tisim.effect import Mutual, Settled
 from tisim.halves import Halves
 from tisim.pairs import PairSum
-from tisim.program import PerParticle, Phase, Repeat
+from tisim.program import Item, PerParticle, Phase, Repeat
 from tisim.state import UNSETTLED, State
 
 
@@ -38,53 +38,112 @@ def _same(vector):
 
 @ti.data_oriented
 class Settling:
-    """One mutual quantity on its way: the values of the next sweep, and whether there must be one."""
+    """A quantity that follows from what a particle is and where: nothing of the others, and no memory."""
 
-    def __init__(self, s: State, domain: Domain, effect: Mutual, halves: Halves | None) -> None:
-        self.s, self.domain, self.effect, self.halves = s, domain, effect, halves
+    def __init__(self, s: State, effect: Settled) -> None:
+        self.s, self.effect = s, effect
         declared = [f.components for f in s.fields if f.name == effect.quantity]
         if not declared:
             raise TypeError(f"{type(effect).__name__}.needs must name its quantity, {effect.quantity!r}")
         self.value, self.components = getattr(s, effect.quantity), declared[0]
+        vector = self.components == 3
+        self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)
+        self.size = _length if vector else _magnitude
+
+    def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
+        """Settle it; ``again``, only in worlds where events have changed who is where; ``trial``, in a state
+        that may be far from any solution: what is not finite is then left to the forces to show."""
+        return ((SetAgain if again else Set)(self, trial),)
+
+    @ti.func
+    def set(self, w, i, t):
+        """Settle that of particle i."""
+        nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
+        self.value[w, i] = self.effect.response(self.s, w, i, nothing, t)
+
+
+class Set(PerParticle):
+    """value_i = response(0)."""
+
+    def __init__(self, settling: Settling, trial: bool) -> None:
+        super().__init__(settling.s)
+        self.settling, self.trial = settling, trial
+
+    @ti.func
+    def run(self, w, i):
+        self.settling.set(w, i, self.s.time[w])
+        if ti.static(not self.trial):
+            self.check(w, i)
+
+    @ti.func
+    def check(self, w, i):
+        a = self.settling
+        # Not below infinity: also true of NaN.
+        if not (a.size(a.value[w, i]) < ti.math.inf):
+            self.s.fault(w, i, a.effect.index)
+
+
+class SetAgain(Set):
+    """The same after events."""
+
+    conditional: ClassVar[bool] = True
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]
+
+
+class MutualSettling(Settling):
+    """A quantity that particles give each other: the values of the next sweep, and whether there is one.
+
+    changes : the largest of a particle in this sweep, the last, and the one before.
+    """
+
+    effect: Mutual
+
+    def __init__(self, s: State, effect: Mutual, domain: Domain, halves: Halves | None) -> None:
+        super().__init__(s, effect)
+        self.domain, self.halves = domain, halves
         self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
-        self.size = _length if self.components == 3 else _magnitude
         self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
-        self.largest = ti.field(s.real)
+        self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.next)
-        for column in (self.pending, self.sweeps, self.again, self.largest):
+        for column in (self.pending, self.sweeps, self.again, self.largest, *self.changes):
             builder.dense(ti.i, s.worlds).place(column)
         self._tree = builder.finalize()
 
-    def phases(self, again: bool = False) -> tuple[Phase | Repeat, ...]:
-        """Settle it; ``again``, only in worlds where events have changed who is where."""
-        start = (StartAgain if again else Start)(self)
-        return (start, Sweeps(self))
+    def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
+        return ((StartAgain if again else Start)(self), Sweeps(self, trial))
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
         real = 8 if self.s.real == ti.f64 else 4
-        return self.s.worlds * (real * (1 + self.components * self.s.capacity) + 12)
+        return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12)
 
     def destroy(self) -> None:
         """Give the memory back."""
         ti.sync()
         self._tree.destroy()
 
-    @ti.func
-    def start(self, w):
-        self.pending[w], self.sweeps[w], self.again[w], self.largest[w] = 1, 0, 0, 0.0
 
+class Start(PerParticle):
+    """There must be a sweep, from the last values, or from nothing where they have been lost."""
 
-class Start(Phase):
-    """There must be a sweep."""
-
-    def __init__(self, settling: Settling) -> None:
+    def __init__(self, settling: MutualSettling) -> None:
+        super().__init__(settling.s)
         self.settling = settling
 
     @ti.func
-    def run(self, w, _k):
-        self.settling.start(w)
+    def run(self, w, i):
+        a = self.settling
+        if i == 0:
+            a.pending[w], a.sweeps[w], a.again[w] = 1, 0, 0
+            a.largest[w] = 0.0
+            for change in ti.static(a.changes):
+                change[w] = 0.0
+        if not (a.size(a.value[w, i]) < ti.math.inf):
+            a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
 
 
 class StartAgain(Start):
@@ -94,14 +153,14 @@ class StartAgain(Start):
 
     @ti.func
     def when(self, w):
-        return self.settling.s.events[w]
+        return self.s.events[w]
 
 
 class Sweeps(Repeat):
     """Sweep until it has settled."""
 
-    def __init__(self, settling: Settling) -> None:
-        super().__init__((Sweep(settling), Take(settling), Judge(settling)))
+    def __init__(self, settling: MutualSettling, trial: bool) -> None:
+        super().__init__((Sweep(settling, trial), Take(settling, trial), Judge(settling)))
         self.settling = settling
 
     @ti.func
@@ -110,61 +169,91 @@ class Sweeps(Repeat):
 
 
 class Sweep(PairSum):
-    """next_i = response(sum_j influence(value_j))."""
+    """next_i = (1 - a) value_i + a response(sum_j influence(value_j))."""
 
-    def __init__(self, settling: Settling) -> None:
+    def __init__(self, settling: MutualSettling, trial: bool) -> None:
         super().__init__(settling.s, settling.domain, (settling.effect,), settling.halves)
-        self.settling, self.effect, self.components = settling, settling.effect, settling.components
-        self.packed, self.unpacked = (_packed, _unpacked) if self.components == 1 else (_same, _same)
+        self.settling, self.effect, self.trial = settling, settling.effect, trial
+        self.components = settling.components
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        influence = effect.influence(self.s, w, i, j, separation, distance, t)
-        return self.packed(influence)
+        return self.settling.packed(effect.influence(self.s, w, i, j, separation, distance, t))
 
     @ti.func
     def finish(self, w, i, total, t):
-        new = self.effect.response(self.s, w, i, self.unpacked(total), t)
-        self.settling.next[w, i] = new
-        size = self.settling.size(new)
-        if size > self.settling.largest[w]:
-            ti.atomic_max(self.settling.largest[w], size)
+        a, part = self.settling, self.effect.relaxation(w)
+        new = self.effect.response(self.s, w, i, a.unpacked(total), t)
+        a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
+        size = a.size(new)
+        if size > a.largest[w]:
+            ti.atomic_max(a.largest[w], size)
+        if ti.static(not self.trial):
+            self.check(w, i, size)
+
+    @ti.func
+    def check(self, w, i, size):
+        """What is not finite in the first sweep never was; what becomes so has not converged."""
         # Not below infinity: also true of NaN.
         if not (size < ti.math.inf):
-            self.s.fault(w, i, self.effect.index)
+            if self.settling.sweeps[w] == 0:
+                self.s.fault(w, i, self.effect.index)
+            else:
+                unsettled(self.s, w, i, self.effect)
 
 
 class Take(PerParticle):
     """The new values take the place of the old, and are compared with them."""
 
-    def __init__(self, settling: Settling) -> None:
+    def __init__(self, settling: MutualSettling, trial: bool) -> None:
         super().__init__(settling.s)
-        self.settling, self.effect = settling, settling.effect
+        self.settling, self.effect, self.trial = settling, settling.effect, trial
 
     @ti.func
     def run(self, w, i):
         a, s = self.settling, self.s
         change = a.size(a.next[w, i] - a.value[w, i])
         a.value[w, i] = a.next[w, i]
+        if change > a.changes[0][w]:
+            ti.atomic_max(a.changes[0][w], change)
         if ti.static(self.effect.sweeps > 0):
-            unsettled = change > self.effect.tolerance(w) * a.largest[w]
-            if unsettled and a.sweeps[w] + 1 < self.effect.sweeps:
+            on = change > self.effect.relaxation(w) * self.effect.tolerance(w) * a.largest[w]
+            if on and a.sweeps[w] + 1 < self.effect.sweeps:
                 ti.atomic_max(a.again[w], 1)
-            elif unsettled:
-                s.fail(w, UNSETTLED, i)
-                ti.atomic_min(s.blame[w], self.effect.index)
+            elif on:
+                if ti.static(self.trial):
+                    # Forces that are not finite: the step is given up.
+                    a.value[w, i] *= ti.math.inf
+                else:
+                    unsettled(s, w, i, self.effect)
+
+
+@ti.func
+def unsettled(s, w, i, effect: ti.template()):  # type: ignore[valid-type]
+    s.fail(w, UNSETTLED, i)
+    ti.atomic_min(s.blame[w], effect.index)
 
 
 class Judge(Phase):
     """One sweep more, or none."""
 
-    def __init__(self, settling: Settling) -> None:
+    def __init__(self, settling: MutualSettling) -> None:
         self.settling = settling
 
     @ti.func
     def run(self, w, _k):
-        a = self.settling
-        a.s.mutual_sweeps[w] += 1
+        a, s = self.settling, self.settling.s
+        s.mutual_sweeps[w] += 1
+        now, last, before = ti.static(a.changes)
+        if before[w] > 0.0:
+            # Of two sweeps: where others act as much along as against, changes grow by turns.
+            s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
+        before[w], last[w], now[w] = last[w], now[w], 0.0
         a.sweeps[w] += 1
         a.pending[w] = a.again[w]
         a.again[w], a.largest[w] = 0, 0.0
+
+
+def settling(s: State, effect: Settled, domain: Domain, halves: Halves | None) -> Any:
+    """What settles the quantity of an effect."""
+    return MutualSettling(s, effect, domain, halves) if isinstance(effect, Mutual) else Settling(s, effect)

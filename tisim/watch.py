@@ -46,7 +46,7 @@ class Watch:
             for w in map(int, np.flatnonzero(bad.any(axis=1))):
                 found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
         for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
-            found[w] = self._fault(w, REASONS[int(status[w])])
+            found[w] = self._fault(w, int(status[w]))
         for w, fault in found.items():
             self.faults.setdefault(w, (float(now["time"][w]), fault))
         sound = np.array([w not in found for w in range(worlds)])
@@ -63,9 +63,10 @@ class Watch:
             return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
         return Status(code == ENDED, REASONS[code])
 
-    def _fault(self, w: int, reason: str) -> str:
+    def _fault(self, w: int, code: int) -> str:
         """What the kernels have recorded of a failure: reason, effect and particle."""
         blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
         effects = self.scenes[w].effects
         by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
-        return f"{reason}{by}, at particle {who}"
+        factor = f": a sweep multiplies the change by {self.s.read('sweep_factor')[w]:.3g}"
+        return f"{REASONS[code]}{factor if code == UNSETTLED else ''}{by}, at particle {who}"

@@ -4,32 +4,13 @@ import numpy as np
 import pytest
 
 from tests.effects.loads import WORLDS, close, cloud, fields_beside_the_core, jacobians, loads, vector
+from tests.effects.magnets import Quadrupole
 from tests.scenes import scene, simulate
 from tisim import Scene
-from tisim._taichi import ti
-from tisim.effect import Source, parameter
 from tisim.effects.lorentz import Lorentz
 from tisim.effects.magnetic_body_force import MagneticBodyForce
 from tisim.errors import InputError
 from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.spec import Vector
-
-
-class Quadrupole(Source):
-    """B = C + S (y, x, z^2), whose gradient is not symmetric once sheared by the scale of each component."""
-
-    quantity = "magnetic_flux_density"
-    constant: Vector = parameter("T")
-    scale: Vector = parameter("T/m")
-
-    @ti.func
-    def value(self, w, r, t):
-        return self.constant(w) + self.scale(w) * ti.Vector([r[1], r[0], r[2] * r[2]])
-
-    @ti.func
-    def gradient(self, w, r, t):
-        a = self.scale(w)
-        return ti.Matrix([[0.0, a[0], 0.0], [a[1], 0.0, 0.0], [0.0, 0.0, 2.0 * a[2] * r[2]]])
 
 
 def waves(source, t):

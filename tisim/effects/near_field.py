@@ -96,7 +96,7 @@ class TruncatedNearField(NearField):
         return ()
 
     @ti.func
-    def reach(self, w):
+    def reach(self, s, w, i):
         # Pairs are listed by the gap between their surfaces, which is less than the distance of the centres.
         return self.cutoff(w)
 

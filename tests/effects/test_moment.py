@@ -1,0 +1,144 @@
+"""Magnetic moments along the field, and the pull of a field on them, against NumPy and closed forms."""
+
+from decimal import Decimal, getcontext
+
+import numpy as np
+import pytest
+
+from tests.effects.loads import WORLDS, close, cloud, fields_beside_the_core, loads, vector
+from tests.effects.magnets import K_B, MU_0, Quadrupole, flux_density, gradient
+from tests.scenes import scene, simulate
+from tisim.effects.magnetophoresis import Magnetophoresis
+from tisim.effects.moment import FixedMoment, InducedMoment, LangevinMoment
+from tisim.errors import InputError
+from tisim.sources.uniform import MagneticField
+from tisim.steppers.boris import Boris
+from tisim.steppers.collocation import Collocation
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.stage_control import StageControl
+from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.verlet import Verlet
+
+
+def langevin(x):
+    """L(x) = coth x - 1/x with 60 digits."""
+    getcontext().prec = 60
+    x = Decimal(float(x))
+    e = (-2 * x).exp()
+    return float((1 + e) / (1 - e) - 1 / x)
+
+
+def made_of(rng, law, **quantities):
+    effects = (
+        Quadrupole(constant=vector(rng), scale=vector(rng)),
+        MagneticField(constant=vector(rng)),
+        law,
+        Magnetophoresis(),
+    )
+    return cloud(rng, effects, quantities=quantities)
+
+
+def check(made, size):
+    """Moments of ``size`` along B, and the force of the gradient on them."""
+    for one, state in zip(made, loads(made), strict=True):
+        b = flux_density(one, state["position"])
+        strength = np.linalg.norm(b, axis=1)
+        expected = (size(one.effects[2], state, strength) / strength)[:, None] * b
+        close(state["moment"], expected)
+        close(state["force"], np.einsum("iab,ib->ia", gradient(one, state["position"]), expected))
+
+
+def test_langevin_moments_of_many_domains(rng):
+    """x from 1e-2 to 1e2, for each particle its own domains."""
+    made = []
+    for _ in range(WORLDS):
+        law = LangevinMoment(temperature=float(rng.uniform(100, 500)))
+        domains = K_B * law.temperature * 10 ** rng.uniform(-2, 2, 12)
+        made.append(made_of(rng, law, saturation_moment=rng.uniform(0, 2, 12), domain_moment=domains))
+
+    def size(law, state, strength):
+        x = state["domain_moment"] * strength / (K_B * law.temperature)
+        return state["saturation_moment"] * [langevin(x) for x in x]
+
+    check(made, size)
+
+
+def test_induced_moments_are_those_of_magnetised_spheres(rng):
+    """V M with M = chi H and H = H_0 - M/3 inside; from a superconductor to iron."""
+    made = [made_of(rng, InducedMoment(susceptibility=chi)) for chi in (-1, -1e-5, 0, 1e-3, 0.5, 3, 1e3, 1e6)]
+
+    def size(law, state, strength):
+        magnetisation = np.linalg.solve([[1, -law.susceptibility], [1 / 3, 1]], [0, 1])[0] / MU_0
+        return 4 / 3 * np.pi * state["radius"] ** 3 * magnetisation * strength
+
+    check(made, size)
+
+
+STEPPERS = [
+    pytest.param(Verlet(control=FixedStep(dt=1e-3)), id="verlet"),
+    pytest.param(Boris(control=FixedStep(dt=1e-3)), id="boris", marks=pytest.mark.long),
+    pytest.param(
+        Trapezoid(control=ErrorControl(error=1e-7, tolerance=1e-9, first=1e-3, longest=1e-2)),
+        id="trapezoid, each particle alone",
+        marks=pytest.mark.long,
+    ),
+    pytest.param(
+        Collocation(control=StageControl(error=1e-10, first=1e-3)), id="collocation", marks=pytest.mark.long
+    ),
+]
+
+
+@pytest.mark.parametrize("stepper", STEPPERS)
+def test_every_stepper_settles_moments_before_forces(stepper):
+    """In B = (y, x, 0) a moment of m_s B/|B| is pulled by m_s r/|r| in the plane: a constant force outwards.
+
+    Particles that start from rest on a ray go along it: r = r_0 + m_s/m t^2/2. At the end the moment is that
+    of the place.
+    """
+    field = Quadrupole(constant=(0, 0, 0), scale=(1, 1, 0))
+    effects = (field, FixedMoment(), Magnetophoresis())
+    angle = np.array([0.1, 2.0, 4.0])
+    ray = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    moments = {"saturation_moment": [3.0, 2.0, 1.0]}
+    made = scene(ray, 0 * ray, effects, mass=2.0, duration=1.5, quantities=moments, stepper=stepper)
+    (result,) = simulate([made], capacity=4)
+    assert result.status.ok
+    assert result.time == 1.5
+    r = result.state["position"]
+    size = np.array([[3.0], [2.0], [1.0]])
+    np.testing.assert_allclose(r, (1 + 0.5 * size / 2.0 * 1.5**2) * ray, rtol=0, atol=2e-6)
+    expected = size * r[:, [1, 0, 2]] / np.linalg.norm(r, axis=1)[:, None]
+    np.testing.assert_allclose(result.state["moment"], expected, rtol=0, atol=1e-9)
+
+
+def test_only_what_is_needed_is_allocated():
+    field = MagneticField(constant=(0, 0, 1))
+    fixed = {"moment", "saturation_moment"}
+    for law, more in (
+        (FixedMoment(), fixed),
+        (LangevinMoment(temperature=1), fixed | {"domain_moment"}),
+        (InducedMoment(susceptibility=1), {"moment"}),
+    ):
+        assert fields_beside_the_core(scene([[0, 0, 0]], [[0, 0, 0]], (field, law))) == more
+
+
+AT_REST = ([[0, 0, 0]], [[0, 0, 0]])
+WRONG = {
+    "effects.fixed_moment must be used together with a source of magnetic_flux_density; "
+    "received 'fixed_moment'": lambda: scene(*AT_REST, (FixedMoment(),)),
+    "langevin_moment.temperature must be greater than 0.0; received 0": lambda: LangevinMoment(temperature=0),
+    "induced_moment.susceptibility must be at least -1.0; received -2": lambda: InducedMoment(
+        susceptibility=-2
+    ),
+    "particles must be given saturation_moment, which effects of the scene need; received none": lambda: (
+        loads([scene(*AT_REST, (MagneticField(), FixedMoment()))])
+    ),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_wrong_is_named(message):
+    with pytest.raises(InputError) as fault:
+        WRONG[message]()
+    assert str(fault.value) == message
