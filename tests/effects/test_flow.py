@@ -1,0 +1,77 @@
+"""Flows that drag laws feel, against NumPy and a closed form."""
+
+import numpy as np
+import pytest
+
+from tests.effects.loads import WORLDS, close, cloud, loads, vector
+from tests.scenes import scene, simulate
+from tisim.effects.drag import StokesDrag
+from tisim.errors import InputError
+from tisim.sources.flow import DarcyFlow, UniformFlow, kozeny_carman
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.trapezoid import Trapezoid
+
+FORMS = [("fibres", "packing", 4.0), ("spheres", "pores", 6.0)]
+
+
+@pytest.mark.parametrize(("packed", "mean", "per_size"), FORMS)
+def test_drag_in_both_flows_together(packed, mean, per_size, rng):
+    """B16 (7.3), (7.4): U = eps^3 nu^2 / (C (1 - eps)^2) (-grad p) / eta, nu = V / S."""
+    made = []
+    for _ in range(WORLDS):
+        darcy = DarcyFlow(
+            pressure_gradient=vector(rng),
+            viscosity=float(rng.uniform(0.1, 1)),
+            porosity=float(rng.uniform(0.1, 0.9)),
+            diameter=float(rng.uniform(1, 3)),
+            constant=float(rng.uniform(4, 6)),
+            packed=packed,
+            mean=mean,
+        )
+        made.append(cloud(rng, (UniformFlow(velocity=vector(rng)), darcy, StokesDrag(viscosity=0.7))))
+    for one, state in zip(made, loads(made), strict=True):
+        flow, darcy, _ = one.effects
+        eps, nu = darcy.porosity, darcy.diameter / per_size
+        speed = eps**3 * nu**2 / (darcy.constant * (1 - eps) ** 2) / darcy.viscosity
+        speed /= eps if mean == "pores" else 1.0
+        fluid = np.array(flow.velocity) - speed * np.array(darcy.pressure_gradient)
+        expected = 6 * np.pi * 0.7 * state["radius"][:, None] * (fluid - state["velocity"])
+        np.testing.assert_allclose(state["force"], expected, rtol=1e-12, atol=1e-12)
+
+
+def test_permeability_is_that_of_blake_kozeny_and_carman():
+    """Spheres with C = 5: eps^3 D^2 / (180 (1 - eps)^2), the textbook form."""
+    assert kozeny_carman(0.4, 1e-3 / 6, 5.0) == pytest.approx(0.4**3 * 1e-6 / (180 * 0.6**2), rel=1e-14)
+
+
+def test_a_particle_takes_up_the_velocity_of_the_fluid():
+    """v = v_f (1 - exp(-t/tau)), tau = m / (6 pi mu R), from rest."""
+    tau, end = 2.0 / (6 * np.pi * 0.5 * 0.1), 3.0
+    made = scene(
+        [[0, 0, 0]],
+        [[0, 0, 0]],
+        (UniformFlow(velocity=(1, -2, 3)), StokesDrag(viscosity=0.5)),
+        radius=0.1,
+        mass=2.0,
+        stepper=Trapezoid(control=ErrorControl(error=1e-8, tolerance=1e-10, first=1e-3, longest=0.1)),
+        duration=end,
+    )
+    (result,) = simulate([made], capacity=4)
+    assert result.status.ok
+    expected = np.array([1, -2, 3]) * (1 - np.exp(-end / tau))
+    close(result.state["velocity"][0], expected, 1e-6)
+
+
+WRONG = {
+    "darcy_flow.porosity must be less than 1.0; received 1": {"porosity": 1},
+    "darcy_flow.diameter must be greater than 0.0; received 0": {"diameter": 0},
+    "darcy_flow.packed must be 'fibres' or 'spheres'; received 'wool'": {"packed": "wool"},
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_wrong_is_named(message):
+    right = {"pressure_gradient": (0, 0, 1), "viscosity": 1e-3, "porosity": 0.5, "diameter": 1e-3}
+    with pytest.raises(InputError) as fault:
+        DarcyFlow(**{**right, **WRONG[message]})
+    assert str(fault.value) == message

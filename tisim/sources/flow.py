@@ -1,0 +1,67 @@
+"""The velocity of a fluid that particles are in: uniform, or as a pressure drives it through a packing."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from tisim._taichi import ti
+from tisim.effect import Source, parameter
+from tisim.spec import Vector
+
+
+class UniformFlow(Source):
+    """Fluid that moves everywhere at the same velocity; who feels it are the drag laws.
+
+    velocity : of the fluid. Source: B16 section 7.2.
+    """
+
+    quantity = "flow_velocity"
+
+    velocity: Vector = parameter("m/s")
+
+    @ti.func
+    def value(self, w, r, t):
+        return self.velocity(w)
+
+
+def kozeny_carman(porosity, size, constant):
+    """Permeability k = (1 - phi)^3 nu^2 / (C phi^2) of a packing (m^2).
+
+    porosity : 1 - phi. size : nu (m), volume over surface of what it is packed of. constant : C.
+    Source: B16 Eq. (7.4), after Kozeny (1927) and Carman (1937).
+    """
+    return porosity**3 * size**2 / (constant * (1.0 - porosity) ** 2)
+
+
+_kozeny_carman = ti.func(kozeny_carman)
+
+
+class DarcyFlow(Source):
+    """U = -k/eta grad p: slow flow through a packing, in the mean over it; k of Kozeny and Carman.
+
+    pressure_gradient : grad p; the fluid goes against it. viscosity : eta, dynamic, of the fluid.
+    porosity : 1 - phi. diameter : D of the fibres (long ones: nu = D/4) or spheres (D/6) it is packed of.
+    constant : C of Kozeny and Carman; about 5 in random packings.
+    mean : over the whole "packing", Darcy's velocity, or over the "pores" alone, where it is faster by one
+    over the porosity. B16 (7.3) gives the mass that flows, rho_0 A U.
+
+    Source: B16 Eqs (7.3), (7.4).
+    """
+
+    quantity = "flow_velocity"
+
+    pressure_gradient: Vector = parameter("Pa/m")
+    viscosity: float = parameter("Pa s", gt=0)
+    porosity: float = parameter("", gt=0, lt=1)
+    diameter: float = parameter("m", gt=0)
+    constant: float = parameter("", 5.0, gt=0)
+    packed: Literal["fibres", "spheres"] = "fibres"
+    mean: Literal["packing", "pores"] = "packing"
+
+    @ti.func
+    def value(self, w, r, t):
+        size = self.diameter(w) / ti.static(4.0 if self.packed == "fibres" else 6.0)
+        velocity = -_kozeny_carman(self.porosity(w), size, self.constant(w)) / self.viscosity(w)
+        if ti.static(self.mean == "pores"):
+            velocity /= self.porosity(w)
+        return velocity * self.pressure_gradient(w)
