@@ -245,7 +245,7 @@ class Judge(Phase):
         a, s = self.settling, self.settling.s
         s.mutual_sweeps[w] += 1
         now, last, before = ti.static(a.changes)
-        if before[w] > 0.0:
+        if before[w] > 0.0 and now[w] < ti.math.inf:
             # Of two sweeps: where others act as much along as against, changes grow by turns.
             s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
         before[w], last[w], now[w] = last[w], now[w], 0.0

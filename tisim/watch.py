@@ -68,5 +68,7 @@ class Watch:
         blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
         effects = self.scenes[w].effects
         by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
-        factor = f": a sweep multiplies the change by {self.s.read('sweep_factor')[w]:.3g}"
-        return f"{REASONS[code]}{factor if code == UNSETTLED else ''}{by}, at particle {who}"
+        reason = REASONS[code]
+        if code == UNSETTLED:
+            reason += f": a sweep multiplies the change by {self.s.read('sweep_factor')[w]:.3g}"
+        return f"{reason}{by}, at particle {who}"

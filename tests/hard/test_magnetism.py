@@ -1,0 +1,257 @@
+"""Magnetic moments where it is hardest: in no field and too much, at contact and closer, near divergence."""
+
+import numpy as np
+import pytest
+
+from tests.effects.loads import WORLDS, close, loads
+from tests.effects.magnets import K_B, MU_0, Quadrupole, dipole_field
+from tests.effects.test_dipole_dipole import SIDE, magnets
+from tests.effects.test_moment import langevin
+from tests.scenes import by_id, fixed, scene, simulate
+from tisim import Simulation
+from tisim._taichi import ti
+from tisim.effects.dipole_dipole import DipoleDipole
+from tisim.effects.magnetophoresis import Magnetophoresis
+from tisim.effects.mie import Mie
+from tisim.effects.moment import FixedMoment, LangevinMoment
+from tisim.effects.mutual_moment import MutualInducedMoment
+from tisim.effects.near_field import NearField
+from tisim.langevin import langevin_ratio
+from tisim.sources.uniform import MagneticField
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.trapezoid import Trapezoid
+
+N = np.array([2.0, -3.0, 6.0]) / 7
+ARGUMENTS = np.concatenate(
+    [[1e-30, 1e-12, 1e6, 1e30], np.nextafter(1, [0, 1, 2]), 10 ** np.linspace(-4, 3, 400)]
+)
+
+
+@ti.kernel
+def _ratios(x: ti.types.ndarray(), out: ti.types.ndarray()):
+    for k in range(x.shape[0]):
+        out[k] = langevin_ratio(x[k])
+
+
+def ratios(real=np.float32):
+    """L(x)/x of all arguments, and of 0."""
+    x = np.concatenate([ARGUMENTS, [0.0]]).astype(real)
+    out = np.zeros_like(x)
+    _ratios(x, out)
+    return out.astype(float).tolist()
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+def test_langevins_function_is_right_to_rounding(real, request):
+    """For x from 1e-30 to 1e30, in both precisions, against 60 digits; 1/3 at 0."""
+    found = np.array(
+        ratios(real)
+        if real is np.float64
+        else request.getfixturevalue("single")("hard.test_magnetism", "ratios")
+    )
+    assert found[-1] == real(1 / 3)
+    x = ARGUMENTS.astype(real).astype(float)
+    expected = np.array([langevin(x) / x if x > 1e-15 else 1 / 3 for x in x])
+    assert np.abs(found[:-1] / expected - 1).max() < 4 * np.finfo(real).eps
+
+
+def test_no_field_no_moment_and_no_force():
+    """Where B = 0 no direction is preferred; next to it the moment is whole. Nothing is 0/0."""
+    place = np.array([[0, 0, 0], [1e-12, 0, 0], [0, 0, 0], [1, 0, 0]])
+    field = Quadrupole(constant=(0, 0, 0), scale=(2, 2, 1))
+    start = {"saturation_moment": 5.0}
+    expected = {FixedMoment(): 5.0, LangevinMoment(temperature=1e4): None}
+    for law, size in expected.items():
+        effects = (field, law, Magnetophoresis())
+        quantities = start if size else {**start, "domain_moment": 1e-20}
+        (state,) = loads([scene(place, 0 * place, effects, mass=1.0, quantities=quantities)])
+        x = 1e-20 * 2 * place[:, 0] / (K_B * 1e4)
+        along = [5.0, 5.0] if size else [5.0 * x[1] / 3, 5.0 * langevin(x[3])]
+        np.testing.assert_allclose(state["moment"][[1, 3], 1], along, rtol=1e-14)
+        np.testing.assert_array_equal(state["moment"][[0, 2]], 0.0)
+        np.testing.assert_array_equal(state["force"][[0, 2]], 0.0)
+        np.testing.assert_allclose(state["force"][[1, 3], 0], 2 * np.array(along), rtol=1e-14)
+
+
+def test_langevin_moments_of_weak_and_strong_fields():
+    """x from 1e-12 to 1e6: linear, m_s x / 3, and saturated, m_s (1 - 1/x)."""
+    law = LangevinMoment(temperature=300.0)
+    made = []
+    for b in (1e-12, 1e-6, 1e3, 1e6):
+        effects = (Quadrupole(constant=b * N, scale=(0, 0, 0)), law, Magnetophoresis())
+        quantities = {"saturation_moment": 1e-16, "domain_moment": K_B * 300.0}
+        made.append(scene([[0, 0, 0]], [[0, 0, 0]], effects, mass=1.0, quantities=quantities))
+    sizes = [1e-12 / 3, 1e-6 / 3, 1 - 1e-3, 1 - 1e-6]
+    for state, size in zip(loads(made), sizes, strict=True):
+        np.testing.assert_allclose(state["moment"], [1e-16 * size * N], rtol=1e-12)
+
+
+def test_dipoles_at_contact_and_closer(rng):
+    """In one place a force has neither direction nor size: a failure that names it. At 1e-12 of a radius it
+    is as anywhere; antiparallel ones at contact are drawn together side by side and driven apart in line."""
+    moment = rng.normal(size=3)
+    place = np.array([[1.0, 1, 1], [1.0, 1, 1], [2, 2, 2]])
+    law = magnets(rng, DipoleDipole(), n=3)
+
+    def at(place, moments):
+        start = law.particles.model_copy(
+            update={
+                "position": tuple(map(tuple, place)),
+                "quantities": {"moment": [list(m) for m in moments]},
+                "radius": (0.1,) * 3,
+            }
+        )
+        return law.model_copy(update={"particles": start})
+
+    (bad,) = simulate([at(place, [moment] * 3)], worlds=WORLDS, capacity=16)
+    for word in ("at t = 0 s", "effects.dipole_dipole", "particle 0", "not finite"):
+        assert word in bad.status.reason
+    np.testing.assert_array_equal(bad.state["position"], place)
+    far = [0.1, 0.1, 0.1]
+    d = np.array([2.0**-44, 0, 0])
+    (near,) = loads([at([d, [0, 0, 0], far], [[3.0, 0, 0], [2.0, 0, 0], [0, 0, 0]])])
+    unit = 3 * MU_0 / (4 * np.pi)
+    np.testing.assert_allclose(near["force"][0], [-2 * unit * 6.0 * 2.0**176, 0, 0], rtol=1e-12)
+    assert (near["force"].sum(axis=0) == 0).all()
+    for moments, expected in (
+        ([[0, 1, 0], [0, -1, 0], [0, 0, 0]], unit / 0.2**4),
+        ([[1, 0, 0], [-1, 0, 0], [0, 0, 0]], -2 * unit / 0.2**4),
+    ):
+        (state,) = loads([at([[0.5, 0.5, 0.5], [0.7, 0.5, 0.5], [0.5, 2, 2]], moments)])
+        np.testing.assert_allclose(state["force"][0], [expected, 0, 0], rtol=1e-12, atol=1e-20)
+    assert SIDE > 2
+
+
+def spheres(place, **options):
+    """Of mu_r = 1e6 and 1 m, in a uniform field."""
+    law = MutualInducedMoment(susceptibility=1e6 - 1, **options)
+    laws = (MagneticField(constant=(0, 0, 1)), law)
+    return scene(place, 0 * place, laws, radius=1.0, mass=1.0)
+
+
+def settled(made, capacity=128):
+    simulation = Simulation(made[0], worlds=len(made), capacity=capacity)
+    simulation.load(made)
+    results = simulation.results()
+    simulation.close()
+    return results
+
+
+def solve(place):
+    n, chi = len(place), 1e6 - 1
+    gain = 4 * np.pi / MU_0 * chi / (3 + chi)
+    matrix = np.eye(3 * n) - gain * dipole_field(place).transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+    return np.linalg.solve(matrix, np.tile([0, 0, gain], n)).reshape(n, 3)
+
+
+def test_mutual_induction_converges_or_says_that_it_cannot():
+    """mu_r = 1e6. Two that overlap until 2 a = 2 R^3/d^3 exceeds 1, where their moments would grow without
+    end; a long chain; dense lattices, whose eigenvalues below -1 relaxation takes in. The right moments, or a
+    clear failure with what a sweep multiplies the change by."""
+    lattice = 2.0 * np.argwhere(np.ones((5, 5, 5)))
+    faces = np.argwhere(np.ones((6, 6, 6)))
+    faces = np.sqrt(2) * faces[faces.sum(axis=1) % 2 == 0]
+    chain = np.stack([0 * np.arange(50.0), 0 * np.arange(50.0), 2 * np.arange(50.0)], axis=1)
+
+    def pair(d):
+        return np.array([[0, 0, 0], [0, 0, d]])
+
+    enough = {"sweeps": 2000, "tolerance": 1e-12}
+    cases = [
+        (pair(2.0), {}, None),
+        (pair(1.27), {}, None),
+        (chain, {}, None),
+        (lattice, {"relaxation": 0.75}, None),
+        (faces, {"relaxation": 0.75}, None),
+        (pair(1.25), {}, 2 / 1.25**3),
+        (pair(0.5), {}, 2 / 0.5**3),
+        (pair(1e-3), {}, 2e9),
+        (lattice, {}, 1.0639),
+        (faces, {}, 1.3313),
+        (pair(0.0), {}, np.nan),
+    ]
+    results = settled([spheres(place, **enough, **options) for place, options, _ in cases])
+    for (place, _, factor), result in zip(cases, results, strict=True):
+        if factor is None:
+            assert result.status.ok or result.status.reason == "running", result.status.reason
+            close(result.state["moment"], solve(place), 1e-9)
+            continue
+        assert "effects.mutual_induced_moment, at particle" in result.status.reason
+        np.testing.assert_array_equal(result.state["position"], place)
+        if np.isfinite(factor):
+            assert "does not converge: a sweep multiplies the change by" in result.status.reason
+            # Of (1 - 1e-6) of it, as mu_r is not infinite.
+            assert result.measures["sweep_factor"] == pytest.approx(factor, rel=1e-4)
+        else:
+            assert "not finite" in result.status.reason
+
+
+def energy(state, wall, b):
+    """Kinetic, of linear dipoles in the field b, and of the repulsion between the two. J."""
+    gap = np.linalg.norm(state["position"][1] - state["position"][0])
+    return 0.5 * (state["velocity"] ** 2).sum() - 0.5 * (state["moment"] @ b).sum() + wall(gap)
+
+
+@pytest.mark.long
+def test_a_trial_state_in_which_nothing_converges_is_given_up():
+    """Two spheres fly at each other in a field and bounce off; a first step so long that it ends with both in
+    each other, where moments have no end, is tried again with a shorter one. Energy stays; nothing fails.
+    """
+    b, power = (0.0, 0, 1e-2), 30
+    push = NearField(alpha2=900.0 * (power - 1) * 2.05 ** (power - 1), beta2=power)
+    law = MutualInducedMoment(susceptibility=1e6, tolerance=1e-13, sweeps=200)
+    made = scene(
+        [[0, 0, -2.0], [0, 0, 2.0]],
+        [[0, 0, 30.0], [0, 0, -30.0]],
+        (MagneticField(constant=b), law, DipoleDipole(), push),
+        radius=1.0,
+        mass=1.0,
+        stepper=Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-9, first=0.05, longest=0.05)),
+        duration=0.2,
+    )
+    (start,) = settled([made], capacity=4)
+    (result,) = simulate([made], capacity=4)
+    assert result.status.ok, result.status.reason
+    assert result.work["rejections"] > 0
+    assert by_id(result)["velocity"][1, 2] > 20
+
+    def wall(gap):
+        return push.alpha2 / (power - 1) * gap ** (1 - power)
+
+    assert energy(by_id(result), wall, b) == pytest.approx(energy(by_id(start), wall, b), rel=1e-4)
+
+
+@pytest.mark.long
+def test_a_pair_that_snaps_together_keeps_its_energy():
+    """Head to tail, from rest, onto hard spheres and off again, twenty times: Mie(30, 15) takes the blows."""
+    size, bottom, steps = 4e3, 2 * 2 ** (1 / 15), 300
+    made = scene(
+        [[0, 0, -1.3], [0, 0, 1.3]],
+        np.zeros((2, 3)),
+        (DipoleDipole(), Mie(epsilon=3.0)),
+        radius=1.0,
+        mass=1.0,
+        stepper=fixed(1e-3),
+        duration=60.0,
+        quantities={"moment": [[0, 0, size]] * 2},
+    )
+
+    def look(result):
+        state = by_id(result)
+        gap = np.linalg.norm(state["position"][1] - state["position"][0])
+        wall = 3 * (4 * ((2 / gap) ** 30 - (2 / gap) ** 15) + 1) if gap < bottom else 0.0
+        pull = -2 * MU_0 / (4 * np.pi) * size**2 / gap**3
+        return gap, 0.5 * (state["velocity"] ** 2).sum() + pull + wall
+
+    simulation = Simulation(made)
+    simulation.load([made])
+    seen = [look(*simulation.results())]
+    while simulation.fraction() < 1:
+        simulation.run(steps=steps)
+        seen.append(look(*simulation.results()))
+    assert simulation.results()[0].status.ok
+    simulation.close()
+    gaps, energies = np.array(seen).T
+    assert (np.diff(np.sign(np.diff(gaps))) != 0).sum() > 30
+    assert gaps.min() < bottom < 2.55 < gaps.max() < 2.601
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-3)
