@@ -116,20 +116,23 @@ class SumForces(PairSum):
 
     @ti.func
     def largest(self, w, i):
-        """Index of the effect whose force on i is largest, or not finite."""
+        """Index of the effect whose force on i is largest, or not finite, or settles to nothing finite."""
         s = self.s
         t = s.time[w]
         most, found = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces):
             size = self.single(effect, w, i, t).norm()
-            if not (size <= most):
+            if most < ti.math.inf and not (size <= most):
                 most, found = size, effect.index
         for effect in ti.static(self.pair_forces):
             total = ti.Vector.zero(s.real, self.components)
             for j in range(s.count[w]):
                 total += self.of((effect,), w, i, j, t)
-            if not (total.norm() <= most):
+            if most < ti.math.inf and not (total.norm() <= most):
                 most, found = total.norm(), effect.index
+        for settling in ti.static(self.settlings):
+            if not (settling.size(settling.value[w, i]) < ti.math.inf):
+                found = settling.effect.index
         return found
 
 

@@ -29,16 +29,16 @@ class Quadrupole(Source):
         return ti.Matrix([[0.0, a[0], 0.0], [a[1], 0.0, 0.0], [0.0, 0.0, 2.0 * a[2] * r[2]]])
 
 
-def flux_density(made, r):
+def flux_density(effects, r):
     """B of a Quadrupole, first of the effects, and a uniform MagneticField, second; at r, (n, 3)."""
-    field, uniform = made.effects[:2]
+    field, uniform = effects[:2]
     b = np.array(field.constant) + np.array(uniform.constant)
     return b + np.array(field.scale) * np.stack([r[:, 1], r[:, 0], r[:, 2] ** 2], axis=1)
 
 
-def gradient(made, r):
+def gradient(effects, r):
     """[a, b] the derivative of component a of the same along axis b; (n, 3, 3)."""
-    a, zero = made.effects[0].scale, 0.0 * r[:, 0]
+    a, zero = effects[0].scale, 0.0 * r[:, 0]
     rows = [[zero, a[0] + zero, zero], [a[1] + zero, zero, zero], [zero, zero, 2 * a[2] * r[:, 2]]]
     return np.array(rows).transpose(2, 0, 1)
 

@@ -130,7 +130,7 @@ def solved(one, r, radius):
     """Induced moments by one linear solve, and the energy -1/2 sum m . B of the applied field."""
     chi = one.effects[2].susceptibility
     gain = 4 * np.pi / MU_0 * chi / (3 + chi) * radius**3
-    b, n = flux_density(one, r), len(r)
+    b, n = flux_density(one.effects, r), len(r)
     matrix = np.eye(3 * n) - np.repeat(gain, 3)[:, None] * dipole_field(r).transpose(0, 2, 1, 3).reshape(
         3 * n, 3 * n
     )
@@ -200,7 +200,7 @@ def test_langevin_moments_in_each_others_field(rng):
     ratios = []
     for one, state in zip(made, loads(made), strict=True):
         m = state["moment"]
-        own = flux_density(one, state["position"])
+        own = flux_density(one.effects, state["position"])
         b = own + np.einsum("ijab,jb->ia", dipole_field(state["position"]), m)
         x = np.linalg.norm(b, axis=1)
         expected = (state["saturation_moment"] * (1 / np.tanh(x) - 1 / x) / x)[:, None] * b

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.effects.loads import WORLDS, close, loads
-from tests.effects.magnets import K_B, MU_0, Quadrupole, dipole_field
+from tests.effects.magnets import K_B, MU_0, Quadrupole, dipole_field, flux_density
 from tests.effects.test_dipole_dipole import SIDE, magnets
 from tests.effects.test_moment import langevin
 from tests.scenes import by_id, fixed, scene, simulate
@@ -55,35 +55,44 @@ def test_langevins_function_is_right_to_rounding(real, request):
     assert np.abs(found[:-1] / expected - 1).max() < 4 * np.finfo(real).eps
 
 
-def test_no_field_no_moment_and_no_force():
-    """Where B = 0 no direction is preferred; next to it the moment is whole. Nothing is 0/0."""
+def test_no_field_no_moment_and_no_force(rng):
+    """Where B = 0 no direction is preferred; next to it the moment is whole, and elsewhere."""
     place = np.array([[0, 0, 0], [1e-12, 0, 0], [0, 0, 0], [1, 0, 0]])
     field = Quadrupole(constant=(0, 0, 0), scale=(2, 2, 1))
-    start = {"saturation_moment": 5.0}
-    expected = {FixedMoment(): 5.0, LangevinMoment(temperature=1e4): None}
-    for law, size in expected.items():
-        effects = (field, law, Magnetophoresis())
-        quantities = start if size else {**start, "domain_moment": 1e-20}
-        (state,) = loads([scene(place, 0 * place, effects, mass=1.0, quantities=quantities)])
+    start = {"saturation_moment": 5.0, "domain_moment": 1e-20}
+    for law in (FixedMoment(), LangevinMoment(temperature=1e4)):
+        fixed_size = isinstance(law, FixedMoment)
+        quantities = {"saturation_moment": 5.0} if fixed_size else start
+
+        def at(place, effects, quantities=quantities):
+            return scene(place, 0 * place, effects, mass=1.0, quantities=quantities)
+
+        anywhere = Quadrupole(constant=tuple(rng.normal(size=3)), scale=tuple(rng.normal(size=3)))
+        effects = [(source, law, Magnetophoresis()) for source in (field, anywhere)]
+        null, other = loads([at(place, effects[0]), at(rng.normal(size=(9, 3)), effects[1])])
         x = 1e-20 * 2 * place[:, 0] / (K_B * 1e4)
-        along = [5.0, 5.0] if size else [5.0 * x[1] / 3, 5.0 * langevin(x[3])]
-        np.testing.assert_allclose(state["moment"][[1, 3], 1], along, rtol=1e-14)
-        np.testing.assert_array_equal(state["moment"][[0, 2]], 0.0)
-        np.testing.assert_array_equal(state["force"][[0, 2]], 0.0)
-        np.testing.assert_allclose(state["force"][[1, 3], 0], 2 * np.array(along), rtol=1e-14)
+        along = [5.0, 5.0] if fixed_size else [5.0 * x[1] / 3, 5.0 * langevin(x[3])]
+        np.testing.assert_allclose(null["moment"][[1, 3], 1], along, rtol=1e-14)
+        np.testing.assert_array_equal(null["moment"][[0, 2]], 0.0)
+        np.testing.assert_array_equal(null["force"][[0, 2]], 0.0)
+        np.testing.assert_allclose(null["force"][[1, 3], 0], 2 * np.array(along), rtol=1e-14)
+        b = flux_density((anywhere, MagneticField()), other["position"])
+        strength = np.linalg.norm(b, axis=1)
+        size = [1.0 if fixed_size else langevin(1e-20 * b / (K_B * 1e4)) for b in strength]
+        close(other["moment"], (5.0 * np.array(size) / strength)[:, None] * b)
 
 
 def test_langevin_moments_of_weak_and_strong_fields():
-    """x from 1e-12 to 1e6: linear, m_s x / 3, and saturated, m_s (1 - 1/x)."""
+    """x from 1e-12 to 1e6: linear, m_s x / 3, and saturated, m_s (1 - 1/x); of particles of one domain."""
     law = LangevinMoment(temperature=300.0)
     made = []
     for b in (1e-12, 1e-6, 1e3, 1e6):
         effects = (Quadrupole(constant=b * N, scale=(0, 0, 0)), law, Magnetophoresis())
-        quantities = {"saturation_moment": 1e-16, "domain_moment": K_B * 300.0}
+        quantities = {"saturation_moment": K_B * 300.0}
         made.append(scene([[0, 0, 0]], [[0, 0, 0]], effects, mass=1.0, quantities=quantities))
     sizes = [1e-12 / 3, 1e-6 / 3, 1 - 1e-3, 1 - 1e-6]
     for state, size in zip(loads(made), sizes, strict=True):
-        np.testing.assert_allclose(state["moment"], [1e-16 * size * N], rtol=1e-12)
+        np.testing.assert_allclose(state["moment"], [K_B * 300.0 * size * N], rtol=1e-12)
 
 
 def test_dipoles_at_contact_and_closer(rng):
@@ -199,18 +208,33 @@ def test_a_trial_state_in_which_nothing_converges_is_given_up():
     """
     b, power = (0.0, 0, 1e-2), 30
     push = NearField(alpha2=900.0 * (power - 1) * 2.05 ** (power - 1), beta2=power)
-    law = MutualInducedMoment(susceptibility=1e6, tolerance=1e-13, sweeps=200)
-    made = scene(
-        [[0, 0, -2.0], [0, 0, 2.0]],
-        [[0, 0, 30.0], [0, 0, -30.0]],
-        (MagneticField(constant=b), law, DipoleDipole(), push),
-        radius=1.0,
-        mass=1.0,
-        stepper=Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-9, first=0.05, longest=0.05)),
-        duration=0.2,
+    stepper = Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-9, first=0.05, longest=0.05))
+    made, never = (
+        scene(
+            [[0, 0, -2.0], [0, 0, 2.0]],
+            [[0, 0, 30.0], [0, 0, -30.0]],
+            (
+                MagneticField(constant=b),
+                MutualInducedMoment(susceptibility=1e6, tolerance=tolerance, sweeps=12),
+                DipoleDipole(),
+                push,
+            ),
+            radius=1.0,
+            mass=1.0,
+            stepper=stepper,
+            duration=0.2,
+        )
+        for tolerance in (1e-6, 1e-13)
     )
-    (start,) = settled([made], capacity=4)
-    (result,) = simulate([made], capacity=4)
+    simulation = Simulation(made, worlds=2)
+    simulation.load([made, made])
+    start = simulation.results()[0]
+    simulation.load([made, never])
+    simulation.run()
+    result, failed = simulation.results()
+    simulation.close()
+    stuck = "cannot be solved even at the shortest step, by effects.mutual_induced_moment, at particle"
+    assert stuck in failed.status.reason
     assert result.status.ok, result.status.reason
     assert result.work["rejections"] > 0
     assert by_id(result)["velocity"][1, 2] > 20
