@@ -7,14 +7,14 @@ a table, not code.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
 from tisim._taichi import ti
 from tisim.errors import must
-from tisim.spec import Spec
+from tisim.spec import Spec, room
 
 Part = TypeVar("Part", bound=Spec)
 
@@ -35,11 +35,60 @@ def _reader(table: Any, slot: int, size: int) -> Any:
     return read
 
 
+def _row_reader(table: Any, slot: int, size: int, stride: int) -> Any:
+    if size == 1:
+
+        @ti.func
+        def read(w, k):
+            return table[w, slot + k * stride]
+
+    else:
+
+        @ti.func
+        def read(w, k):
+            at = slot + k * stride
+            return ti.Vector([table[w, at], table[w, at + 1], table[w, at + 2]])
+
+    return read
+
+
+def _length_reader(table: Any, slot: int) -> Any:
+    @ti.func
+    def read(w):
+        return ti.cast(table[w, slot], ti.i32)
+
+    return read
+
+
+def _width(kind: type[Spec]) -> int:
+    return sum(size for _, _, size in kind.parameters())
+
+
+def _slots(part: Spec) -> int:
+    """In the table of a world: the part's own, and for each list its length and room for its rows."""
+    return _width(type(part)) + sum(
+        1 + _width(kind) * room(len(getattr(part, n))) for n, kind in part.lists()
+    )
+
+
+def _entries(part: Spec, where: str) -> Iterator[tuple[str, float]]:
+    """What stands in the slots of a part, in order, each with its dotted name."""
+    names = [f"{where}.{name}" for name, _, size in part.parameters() for _ in range(size)]
+    yield from zip(names, part.values(), strict=True)
+    for name, kind in part.lists():
+        rows = getattr(part, name)
+        yield f"{where}.{name}", float(len(rows))
+        for k, row in enumerate(rows):
+            yield from _entries(row, f"{where}.{name}.{k}")
+        spare = _width(kind) * (room(len(rows)) - len(rows))
+        yield from [(f"{where}.{name}", 0.0)] * spare
+
+
 class Table:
     """The parameters of every part of a scene, for every world: ``table[world, slot]``."""
 
     def __init__(self, parts: Sequence[Spec], worlds: int, real: Any) -> None:
-        self.slots = sum(size for part in parts for _, _, size in part.parameters())
+        self.slots = sum(_slots(part) for part in parts)
         self.field = ti.field(real)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, worlds).dense(ti.j, max(1, self.slots)).place(self.field)
@@ -48,10 +97,23 @@ class Table:
 
     def bind(self, part: Part) -> Part:
         """A copy of a part, of the same class, whose parameters are functions of the world."""
-        bound = part.model_copy()
+        bound, slot = part.model_copy(), self._next
         for name, _, size in part.parameters():
-            bound.__dict__[name] = _reader(self.field, self._next, size)
-            self._next += size
+            bound.__dict__[name] = _reader(self.field, slot, size)
+            slot += size
+        for name, kind in part.lists():
+            bound.__dict__[name] = self._bind_rows(kind, slot)
+            slot += 1 + _width(kind) * room(len(getattr(part, name)))
+        self._next = slot
+        return bound
+
+    def _bind_rows(self, kind: type[Spec], slot: int) -> Spec:
+        """The one bound row that stands for a list."""
+        bound, first = kind.model_construct(), slot + 1
+        bound.__dict__["size"] = _length_reader(self.field, slot)
+        for name, _, size in kind.parameters():
+            bound.__dict__[name] = _row_reader(self.field, first, size, _width(kind))
+            first += size
         return bound
 
     def write(self, rows: Sequence[Sequence[Spec]]) -> None:
@@ -61,17 +123,12 @@ class Table:
         """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):
-            table[world, : self.slots] = [value for part in parts for value in part.values()]
+            table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.kind())]
         with np.errstate(over="ignore"):
             held = table.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
         for world, slot in np.argwhere(~np.isfinite(held)):
-            slots = [
-                (part.kind(), name)
-                for part in rows[world]
-                for name, _, n in part.parameters()
-                for _ in range(n)
-            ]
-            must(False, ".".join(slots[slot]), "within the range of f32", float(table[world, slot]))
+            names = [name for part in rows[world] for name, _ in _entries(part, part.kind())]
+            must(False, names[slot], "within the range of f32", float(table[world, slot]))
         self.field.from_numpy(held)
 
     def destroy(self) -> None:

@@ -2,7 +2,8 @@
 
 Rules
 1. An effect is a frozen ``Spec``: validated data, its source and equation in the docstring.
-2. Every float or Vector parameter may differ per world; in a kernel it is a function, ``self.name(w)``.
+2. Every float or Vector parameter may differ per world; in a kernel it is a function, ``self.name(w)``. So
+   may a list of parts, in number too: ``self.list.name(w, k)``, k below ``self.list.size(w)``.
    Every other option (bool, int, text) is compiled in, and the same for all worlds of a batch.
 3. ``needs`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
    A field that no other effect has ever needed is declared by putting a ``Field`` there. Where the
@@ -227,6 +228,11 @@ class Source(Effect):
     def gradient(self, w, r, t):
         """Its gradient, [a, b] the derivative of component a along axis b; per metre."""
         return r.outer_product(0.0 * r)
+
+    @ti.func
+    def value_and_gradient(self, w, r, t):
+        """Both, for who needs both: a source that makes them of the same numbers does so once."""
+        return self.value(w, r, t), self.gradient(w, r, t)
 
 
 def sources(peers: tuple[Any, ...], quantity: str) -> tuple[Any, ...]:

@@ -19,6 +19,9 @@ from tisim.simulation import Simulation
 from tisim.spec import Spec, unit_of
 from tisim.state import CORE
 
+SHOWN = 3
+"""Rows of a list that are shown."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -135,12 +138,21 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
 
 
 def _part(spec: Spec) -> Part:
-    values = []
+    return Part(spec.kind(), _summary(type(spec)), _source(type(spec)), tuple(_values(spec)))
+
+
+def _values(spec: Spec, within: str = "") -> Iterator[tuple[str, str, str]]:
+    """(name, value, unit) of each parameter; of a long list, of its first rows."""
+    lists = dict(spec.lists())
     for name, info in type(spec).model_fields.items():
         value = getattr(spec, name)
-        if not isinstance(value, Spec):
-            values.append((name, _text(value), unit_of(info)))
-    return Part(spec.kind(), _summary(type(spec)), _source(type(spec)), tuple(values))
+        if name in lists:
+            for k, row in enumerate(value[:SHOWN]):
+                yield from _values(row, f"{within}{name}.{k}.")
+            if not 0 < len(value) <= SHOWN:
+                yield f"{within}{name}", f"{len(value)} in all", ""
+        elif not isinstance(value, Spec):
+            yield f"{within}{name}", _text(value), unit_of(info)
 
 
 def _text(value: object) -> str:

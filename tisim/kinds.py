@@ -27,8 +27,10 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
     values = dict(data)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
+    listed = dict(kind.lists())
     for name, info in kind.model_fields.items():
-        inner = _part(info.annotation)
+        # Rows of a list are all of one kind, and need no name of it.
+        inner = None if name in listed else _part(info.annotation)
         if name in values and inner is not None:
             values[name] = from_dict(inner, values[name], f"{where}.{name}")
     return kind(**values)
@@ -48,18 +50,28 @@ def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:
     for key in values:
         if isinstance(inner := getattr(part, key), Spec):
             values[key] = to_dict(inner)
+    for key, _ in part.lists():
+        values[key] = [to_dict(row, named=False) for row in getattr(part, key)]
     return {"kind": part.kind(), **values} if named else values
 
 
 def toml(table: Mapping[str, Any], path: str = "") -> str:
     """TOML text of nested tables of numbers, text, flags and lists."""
-    lines = [f"{key} = {inline(value)}" for key, value in table.items() if not isinstance(value, Mapping)]
+    tables = {key for key, value in table.items() if isinstance(value, Mapping) or _tables(value)}
+    lines = [f"{key} = {inline(value)}" for key, value in table.items() if key not in tables]
     text = "\n".join(lines) + "\n" if lines else ""
     for key, value in table.items():
+        name = f"{path}.{key}" if path else key
         if isinstance(value, Mapping):
-            name = f"{path}.{key}" if path else key
             text += f"\n[{name}]\n{toml(value, name).lstrip()}"
+        elif key in tables:
+            text += "".join(f"\n[[{name}]]\n{toml(row, name).lstrip()}" for row in value)
     return text
+
+
+def _tables(value: Any) -> bool:
+    """Whether it is a list of tables."""
+    return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
 
 
 def inline(value: Any) -> str:

@@ -157,16 +157,16 @@ class Scene(Spec):
         return kinds.toml(self.to_dict())
 
     def replace(self, settings: Mapping[str, Any]) -> Scene:
-        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``."""
+        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a list by
+        number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
         data = self.to_dict()
         for key, value in settings.items():
             *path, last = key.split(".")
             place: Any = data
             for step in path:
-                must(isinstance(place, dict) and step in place, key, "a setting of this scene", step)
-                place = place[step]
-            must(isinstance(place, dict), key, "a setting of this scene", last)
-            place[last] = value
+                place = place[_step(place, step, key)]
+            # A key that is not there may be one that is left at its default.
+            place[last if isinstance(place, dict) else _step(place, last, key)] = value
         return type(self).from_dict(data)
 
     def without(self, *names: str) -> Scene:
@@ -177,6 +177,13 @@ class Scene(Spec):
             must(name in data["effects"], "effect to leave out", f"one of {known}", name)
         kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
         return type(self).from_dict({**data, "effects": kept})
+
+
+def _step(place: Any, step: str, key: str) -> Any:
+    """The key or number by which a place in plain data is entered; InputError naming the whole ``key``."""
+    listed = isinstance(place, list) and step.isdecimal() and int(step) < len(place)
+    must(listed or (isinstance(place, dict) and step in place), key, "a setting of this scene", step)
+    return int(step) if listed else step
 
 
 def _names(kind: type[Spec]) -> list[str]:

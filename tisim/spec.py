@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
@@ -19,6 +19,8 @@ from tisim.knob import Knob
 
 Vector = tuple[float, float, float]
 """Three Cartesian components."""
+ROWS = 32
+"""Rows that there is room for in every list."""
 
 
 class Checked(BaseModel):
@@ -64,6 +66,15 @@ class Spec(Checked):
             elif info.annotation == Vector:
                 yield name, info, 3
 
+    @classmethod
+    def lists(cls) -> Iterator[tuple[str, type[Spec]]]:
+        """Name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a world may
+        have any number of them."""
+        for name, info in cls.model_fields.items():
+            row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
+            if rest == [...] and isinstance(row, type) and issubclass(row, Spec):
+                yield name, row
+
     def values(self) -> list[float]:
         """The parameters of ``parameters()`` in order, vectors spread out; SI units."""
         spread: list[float] = []
@@ -73,10 +84,10 @@ class Spec(Checked):
         return spread
 
     def structure(self) -> tuple[Any, ...]:
-        """What is compiled in: the class and every option that is not a per-world parameter."""
-        varying = {name for name, _, _ in self.parameters()}
+        """What is compiled in: class, every option that is not a per-world parameter, room for lists."""
+        varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
         fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
-        return (type(self), *fixed)
+        return (type(self), *fixed, *((name, room(len(getattr(self, name)))) for name, _ in self.lists()))
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         """Attributes to set on the bound copy, chosen among the bound effects of the scene."""
@@ -102,9 +113,16 @@ def parameter(unit: str, default: Any = ..., **rules: Any) -> Any:
     """Declare a physical parameter: its unit, and pydantic rules such as ``gt=0``.
 
     A float or ``Vector`` parameter may differ in every world of a batch. A kernel reads it as
-    ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile.
+    ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile. A list of
+    parts, ``tuple[Row, ...]`` with Row a Spec of such parameters, is one bound Row there. Its parameters are
+    functions of the world and the row: ``self.rows.name(w, k)``, k below ``self.rows.size(w)``.
     """
     return Field(default, json_schema_extra={"unit": unit}, **rules)
+
+
+def room(rows: int) -> int:
+    """Rows that a world's table has room for, so that scenes with lists of like lengths run as one batch."""
+    return max(ROWS, 1 << (rows - 1).bit_length())
 
 
 def unit_of(info: FieldInfo) -> str:
@@ -143,7 +161,7 @@ def explain_invalid(invalid: ValidationError, where: str) -> str:
         name = ".".join([where, *(str(part) for part in fault["loc"])])
         context: Mapping[str, Any] = fault.get("ctx", {})
         if isinstance(context.get("error"), InputError):
-            lines.append(str(context["error"]))
+            lines += _named_within(name, fault["loc"], str(context["error"]))
             continue
         if fault["type"] == "extra_forbidden":
             lines.append(f"{name} must be a known key; received {fault['input']!r}")
@@ -155,3 +173,9 @@ def explain_invalid(invalid: ValidationError, where: str) -> str:
         rule = known.format(**context) if known else fault["msg"].removeprefix("Input should be ")
         lines.append(f"{name} must be {rule}; received {fault['input']!r}")
     return "\n".join(lines)
+
+
+def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:
+    """What a part says of itself; a row of a list, which row it is."""
+    row = bool(loc) and isinstance(loc[-1], int)
+    return [f"{name}.{line.partition('.')[2]}" if row else line for line in text.splitlines()]

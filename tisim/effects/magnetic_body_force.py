@@ -28,6 +28,7 @@ class MagneticBodyForce(Force):
         r = s.position[w, i]
         b, gradient = 0.0 * r, ti.Matrix.zero(s.real, 3, 3)
         for source in ti.static(self.applied):
-            b += source.value(w, r, t)
-            gradient += source.gradient(w, r, t)
+            value, slope = source.value_and_gradient(w, r, t)
+            b += value
+            gradient += slope
         return 2.0 * self.gamma(w) * (gradient.transpose() @ b)

@@ -1,0 +1,132 @@
+"""One end of a uniformly magnetised cylinder: what its field and gradient are made of.
+
+Let W(r) = 1/(4 pi) integral dV' / |r - r'| over the cylinder. Then H_i = sum_j d_i d_j W M_j, so field and
+gradient are the second and third derivatives of W, and each of them is a difference between the two ends.
+An end enters as that of a half-infinite cylinder of radius R that reaches away from the point, which is
+u >= 0 before it along its axis; V is its W. Six numbers in this order, rho the distance from the axis,
+subscripts derivatives:
+
+    V_uu,  V_rho / rho,  rho (V_rho / rho)_rho / rho,  V_rho u / rho,  V_uuu,  V_rho uu / rho
+
+All others follow from the equation of Laplace. They go smoothly to 0 far away and have no digits to cancel.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+from tisim import runtime
+from tisim._taichi import ti
+from tisim.elliptic import elliptic, limits
+
+SLIM = 1.0 / 36.0
+"""(rho / distance to the rim)^2, seen from the axis, below which the series about the axis is used."""
+TERMS = {ti.f64: 12, ti.f32: 5}
+
+
+def terms() -> int:
+    """``TERMS`` of the precision that runs."""
+    return TERMS[runtime.current().real]
+
+
+def _about_axis(j: int) -> tuple[float, float]:
+    """(1/2)_j / j! and the same over j + 1: coefficients of the series."""
+    own = factorial(2 * j) / (4**j * factorial(j) ** 2)
+    return own, own / (j + 1)
+
+
+@ti.func
+def end(rho, u, radius):
+    """The six numbers of an end; rho >= 0, u >= 0, radius > 0 in one unit of length."""
+    far = u * u + radius * radius
+    six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
+    if rho * rho < SLIM * far:  # noqa: SIM108 - a conditional expression works out both
+        six = near_axis(rho, u, radius, far)
+    else:
+        six = off_axis(rho, u, radius)
+    return six
+
+
+@ti.func
+def near_axis(rho, u, radius, far):
+    """The power series in rho of an axisymmetric harmonic function, whose values on the axis are closed.
+
+    V_uuu(0, u) = R^2 / (2 d^3), d^2 = far = u^2 + R^2, and its k-th derivative is that times
+    (-1)^k k! C_k(u/d) / d^k, with Gegenbauer's C_k of order 3/2.
+    """
+    d = ti.sqrt(far)
+    c, t = u / d, -rho * rho / far
+    even, odd, power = 1.0 + 0.0 * c, 3.0 * c, 1.0 + 0.0 * c
+    uu, over, turn, cross, uuu, bend = 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c
+    for j in ti.static(range(terms())):
+        own, shared = ti.static(_about_axis(j))
+        after, shared_after = ti.static(_about_axis(j + 1))
+        a, b = power * even, power * odd
+        uuu += own * a
+        cross += shared * a
+        bend += (2 * j + 1) * shared * b
+        uu += after / (2 * j + 2) * b
+        over += shared_after / (2 * j + 2) * b
+        turn += shared_after * b
+        even = (4 * j + 5) / (2 * j + 2) * c * odd - (2 * j + 3) / (2 * j + 2) * even
+        odd = (4 * j + 7) / (2 * j + 3) * c * even - (2 * j + 4) / (2 * j + 3) * odd
+        power *= t
+    area = radius * radius / far
+    tip = 1.0 / (1.0 + c)
+    return area * ti.Vector(
+        [
+            -0.5 * (tip + t * uu),
+            0.25 * (tip + t * over),
+            -0.25 * rho / far * turn,
+            -0.25 / d * cross,
+            0.5 / d * uuu,
+            0.25 / far * bend,
+        ]
+    )
+
+
+@ti.func
+def off_axis(rho, u, radius):
+    """Closed forms in complete elliptic integrals, put into the sums of ``elliptic``.
+
+    The second derivatives are B16 Eqs (5.3)-(5.6), (5.20)-(5.22), the third those of a current loop (W. R.
+    Smythe, Static and Dynamic Electricity, 1950, section 7.10).
+    """
+    least = ti.static(limits()[1])
+    total, gap = rho + radius, rho - radius
+    wide = total * total
+    reach = u * u + wide
+    s = ti.sqrt(reach)
+    beta, m, n = u / s, 4.0 * rho * radius / reach, 4.0 * rho * radius / wide
+    inside = gap < 0.0
+    size = ti.max(ti.abs(gap) / total, least)
+    gamma = ti.select(inside, -size, size)
+    kc = ti.max(ti.sqrt((u * u + gap * gap) / reach), least)
+    k, sigma, third, other = elliptic(kc, m, size, n * (size * size + beta * beta))
+    k /= ti.math.pi
+    # The same difference twice: each loses digits where the other does not.
+    lift = ti.select(
+        gamma < 0.5,
+        1.0 - 0.5 * (1.0 + gamma) * (third / gamma),
+        0.5 * ((1.0 + gamma) * other - (1.0 - gamma)) / gamma,
+    )
+    uu = 0.5 * beta * (1.0 - gamma) * k * lift
+    ratio = radius * radius / (rho * rho)
+    over = -2.0 * radius * radius / wide * beta * k * (wide / reach * sigma + other / n)
+    slope = (1.0 - gamma) * (1.0 + 0.5 * (1.0 - gamma) * third / gamma) + 2.0 * m * sigma
+    turn = 2.0 * radius * radius / (wide * n) * beta * k * slope
+    square = kc * kc
+    volume = radius * k / (reach * s)
+    e = 1.0 - 0.5 * m - 0.5 * m * m * sigma
+    rim = (square * reach - (gap * total + u * u) * e) / radius
+    away = 2.0 * radius + 2.0 * m * rho * sigma - total * m * (1.0 + m * sigma)
+    return ti.Vector(
+        [
+            uu - ti.select(inside, 0.5, 0.0),
+            over + 0.25 * ti.select(inside, 1.0, ratio),
+            (turn - 0.5 * ti.select(inside, 0.0, ratio)) / rho,
+            -4.0 * radius * volume * sigma,
+            0.5 * volume / square * ti.select(m < 0.5, away, rim),
+            2.0 * radius * u * volume / (reach * square) * (1.0 - sigma * (2.0 - m)),
+        ]
+    )
