@@ -31,7 +31,8 @@ def _force(force, torque):
 class SumForces(PairSum):
     """force[w, i] = sum of the scene's forces on i: single, all pairs, near pairs; each in a fixed order.
 
-    Where an effect of the scene exerts torques these are summed along with it: one vector of six.
+    Where an effect of the scene exerts torques these are summed along with it: one vector of six. A particle
+    that is ``fixed``, where the scene has that field, takes none.
     """
 
     trial: ClassVar[bool] = False
@@ -48,6 +49,7 @@ class SumForces(PairSum):
         super().__init__(s, domain, pair_forces, halves)
         self.forces, self.pair_forces, self.settlings = forces, pair_forces, settlings
         self.turning = turning(forces, pair_forces)
+        self.fixes = any(field.name == "fixed" for field in s.fields)
         self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
 
     @ti.func
@@ -56,8 +58,9 @@ class SumForces(PairSum):
 
     @ti.func
     def finish(self, w, i, total, t):
-        self.write(w, i, total)
-        self.check(w, i, total)
+        taken = ti.select(self.moves(w, i), total, 0.0)
+        self.write(w, i, taken)
+        self.check(w, i, taken)
 
     @ti.func
     def alone(self, w, i, t):
@@ -71,9 +74,18 @@ class SumForces(PairSum):
         """Sum of the forces on i by itself."""
         s = self.s
         total = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
-        for effect in ti.static(self.forces):
-            total += self.single(effect, w, i, t)
+        if self.moves(w, i):
+            for effect in ti.static(self.forces):
+                total += self.single(effect, w, i, t)
         return total
+
+    @ti.func
+    def moves(self, w, i):
+        """Whether forces may move i."""
+        free = True
+        if ti.static(self.fixes):
+            free = self.s.fixed[w, i] == 0
+        return free
 
     @ti.func
     def write(self, w, i, total):

@@ -64,6 +64,7 @@ SHARED = {
         Field("temperature", "K", default=None, minimum=0.0),
         Field("spin", "rad/s", 3),
         Field("charge", "C", 1, "sum", default=None),
+        Field("fixed", "", 1, "keep", integer=True, minimum=0.0),
     )
 }
 """Fields that several effects share by name."""

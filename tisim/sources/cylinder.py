@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from pydantic import field_validator
 
 from tisim._taichi import ti
-from tisim.effect import Source, parameter
+from tisim.effect import parameter
 from tisim.errors import must
 from tisim.sources import cylinder_field
-from tisim.spec import Spec, Vector
-
-MU_0 = 1.25663706127e-6
-"""Magnetic constant, N/A^2 (CODATA 2022)."""
+from tisim.sources.magnets import MU_0, Body, Magnets
+from tisim.spec import Vector
 
 
-class Cylinder(Spec):
-    """A cylinder: a solid body, and a magnet when it is magnetised, uniformly and in any direction.
+class Cylinder(Body):
+    """A cylinder, magnetised uniformly and in any direction, or not at all.
 
-    centre, axis : of any length but 0; made a unit vector. length : from end to end. magnetisation : M.
+    centre; axis : of any length but 0, made a unit vector; radius; length : from end to end;
+    magnetisation : M.
     """
 
-    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
     axis: Vector = parameter("", (0.0, 0.0, 1.0))
     radius: float = parameter("m", gt=0)
     length: float = parameter("m", gt=0)
-    magnetisation: Vector = parameter("A/m", (0.0, 0.0, 0.0))
 
     @field_validator("axis", mode="after")
     @classmethod
@@ -35,7 +30,7 @@ class Cylinder(Spec):
         size = float(np.linalg.norm(axis))
         must(0 < size < np.inf, "cylinder.axis", "a direction", axis)
         # One that is of unit length to rounding stays as it is: files give back the same bits.
-        return axis if abs(size - 1) < 1e-15 else tuple(float(x / size) for x in axis)  # type: ignore[return-value]
+        return axis if abs(size - 1) < 1e-15 else (axis[0] / size, axis[1] / size, axis[2] / size)
 
     @ti.func
     def place(self, w, k, r):
@@ -48,35 +43,55 @@ class Cylinder(Spec):
         return rho, across / ti.select(rho > 0.0, rho, 1.0), z
 
     @ti.func
-    def shape(self, w, k, rho, z):
-        """The six functions of ``cylinder_field``."""
-        return cylinder_field.shape(rho, z, self.radius(w, k), 0.5 * self.length(w, k))
-
-    @ti.func
-    def across_and_along(self, w, k):
+    def magnetised(self, w, k):
         """The magnetisation across the axis, and its component along it."""
         m, axis = self.magnetisation(w, k), self.axis(w, k)
         along = m.dot(axis)
         return m - along * axis, along
 
     @ti.func
-    def flux_density(self, w, k, six, rho, outward, z):
+    def nearest(self, w, k, r):
+        rho, outward, z = self.place(w, k, r)
+        side, end = rho - self.radius(w, k), ti.abs(z) - 0.5 * self.length(w, k)
+        upward = ti.select(z < 0.0, -1.0, 1.0) * self.axis(w, k)
+        # Inside, the nearer of side and end; on the axis there is no way to the side.
+        sideways = side >= end and rho > 0.0
+        distance, normal = ti.select(sideways, side, end), ti.select(sideways, outward, upward)
+        if side > 0.0 and end > 0.0:
+            distance = ti.sqrt(side * side + end * end)
+            normal = (side * outward + end * upward) / distance
+        return distance, normal
+
+    @ti.func
+    def shape(self, w, k, rho, z):
+        """The six functions of ``cylinder_field``."""
+        return cylinder_field.shape(rho, z, self.radius(w, k), 0.5 * self.length(w, k))
+
+    @ti.func
+    def flux_density(self, w, k, r):
+        rho, outward, z = self.place(w, k, r)
+        return self.density(w, k, self.shape(w, k, rho, z), rho, outward, z)
+
+    @ti.func
+    def flux(self, w, k, r):
+        rho, outward, z = self.place(w, k, r)
+        six = self.shape(w, k, rho, z)
+        m_across, m_along = self.magnetised(w, k)
+        slope = cylinder_field.gradient(six, rho, outward, self.axis(w, k), m_across, m_along)
+        return self.density(w, k, six, rho, outward, z), MU_0 * slope
+
+    @ti.func
+    def density(self, w, k, six, rho, outward, z):
         """B = mu_0 (H + M), M inside only."""
-        m_across, m_along = self.across_and_along(w, k)
+        m_across, m_along = self.magnetised(w, k)
         across, along = cylinder_field.field(six, rho, outward, m_across, m_along)
         b = across + along * self.axis(w, k)
         if rho < self.radius(w, k) and ti.abs(z) < 0.5 * self.length(w, k):
             b += self.magnetisation(w, k)
         return MU_0 * b
 
-    @ti.func
-    def flux_gradient(self, w, k, six, rho, outward):
-        """dB_i/dr_k, away from the surface."""
-        m_across, m_along = self.across_and_along(w, k)
-        return MU_0 * cylinder_field.gradient(six, rho, outward, self.axis(w, k), m_across, m_along)
 
-
-class MagneticCylinders(Source):
+class MagneticCylinders(Magnets):
     """B of uniformly magnetised cylinders: the sum over all of them. They do not magnetise each other.
 
     cylinders : any number of them, which may differ per world.
@@ -86,28 +101,4 @@ class MagneticCylinders(Source):
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
-    quantity: ClassVar[str] = "magnetic_flux_density"
     cylinders: tuple[Cylinder, ...]
-
-    @ti.func
-    def value(self, w, r, t):
-        b = 0.0 * r
-        for k in range(self.cylinders.size(w)):
-            rho, outward, z = self.cylinders.place(w, k, r)
-            six = self.cylinders.shape(w, k, rho, z)
-            b += self.cylinders.flux_density(w, k, six, rho, outward, z)
-        return b
-
-    @ti.func
-    def gradient(self, w, r, t):
-        return self.value_and_gradient(w, r, t)[1]
-
-    @ti.func
-    def value_and_gradient(self, w, r, t):
-        b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        for k in range(self.cylinders.size(w)):
-            rho, outward, z = self.cylinders.place(w, k, r)
-            six = self.cylinders.shape(w, k, rho, z)
-            b += self.cylinders.flux_density(w, k, six, rho, outward, z)
-            gradient += self.cylinders.flux_gradient(w, k, six, rho, outward)
-        return b, gradient

@@ -13,26 +13,19 @@ All others follow from the equation of Laplace. They go smoothly to 0 far away a
 
 from __future__ import annotations
 
-from math import factorial
-
 from tisim import runtime
 from tisim._taichi import ti
 from tisim.elliptic import elliptic, limits
 
 SLIM = 1.0 / 36.0
 """(rho / distance to the rim)^2, seen from the axis, below which the series about the axis is used."""
-TERMS = {ti.f64: 12, ti.f32: 5}
+SMALL = {ti.f64: 1e-18, ti.f32: 1e-9}
+"""Powers in a series that are below this are left out."""
 
 
-def terms() -> int:
-    """``TERMS`` of the precision that runs."""
-    return TERMS[runtime.current().real]
-
-
-def _about_axis(j: int) -> tuple[float, float]:
-    """(1/2)_j / j! and the same over j + 1: coefficients of the series."""
-    own = factorial(2 * j) / (4**j * factorial(j) ** 2)
-    return own, own / (j + 1)
+def small() -> float:
+    """``SMALL`` of the precision that runs."""
+    return SMALL[runtime.current().real]
 
 
 @ti.func
@@ -56,21 +49,30 @@ def near_axis(rho, u, radius, far):
     """
     d = ti.sqrt(far)
     c, t = u / d, -rho * rho / far
-    even, odd, power = 1.0 + 0.0 * c, 3.0 * c, 1.0 + 0.0 * c
+    # C_2j and C_2j+1, t^j, and (1/2)_j / j!, each with its own factor of j in the sums.
+    even, odd, power, part = 1.0 + 0.0 * c, 3.0 * c, 1.0 + 0.0 * c, 1.0 + 0.0 * c
     uu, over, turn, cross, uuu, bend = 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c
-    for j in ti.static(range(terms())):
-        own, shared = ti.static(_about_axis(j))
-        after, shared_after = ti.static(_about_axis(j + 1))
-        a, b = power * even, power * odd
-        uuu += own * a
-        cross += shared * a
-        bend += (2 * j + 1) * shared * b
-        uu += after / (2 * j + 2) * b
-        over += shared_after / (2 * j + 2) * b
-        turn += shared_after * b
-        even = (4 * j + 5) / (2 * j + 2) * c * odd - (2 * j + 3) / (2 * j + 2) * even
-        odd = (4 * j + 7) / (2 * j + 3) * c * even - (2 * j + 4) / (2 * j + 3) * odd
+    j = 0.0 * c
+    while ti.abs(power) > ti.static(small()):
+        k = 2.0 * j
+        inverse = 1.0 / ((j + 1.0) * (j + 2.0) * (k + 3.0))
+        next, shared = 0.5 * (j + 2.0) * (k + 3.0) * inverse, (j + 2.0) * (k + 3.0) * inverse
+        term = power * part
+        uuu += term * even
+        cross += term * shared * even
+        bend += term * shared * (k + 1.0) * odd
+        term *= (k + 1.0) * next
+        # (1/2)_(j+1) / (j+1)! and the same over j + 2.
+        over_next = (j + 1.0) * (k + 3.0) * inverse
+        turn += term * over_next * odd
+        uu += term * next * odd
+        over += term * over_next * next * odd
+        even = (2.0 * k + 5.0) * next * c * odd - (k + 3.0) * next * even
+        after = (j + 1.0) * (j + 2.0) * inverse
+        odd = (2.0 * k + 7.0) * after * c * even - (k + 4.0) * after * odd
+        part *= (k + 1.0) * next
         power *= t
+        j += 1.0
     area = radius * radius / far
     tip = 1.0 / (1.0 + c)
     return area * ti.Vector(

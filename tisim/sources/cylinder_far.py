@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from tisim import runtime
 from tisim._taichi import ti
+from tisim.sources.cylinder_end import small
 
 FAR = 36.0
 """(distance from the centre / distance of the rim from it)^2 from where the series is used."""
-TERMS = {ti.f64: 12, ti.f32: 5}
-
-
-def terms() -> int:
-    """``TERMS`` of the precision that runs."""
-    return TERMS[runtime.current().real]
 
 
 @ti.func
@@ -33,28 +27,31 @@ def far_away(rho, z, radius, half):
     xp, xq, dxp, dxq = 1.0 + 0.0 * x, x, 0.0 * x, 1.0 + 0.0 * x
     power = 1.0 + 0.0 * c
     zz, over, turn, cross, zzz, bend = 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c
-    for i in ti.static(range(terms())):
-        n = ti.static(2 * i)
-        # To order n + 2, and its neighbours.
-        xp, xq = xq, ((2 * n + 3) * x * xq - (n + 1) * xp) / (n + 2)
-        dxp, dxq = dxq, dxp + (2 * n + 3) * xp
-        first = dq
-        ddp, ddq = ddq, ddp + (2 * n + 3) * dq
-        dp, dq = dq, dp + (2 * n + 3) * q
-        p, q = q, ((2 * n + 3) * c * q - (n + 1) * p) / (n + 2)
+    n, ratio = 0.0 * c, square / (distance * distance)
+    while power > ti.static(small()):
+        inverse = 1.0 / ((n + 1.0) * (n + 2.0) * (n + 3.0))
+        second, third = (n + 1.0) * (n + 3.0) * inverse, (n + 1.0) * (n + 2.0) * inverse
+        a, b, lead = 2.0 * n + 3.0, 2.0 * n + 5.0, dq
+        # To order n + 2, and for the point on to order n + 3.
+        xp, xq = xq, (a * x * xq - (n + 1.0) * xp) * second
+        dxp, dxq = dxq, dxp + a * xp
+        ddp, ddq = ddq, ddp + a * dq
+        dp, dq = dq, dp + a * q
+        p, q = q, (a * c * q - (n + 1.0) * p) * second
         moment = power * dxq
-        zz += moment / (n + 3) * q
-        over += moment / ((n + 1) * (n + 2) * (n + 3)) * first
-        turn += moment / ((n + 1) * (n + 2) * (n + 3)) * ddq
-        cross += moment / ((n + 2) * (n + 3)) * dq
-        ddp, ddq = ddq, ddp + (2 * n + 5) * dq
-        dp, dq = dq, dp + (2 * n + 5) * q
-        p, q = q, ((2 * n + 5) * c * q - (n + 2) * p) / (n + 3)
-        xp, xq = xq, ((2 * n + 5) * x * xq - (n + 2) * xp) / (n + 3)
-        dxp, dxq = dxq, dxp + (2 * n + 5) * xp
+        zz += moment * third * q
+        over += moment * inverse * lead
+        turn += moment * inverse * ddq
+        cross += moment * second * third * dq
+        xp, xq = xq, (b * x * xq - (n + 2.0) * xp) * third
+        dxp, dxq = dxq, dxp + b * xp
+        ddp, ddq = ddq, ddp + b * dq
+        dp, dq = dq, dp + b * q
+        p, q = q, (b * c * q - (n + 2.0) * p) * third
         zzz += moment * q
-        bend += moment / (n + 3) * dq
-        power *= square / (distance * distance)
+        bend += moment * third * dq
+        power *= ratio
+        n += 2.0
     size = radius / distance * (radius / distance) * ti.sqrt(square) / distance
     return size * ti.Vector(
         [

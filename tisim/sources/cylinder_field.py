@@ -28,21 +28,15 @@ def shape(rho, z, radius, half):
 @ti.func
 def close_by(rho, z, radius, half):
     """The difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
-    side = ti.select(z < 0.0, -1.0, 1.0)
-    height = ti.abs(z)
+    side, height = ti.select(z < 0.0, -1.0, 1.0), ti.abs(z)
     between = height < half
-    a, b = end(rho, height + half, radius), end(rho, ti.abs(height - half), radius)
-    sign = ti.select(between, -1.0, 1.0)
-    six = ti.Vector(
-        [
-            a[0] - sign * b[0],
-            a[1] - sign * b[1],
-            a[2] - sign * b[2],
-            side * (a[3] - b[3]),
-            side * (a[4] - b[4]),
-            a[5] - sign * b[5],
-        ]
-    )
+    six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
+    # A loop, so that what is long is compiled once.
+    for k in range(2):
+        near = k > 0
+        one = end(rho, ti.abs(height + ti.select(near, -half, half)), radius)
+        odd, even = ti.select(near and not between, -1.0, 1.0), ti.select(near, -side, side)
+        six += ti.Vector([odd, odd, odd, even, even, odd]) * one
     if between:
         if rho < radius:
             six[1] -= 0.5
