@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tisim.errors import InputError, must
-from tisim.spec import Spec, Vector, parameter, unit_of
+from tisim.spec import ROWS, Spec, Vector, parameter, unit_of
 
 
 class SampleSpring(Spec):
@@ -88,6 +88,35 @@ def test_parameters_vary_and_options_are_structure():
     assert part.structure() == SampleSpring(stiffness=9, share=0.1).structure()
     assert part.structure() != SampleSpring(stiffness=2, stiff=True).structure()
     assert part.structure() != SampleSpring(stiffness=2, order=3).structure()
+
+
+class SampleRow(Spec):
+    """A row of a list."""
+
+    radius: float = parameter("m", gt=0)
+    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+
+
+class SampleList(Spec):
+    """A part with a list of rows, of which each world may have its own number."""
+
+    scale: float = parameter("", 1.0)
+    rows: tuple[SampleRow, ...]
+
+
+def test_a_list_of_rows_varies_in_number_too():
+    """Rows are no structure, up to the room that there is for them; messages say which row is wrong."""
+    few, many = ([SampleRow(radius=1)] * n for n in (0, ROWS))
+    assert list(SampleList.lists()) == [("rows", SampleRow)]
+    assert [name for name, _, _ in SampleList.parameters()] == ["scale"]
+    assert SampleList(rows=few).structure() == SampleList(rows=many, scale=2).structure()
+    assert SampleList(rows=[*many, *many]).structure() != SampleList(rows=many).structure()
+    with pytest.raises(InputError) as fault:
+        SampleList(rows=[{"radius": 1}, {"radius": -1}])
+    assert str(fault.value) == "sample_list.rows.1.radius must be greater than 0.0; received -1"
+    with pytest.raises(InputError) as fault:
+        SampleList(rows=3)
+    assert str(fault.value) == "sample_list.rows must be a list; received 3"
 
 
 def test_must():

@@ -1,0 +1,149 @@
+"""Particles that touch a magnet stay there: against a twin in NumPy, and whatever pulls at them then."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, scene, simulate
+from tisim import Scene
+from tisim.effects.gravity import Gravity
+from tisim.effects.magnetic_body_force import MagneticBodyForce
+from tisim.effects.tether import Tether
+from tisim.errors import InputError
+from tisim.operators.capture import Capture
+from tisim.sources.cylinder import Cylinder, MagneticCylinders
+from tisim.sources.sphere import MagneticSpheres, Sphere
+from tisim.sources.uniform import MagneticField
+
+DT, STEPS, RADIUS = 0.02, 60, 0.05
+"""Flights of 1.2 s at speeds of about 1 m/s, in steps shorter than a radius."""
+
+
+def bodies(rng, cylinders, spheres):
+    """Magnets that attract nothing, at random."""
+    return (
+        MagneticCylinders(
+            cylinders=[
+                Cylinder(
+                    centre=rng.normal(size=3),
+                    axis=rng.normal(size=3),
+                    radius=rng.uniform(0.1, 0.4),
+                    length=rng.uniform(0.1, 1),
+                )
+                for _ in range(cylinders)
+            ]
+        ),
+        MagneticSpheres(
+            spheres=[Sphere(centre=rng.normal(size=3), radius=rng.uniform(0.1, 0.4)) for _ in range(spheres)]
+        ),
+    )
+
+
+def distance(body, r):
+    """From the surface of a body, negative inside; r is (n, 3)."""
+    d = r - body.centre
+    if isinstance(body, Sphere):
+        return np.linalg.norm(d, axis=1) - body.radius
+    z = d @ np.array(body.axis)
+    side = np.linalg.norm(d - z[:, None] * np.array(body.axis), axis=1) - body.radius
+    end = np.abs(z) - body.length / 2
+    return np.hypot(np.maximum(side, 0), np.maximum(end, 0)) + np.minimum(np.maximum(side, end), 0)
+
+
+def flying(rng, magnets, n=60, **more):
+    """Particles in free flight, none of which touches at the start."""
+    solids = [*magnets[0].cylinders, *magnets[1].spheres]
+    position = rng.normal(size=(400, 3)) * 1.5
+    position = position[np.all([distance(body, position) > 2 * RADIUS for body in solids], axis=0)][:n]
+    effects = (*magnets, Tether(stiffness=(0.0, 0.0, 0.0)), Capture())
+    return scene(
+        position,
+        0.4 * rng.normal(size=position.shape) - position,
+        effects,
+        radius=RADIUS,
+        mass=1.0,
+        dt=DT,
+        steps=STEPS,
+        **more,
+    )
+
+
+def twin(made):
+    """Which magnet each particle touches first and when, -1 for none, and where it then is."""
+    solids = [*made.effects[0].cylinders, *made.effects[1].spheres]
+    r, v = np.array(made.particles.position), np.array(made.particles.velocity)
+    by, at = np.full(len(r), -1), np.full(len(r), -1.0)
+    for step in range(1, STEPS + 1):
+        free = by < 0
+        r[free] += DT * v[free]
+        gaps = np.array([distance(body, r) for body in solids])
+        touch = free & (gaps.min(axis=0) <= RADIUS)
+        by[touch], at[touch] = gaps.argmin(axis=0)[touch], step * DT
+    return by, at, r
+
+
+@pytest.mark.long
+def test_against_the_twin(rng):
+    """Who is caught, by which and when; on its surface; in worlds with other numbers of magnets."""
+    worlds = [flying(rng, bodies(rng, *numbers)) for numbers in ((1, 0), (3, 2), (0, 6), (8, 5))]
+    results = simulate(worlds, worlds=4, capacity=64)
+    caught = 0
+    for made, result in zip(worlds, results, strict=True):
+        assert result.status.ok, result.status.reason
+        by, at, r = twin(made)
+        np.testing.assert_array_equal(result.state["captured_by"], by)
+        np.testing.assert_array_equal(result.state["fixed"], by >= 0)
+        np.testing.assert_allclose(result.state["captured_at"], at, rtol=1e-12)
+        assert result.work["captures"] == (by >= 0).sum()
+        assert result.measures["captured_fraction"] == pytest.approx((by >= 0).mean())
+        solids = [*made.effects[0].cylinders, *made.effects[1].spheres]
+        for k, body in enumerate(solids):
+            held = result.state["position"][by == k]
+            np.testing.assert_allclose(distance(body, held), RADIUS, rtol=1e-12)
+        assert (result.state["velocity"][by >= 0] == 0).all()
+        np.testing.assert_allclose(result.state["position"][by < 0], r[by < 0], atol=1e-12)
+        # Put back from where the step brought it, the shortest way.
+        moved = np.linalg.norm(result.state["position"] - r, axis=1)
+        assert (moved <= DT * np.linalg.norm(made.particles.velocity, axis=1) + 1e-12).all()
+        caught += (by >= 0).sum()
+    assert caught > 20
+    alone = simulate(worlds[1:2], worlds=4, capacity=64)[0]
+    for name, values in alone.state.items():
+        np.testing.assert_array_equal(values, results[1].state[name])
+
+
+@pytest.mark.long
+def test_what_is_fixed_takes_no_force():
+    """Gravity and the magnet's pull act on the free one only; what a start fixes is no capture."""
+    magnet = MagneticCylinders(cylinders=[Cylinder(radius=0.5, length=1, magnetisation=(0, 0, 1e6))])
+    made = scene(
+        [[0.0, 0, 0.56], [3, 0, 0], [0, 0, 2]],
+        [[0.0, 0, -2], [0, 0, 0], [0, 0, 0]],
+        (magnet, MagneticField(constant=(0, 0, 1)), MagneticBodyForce(gamma=1e-2), Gravity(), Capture()),
+        radius=RADIUS,
+        mass=1.0,
+        dt=0.01,
+        steps=20,
+        quantities={"fixed": [0, 0, 1]},
+    )
+    (result,) = simulate([made], capacity=4)
+    end = result.state
+    np.testing.assert_allclose(end["position"][0], [0, 0, 0.55], atol=1e-15)
+    np.testing.assert_array_equal(end["position"][2], [0, 0, 2])
+    assert (end["velocity"][[0, 2]] == 0).all()
+    assert end["velocity"][1, 2] == pytest.approx(-9.81 * 0.2, rel=0.01)
+    np.testing.assert_array_equal(end["fixed"], [1, 0, 1])
+    np.testing.assert_array_equal(end["captured_by"], [0, -1, -1])
+    assert result.work["captures"] == 1
+    assert result.measures["captured_fraction"] == pytest.approx(1 / 3)
+    force = compiled(made, capacity=4).s.read("force")[0]
+    assert (force[[0, 2]] == 0).all()
+    assert (force[1] != 0).any()
+
+
+def test_it_needs_a_magnet_and_files_give_it_back():
+    with pytest.raises(InputError, match=r"effects\.capture must be used together with effects\.magnetic_"):
+        scene([[0, 0, 0]], [[0, 0, 0]], (Capture(),))
+    made = scene(
+        [[0, 0, 5]], [[0, 0, 0]], (MagneticCylinders(cylinders=[Cylinder(radius=1, length=1)]), Capture())
+    )
+    assert Scene.from_dict(made.to_dict()).digest() == made.digest()
