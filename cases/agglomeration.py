@@ -66,8 +66,7 @@ SIZES = {
         "60 grains; a look in seconds",
         {"grains": 60},
         {
-            "population": 10,
-            "parents": 4,
+            "options": {"population": 10, "parents": 4},
             "generations": 3,
             "ensemble": {"tolerance": 5e-3, "max_starts": 12, "confirm": 12},
         },

@@ -54,7 +54,7 @@ NEIGHBOURS = 3 * RADIUS
 """Distance within which the size "clumps" has a near field, m: half a diameter between surfaces."""
 
 SEARCH = {
-    "population": 20, "generations": 24,
+    "generations": 24,
     "ensemble": {"tolerance": 1e-2, "min_starts": 2, "block": 2, "max_starts": 4, "confirm": 8},
 }  # fmt: skip
 

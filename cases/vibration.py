@@ -60,7 +60,7 @@ SPACING = CUBE / (SITES - 1)
 VARIANTS = ("resonate", "avoid")
 """The inverse problems: the largest response to a given drive, and the smallest."""
 SEARCH = {
-    "population": 24, "parents": 8, "generations": 16,
+    "generations": 16, "options": {"population": 24, "parents": 8},
     # Nothing is random: a second start is the first.
     "ensemble": {"min_starts": 2, "block": 2, "max_starts": 2},
 }  # fmt: skip

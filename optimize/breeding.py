@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import inspect
 import random
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from deap import base, tools
 from pydantic import Field, model_validator
 
-from optimize.ensemble import Estimate
 from optimize.genome import Box
+from optimize.individual import Individual
+from optimize.own_random import OwnRandom
 from tisim.errors import InputError, must
 from tisim.spec import Checked
 
@@ -25,22 +25,6 @@ _UNFIT = {
         "is for several objectives",
     ),
 }
-
-
-class FitnessMin(base.Fitness):
-    """One objective, minimised."""
-
-    weights = (-1.0,)
-
-
-class Individual(list[float]):
-    """A genetic string: a point of the unit cube, its DEAP fitness (invalid until known) and its Estimate."""
-
-    def __init__(self, genes: Iterable[float]) -> None:
-        super().__init__(float(x) for x in genes)
-        self.fitness = FitnessMin()
-        self.estimate: Estimate | None = None
-        self.confirmed: Estimate | None = None
 
 
 class Operator(Checked):
@@ -92,7 +76,7 @@ class Breeding(Checked):
     offspring : bred strings (None: as many as parents). The rest are fresh random strings of the search box.
     recentre_every : generations between re-centrings of the box on the best (0: never);
     recentre_factor : its shrinking each time.
-    method : "z04" - the parents, ranked, are mated in neighbouring pairs (1st with 2nd, 3rd with 4th, ...),
+    breeding : "z04" - the parents, ranked, are mated in neighbouring pairs (1st with 2nd, 3rd with 4th, ...),
     each pair giving two offspring, so K parents give exactly K; or "deap" - select, mate and mutate name
     operators of deap.tools, which work in the coordinates of the search box, and keep to it.
     """
@@ -102,12 +86,17 @@ class Breeding(Checked):
     offspring: int | None = Field(None, ge=0)
     recentre_every: int = Field(4, ge=0)
     recentre_factor: float = Field(0.5, gt=0, le=1)
-    method: Literal["z04", "deap"] = "z04"
+    breeding: Literal["z04", "deap"] = "z04"
     select: Operator = Operator(name="selTournament", options={"tournsize": 3})
     mate: Operator = Operator(name="cxBlend", options={"alpha": 0.5})
     mutate: Operator = Operator(name="mutGaussian", options={"mu": 0.0, "sigma": 0.1, "indpb": 0.2})
     crossover_probability: float = Field(0.9, ge=0, le=1)
     mutation_probability: float = Field(0.5, ge=0, le=1)
+
+    @classmethod
+    def kind(cls) -> str:
+        """As in ``--set search.options.population=30``."""
+        return "search.options"
 
     @property
     def bred(self) -> int:
@@ -119,7 +108,7 @@ class Breeding(Checked):
         total = self.parents + self.bred
         must(total <= self.population, "parents + offspring", f"<= population = {self.population}", total)
         must(self.bred % 2 == 0, "number of offspring", "even (a pair has two)", self.bred)
-        if self.method == "z04":
+        if self.breeding == "z04":
             must(
                 self.bred <= self.parents,
                 "offspring",
@@ -142,10 +131,10 @@ class Breeder:
         self.settings = settings
         self.box = Box.full(genes)
         self._rng = np.random.default_rng(np.random.SeedSequence([seed, 0]))
-        self._state = random.Random(seed).getstate()
+        self.random = OwnRandom(seed)
         self.toolbox = base.Toolbox()
         self.toolbox.register("clone", copy.deepcopy)
-        if settings.method == "z04":
+        if settings.breeding == "z04":
             self.toolbox.register("select", tools.selBest)
             self.toolbox.register("mate", mate_z04, rng=self._rng)
         else:
@@ -173,11 +162,11 @@ class Breeder:
         return [Individual(self.box.sample(self._rng)) for _ in range(count)]
 
     def _offspring(self, population: Sequence[Individual], count: int) -> list[Individual]:
-        if self.settings.method == "z04":
+        if self.settings.breeding == "z04":
             mated = [self.toolbox.clone(string) for string in self.toolbox.select(population, count)]
             pairs = zip(mated[::2], mated[1::2], strict=True)
             return [Individual(child) for pair in pairs for child in self.toolbox.mate(*pair)]
-        with self._own_random():
+        with self.random:
             mated = [self._to_box(string) for string in self.toolbox.select(list(population), count)]
             for i in range(0, count, 2):
                 if random.random() < self.settings.crossover_probability:
@@ -195,26 +184,15 @@ class Breeder:
             np.clip(self.box.low + np.array(string) * self.box.width, self.box.low, self.box.high)
         )
 
-    @contextlib.contextmanager
-    def _own_random(self) -> Iterator[None]:
-        """DEAP draws from the random module: lend it the search's own state, and put the caller's back."""
-        callers = random.getstate()
-        random.setstate(self._state)
-        try:
-            yield
-        finally:
-            self._state = random.getstate()
-            random.setstate(callers)
-
     def _rehearse(self, genes: int) -> None:
         """Breed from throwaway strings, one of them failed: an unfit operator must show before any run."""
-        rng, state = np.random.default_rng(0), self._state
+        rng, state = np.random.default_rng(0), self.random.state
         strings = [Individual(rng.random(genes)) for _ in range(self.settings.population)]
         for rank, string in enumerate(strings):
             string.fitness.values = (float(rank) if rank else float("inf"),)
         try:
             bred = self._offspring(strings, self.settings.bred)
-            with self._own_random():
+            with self.random:
                 for string in strings:
                     bred += self.toolbox.mate(Individual(string), Individual(strings[0]))
                     bred += self.toolbox.mutate(Individual(string))
@@ -224,7 +202,7 @@ class Breeder:
                 f"operators must be fit for real-valued strings; received {self._names()} ({error!r})"
             ) from error
         finally:
-            self._state = state
+            self.random.state = state
         must(good, "operators", "fit for real-valued strings", self._names())
 
     def _names(self) -> Mapping[str, str]:

@@ -213,7 +213,7 @@ def verify(path: str | Path) -> VerifyReport:
     first: dict[str, Record] = {}
     for record in (*rows, *frames):
         first.setdefault(record.key, record)
-    conflicts = {r.key for r in (*rows, *frames) if repr(r.fitness) != repr(first[r.key].fitness)}
+    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(first[r.key].values)}
     return VerifyReport(
         rows=len(rows),
         journal=len(frames),

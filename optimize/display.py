@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from types import TracebackType
 
 from rich.console import Console
@@ -43,20 +42,26 @@ class Display:
     def generation(self, where: Progress) -> None:
         """A generation is done."""
         self.step(where)
-        self.bar.update(self.task, best=self._fitness(where.best_fitness).split("  ")[0])
+        best = self._best(where)
+        self.bar.update(self.task, best=best.split("  ")[0])
         ran = f"{where.evaluations} runs" + (f", {where.hits} from the file" if where.hits else "")
-        line = f"generation {where.generation:3d}  best {self._fitness(where.best_fitness)}  ({ran})"
+        line = f"generation {where.generation:3d}  {best}  ({ran})"
         self.console.print(line, highlight=False, markup=False)
         if where.best_design is not None and where.best_design != self.best:
             self.best = where.best_design
             text = f"    {self._design(self.best)}"
             self.console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
 
-    def _fitness(self, fitness: float) -> str:
-        if not math.isfinite(fitness):
-            return "none yet"
+    def _best(self, where: Progress) -> str:
+        if not where.best:
+            return "best none yet"
+        pairs = zip(self.problem.objectives, where.best, strict=True)
+        if self.problem.several:
+            best = "".join(f"  {o.name} {value:.4g} {o.unit}".rstrip() for o, value in pairs)
+            return f"front of {where.designs}  best{best}"
+        objective, fitness = next(pairs)
         derived = "".join(f"  {name} {of(fitness):.4g}" for name, of in self.problem.derived.items())
-        return f"{self.problem.symbol} {fitness:.4f}{derived}"
+        return f"best {objective.name} {fitness:.4f} {objective.unit}".rstrip() + derived
 
     def _design(self, design: dict[str, float]) -> str:
         units = {gene.name: gene.unit for gene in self.problem.genome.genes}

@@ -1,16 +1,12 @@
 """Fitness of designs averaged over random starts until the running mean settles (Z04 Eq. 8.1).
 
-All designs share one evaluator call per block of starts, and every evaluation goes through the cache.
+Designs that compete for the first place can be given more starts.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -18,31 +14,14 @@ from pydantic import Field, model_validator
 from optimize.cache import Cache
 from optimize.estimate import Estimate, settled_after
 from optimize.problem import Problem
-from optimize.record import Record, canonical, evaluation_key
-from tisim.errors import InputError, RunError, must
+from optimize.record import canonical
+from optimize.runs import Evaluator, Runs, Sample
+from optimize.student import student_t
+from tisim.errors import must
 from tisim.spec import Checked
 
-if TYPE_CHECKING:
-    from tisim.result import Result
-    from tisim.scene import Scene
-
-
-class Evaluator(Protocol):
-    """Runs scenes.
-
-    settings : all about it that may change a fitness (precision, device kind); part of the cache key.
-    """
-
-    settings: dict[str, Any]
-
-    def evaluate(
-        self, scenes: Sequence[Scene], progress: Callable[[float], None] | None
-    ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result) once for each scene, in any order, as soon as it is finished.
-
-        progress, if given, is called now and then with the finished fraction of this call, 0..1.
-        """
-        ...
+Design = Mapping[str, float]
+Report = Callable[[float], None]
 
 
 class EnsembleSettings(Checked):
@@ -51,6 +30,7 @@ class EnsembleSettings(Checked):
     tolerance : TOL of Z04 Eq. 8.1. block : starts per evaluator call (the first block has min_starts if
     that is more). min_starts, max_starts : bounds of the number of starts. common_starts : start k is the
     same for every design, so that designs are compared on equal terms; False draws each design's own.
+    race : starts that a generation spends, beyond Eq. 8.1, on telling the best designs apart (0: none).
     confirm : fresh starts from which the best designs are run again once the search has ended (0: not).
     """
 
@@ -59,6 +39,7 @@ class EnsembleSettings(Checked):
     min_starts: int = Field(4, ge=1)
     max_starts: int = Field(48, ge=1)
     common_starts: bool = True
+    race: int = Field(0, ge=0)
     confirm: int = Field(0, ge=0)
 
     @classmethod
@@ -77,145 +58,139 @@ class EnsembleSettings(Checked):
         return self
 
 
-def start_seed(seed: int, start: int, design: Mapping[str, float] | None = None) -> int:
-    """Seed (0 .. 2^31 - 1) of a start: a function of (seed, start), and of the design if one is given."""
-    entropy = [seed, start]
-    if design is not None:
-        entropy.append(int.from_bytes(hashlib.sha256(canonical(dict(design))).digest()[:8], "little"))
-    return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0] >> 1)
-
-
-@dataclass
-class _Sample:
-    """The starts of one design so far."""
-
-    design: Mapping[str, float]
-    values: list[float] = field(default_factory=list)
-    reason: str = ""
-    open: bool = True
-
-
 class Ensemble:
-    """Estimates fitnesses. evaluations, hits : how many were run, and found in the cache instead."""
+    """Estimates the objectives of designs; each design is known once it has been estimated.
+
+    budget : most runs that estimates and races may ask for (None: no end); exhausted : it has cut one short.
+    runs : counts them. An estimate is a tuple, one Estimate of the cost for each objective.
+    """
 
     def __init__(
-        self, problem: Problem, evaluator: Evaluator, cache: Cache, settings: EnsembleSettings, seed: int
+        self,
+        problem: Problem,
+        evaluator: Evaluator,
+        cache: Cache,
+        settings: EnsembleSettings,
+        seed: int,
+        budget: int | None = None,
     ) -> None:
-        self.problem, self.evaluator, self.cache = problem, evaluator, cache
-        self.settings, self.seed = settings, seed
-        self.evaluations = 0
-        self.hits = 0
+        self.settings, self.objectives = settings, len(problem.objectives)
+        self.runs = Runs(problem, evaluator, cache, seed, settings.common_starts)
+        self.budget = math.inf if budget is None else budget
+        self.exhausted = False
+        self._known: dict[bytes, Sample] = {}
+
+    @property
+    def asked(self) -> int:
+        """Different runs asked for."""
+        return self.runs.evaluations + self.runs.hits
 
     def estimate(
-        self, designs: Sequence[Mapping[str, float]], progress: Callable[[float], None] | None = None
-    ) -> list[Estimate]:
-        """Fitness of each design, in order. progress is called with the finished fraction, never decreasing.
+        self, designs: Sequence[Design], progress: Report | None = None
+    ) -> list[tuple[Estimate, ...] | None]:
+        """Of each design, in order; None where the budget was spent before its first block of starts.
 
-        A design with any failed start has fitness +inf. Errors of the evaluator itself and KeyboardInterrupt
-        pass through; what was finished by then is in the cache.
+        progress is called with the finished fraction, never decreasing. A design with any failed start has
+        cost +inf.
         """
-        samples = [_Sample(design) for design in designs]
-        size = max(self.settings.block, self.settings.min_starts)
+        wish = self.settings
+        samples = [self._sample(design) for design in designs]
+        different = list(dict.fromkeys(samples))
+        size = max(wish.block, wish.min_starts)
         first, shown = 0, 0.0
-        while running := [sample for sample in samples if sample.open]:
-            last = min(first + size, self.settings.max_starts)
-            done = sum(1.0 if not sample.open else first / self.settings.max_starts for sample in samples)
-            share = len(running) * (last - first) / self.settings.max_starts
+        while running := [sample for sample in different if sample.open]:
+            last = min(first + size, wish.max_starts)
+            afforded = self._afforded(running, last - first)
+            done = sum(1.0 if not sample.open else first / wish.max_starts for sample in different)
+            share = len(afforded) * (last - first) / wish.max_starts
 
             def report(fraction: float, done: float = done, share: float = share) -> None:
                 nonlocal shown
-                shown = max(shown, (done + share * fraction) / len(samples))
+                shown = max(shown, (done + share * fraction) / len(different))
                 if progress is not None:
                     progress(shown)
 
-            self._run(running, range(first, last), report)
-            for sample in running:
-                settled = settled_after(sample.values, self.settings.tolerance, self.settings.min_starts)
-                sample.open = not sample.reason and settled is None and last < self.settings.max_starts
-            first, size = last, self.settings.block
+            for sample in running[len(afforded) :]:
+                sample.open = False
+            self.runs.add([(sample, range(first, last)) for sample in afforded], report)
+            for sample in afforded:
+                if sample.reason:
+                    sample.open = False
+                    continue
+                settled = settled_after(sample.costs, wish.tolerance, wish.min_starts)
+                sample.used, sample.settled = settled or len(sample.costs), settled is not None
+                sample.open = settled is None and last < wish.max_starts
+            first, size = last, wish.block
         if progress is not None:
             progress(1.0)
+        return [self._summary(sample) if sample.used or sample.reason else None for sample in samples]
+
+    def race(self, designs: Sequence[Design], progress: Report | None = None) -> list[tuple[Estimate, ...]]:
+        """Spend starts on those of the designs that may still be the best; all their estimates afterwards.
+
+        Every round gives a block of starts more, up to max_starts, to each design that no other one beats
+        surely: by the 95 % confidence interval of the mean difference, start by start, in every objective.
+        Racing with paired t tests: O. Maron and A. W. Moore, NIPS 6 (1994) 59-66; M. Birattari et al., GECCO
+        (2002) 11-18 (there "tNo-Race": no correction for repeated tests).
+        """
+        samples = [self._sample(design) for design in designs]
+        racing = self._unbeaten(samples)
+        purse = self.settings.race
+        while len(racing) > 1:
+            goals = {s: min(s.used + self.settings.block, self.settings.max_starts) for s in racing}
+            wanted = [(s, range(len(s.costs), goal)) for s, goal in goals.items()]
+            price = sum(len(starts) for _, starts in wanted)
+            if price > purse or price > self.budget - self.asked or all(s.used == goals[s] for s in racing):
+                break
+            self.runs.add(wanted, progress or (lambda fraction: None))
+            purse -= price
+            for sample, goal in goals.items():
+                sample.used = goal
+            racing = self._unbeaten(racing)
         return [self._summary(sample) for sample in samples]
 
     def confirm(
-        self, designs: Sequence[Mapping[str, float]], progress: Callable[[float], None] | None = None
-    ) -> list[Estimate]:
-        """Fitness of each design from `confirm` starts that no estimate has used.
+        self, designs: Sequence[Design], progress: Report | None = None
+    ) -> list[tuple[Estimate, ...]]:
+        """Of each design from `confirm` starts that no estimate has used; the budget is not looked at.
 
         A winner has won by being good and by being lucky in its starts; this is without the luck.
         """
-        samples = [_Sample(design) for design in designs]
+        samples = [Sample(design) for design in designs]
         first = self.settings.max_starts
-        self._run(samples, range(first, first + self.settings.confirm), progress or (lambda fraction: None))
-        return [
-            self._summary(sample) if sample.reason else Estimate.of(sample.values, True) for sample in samples
-        ]
+        starts = range(first, first + self.settings.confirm)
+        self.runs.add([(sample, starts) for sample in samples], progress or (lambda fraction: None))
+        for sample in samples:
+            sample.used, sample.settled = len(sample.costs), True
+        return [self._summary(sample) for sample in samples]
 
-    def _run(self, running: Sequence[_Sample], starts: range, report: Callable[[float], None]) -> None:
-        """Add the fitness of each start to each running sample; all that is not in the cache in one call."""
-        self.cache.refresh()
-        wanted: list[tuple[_Sample, int, int, str]] = []
-        missing: dict[str, tuple[Scene, _Sample, int]] = {}
-        for sample in running:
-            for start in starts:
-                seed = start_seed(self.seed, start, None if self.settings.common_starts else sample.design)
-                try:
-                    scene = self.problem.scene(sample.design, seed)
-                except InputError as error:
-                    sample.reason = sample.reason or f"infeasible: {error}"
-                    break
-                key = evaluation_key(
-                    scene.digest(), self.evaluator.settings, self.problem.name, self.problem.version
-                )
-                wanted.append((sample, start, seed, key))
-                if self.cache.get(key) is None and key not in missing:
-                    missing[key] = (scene, sample, seed)
-                else:
-                    self.hits += 1
-        self._evaluate(missing, report)
-        for sample, start, seed, key in wanted:
-            record = self.cache.get(key)
-            if record is None:
-                raise RunError(
-                    f"evaluator must yield every scene; received none for start {start}, seed {seed}"
-                )
-            sample.values.append(record.fitness)
-            if not record.ok and not sample.reason:
-                sample.reason = f"start {start} (seed {seed}): {record.reason}"
+    def _sample(self, design: Design) -> Sample:
+        return self._known.setdefault(canonical(dict(design)), Sample(design))
 
-    def _evaluate(
-        self, missing: Mapping[str, tuple[Scene, _Sample, int]], report: Callable[[float], None]
-    ) -> None:
-        if not missing:
-            return
-        keys = list(missing)
-        results = self.evaluator.evaluate([missing[key][0] for key in keys], report)
-        for finished, (index, result) in enumerate(results, start=1):
-            _, sample, seed = missing[keys[index]]
-            ok, reason, fitness = result.status.ok, result.status.reason, math.nan
-            if ok:
-                fitness = float(self.problem.objective(result))
-                if not math.isfinite(fitness):
-                    ok, reason, fitness = False, f"objective is {fitness}", math.nan
-            self.cache.put(
-                Record(
-                    key=keys[index],
-                    problem=self.problem.name,
-                    fitness=fitness,
-                    ok=ok,
-                    reason="" if ok else reason or "failed without a reason",
-                    seed=seed,
-                    design=dict(sample.design),
-                    work=dict(result.work),
-                    wall_s=float(result.wall_s),
-                    created=time.time(),
-                )
-            )
-            self.evaluations += 1
-            report(finished / len(keys))
+    def _afforded(self, running: list[Sample], starts: int) -> list[Sample]:
+        room = (self.budget - self.asked) // starts
+        if room < len(running):
+            self.exhausted = True
+            return running[: int(room)]
+        return running
 
-    def _summary(self, sample: _Sample) -> Estimate:
+    def _unbeaten(self, samples: Sequence[Sample]) -> list[Sample]:
+        good = [sample for sample in dict.fromkeys(samples) if not sample.reason]
+        return [one for one in good if not any(_beats(other, one) for other in good)]
+
+    def _summary(self, sample: Sample) -> tuple[Estimate, ...]:
         if sample.reason:
-            return Estimate(math.inf, math.nan, math.nan, len(sample.values), False, sample.reason)
-        settled = settled_after(sample.values, self.settings.tolerance, self.settings.min_starts)
-        return Estimate.of(sample.values[:settled], settled is not None)
+            failed = Estimate(math.inf, math.nan, math.nan, len(sample.costs), False, sample.reason)
+            return (failed,) * self.objectives
+        columns = zip(*sample.costs[: sample.used], strict=True)
+        return tuple(Estimate.of(column, sample.settled) for column in columns)
+
+
+def _beats(one: Sample, other: Sample) -> bool:
+    """Whether one is better in every objective, its 95 % confidence interval of the difference above 0."""
+    n = min(one.used, other.used)
+    if n < 2:
+        return False
+    lead = np.array(other.costs[:n]) - np.array(one.costs[:n])
+    unsure = student_t(n - 1) * np.std(lead, axis=0, ddof=1) / math.sqrt(n)
+    return bool(np.all(np.mean(lead, axis=0) > unsure))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from optimize.student import student_t
 
@@ -42,14 +43,17 @@ class Estimate:
         return cls(mean, std, half_width, n, settled)
 
 
-def settled_after(values: Sequence[float], tolerance: float, min_starts: int) -> int | None:
+def settled_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:
     """The least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04 Eq. 8.1).
 
+    values : shape (starts,) or (starts, objectives); of several objectives each must meet it at once.
     Two equal means count as settled, also when both are zero. None if there is no such n in values.
     """
-    means = np.cumsum(values) / np.arange(1, len(values) + 1)
-    for n in range(max(min_starts, 2), len(values) + 1):
-        change = abs(means[n - 1] - means[n - 2])
-        if change == 0 or change < tolerance * abs(means[n - 1]):
+    numbers = np.asarray(values, dtype=float)
+    columns = numbers.reshape(len(numbers), -1)
+    means = np.cumsum(columns, axis=0) / np.arange(1, len(columns) + 1)[:, None]
+    for n in range(max(min_starts, 2), len(columns) + 1):
+        change = np.abs(means[n - 1] - means[n - 2])
+        if np.all((change == 0) | (change < tolerance * np.abs(means[n - 1]))):
             return n
     return None

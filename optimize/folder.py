@@ -2,7 +2,8 @@
 
 search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
 best.csv          the best designs, all digits
-convergence.png   (and .pdf) best and mean fitness by generation
+convergence.png   (and .pdf) best and mean fitness by generation; of several objectives the best of each
+front.png         (and .pdf) the front of several objectives
 best_scene.toml   the best design from the first random start, for ``tisim run``
 best_cloud.png    that run at start and end, where the problem says how to draw it
 best_run.csv      what that run shows beside what was wanted, where the problem says what
@@ -17,7 +18,7 @@ from typing import Any
 
 from optimize.cache import Cache
 from optimize.record import canonical
-from optimize.settings import search_name
+from optimize.settings import FORMAT, search_name
 from optimize.stored import searches
 from tisim.durable import locked
 from tisim.errors import InputError, must
@@ -27,6 +28,8 @@ BESIDE = (
     "best.csv",
     "convergence.png",
     "convergence.pdf",
+    "front.png",
+    "front.pdf",
     "best_scene.toml",
     "best_cloud.png",
     "best_run.csv",
@@ -49,7 +52,14 @@ def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:
     """InputError when the file in the folder is of another search than the one wished, by their identity."""
     known = searches(cache)
     if known and search_name(wished) not in known:
-        there = _leaves(json.loads(next(iter(known.values()))["identity"]))
+        old = json.loads(next(iter(known.values()))["identity"])
+        must(
+            old.get("format") == FORMAT,
+            "output folder",
+            "of a search of this version of the program (or give --out, or --fresh --overwrite)",
+            str(folder),
+        )
+        there = _leaves(old)
         here = _leaves(json.loads(canonical(wished)))
         names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
         differ = ", ".join(f"{name} = {there.get(name)} and not {here.get(name)}" for name in names)

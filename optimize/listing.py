@@ -24,20 +24,25 @@ def listing(path: str | Path) -> RenderableType:
     records = cache.records()
     table = plain_table("search", "generations", "best", "ended by")
     for name, about in searches(cache).items():
-        best = cache.table(f"{name}/logbook").columns.get("best", [])
-        last = f"{best[-1]:.6g}" if best else "none"
-        table.add_row(name, str(max(0, len(best) - 1)), last, str(about["stopped"]) or "not ended")
+        log = cache.table(f"{name}/logbook").columns
+        best = [values[-1] for heading, values in log.items() if heading.split(" ")[0] == "best" and values]
+        last = ", ".join(f"{value:.6g}" for value in best) or "none"
+        table.add_row(
+            name, str(max(0, len(log.get("gen", [])) - 1)), last, str(about["stopped"]) or "not ended"
+        )
     return Group(_evaluations(records), "", table, *_failures(records))
 
 
 def _evaluations(records: Sequence[Record]) -> Table:
-    table = plain_table("problem", "evaluations", "failed", "lowest", "run time")
+    table = plain_table("problem", "evaluations", "failed", "lowest .. highest", "run time")
     for problem in dict.fromkeys(record.problem for record in records):
         mine = [record for record in records if record.problem == problem]
-        good = [record.fitness for record in mine if record.ok]
-        lowest = f"{min(good):.6g}" if good else "none"
+        good = [record.values for record in mine if record.ok]
+        ranges = ", ".join(f"{min(v):.6g} .. {max(v):.6g}" for v in zip(*good, strict=True))
         seconds = sum(record.wall_s for record in mine)
-        table.add_row(problem, str(len(mine)), str(len(mine) - len(good)), lowest, f"{seconds:.1f} s")
+        table.add_row(
+            problem, str(len(mine)), str(len(mine) - len(good)), ranges or "none", f"{seconds:.1f} s"
+        )
     return table
 
 

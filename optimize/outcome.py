@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 from deap import tools
 
-from optimize.breeding import Individual
+from optimize.hall import compromise
+from optimize.individual import Individual
 from optimize.problem import Problem
 from optimize.settings import Settings, search_name
 
@@ -17,13 +18,16 @@ Stopped = Literal["", "generations", "target", "patience", "evaluations", "wall 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a search is. fraction : of this generation, 0..1. best_design : None until one is known.
-    evaluations, hits : run, and found in the cache. elapsed_s : wall seconds since the search began."""
+    """Where a search is. fraction : of this generation, 0..1. best : value of each objective, the best that
+    any design of the hall has; empty until one is known. designs : in the hall. best_design : of one
+    objective; None until one is known. evaluations, hits : run, and found in the cache. elapsed_s : wall
+    seconds since the search began."""
 
     generation: int
     generations: int
     fraction: float
-    best_fitness: float
+    best: tuple[float, ...]
+    designs: int
     best_design: dict[str, float] | None
     evaluations: int
     hits: int
@@ -35,10 +39,12 @@ class Outcome:
     """What a search found.
 
     hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
-    succeeded); failed designs never enter.
+    succeeded); of several objectives the front. Failed designs never enter. seen : values of the objectives
+    of each design that succeeded, in the order they were first estimated.
     logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations asked for),
-    failed, best, mean, std (of the successful designs in the population; best is +inf and mean and std NaN
-    if there is none), box (mean width of the search box it drew from), recentred (box moved after it).
+    failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
+    infinitely bad if there is none), and for one objective mean and std of the successful designs in the
+    population (NaN if there is none), for several the number of designs in the front, and best for each.
     evaluations, hits : run, and found in the cache. stopped : the rule that ended it.
     identity : see optimize.settings. name : of its group in the cache file.
     """
@@ -47,6 +53,7 @@ class Outcome:
     settings: Settings
     identity: Mapping[str, Any]
     hall: list[Individual] = field(default_factory=list)
+    seen: list[tuple[float, ...]] = field(default_factory=list)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0
     hits: int = 0
@@ -59,6 +66,9 @@ class Outcome:
 
     @property
     def best(self) -> Individual | None:
+        """Of one objective the best; of several the one of the front that is nearest to the best of each."""
+        if self.hall and self.problem.several:
+            return compromise(self.hall)
         return self.hall[0] if self.hall else None
 
     @property

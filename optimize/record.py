@@ -29,7 +29,8 @@ class Record:
     """One evaluation of one design from one random start.
 
     key : see evaluation_key; problem : its name.
-    fitness : the objective, NaN if the evaluation failed; ok, reason : how it ended.
+    fitness : the first objective, NaN if the evaluation failed; others : the other ones, where there are
+    several. ok, reason : how it ended.
     seed : of the start; design : gene -> value in its unit; work : counts of the run.
     wall_s : seconds it took; created : seconds since 1970 (UTC).
     """
@@ -44,18 +45,27 @@ class Record:
     work: Mapping[str, Any]
     wall_s: float
     created: float
+    others: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         plain = self.reason.encode("ascii", "backslashreplace").decode().replace("\0", " ")
         object.__setattr__(self, "reason", plain[:REASON_LENGTH])
         object.__setattr__(self, "design", dict(self.design))
         object.__setattr__(self, "work", dict(self.work))
+        object.__setattr__(self, "others", tuple(self.others))
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """All objectives, as they are (not with the sign of a cost)."""
+        return (self.fitness, *self.others)
 
     def payload(self) -> bytes:
         """The record as canonical JSON; NaN is written as null, which every JSON reader knows."""
         fields = dict(vars(self))
         fields["fitness"] = self.fitness if math.isfinite(self.fitness) else None
-        return canonical(fields)
+        if not fields.pop("others"):
+            return canonical(fields)  # as it was before there could be others: old checksums stay true
+        return canonical(fields | {"others": [v if math.isfinite(v) else None for v in self.others]})
 
     @classmethod
     def parse(cls, payload: bytes) -> Record:
@@ -63,4 +73,5 @@ class Record:
         fields = json.loads(payload)
         if fields["fitness"] is None:
             fields["fitness"] = math.nan
-        return cls(**fields)
+        others = fields.pop("others", ())
+        return cls(**fields, others=tuple(math.nan if value is None else value for value in others))

@@ -10,31 +10,35 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from optimize.convergence import convergence_figure
+from optimize.front import front_figure
 from optimize.outcome import Outcome
-from optimize.tables import best_columns, logbook_columns
+from optimize.tables import best_columns
 from tisim.durable import replace_file
-from tisim.figure import empty
 
 WIDTH = 80
 """Of the table of the best designs; every terminal has as many columns."""
-_BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
 
 def best_table(outcome: Outcome) -> RenderableType:
     """The best designs for the terminal: a column per design, genes in their units, fitness with its 95 %
-    interval, derived values. In several tables where they would not fit on WIDTH columns side by side.
+    interval, derived values. In several tables where they would not fit on WIDTH columns side by side. Of a
+    front as many as the hall of fame has places, spread along it.
     """
-    headings, *rows = (
-        (heading, *map(_text, values))
-        for heading, values in best_columns(outcome.problem, outcome.hall).items()
-    )
+    columns = best_columns(outcome.problem, outcome.hall)
+    places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
+    shown = _spread(len(outcome.hall), places)
+    headings, *rows = ((heading, *(_text(values[k]) for k in shown)) for heading, values in columns.items())
     designs = max(1, (WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
-    blocks: list[RenderableType] = [Text(outcome.problem.title or outcome.problem.name, "italic")]
+    title = outcome.problem.title or outcome.problem.name
+    part = (
+        f"; {len(shown)} of the {len(outcome.hall)} designs of its front" if outcome.problem.several else ""
+    )
+    blocks: list[RenderableType] = [Text(title + part, "italic")]
     for first in range(1, max(2, len(headings)), designs):
         table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
         table.add_column(headings[0], no_wrap=True)
@@ -44,6 +48,11 @@ def best_table(outcome: Outcome) -> RenderableType:
             table.add_row(Text(name), *cells[first - 1 : first - 1 + designs])
         blocks += ["", table]
     return Group(*blocks)
+
+
+def _spread(number: int, places: int) -> list[int]:
+    """At most so many places in a row of that number, the first and the last among them."""
+    return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})
 
 
 def details_table(details: Mapping[str, float]) -> RenderableType:
@@ -77,63 +86,20 @@ def best_csv(outcome: Outcome) -> bytes:
     return text.getvalue().encode()
 
 
-def convergence_figure(outcome: Outcome) -> Figure:
-    """Best and mean fitness against generation, and below it the problem's first derived value of the best.
-
-    Dotted lines mark the generations after which the search box was re-centred. Where the best design has
-    been run again from fresh starts, that stands at the end: the curve is lower by the luck of a winner.
-    """
-    problem = outcome.problem
-    log = logbook_columns(problem, outcome.logbook)
-    derived = next(iter(problem.derived), None)
-    panels = 2 if derived else 1
-    figure = empty(5.6, 2.7 * panels)
-    axes = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
-    if log:
-        generation = np.array(log["gen"])
-        best, mean = _plottable(log["best"]), _plottable(log["mean"])
-        axes[0].plot(generation, mean, color=_MEAN, marker="o", ms=2.5, lw=1, label="mean of the population")
-        axes[0].plot(generation, best, color=_BEST, marker="o", ms=3.5, lw=1.6, label="best")
-        if derived:
-            axes[1].plot(generation, _plottable(log[derived]), color=_BEST, marker="o", ms=3.5, lw=1.6)
-        sure = outcome.best.confirmed if outcome.best else None
-        if sure is not None:
-            axes[0].errorbar(
-                generation[-1] + 0.4, sure.mean, sure.half_width, color=_SURE, marker="s", ms=3.5, lw=1.2,
-                capsize=2, ls="none", label="best, from fresh starts, 95 % CI",
-            )  # fmt: skip
-            if derived:
-                value = problem.derived[derived](sure.mean)
-                axes[1].plot(generation[-1] + 0.4, value, color=_SURE, marker="s", ms=3.5)
-        for axis in axes:
-            for count, at in enumerate(generation[np.array(log["recentred"], dtype=bool)]):
-                label = "search box re-centred" if count == 0 else None
-                axis.axvline(at, color=_MARK, ls=":", lw=1.2, zorder=0, label=label)
-        axes[0].legend(framealpha=1, edgecolor="none", fontsize=8)
-    axes[0].set_ylabel(problem.symbol)
-    if derived:
-        axes[1].set_ylabel(f"{derived} of the best")
-    axes[-1].set_xlabel("generation")
-    axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
-    for axis in axes:
-        axis.spines[["top", "right"]].set_visible(False)
-        axis.tick_params(direction="in")
-    return figure
-
-
 def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
-    """Write best.csv, convergence.png and convergence.pdf into a folder (made if missing); name -> path.
+    """Write best.csv, convergence and front (of several objectives) as .png and .pdf into a folder (made if
+    missing); name -> path.
 
     Each file is, at every instant, the old one or the new one. RunError if the disk is full.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    figure = convergence_figure(outcome)
-    contents = {
-        "best.csv": best_csv(outcome),
-        "convergence.png": drawn(figure, "png", dpi=200),
-        "convergence.pdf": drawn(figure, "pdf"),
-    }
+    figures = {"convergence": convergence_figure(outcome)}
+    if outcome.problem.several:
+        figures["front"] = front_figure(outcome)
+    contents = {"best.csv": best_csv(outcome)}
+    for name, figure in figures.items():
+        contents |= {f"{name}.png": drawn(figure, "png", dpi=200), f"{name}.pdf": drawn(figure, "pdf")}
     for name, content in contents.items():
         replace_file(folder / name, content)
     return {name: folder / name for name in contents}
@@ -152,9 +118,3 @@ def _text(value: Any) -> str:
         return str(value)
     digits, power, exponent = f"{value:.4g}".partition("e")
     return f"{digits}e{int(exponent)}" if power else digits
-
-
-def _plottable(values: list[float]) -> np.ndarray:
-    """Generations without a successful design leave a gap."""
-    array = np.array(values, dtype=float)
-    return np.where(np.isfinite(array), array, np.nan)

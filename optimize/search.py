@@ -1,4 +1,4 @@
-"""The genetic search: generations, their log, stopping rules, and what is left in the cache file.
+"""The search: generations of a method, their log, stopping rules, and what is left in the cache file.
 
 A search is a function of its problem, settings and evaluator settings. Resuming is therefore running it again
 on the same cache file: every finished evaluation comes from there, the rest follows as if never stopped.
@@ -6,20 +6,19 @@ on the same cache file: every finished evaluation comes from there, the rest fol
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
-from typing import Any
 
-import numpy as np
-from deap import tools
-
-from optimize.breeding import Breeder, Individual
 from optimize.cache import Cache
-from optimize.ensemble import Ensemble, Evaluator
+from optimize.ensemble import Ensemble
+from optimize.hall import Hall
+from optimize.individual import Individual
+from optimize.log import statistics
+from optimize.method import find
 from optimize.outcome import Outcome, Progress, Stopped
 from optimize.problem import Problem
-from optimize.settings import Settings, identity
+from optimize.runs import Evaluator
+from optimize.settings import Settings, fit, identity
 from optimize.stored import searches, store
 
 
@@ -36,24 +35,14 @@ def search(
     on_generation: Callable[[Progress], None] | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Outcome:
-    """Minimise the problem's fitness over its genome (Z04 sections 7 and 8).
+    """Look for the problem's best design, or its front, over its genome.
 
     on_generation is called after each generation, on_progress as evaluations finish. After each generation
     settings, versions, logbook and hall of fame are in the cache file, below Outcome.name.
     KeyboardInterrupt ends the search cleanly and is reported in Outcome.stopped.
-    Raises InputError for operators that cannot work on the genome, RunError if the disk is full.
+    Raises InputError for a method that cannot work on the problem, RunError if the disk is full.
     """
     return _Search(problem, evaluator, cache, settings or Settings(), on_generation, on_progress).run()
-
-
-def _successful(function: Callable[[Any], Any], otherwise: float) -> Callable[[Any], float]:
-    """The statistic over the designs that did not fail."""
-
-    def statistic(values: Any) -> float:
-        finite = [value for value in values if math.isfinite(value)]
-        return float(function(finite)) if finite else otherwise
-
-    return statistic
 
 
 class _Search:
@@ -66,16 +55,18 @@ class _Search:
         on_generation: Callable[[Progress], None] | None,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
+        fit(problem, settings)
         self.problem, self.cache, self.settings = problem, cache, settings
         self.on_generation, self.on_progress = on_generation, on_progress
-        self.ensemble = Ensemble(problem, evaluator, cache, settings.ensemble, settings.seed)
-        self.breeder = Breeder(len(problem.genome), settings, settings.seed)
-        self.hall = tools.HallOfFame(settings.hall_of_fame)
+        self.ensemble = Ensemble(
+            problem, evaluator, cache, settings.ensemble, settings.seed, settings.max_evaluations
+        )
+        self.method = find(settings.method)(
+            len(problem.genome), len(problem.objectives), settings.options, settings.seed
+        )
+        self.hall = Hall(settings.hall_of_fame)
         self.ranked: list[Individual] = []
-        self.statistics = tools.Statistics(lambda string: string.fitness.values[0])
-        self.statistics.register("best", _successful(np.min, math.inf))
-        self.statistics.register("mean", _successful(np.mean, math.nan))
-        self.statistics.register("std", _successful(np.std, math.nan))
+        self.waited = 0
         self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
         self.began = time.monotonic()
 
@@ -94,36 +85,35 @@ class _Search:
 
     def _confirm(self) -> None:
         """Run the best designs again from fresh starts, and rank them by that."""
-        if not self.settings.ensemble.confirm or not self.hall or self._out_of_time():
+        if not self.settings.ensemble.confirm or not self.hall.strings or self._out_of_time():
             return
-        ranked = list(self.hall)
         last = len(self.outcome.logbook) - 1
-        designs = [self.problem.genome.decode(string) for string in ranked]
+        designs = [self.problem.genome.decode(string) for string in self.hall.strings]
         found = self.ensemble.confirm(designs, lambda fraction: self._report(last, 1.0))
-        for string, estimate in zip(ranked, found, strict=True):
-            string.confirmed = estimate
-        order = sorted(range(len(ranked)), key=lambda k: found[k].mean)
-        self.ranked = [ranked[k] for k in order]
+        for string, estimates in zip(self.hall.strings, found, strict=True):
+            string.confirmed = estimates
+        self.ranked = sorted(self.hall.strings, key=lambda s: [estimate.mean for estimate in s.confirmed])
 
     def _generations(self) -> None:
-        population = self.breeder.first()
         for generation in range(self.settings.generations + 1):
-            box = float(self.breeder.box.width.mean())
-            asked = self.ensemble.evaluations + self.ensemble.hits
+            width = self.method.width
+            asked = self.ensemble.asked
+            population = self.method.ask()
             fresh = self._estimate(population, generation)
-            self.hall.update([string for string in population if string.fitness.values[0] < math.inf])
-            every = self.settings.recentre_every
-            recentred = bool(every and generation and generation % every == 0 and self.hall)
-            if recentred:
-                self.breeder.recentre(self.hall[0])
+            population = [string for string in population if string.fitness.valid]
+            better = self.hall.update(population)
+            self._race(population, generation)
+            if not self.ensemble.exhausted:  # or the generation is not whole, and the last
+                self.method.tell(population, self.hall.strings)
+            self.waited = 0 if better else self.waited + 1
             self.outcome.logbook.record(
                 gen=generation,
                 designs=fresh,
-                starts=self.ensemble.evaluations + self.ensemble.hits - asked,
-                failed=sum(string.fitness.values[0] == math.inf for string in population),
-                box=box,
-                recentred=recentred,
-                **self.statistics.compile(population),
+                starts=self.ensemble.asked - asked,
+                failed=sum(string.failed for string in population),
+                box=width,
+                recentred=self.method.moved and not self.ensemble.exhausted,
+                **statistics(self.problem, population, self.hall.strings),
             )
             self._store()
             if self.on_generation is not None:
@@ -131,18 +121,31 @@ class _Search:
             self.outcome.stopped = self._stop(generation)
             if self.outcome.stopped:
                 return
-            population = self.breeder.following(population)
 
     def _estimate(self, population: list[Individual], generation: int) -> int:
-        """Estimate the strings whose fitness is not known yet; return how many they were."""
-
+        """Estimate the strings whose fitness is not known, as far as the budget goes; how many they were."""
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
         found = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
-        for string, estimate in zip(fresh, found, strict=True):
-            string.estimate = estimate
-            string.fitness.values = (estimate.mean,)
-        return len(fresh)
+        for string, estimates in zip(fresh, found, strict=True):
+            if estimates is not None:
+                string.know(estimates)
+                if not string.failed:
+                    self.outcome.seen.append(self.problem.costs(string.fitness.values))
+        return sum(string.fitness.valid for string in fresh)
+
+    def _race(self, population: list[Individual], generation: int) -> None:
+        """Spend more starts on the hall's designs, and rank it by what is known then."""
+        if not self.settings.ensemble.race:
+            return
+        racing = self.hall.strings
+        designs = [self.problem.genome.decode(string) for string in racing]
+        found = self.ensemble.race(designs, lambda fraction: self._report(generation, 1.0))
+        known = {tuple(string): estimates for string, estimates in zip(racing, found, strict=True)}
+        for string in (*racing, *population):
+            if tuple(string) in known:
+                string.know(known[tuple(string)])
+        self.hall.update(population)
 
     def _report(self, generation: int, fraction: float) -> None:
         if self.on_progress is not None:
@@ -151,14 +154,14 @@ class _Search:
             raise _OutOfTime
 
     def _stop(self, generation: int) -> Stopped:
-        best = self.outcome.logbook.select("best")
         wish = self.settings
-        if wish.target is not None and best[-1] <= wish.target:
-            return "target"
-        if wish.patience is not None and generation - best.index(min(best)) >= wish.patience:
+        if wish.target is not None and self.hall.strings:
+            (goal,) = self.problem.costs([wish.target])
+            if self.hall.strings[0].fitness.values[0] <= goal:
+                return "target"
+        if wish.patience is not None and self.waited >= wish.patience:
             return "patience"
-        asked = self.ensemble.evaluations + self.ensemble.hits
-        if wish.max_evaluations is not None and asked >= wish.max_evaluations:
+        if self.ensemble.exhausted or self.ensemble.asked >= self.ensemble.budget:
             return "evaluations"
         if generation == wish.generations:
             return "generations"
@@ -169,22 +172,24 @@ class _Search:
         return budget is not None and time.monotonic() - self.began >= budget
 
     def _progress(self, generation: int, fraction: float) -> Progress:
-        best = self.hall[0] if self.hall else None
+        hall = self.hall.strings
+        costs = [min(column) for column in zip(*(string.fitness.values for string in hall), strict=True)]
         return Progress(
             generation=generation,
             generations=self.settings.generations,
             fraction=fraction,
-            best_fitness=best.fitness.values[0] if best else math.inf,
-            best_design=self.problem.genome.decode(best) if best else None,
-            evaluations=self.ensemble.evaluations,
-            hits=self.ensemble.hits,
+            best=self.problem.costs(costs) if hall else (),
+            designs=len(hall),
+            best_design=None if self.problem.several or not hall else self.problem.genome.decode(hall[0]),
+            evaluations=self.ensemble.runs.evaluations,
+            hits=self.ensemble.runs.hits,
             elapsed_s=time.monotonic() - self.began,
         )
 
     def _store(self) -> None:
         """Bring the outcome up to date and put it into the cache file."""
         out = self.outcome
-        out.hall = self.ranked or list(self.hall)
-        out.evaluations, out.hits = self.ensemble.evaluations, self.ensemble.hits
+        out.hall = self.ranked or list(self.hall.strings)
+        out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits
         out.elapsed_s = time.monotonic() - self.began
         store(self.cache, out)

@@ -8,14 +8,14 @@ from pathlib import Path
 from rich.console import Console
 
 from optimize import report
-from optimize.breeding import Individual
 from optimize.cache import Cache
 from optimize.display import Display
-from optimize.ensemble import start_seed
 from optimize.evaluator import Evaluator
 from optimize.folder import FILE, check
+from optimize.individual import Individual
 from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
+from optimize.runs import start_seed
 from optimize.search import search
 from optimize.settings import Settings, identity
 from tisim.durable import replace_file

@@ -6,26 +6,35 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import Field
+from pydantic import Field, SerializeAsAny, model_validator
 
-from optimize.breeding import Breeding
 from optimize.ensemble import EnsembleSettings
+from optimize.method import every, find
 from optimize.problem import Problem
 from optimize.record import canonical
+from tisim.errors import must
+from tisim.spec import Checked
+
+FORMAT = 2
+"""Of the identity below; raised when a search of before cannot be gone on with."""
 
 
-class Settings(Breeding):
-    """All that decides a search, and when it stops. Defaults are Z04 section 8.
+class Settings(Checked):
+    """All that decides a search, and when it stops.
 
-    seed : of the search and of its random starts. generations : after generation 0, the random start.
-    ensemble : averaging over starts. hall_of_fame : best designs kept.
-    Stopping rules, None = off, looked at after each generation: target - best fitness <= target;
-    patience - generations without improvement; max_evaluations - single evaluations asked for, whether run
-    or found in the cache (so that a resumed search stops at the same place); wall_clock_s - seconds, looked
-    at after every evaluation too: the generation under way is then dropped, its evaluations stay cached.
+    seed : of the search and of its random starts. method : by name, see optimize.method; options : its own
+    settings. generations : after generation 0, the random start. ensemble : averaging over starts.
+    hall_of_fame : best designs kept; a front is kept whole.
+    Stopping rules, None = off, looked at after each generation: target - best fitness as good as that;
+    patience - generations without improvement; wall_clock_s - seconds, looked at after every evaluation too:
+    the generation under way is then dropped, its evaluations stay cached.
+    max_evaluations : different runs asked for, whether run or found in the cache (so that a resumed search
+    stops at the same place); never more: the last generation is cut short.
     """
 
     seed: int = Field(0, ge=0)
+    method: str = "genetic"
+    options: SerializeAsAny[Checked] = Checked()
     generations: int = Field(25, ge=0)
     ensemble: EnsembleSettings = EnsembleSettings()
     hall_of_fame: int = Field(6, ge=1)
@@ -36,8 +45,18 @@ class Settings(Breeding):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.population=30``."""
+        """As in ``--set search.generations=30``."""
         return "search"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _options_of_the_method(cls, data: dict[str, Any]) -> dict[str, Any]:
+        kind = find(data.get("method", "genetic")).Options
+        given = data.get("options", {})
+        if not isinstance(given, kind):
+            must(isinstance(given, Mapping), "search.options", "settings of the method, by name", given)
+            given = kind(**given)
+        return {**data, "options": given}
 
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
@@ -51,6 +70,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
     return {
+        "format": FORMAT,
         "problem": problem.name,
         "problem_version": problem.version,
         "search": settings.model_dump(mode="json", exclude=left_out),
@@ -61,3 +81,22 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
 def search_name(identity: Mapping[str, Any]) -> str:
     """Group of a search in its cache file."""
     return f"searches/{identity['problem']}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
+
+
+def fit(problem: Problem, settings: Settings) -> None:
+    """InputError when the method, or a rule of the settings, cannot be for the problem's objectives."""
+    if problem.several:
+        able = [name for name, method in every().items() if method.several]
+        must(settings.method in able, "method", f"for several objectives: {', '.join(able)}", settings.method)
+        must(settings.target is None, "target", "left out for several objectives", settings.target)
+
+
+def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:
+    """Settings of a case with another method: its options are that method's own defaults then.
+
+    base : of the case. method : by name; None for the case's, or what its objectives need.
+    """
+    usual = base.get("method", "nsga2" if problem.several else "genetic")
+    if method in (None, usual):
+        return {**base, "method": usual}
+    return {**{key: value for key, value in base.items() if key != "options"}, "method": method}

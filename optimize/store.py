@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ _COLUMNS: dict[str, Any] = {
     "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
     "design": bytes, "work": bytes, "wall_s": np.float64, "created": np.float64, "crc": np.uint32,
 }  # fmt: skip
+_OTHERS = "others"
+"""Column with the further objectives as JSON; absent in files in which all evaluations have one."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,8 @@ def image(old: Path | None, records: Sequence[Record], tables: Mapping[str, Tabl
 def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
     """The whole evaluations in order, and a description of each row whose checksum fails."""
     columns = {name: file[ROWS][name][...] for name in _COLUMNS}
+    if _OTHERS in file[ROWS]:
+        columns[_OTHERS] = file[ROWS][_OTHERS][...]
     lengths = {name: len(column) for name, column in columns.items()}
     must(len(set(lengths.values())) == 1, f"columns of {file.filename}", "all of one length", lengths)
     records, damaged = [], []
@@ -133,7 +138,7 @@ def damaged_tables(file: h5py.File) -> list[str]:
 
 
 def _record(cells: Mapping[str, Any]) -> Record:
-    text = {name: bytes(value).decode("ascii") for name, value in cells.items() if _COLUMNS[name] is bytes}
+    text = {name: bytes(cell).decode("ascii") for name, cell in cells.items() if _COLUMNS.get(name) is bytes}
     return Record(
         key=text["key"],
         problem=text["problem"],
@@ -145,6 +150,7 @@ def _record(cells: Mapping[str, Any]) -> Record:
         work=json.loads(text["work"]),
         wall_s=float(cells["wall_s"]),
         created=float(cells["created"]),
+        others=tuple(math.nan if v is None else v for v in json.loads(cells.get(_OTHERS, b"[]"))),
     )
 
 
@@ -158,6 +164,9 @@ def _write_rows(group: h5py.Group, records: Sequence[Record]) -> None:
             group[name] = _strings([getattr(record, name).encode() for record in records])
         else:
             group[name] = np.array([getattr(record, name) for record in records], dtype=kind)
+    if any(record.others for record in records):
+        finite = [[v if math.isfinite(v) else None for v in record.others] for record in records]
+        group[_OTHERS] = _strings([canonical(others) for others in finite])
 
 
 def _strings(values: Sequence[bytes]) -> np.ndarray:

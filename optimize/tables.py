@@ -2,37 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from deap import tools
 
-from optimize.breeding import Individual
+from optimize.estimate import Estimate
+from optimize.individual import Individual
 from optimize.problem import Problem
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
-    """Z04 tables 1 to 3 in one: rank, every gene in its unit, fitness with the half-width of its 95 %
+    """Z04 tables 1 to 3 in one: rank, every gene in its unit, each objective with the half-width of its 95 %
     confidence interval, the derived columns of the problem, starts, whether their mean has settled; the same
-    from fresh starts where the designs have been confirmed. Heading -> values, best first.
+    from fresh starts where the designs have been confirmed. Heading -> values, best first; of several
+    objectives the front along the first, the best of that first.
     """
-    estimates = [string.estimate for string in hall if string.estimate is not None]
-    columns: dict[str, list[Any]] = {"rank": list(range(1, len(estimates) + 1))}
+    estimates = [string.estimates for string in hall]
+    number = "front" if problem.several else "rank"
+    columns: dict[str, list[Any]] = {number: list(range(1, len(estimates) + 1))}
     designs = [problem.genome.decode(string) for string in hall]
     for gene in problem.genome.genes:
         columns[gene.label] = [design[gene.name] for design in designs]
-    columns[problem.symbol] = [estimate.mean for estimate in estimates]
-    columns["95 % +-"] = [estimate.half_width for estimate in estimates]
-    for heading, function in problem.derived.items():
-        columns[heading] = [float(function(estimate.mean)) for estimate in estimates]
-    columns["starts"] = [estimate.starts for estimate in estimates]
-    columns["settled"] = ["yes" if estimate.settled else "no" for estimate in estimates]
-    confirmed = [string.confirmed for string in hall if string.confirmed is not None]
+    columns |= _objectives(problem, estimates, "")
+    columns["starts"] = [of_all[0].starts for of_all in estimates]
+    columns["settled"] = ["yes" if of_all[0].settled else "no" for of_all in estimates]
+    confirmed = [string.confirmed for string in hall if string.confirmed]
     if confirmed:
-        columns[f"{problem.symbol}, fresh starts"] = [estimate.mean for estimate in confirmed]
-        columns["95 % +-, fresh starts"] = [estimate.half_width for estimate in confirmed]
+        columns |= _objectives(problem, confirmed, ", fresh starts")
+    return columns
+
+
+def _objectives(
+    problem: Problem, estimates: Sequence[tuple[Estimate, ...]], after: str
+) -> Mapping[str, list[Any]]:
+    columns: dict[str, list[Any]] = {}
+    for k, objective in enumerate(problem.objectives):
+        means = [objective.sign * of_all[k].mean for of_all in estimates]
+        columns[f"{objective.label}{after}"] = means
+        interval = f"{objective.name} 95 % +-" if problem.several else "95 % +-"
+        columns[f"{interval}{after}"] = [of_all[k].half_width for of_all in estimates]
         for heading, function in problem.derived.items():
-            columns[f"{heading}, fresh starts"] = [float(function(estimate.mean)) for estimate in confirmed]
+            columns[f"{heading}{after}"] = [float(function(mean)) for mean in means]
     return columns
 
 

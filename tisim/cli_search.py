@@ -20,6 +20,9 @@ def optimize(
     folder: Out = None,
     seed: Seed = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    method: Annotated[
+        str | None, typer.Option(help="genetic, restart, cma-es, or nsga2 for several objectives.")
+    ] = None,
     generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
     population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
     target: Annotated[float | None, typer.Option(help="Stop at a fitness this low.")] = None,
@@ -41,7 +44,7 @@ def optimize(
     from cases.case import find
     from optimize.folder import FILE, clear
     from optimize.session import session
-    from optimize.settings import Settings
+    from optimize.settings import Settings, fit, proposed
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
     found = find(case)
@@ -52,14 +55,15 @@ def optimize(
     wishes = {
         "seed": seed,
         "generations": generations,
-        "population": population,
+        "options.population": population,
         "target": target,
         "max_evaluations": budget_evaluations,
         "wall_clock_s": None if budget_minutes is None else 60 * budget_minutes,
         **request.below("search", request.assignments(changes or ())),
     }
     given = {key: value for key, value in wishes.items() if value is not None}
-    settings = Settings(**request.nested(chosen.search, given))
+    settings = Settings(**request.nested(proposed(problem, chosen.search, method), given))
+    fit(problem, settings)
     runtime.start(device, precision, threads)
     place = folder or Path("out") / problem.name
     if fresh:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from fake_runs import bowl
 
-from optimize.breeding import Breeder, Breeding, Individual, Operator
+from optimize.breeding import Breeder, Breeding, Operator
+from optimize.individual import Individual
 from tisim.errors import InputError
 
 GENES = 5
@@ -78,7 +79,7 @@ OPTIONS = {
 )
 def test_deap_operators_breed_within_the_box(kind, name):
     chosen = {kind: Operator(name=name, options=OPTIONS.get(name, {}))}
-    settings = Breeding(method="deap", offspring=12, mutation_probability=1.0, **chosen)
+    settings = Breeding(breeding="deap", offspring=12, mutation_probability=1.0, **chosen)
     breeder = Breeder(GENES, settings, seed=1)
     population = rated(breeder.first())
     seen = set()
@@ -99,7 +100,7 @@ def test_callers_random_state_is_untouched():
     random.seed(11)
     np.random.seed(11)  # noqa: NPY002 - the legacy global state is what is being guarded
     before = random.getstate(), np.random.get_state()[1].tolist()  # noqa: NPY002
-    breeder = Breeder(GENES, Breeding(method="deap"), seed=1)
+    breeder = Breeder(GENES, Breeding(breeding="deap"), seed=1)
     breeder.following(rated(breeder.first()))
     assert before == (random.getstate(), np.random.get_state()[1].tolist())  # noqa: NPY002
 
@@ -107,7 +108,7 @@ def test_callers_random_state_is_untouched():
 def test_callers_random_numbers_do_not_steer_the_search():
     def strings(noise):
         random.seed(noise)
-        breeder = Breeder(GENES, Breeding(method="deap"), seed=1)
+        breeder = Breeder(GENES, Breeding(breeding="deap"), seed=1)
         population = rated(breeder.first())
         random.random()
         return breeder.following(population)
@@ -137,13 +138,13 @@ def test_callers_random_numbers_do_not_steer_the_search():
             "fit for real-valued",
         ),
         ({"parents": 15}, "parents . offspring must be <= population = 20; received 30"),
-        ({"parents": 5, "method": "z04"}, "even"),
-        ({"offspring": 8, "method": "z04"}, "two for each pair"),
-        ({"population": 0}, "breeding.population must be at least 2; received 0"),
+        ({"parents": 5, "breeding": "z04"}, "even"),
+        ({"offspring": 8, "breeding": "z04"}, "two for each pair"),
+        ({"population": 0}, "search.options.population must be at least 2; received 0"),
         ({"recentre_factor": float("nan")}, "recentre_factor must be"),
-        ({"popultion": 20}, "breeding.popultion must be a known key; received 20"),
+        ({"popultion": 20}, "search.options.popultion must be a known key; received 20"),
     ],
 )
 def test_unfit_settings_are_refused_before_anything_runs(settings, message):
     with pytest.raises(InputError, match=message):
-        Breeder(GENES, Breeding(**{"method": "deap", **settings}), seed=0)
+        Breeder(GENES, Breeding(**{"breeding": "deap", **settings}), seed=0)

@@ -5,7 +5,9 @@ import pytest
 from fake_runs import FakeEvaluator, FakeScene, fake_problem
 
 from optimize.cache import Cache
-from optimize.ensemble import Ensemble, EnsembleSettings, settled_after, start_seed
+from optimize.ensemble import Ensemble, EnsembleSettings
+from optimize.estimate import settled_after
+from optimize.runs import start_seed
 from optimize.settings import Settings
 from tisim.errors import InputError, RunError
 
@@ -45,7 +47,7 @@ def test_estimate_is_the_mean_of_the_starts_up_to_the_settled_one_whatever_the_b
     result = ensemble(tmp_path, evaluator, block=block, tolerance=2e-3, min_starts=3, max_starts=60).estimate(
         DESIGNS
     )
-    for design, estimate in zip(DESIGNS, result, strict=True):
+    for design, (estimate,) in zip(DESIGNS, result, strict=True):
         values = [evaluator.function(design, start_seed(4, k)) for k in range(60)]
         n = twin(values, 2e-3, 3)
         assert (estimate.starts, estimate.settled) == (n, True)
@@ -65,7 +67,7 @@ def test_one_call_for_all_designs_then_only_the_unsettled(tmp_path):
     )
     assert [len(call) for call in evaluator.calls] == [12, 8, 4]
     assert {scene.design["x0"] for scene in evaluator.calls[1]} == {0.9, 0.5}
-    assert [(e.starts, e.settled) for e in result] == [(4, True), (10, False), (10, False)]
+    assert [(e.starts, e.settled) for (e,) in result] == [(4, True), (10, False), (10, False)]
 
 
 def test_common_random_numbers(tmp_path):
@@ -98,17 +100,17 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
 
     evaluator = FakeEvaluator(function)
     run = ensemble(tmp_path, evaluator, block=6)
-    good, failed, _ = run.estimate(DESIGNS)
+    (good,), (failed,), _ = run.estimate(DESIGNS)
     assert good.mean == 1.0
     assert failed.mean == math.inf
     assert not failed.ok
     assert failed.reason == f"start 2 (seed {third}): {reason}"
-    stored = [record for record in run.cache.records() if not record.ok]
+    stored = [record for record in run.runs.cache.records() if not record.ok]
     assert [(record.reason, record.seed, math.isnan(record.fitness)) for record in stored] == [
         (reason, third, True)
     ]
     again = FakeEvaluator(function)
-    assert repr(ensemble(tmp_path, again, block=6).estimate(DESIGNS)[1]) == repr(failed)
+    assert repr(ensemble(tmp_path, again, block=6).estimate(DESIGNS)[1]) == repr((failed,))
     assert again.ran == []
 
 
@@ -119,9 +121,9 @@ def test_infeasible_design_fails_alone(tmp_path):
         return FakeScene(design, seed)
 
     result = ensemble(tmp_path, FakeEvaluator(), fake_problem(2, scene=scene)).estimate(DESIGNS)
-    assert [estimate.ok for estimate in result] == [True, False, True]
-    assert result[1].mean == math.inf
-    assert result[1].reason == "infeasible: packing must be below 0.74; received 0.9"
+    assert [estimate.ok for (estimate,) in result] == [True, False, True]
+    assert result[1][0].mean == math.inf
+    assert result[1][0].reason == "infeasible: packing must be below 0.74; received 0.9"
 
 
 def test_nothing_is_evaluated_twice(tmp_path):
@@ -129,12 +131,12 @@ def test_nothing_is_evaluated_twice(tmp_path):
     run = ensemble(tmp_path, evaluator)
     first = run.estimate([*DESIGNS, DESIGNS[0]])
     assert first[3] == first[0]
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == run.evaluations
-    assert run.hits > 0
+    assert len(evaluator.ran) == len(set(evaluator.ran)) == run.asked
+    assert run.runs.hits == 0
     other = FakeEvaluator()
     again = ensemble(tmp_path, other)
     assert again.estimate([*DESIGNS, DESIGNS[0]]) == first
-    assert (other.ran, again.evaluations, again.hits) == ([], 0, run.evaluations + run.hits)
+    assert (other.ran, again.runs.evaluations, again.runs.hits) == ([], 0, run.asked)
 
 
 @pytest.mark.parametrize("change", ["precision", "problem", "version"])
@@ -146,7 +148,7 @@ def test_what_changes_a_fitness_is_not_reused(tmp_path, change):
         evaluator.settings["precision"] = "f32"
     run = ensemble(tmp_path, evaluator, problem)
     run.estimate(DESIGNS)
-    assert (run.hits, run.evaluations > 0) == (0, True)
+    assert (run.runs.hits, run.runs.evaluations > 0) == (0, True)
 
 
 def test_progress_rises_to_one(tmp_path):

@@ -12,7 +12,7 @@ from optimize.cache import Cache
 from tisim.cli import main
 
 BOWL = Case(
-    "bowl", "A bowl", "none", {"default": Size("", {}, {"population": 8, "parents": 2})},
+    "bowl", "A bowl", "none", {"default": Size("", {}, {"options": {"population": 8, "parents": 2}})},
     scene=lambda size, seed: None, check=lambda: iter(()), problem=lambda size, variant: fake_problem(2),
     variants=("only",),
 )  # fmt: skip
@@ -48,7 +48,7 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     for other, differ in {
         ("--seed", 2): "search.seed = 1 and not 2",
         ("--seed", 1, "--population", 9, "--set", "search.ensemble.block=2"): (
-            "search.ensemble.block = 6 and not 2, search.population = 8 and not 9"
+            "search.ensemble.block = 6 and not 2, search.options.population = 8 and not 9"
         ),
     }.items():
         code, err = optimize(*other)

@@ -8,9 +8,9 @@ from rich.console import Console
 
 from cases import agglomeration
 from optimize import report
-from optimize.breeding import Individual
 from optimize.cache import Cache
 from optimize.estimate import Estimate
+from optimize.individual import Individual
 from optimize.outcome import Outcome
 from optimize.search import search
 from optimize.settings import Settings
@@ -59,8 +59,8 @@ def test_csv_holds_all_digits(outcome, tmp_path):
     assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
     for row, string in zip(rows, outcome.hall, strict=True):
         assert [float(row[f"x{i} (m)"]) for i in range(4)] == list(string)
-        assert float(row["Pi"]) == string.estimate.mean
-        assert float(row["95 % +-"]) == string.estimate.half_width
+        assert float(row["Pi"]) == string.estimates[0].mean
+        assert float(row["95 % +-"]) == string.estimates[0].half_width
         assert float(row["n_f"]) == pytest.approx(float(row["b_f/b_0"]) ** 3)
 
 
@@ -96,7 +96,7 @@ def test_terminal_table_shows_the_best_designs(outcome):
         *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "settle",
     ]  # fmt: skip
     assert rows[0].split() == ["rank", *"123456"]
-    assert rows[5].split() == ["Pi", *(f"{string.estimate.mean:.4g}" for string in outcome.hall)]
+    assert rows[5].split() == ["Pi", *(f"{string.estimates[0].mean:.4g}" for string in outcome.hall)]
 
 
 def agglomerations(number):
@@ -104,8 +104,8 @@ def agglomerations(number):
     made = Outcome(agglomeration.problem("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
         string = Individual([0.851234 + k / 200] * 10)
-        string.estimate = Estimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0)
-        string.confirmed = string.estimate
+        string.estimates = (Estimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)
+        string.confirmed = string.estimates
         made.hall.append(string)
     return made
 

@@ -18,7 +18,7 @@ def run(path, evaluator):
 
 
 def found(outcome):
-    return repr(list(outcome.logbook)), [(list(s), repr(s.estimate)) for s in outcome.hall]
+    return repr(list(outcome.logbook)), [(list(s), repr(s.estimates)) for s in outcome.hall]
 
 
 @pytest.fixture(scope="module")

@@ -9,18 +9,20 @@ from fake_runs import FakeEvaluator, bowl, fake_problem
 
 from optimize.breeding import Operator
 from optimize.cache import Cache, verify
-from optimize.ensemble import EnsembleSettings, start_seed
+from optimize.ensemble import EnsembleSettings
+from optimize.runs import start_seed
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.stored import searches
 from tisim.errors import InputError, RunError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)  # a function without noise needs no averaging
-DEAP = {
-    "method": "deap",
+DEAP_OPTIONS = {
+    "breeding": "deap",
     "mate": Operator(name="cxSimulatedBinaryBounded", options={"eta": 10.0}),
     "mutate": Operator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.3}),
 }
+DEAP = {"options": DEAP_OPTIONS}
 
 
 def quiet_bowl(design, seed):
@@ -43,9 +45,9 @@ def test_beats_random_search_at_equal_evaluations(tmp_path, settings):
     for seed in range(3):
         outcome = run(tmp_path / f"{seed}.h5", genes=10, seed=seed, **settings)
         asked = sum(outcome.logbook.select("starts"))
-        assert asked == 20 + 25 * 14
+        assert 300 < asked <= 20 + 25 * 14  # strings that are bred twice are not run twice
         points = np.random.default_rng(seed).random((asked, 10))
-        found.append(outcome.best.estimate.mean - 0.5)
+        found.append(outcome.best.estimates[0].mean - 0.5)
         chance.append(np.sum((points - 0.3) ** 2, axis=1).min())
     assert np.median(found) < np.median(chance) / 5
     assert max(found) < min(chance)
@@ -68,7 +70,7 @@ def test_log_of_a_search(path, settings):
     ]
     np.testing.assert_allclose(log.select("box"), [1.0] * 5 + [0.5] * 4 + [0.25] * 4)
     assert [s.fitness.values[0] for s in outcome.hall] == sorted(s.fitness.values[0] for s in outcome.hall)
-    assert outcome.best.estimate.mean == min(best) == outcome.hall[0].fitness.values[0]
+    assert outcome.best.estimates[0].mean == min(best) == outcome.hall[0].fitness.values[0]
     assert len({tuple(s) for s in outcome.hall}) == 6
 
 
@@ -95,9 +97,9 @@ def test_stopping_rules(tmp_path):
     assert outcome.stopped == "target"
     assert outcome.logbook.select("best") == best[: best.index(target) + 1]
     outcome = run(tmp_path / "e.h5", generations=20, max_evaluations=60)
-    assert (outcome.stopped, outcome.evaluations) == ("evaluations", 20 + 14 * 3)
+    assert (outcome.stopped, outcome.evaluations) == ("evaluations", 60)
     again = run(tmp_path / "e.h5", generations=20, max_evaluations=60)
-    assert (again.stopped, again.evaluations, again.hits) == ("evaluations", 0, 62)
+    assert (again.stopped, again.evaluations, again.hits) == ("evaluations", 0, 60)
     outcome = run(tmp_path / "p.h5", FakeEvaluator(lambda design, seed: 1.0), generations=20, patience=3)
     assert (outcome.stopped, len(outcome.logbook)) == ("patience", 4)
     assert run(tmp_path / "g.h5", generations=0).logbook.select("designs") == [20]
@@ -117,9 +119,9 @@ def test_wall_clock_stops_in_the_middle_of_a_generation(path):
 def test_wall_clock_stops_between_generations(path):
     outcome = run(path, generations=10_000, wall_clock_s=1.0, ensemble=ONE.model_copy(update={"confirm": 4}))
     assert outcome.stopped == "wall clock"
-    assert outcome.best.confirmed is None
+    assert outcome.best.confirmed == ()
     assert 0 < len(outcome.logbook) < 10_000
-    assert outcome.best.estimate.mean == min(outcome.logbook.select("best"))
+    assert outcome.best.estimates[0].mean == min(outcome.logbook.select("best"))
 
 
 def test_failures_never_win(path):
@@ -131,8 +133,8 @@ def test_failures_never_win(path):
     outcome = run(path, FakeEvaluator(function), generations=8)
     assert min(outcome.logbook.select("failed")) >= 0
     assert max(outcome.logbook.select("failed")) > 0
-    assert outcome.best.estimate.ok
-    assert all(math.isfinite(s.estimate.mean) and s[0] >= 0.35 for s in outcome.hall)
+    assert outcome.best.estimates[0].ok
+    assert all(math.isfinite(s.estimates[0].mean) and s[0] >= 0.35 for s in outcome.hall)
     assert np.all(np.isfinite(outcome.logbook.select("mean")))
 
 
@@ -149,7 +151,7 @@ def test_callbacks_tell_where_the_search_is(path):
     callbacks = {"on_generation": generations.append, "on_progress": steps.append}
     outcome = run(path, callbacks=callbacks, generations=3)
     assert [p.generation for p in generations] == [0, 1, 2, 3]
-    assert [p.best_fitness for p in generations] == outcome.logbook.select("best")
+    assert [p.best[0] for p in generations] == outcome.logbook.select("best")
     assert [p.evaluations for p in generations] == [20, 34, 48, 62]
     assert generations[-1].best_design == outcome.problem.genome.decode(outcome.best)
     assert generations[-1].fraction == 1.0
@@ -177,7 +179,7 @@ def test_file_holds_what_is_needed_to_redo_the_search(path):
     assert about["stopped"] == "generations"
     assert cache.table(f"{outcome.name}/logbook").columns["best"] == outcome.logbook.select("best")
     hall = cache.table(f"{outcome.name}/hall_of_fame").columns
-    assert hall["fitness"] == [s.estimate.mean for s in outcome.hall]
+    assert hall["fitness"] == [s.estimates[0].mean for s in outcome.hall]
     assert hall["x0 (m)"] == [s[0] for s in outcome.hall]
     with Cache(path) as cache:
         redone = search(fake_problem(), FakeEvaluator(quiet_bowl), cache, settings)
@@ -213,11 +215,11 @@ def test_best_designs_are_confirmed_from_starts_that_have_not_been_used(path):
     assert {scene.seed for scene in evaluator.calls[-1]} == fresh
     for string in outcome.hall:
         values = [evaluator.function(outcome.problem.genome.decode(string), seed) for seed in fresh]
-        assert string.confirmed.starts == 10
-        assert string.confirmed.mean == pytest.approx(np.mean(values), rel=1e-12)
-    means = [string.confirmed.mean for string in outcome.hall]
+        assert string.confirmed[0].starts == 10
+        assert string.confirmed[0].mean == pytest.approx(np.mean(values), rel=1e-12)
+    means = [string.confirmed[0].mean for string in outcome.hall]
     assert means == sorted(means)
-    estimates = [string.estimate.mean for string in outcome.hall]
+    estimates = [string.estimates[0].mean for string in outcome.hall]
     assert estimates != sorted(estimates), "ranked anew"
     columns = Cache(path).table(f"{outcome.name}/hall_of_fame").columns
     assert columns["fitness, fresh starts"] == means
@@ -226,7 +228,7 @@ def test_best_designs_are_confirmed_from_starts_that_have_not_been_used(path):
 def test_unfit_operators_stop_it_before_anything_runs(path):
     evaluator = FakeEvaluator()
     with pytest.raises(InputError, match="fit for real-valued strings"):
-        run(path, evaluator, method="deap", mate=Operator(name="cxOrdered"))
+        run(path, evaluator, options={"breeding": "deap", "mate": Operator(name="cxOrdered")})
     assert evaluator.ran == []
 
 

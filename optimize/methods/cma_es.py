@@ -1,0 +1,75 @@
+"""CMA-ES: evolution strategy with covariance matrix adaptation, DEAP's, on genes scaled to the unit cube."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from deap import cma
+from numpy.typing import NDArray
+from pydantic import Field
+
+from optimize.individual import Individual
+from optimize.method import Method
+from tisim.spec import Checked
+
+
+class CmaOptions(Checked):
+    """population : strings per generation (None: 4 + 3 ln(genes)). sigma : first standard deviation, in
+    widths of the search range. smallest : the standard deviation along the widest axis at which the search
+    has converged and begins again elsewhere.
+    """
+
+    population: int | None = Field(None, ge=4)
+    sigma: float = Field(0.3, gt=0, le=1)
+    smallest: float = Field(1e-4, gt=0, lt=1)
+
+    @classmethod
+    def kind(cls) -> str:
+        """As in ``--set search.options.sigma=0.2``."""
+        return "search.options"
+
+
+class CmaEs(Method):
+    """N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195, as deap.cma.Strategy has it.
+
+    Starts in the middle of the range. A component outside the range is reflected at its bound, as often as
+    it takes, and the strategy learns from where the string was evaluated. Converged, it begins again from a
+    random middle with twice the population (A. Auger and N. Hansen, IEEE CEC (2005) 1769-1776).
+    """
+
+    name = "cma-es"
+    Options = CmaOptions
+
+    def __init__(self, genes: int, objectives: int, options: CmaOptions, seed: int) -> None:
+        self.options = options
+        self.rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
+        sizes = {} if options.population is None else {"lambda_": options.population}
+        self.strategy = cma.Strategy(np.full(genes, 0.5), options.sigma, **sizes)
+
+    @property
+    def width(self) -> float:  # type: ignore[override]
+        """Of the interval of +- one standard deviation, the mean of the genes, at most the whole range."""
+        spread = 2 * self.strategy.sigma * np.sqrt(np.diag(self.strategy.C))
+        return float(np.minimum(spread, 1.0).mean())
+
+    def ask(self) -> list[Individual]:
+        now = self.strategy
+        normal = self.rng.standard_normal((now.lambda_, now.dim))
+        return [Individual(point) for point in reflected(now.centroid + now.sigma * normal @ now.BD.T)]
+
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        self.moved = False
+        if all(string.failed for string in population):
+            return  # ranks of nothing but failures would lead it astray; the next strings are others
+        self.strategy.update(list(population))
+        now = self.strategy
+        if now.sigma * now.diagD[-1] < self.options.smallest or not now.diagD[0] > 0:
+            middle = self.rng.random(now.dim)
+            self.strategy = cma.Strategy(middle, self.options.sigma, lambda_=2 * now.lambda_)
+            self.moved = True
+
+
+def reflected(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points, shape (strings, genes), with what lies outside 0..1 reflected at 0 and 1."""
+    return 1 - np.abs(1 - np.mod(points, 2))

@@ -1,0 +1,36 @@
+"""Z04's genetic algorithm, or one put together from DEAP's operators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from optimize.breeding import Breeder, Breeding
+from optimize.individual import Individual
+from optimize.method import Method
+
+
+class Genetic(Method):
+    """Z04 sections 7 and 8; see optimize.breeding."""
+
+    name = "genetic"
+    Options = Breeding
+
+    def __init__(self, genes: int, objectives: int, options: Breeding, seed: int) -> None:
+        self.options, self.breeder = options, Breeder(genes, options, seed)
+        self.told = 0
+        self.following: list[Individual] = []
+
+    @property
+    def width(self) -> float:  # type: ignore[override]
+        return float(self.breeder.box.width.mean())
+
+    def ask(self) -> list[Individual]:
+        return self.following or self.breeder.first()
+
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        every = self.options.recentre_every
+        self.moved = bool(every and self.told and self.told % every == 0 and hall)
+        if self.moved:
+            self.breeder.recentre(hall[0])
+        self.told += 1
+        self.following = self.breeder.following(population)

@@ -1,0 +1,57 @@
+"""Z04's genetic algorithm, begun again around the best design whenever it has converged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from optimize.breeding import Breeding
+from optimize.genome import Box
+from optimize.individual import Individual
+from optimize.methods.genetic import Genetic
+
+
+class RestartOptions(Breeding):
+    """As of ``genetic``, and when to begin again.
+
+    stalled : generations without a better best, after which the search is taken to have converged.
+    smallest : width of the search box below which the next restart is in the whole range.
+    The box shrinks by recentre_factor at each restart, and is not moved between (recentre_every = 0).
+    """
+
+    recentre_every: int = Field(0, ge=0, le=0)
+    stalled: int = Field(4, ge=1)
+    smallest: float = Field(0.05, gt=0, le=1)
+
+
+class Restart(Genetic):
+    """Z04 section 7, option: "Rescale and restart the search around best design every few generations".
+
+    Where ``genetic`` only draws its fresh strings from the rescaled box, here the whole population is drawn
+    anew from it, but for the best design: the parents, and what they have bred towards, are given up.
+    """
+
+    name = "restart"
+    Options = RestartOptions
+    options: RestartOptions
+
+    def __init__(self, genes: int, objectives: int, options: RestartOptions, seed: int) -> None:
+        super().__init__(genes, objectives, options, seed)
+        self.best: tuple[float, ...] = ()
+        self.waited = 0
+
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        if hall:
+            better = not self.best or hall[0].fitness.values < self.best
+            self.best, self.waited = hall[0].fitness.values, 0 if better else self.waited + 1
+        self.moved = self.waited >= self.options.stalled
+        if not self.moved:
+            self.following = self.breeder.following(population)
+            return
+        self.waited = 0
+        if self.width * self.options.recentre_factor < self.options.smallest:
+            self.breeder.box = Box.full(len(hall[0]))
+        else:
+            self.breeder.recentre(hall[0])
+        self.following = [hall[0], *self.breeder.first()[1:]]

@@ -1,0 +1,213 @@
+"""Several objectives: the front is found, kept whole, and its file goes on as any other."""
+
+import csv
+import json
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+from fake_runs import FakeEvaluator, fake_problem, fake_record
+from matplotlib.image import imread
+
+from optimize import report, store
+from optimize.cache import Cache, compact, existing, verify
+from optimize.ensemble import EnsembleSettings
+from optimize.estimate import Estimate
+from optimize.hall import Hall, compromise
+from optimize.individual import Individual
+from optimize.journal import frame
+from optimize.objective import Objective
+from optimize.record import Record
+from optimize.search import search
+from optimize.settings import Settings
+from tisim.errors import InputError
+
+ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
+OBJECTIVES = (
+    Objective("gain", lambda r: r.value[0], "1/s", maximise=True),
+    Objective("price", lambda r: r.value[1]),
+)
+
+
+def zdt1(design, seed, noise=0.0):
+    """ZDT1 (Zitzler, Deb and Thiele, Evol. Comput. 8 (2000) 173-195), its first objective turned round.
+
+    The front is price = 1 - sqrt(-gain), where all genes but the first are 0.
+    """
+    x = np.array(list(design.values()))
+    g = 1 + 9 * x[1:].mean()
+    a, b = noise * np.random.default_rng(seed).normal(size=2)
+    return -float(x[0] + a), float(g * (1 - np.sqrt(x[0] / g)) + b)
+
+
+def run(path, function=zdt1, evaluator=None, genes=3, **settings):
+    wish = Settings(**{"method": "nsga2", "seed": 1, "ensemble": ONE, "generations": 30, **settings})
+    problem = fake_problem(genes, objective=OBJECTIVES)
+    with Cache(path) as cache:
+        return search(problem, evaluator or FakeEvaluator(function), cache, wish)
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("front") / "cache.h5")
+
+
+def values(outcome):
+    return np.array([outcome.problem.costs(string.fitness.values) for string in outcome.hall])
+
+
+def test_nsga2_finds_the_front_and_spreads_along_it(outcome):
+    gain, price = values(outcome).T
+    assert len(gain) >= 40
+    assert np.mean(price - (1 - np.sqrt(-gain)) < 0.05) > 0.95
+    assert np.ptp(gain) > 0.95
+    assert np.diff(np.sort(gain)).max() < 0.1
+    random = np.random.default_rng(0).random((40 * 31, 3))
+    chance = [zdt1(dict(enumerate(x)), 0) for x in random]
+    assert np.mean([p - (1 - np.sqrt(-g)) < 0.05 for g, p in chance]) < 0.01, "not by chance"
+
+
+def test_front_is_what_nothing_dominates(outcome):
+    front, seen = values(outcome), np.array(outcome.seen)
+    better = (seen[:, None, 0] >= front[None, :, 0]) & (seen[:, None, 1] <= front[None, :, 1])
+    strictly = (seen[:, None, 0] > front[None, :, 0]) | (seen[:, None, 1] < front[None, :, 1])
+    assert not np.any(better & strictly)
+    dominated = (
+        (seen[:, None, 0] >= seen[None, :, 0]) & (seen[:, None, 1] <= seen[None, :, 1])
+        & ((seen[:, None, 0] > seen[None, :, 0]) | (seen[:, None, 1] < seen[None, :, 1]))
+    ).any(axis=0)  # fmt: skip
+    assert len({tuple(point) for point in seen[~dominated]}) == len(front)
+    assert list(front[:, 0]) == sorted(front[:, 0], reverse=True), "most gain first"
+
+
+def test_compromise_is_nearest_to_the_best_of_each():
+    front = []
+    for costs in ((0.0, 10.0), (0.4, 4.0), (0.9, 3.0), (1.0, 0.0)):
+        front.append(Individual(costs, 2))
+        front[-1].fitness.values = costs
+    assert compromise(front) is front[1]
+    assert compromise(front[:1]) is front[0]
+
+
+def test_hall_of_one_objective_keeps_the_best_different_ones():
+    hall = Hall(2)
+
+    def string(genes, cost):
+        made = Individual(genes)
+        made.know((Estimate(cost, 0.0, 0.0, 4, True, "" if cost < 9 else "failed"),))
+        return made
+
+    assert hall.update([string([0.1], 3.0), string([0.1], 3.0), string([0.2], 2.0), string([0.3], 9.0)])
+    assert [list(s) for s in hall.strings] == [[0.2], [0.1]]
+    assert not hall.update([string([0.4], 2.5)])
+    assert [list(s) for s in hall.strings] == [[0.2], [0.4]]
+    assert hall.update([string([0.5], 1.0)])
+
+
+def test_log_and_report(outcome, tmp_path):
+    log = outcome.logbook
+    gains, prices = log.select("best gain (1/s)"), log.select("best price")
+    assert gains == sorted(gains)
+    assert prices == sorted(prices, reverse=True)
+    assert log.select("front")[-1] == len(outcome.hall)
+    paths = report.write(outcome, tmp_path)
+    assert sorted(paths) == [
+        "best.csv", "convergence.pdf", "convergence.png", "front.pdf", "front.png",
+    ]  # fmt: skip
+    with paths["best.csv"].open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["gain (1/s)"]) for row in rows] == list(values(outcome)[:, 0])
+    assert [float(row["price"]) for row in rows] == list(values(outcome)[:, 1])
+    (axis,) = report.front_figure(outcome).axes
+    shown = [line for line in axis.get_lines() if len(line.get_xdata()) == len(outcome.hall)]
+    np.testing.assert_array_equal(shown[0].get_xydata(), values(outcome))
+    assert axis.get_xlabel() == "gain (1/s), more is better"
+    assert imread(paths["front.png"]).std() > 0.01
+
+
+def test_resumed_after_interrupt_it_is_the_same(path, tmp_path):
+    settings = {"ensemble": EnsembleSettings(max_starts=8, confirm=2), "generations": 2}
+
+    def noisy(design, seed):
+        if design["x1"] < 0.2:
+            return "lost"
+        return zdt1(design, seed, noise=0.02)
+
+    whole = run(tmp_path / "whole.h5", noisy, **settings)
+    part = run(path, evaluator=FakeEvaluator(noisy, interrupt_after=300), **settings)
+    assert part.interrupted
+    again = run(path, noisy, **settings)
+    assert again.evaluations == whole.evaluations - 300
+    assert [(list(s), repr(s.estimates), repr(s.confirmed)) for s in again.hall] == [
+        (list(s), repr(s.estimates), repr(s.confirmed)) for s in whole.hall
+    ]
+    assert repr(list(again.logbook)) == repr(list(whole.logbook))
+    assert verify(path).ok
+    assert max(whole.logbook.select("failed")) > 0
+    assert all(estimate.starts == 2 for string in whole.hall for estimate in string.confirmed)
+
+
+def test_cache_holds_all_objectives(path):
+    many = [
+        Record(**{**vars(fake_record(n)), "others": (n / 3, -1.0) if n % 2 else (), "ok": n != 3})
+        for n in range(8)
+    ]
+    lost = Record(**{**vars(fake_record(9, float("nan"), ok=False)), "others": (float("nan"),)})
+    with Cache(path) as cache:
+        for record in many:
+            cache.put(record)
+        cache.fold()
+        cache.put(lost)
+        assert [r.values for r in Cache(path).records()[:8]] == [r.values for r in many]
+    assert compact(path) == 9
+    stored = existing(path).records()
+    assert [record.payload() for record in stored] == [record.payload() for record in (*many, lost)]
+    assert np.isnan(stored[-1].values).all()
+    assert len(stored[-1].values) == 2
+    assert verify(path).ok
+
+
+def test_file_of_before_there_were_several_objectives_is_read(path):
+    """One objective is written as it always was, byte for byte, in the journal and in the HDF5 file."""
+    record = fake_record(1)
+    fields = {key: value for key, value in vars(record).items() if key != "others"}
+    old = json.dumps(fields, sort_keys=True, separators=(",", ":")).encode()
+    path.with_name(path.name + ".journal").write_bytes(frame(old))
+    assert Cache(path).records() == [record]
+    assert compact(path) == 1
+    with h5py.File(path) as file:
+        assert "others" not in file[store.ROWS]
+        assert int(file[store.ROWS]["crc"][0]) == zlib.crc32(old)
+
+
+def test_what_cannot_be_is_refused(path):
+    with pytest.raises(InputError, match="method must be for several objectives: nsga2; received 'genetic'"):
+        run(path, method="genetic")
+    with pytest.raises(InputError, match="target must be left out for several objectives; received 1"):
+        run(path, target=1.0)
+    with pytest.raises(InputError, match="population of nsga2 must be a multiple of 4; received 6"):
+        Settings(method="nsga2", options={"population": 6})
+    with pytest.raises(InputError, match=r"method must be one of .*; received 'simplex'"):
+        Settings(method="simplex")
+    with pytest.raises(InputError, match=r"objectives must be one or more, all different"):
+        fake_problem(objective=())
+    with pytest.raises(InputError, match=r"objectives must be one or more, all different"):
+        fake_problem(objective=OBJECTIVES[:1] * 2)
+    with pytest.raises(InputError, match="derived must be empty for several objectives"):
+        fake_problem(objective=OBJECTIVES, derived={"twice": lambda x: 2 * x})
+
+
+def test_one_objective_to_be_made_large(path):
+    """The same search as of its negative, shown as it is."""
+    large = fake_problem(objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
+    with Cache(path) as cache:
+        high = search(large, FakeEvaluator(), cache, Settings(seed=1, generations=3, target=-0.6))
+    with Cache(path) as cache:
+        low = search(
+            fake_problem(name="low"), FakeEvaluator(), cache, Settings(seed=1, generations=3, target=0.6)
+        )
+    assert [list(s) for s in high.hall] == [list(s) for s in low.hall]
+    assert high.logbook.select("best") == [-best for best in low.logbook.select("best")]
+    assert (high.stopped, low.stopped) == ("target", "target")
+    assert report.best_csv(high).decode().splitlines()[1].split(",")[5].startswith("-0.5")
