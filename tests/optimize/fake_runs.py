@@ -78,3 +78,28 @@ def fake_record(number, fitness=None, ok=True, pad=""):
         wall_s=0.5,
         created=1e9 + number,
     )
+
+
+class FakeCache:
+    """Evaluations in memory only, for searches by the dozen."""
+
+    def __init__(self):
+        self.known = {}
+
+    def refresh(self):
+        pass
+
+    def get(self, key):
+        return self.known.get(key)
+
+    def put(self, record):
+        return self.known.setdefault(record.key, record)
+
+    def put_table(self, name, columns, attrs=None):
+        pass
+
+    def fold(self):
+        pass
+
+    def tables(self):
+        return []
