@@ -10,12 +10,11 @@ from rich.console import Console
 from optimize import report
 from optimize.cache import Cache
 from optimize.display import Display
-from optimize.evaluator import Evaluator
 from optimize.folder import FILE, check
 from optimize.individual import Individual
 from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
-from optimize.runs import start_seed
+from optimize.runs import Evaluator, start_seed
 from optimize.search import search
 from optimize.settings import Settings, identity
 from tisim.durable import replace_file
@@ -26,6 +25,7 @@ from tisim.output import writable
 def session(
     problem: Problem,
     settings: Settings,
+    evaluator: Evaluator,
     folder: Path,
     say: Console,
     bar: Console,
@@ -37,19 +37,15 @@ def session(
     search cleanly (Outcome.interrupted). InputError when the folder is another search's or cannot be written.
     """
     writable(folder)
-    evaluator = Evaluator()
-    try:
-        with Cache(folder / FILE) as cache:
-            check(folder, cache, identity(problem, settings, evaluator.settings))
-            outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
-        paths = [folder / FILE]
-        if outcome.best is not None:
-            say.print(report.best_table(outcome))
-            paths += report.write(outcome, folder).values()
-            if not outcome.interrupted:
-                paths += _show_best(outcome.best, outcome, evaluator, folder, say)
-    finally:
-        evaluator.close()
+    with Cache(folder / FILE) as cache:
+        check(folder, cache, identity(problem, settings, evaluator.settings))
+        outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
+    paths = [folder / FILE]
+    if outcome.best is not None:
+        say.print(report.best_table(outcome))
+        paths += report.write(outcome, folder).values()
+        if not outcome.interrupted:
+            paths += _show_best(outcome.best, outcome, evaluator, folder, say)
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
     return outcome
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tisim import request, runtime
+from tisim import request
 from tisim.errors import InputError, RunError, must
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads
 from tisim.terminal import err, out, stopping
+
+Executor = Annotated[
+    str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
+]
 
 
 def optimize(
@@ -39,9 +44,11 @@ def optimize(
     device: Device = "cpu",
     precision: Precision = "f64",
     threads: Threads = 0,
+    executor: Executor = "batch",
 ) -> None:
     """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
     from cases.case import find
+    from optimize.executors import made
     from optimize.folder import FILE, clear
     from optimize.session import session
     from optimize.settings import Settings, fit, proposed
@@ -64,11 +71,11 @@ def optimize(
     given = {key: value for key, value in wishes.items() if value is not None}
     settings = Settings(**request.nested(proposed(problem, chosen.search, method), given))
     fit(problem, settings)
-    runtime.start(device, precision, threads)
     place = folder or Path("out") / problem.name
-    if fresh:
-        clear(place, overwrite)
-    outcome = session(problem, settings, place, out(), err(), stopping)
+    with closing(made(executor, device, precision, threads)) as evaluator:
+        if fresh:
+            clear(place, overwrite)
+        outcome = session(problem, settings, evaluator, place, out(), err(), stopping)
     if outcome.interrupted:
         err().print(f"stopped; {place / FILE} has all that is done. To go on, give the same command again.")
         raise typer.Exit(130)

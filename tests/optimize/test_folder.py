@@ -24,7 +24,7 @@ def optimize(tmp_path, monkeypatch, capsys):
     """Runs a search in a fresh folder with more arguments: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
-    monkeypatch.setattr("optimize.session.Evaluator", FakeEvaluator)
+    monkeypatch.setattr("optimize.executors.Evaluator", FakeEvaluator)
 
     def command(*arguments):
         with pytest.raises(SystemExit) as exit_:
