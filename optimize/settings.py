@@ -92,11 +92,12 @@ def fit(problem: Problem, settings: Settings) -> None:
 
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:
-    """Settings of a case with another method: its options are that method's own defaults then.
+    """Settings of a case with another method, whose options are then its own defaults - but for a method
+    that takes all options of the case's, as restart those of genetic.
 
     base : of the case. method : by name; None for the case's, or what its objectives need.
     """
     usual = base.get("method", "nsga2" if problem.several else "genetic")
-    if method in (None, usual):
-        return {**base, "method": usual}
+    if method is None or issubclass(find(method).Options, find(usual).Options):
+        return {**base, "method": method or usual}
     return {**{key: value for key, value in base.items() if key != "options"}, "method": method}

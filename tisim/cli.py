@@ -229,6 +229,7 @@ def doctor() -> None:
 
 app.command()(cli_cost.cost)
 app.command()(cli_search.optimize)
+app.command()(cli_search.compare)
 app.command()(cli_search.cache)
 app.command()(cli_watch.plot)
 app.command()(cli_watch.figures)

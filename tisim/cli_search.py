@@ -1,21 +1,32 @@
-"""The commands of inverse design: ``tisim optimize`` and ``tisim cache``."""
+"""The commands of inverse design: ``tisim optimize``, ``tisim compare`` and ``tisim cache``."""
 
 from __future__ import annotations
 
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tisim import request
+from tisim.durable import replace_file
 from tisim.errors import InputError, RunError, must
+from tisim.interrupt import Interrupt
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads
+from tisim.output import writable
 from tisim.terminal import err, out, stopping
+
+if TYPE_CHECKING:
+    from cases.case import Size as CaseSize
+    from optimize.problem import Problem
 
 Executor = Annotated[
     str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
+]
+SearchChanges = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
 ]
 
 
@@ -26,17 +37,14 @@ def optimize(
     seed: Seed = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
     method: Annotated[
-        str | None, typer.Option(help="genetic, restart, cma-es, or nsga2 for several objectives.")
+        str | None, typer.Option(help="genetic, restart, cma-es or random; nsga2 for several objectives.")
     ] = None,
     generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
     population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
     target: Annotated[float | None, typer.Option(help="Stop at a fitness this low.")] = None,
     budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
     budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
-    changes: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
-    ] = None,
+    changes: SearchChanges = None,
     fresh: Annotated[
         bool, typer.Option("--fresh/--resume", help="Begin anew; otherwise go on with the folder's search.")
     ] = False,
@@ -47,18 +55,13 @@ def optimize(
     executor: Executor = "batch",
 ) -> None:
     """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
-    from cases.case import find
     from optimize.executors import made
     from optimize.folder import FILE, clear
     from optimize.session import session
     from optimize.settings import Settings, fit, proposed
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
-    found = find(case)
-    chosen = found.size(size or "default")
-    if found.problem is None:
-        raise InputError(f"case must be one with an inverse problem; received {case!r}")
-    problem = found.problem(size or "default", variant or found.variants[0])
+    problem, chosen = _problem(case, size, variant)
     wishes = {
         "seed": seed,
         "generations": generations,
@@ -83,6 +86,69 @@ def optimize(
         raise RunError("the time was over before the first generation; to go on, give the same command again")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {place / FILE}' says why")
+
+
+def compare(
+    case: CaseName,
+    methods: Annotated[
+        str, typer.Option(help="Names with commas between.")
+    ] = "random,genetic,restart,cma-es",
+    evaluations: Annotated[int, typer.Option(help="Runs that every search may spend.")] = 400,
+    repeats: Annotated[int, typer.Option(help="Searches of each method.")] = 5,
+    fresh_starts: Annotated[int, typer.Option(help="Starts from which each best is run again.")] = 24,
+    size: Size = None,
+    folder: Out = None,
+    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    changes: SearchChanges = None,
+    device: Device = "cpu",
+    precision: Precision = "f64",
+    threads: Threads = 0,
+    executor: Executor = "batch",
+) -> None:
+    """Compare search methods on a case at equal numbers of runs. Given again, it goes on."""
+    from optimize import comparison
+    from optimize.cache import Cache
+    from optimize.executors import made
+
+    problem, chosen = _problem(case, size, variant)
+    base = request.nested(chosen.search, request.below("search", request.assignments(changes or ())))
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    place = folder or Path("out") / f"compare-{problem.name}"
+    writable(place)
+    found = []
+    with (
+        closing(made(executor, device, precision, threads)) as evaluator,
+        Cache(place / "compare.h5") as store,
+        Interrupt(stopping) as ctrl_c,
+    ):
+        for one in comparison.compare(
+            problem,
+            base,
+            names,
+            evaluations,
+            repeats,
+            fresh_starts,
+            evaluator,
+            store,
+            lambda _: ctrl_c.check(),
+        ):
+            found.append(one)
+            line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
+            err().print(line, highlight=False, markup=False)
+    out().print(comparison.table(problem, found))
+    replace_file(place / "compare.csv", comparison.as_csv(problem, found))
+    out().print(f"written  {place / 'compare.csv'}", highlight=False, markup=False)
+
+
+def _problem(case: str, size: str | None, variant: str | None) -> tuple[Problem, CaseSize]:
+    """The inverse problem of a case, and the size of it that gives the settings of a search."""
+    from cases.case import find
+
+    found = find(case)
+    chosen = found.size(size or "default")
+    if found.problem is None:
+        raise InputError(f"case must be one with an inverse problem; received {case!r}")
+    return found.problem(size or "default", variant or found.variants[0]), chosen
 
 
 def cache(
