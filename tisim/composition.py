@@ -23,11 +23,6 @@ def _of(effects: Sequence[Effect], kind: type) -> tuple[Any, ...]:
     return tuple(effect for effect in effects if isinstance(effect, kind))
 
 
-def independent(effects: Sequence[Effect]) -> bool:
-    """Whether particles feel nothing of each other, and only forces change them."""
-    return all(isinstance(e, Force | Source | Settled) and not isinstance(e, Mutual) for e in effects)
-
-
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
     """What a scene of these needs beyond the core -> the part that needs it, in order."""
     needed: list[tuple[str | Field, str]] = []
@@ -40,7 +35,7 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
         needed += [(need, effect.kind()) for need in effect.needed()]
         if isinstance(effect, PairForce):
             needed += [(field, effect.kind()) for field in memory_fields(effect)]
-    wanted = stepper.needs(turning(forces, pair_forces), independent(effects))
+    wanted = stepper.needs(turning(forces, pair_forces), stepper.independent(effects))
     needed += [(need, stepper.kind()) for need in wanted]
     users: dict[str | Field, list[str]] = {}
     for need, who in needed:
@@ -103,8 +98,9 @@ class Composition:
             trial_forces=self._summed(SumTrialForces),
             summed=self._sum(SumForces),
             singles=self.forces,
+            sources=_of(effects, Source),
             turning=turning(self.forces, self.pair_forces),
-            independent=independent(effects),
+            independent=stepper.independent(effects),
         )
         step: list[Item] = [*stepper.step(parts)]
         self.memory += tuple(parts.owned)

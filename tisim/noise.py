@@ -68,3 +68,17 @@ def normal(words):
     size = ti.sqrt(-2.0 * ti.log(u[0]))
     angle = ti.cast(6.283185307179586, ti.f64) * u[1]
     return ti.Vector([size * ti.cos(angle), size * ti.sin(angle)], dt=ti.f64)
+
+
+@ti.func
+def normals(words):
+    """Four independent standard normal numbers from four words, of 32 random bits each. f64.
+
+    Half the price of ``normal``; none is larger than 6.7, which one in 4e10 should be.
+    """
+    scale = ti.cast(1.0 / 4294967296.0, ti.f64)
+    u = (ti.cast(words, ti.f64) + 0.5) * scale
+    turn = ti.cast(6.283185307179586, ti.f64)
+    a, b = ti.sqrt(-2.0 * ti.log(u[0])), ti.sqrt(-2.0 * ti.log(u[2]))
+    p, q = turn * u[1], turn * u[3]
+    return ti.Vector([a * ti.cos(p), a * ti.sin(p), b * ti.cos(q), b * ti.sin(q)], dt=ti.f64)

@@ -76,6 +76,7 @@ class Scene(Spec):
                 f"used together with a source of {' or '.join(kind.feels)}",
                 ", ".join(other.kind() for other in present),
             )
+        self.stepper.suits(self.effects, self.domain)
         self.capacity()
         return self
 

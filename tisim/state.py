@@ -69,10 +69,11 @@ SHARED = {
 }
 """Fields that several effects share by name."""
 
-RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED, LOST, STUCK = range(8)
+RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED, LOST, STUCK, STEEP, INDEFINITE = range(10)
 """Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow;
 a quantity that particles settle among themselves does not settle; a particle has left the box so far that its
-place is lost; no step is short enough to be solved."""
+place is lost; no step is short enough to be solved; a force asks for a step shorter than the shortest; a
+diffusion matrix is not positive definite."""
 
 CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
 BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id")

@@ -6,7 +6,19 @@ import numpy as np
 
 from tisim.result import Status
 from tisim.scene import Scene
-from tisim.state import CROWDED, ENDED, FULL, LOST, NOT_FINITE, RUNNING, STUCK, UNSETTLED, State
+from tisim.state import (
+    CROWDED,
+    ENDED,
+    FULL,
+    INDEFINITE,
+    LOST,
+    NOT_FINITE,
+    RUNNING,
+    STEEP,
+    STUCK,
+    UNSETTLED,
+    State,
+)
 
 REASONS = {
     RUNNING: "running",
@@ -17,6 +29,8 @@ REASONS = {
     UNSETTLED: "a quantity that particles settle among themselves does not converge",
     LOST: "a step so long or so fast that rounding loses the place in the box",
     STUCK: "the implicit equations of a step cannot be solved even at the shortest step",
+    STEEP: "a force so strong that it asks for a step shorter than the shortest",
+    INDEFINITE: "the diffusion matrix is not positive definite",
 }
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from tisim.batches import Progress
-from tisim.composition import independent
 from tisim.errors import RunError
 from tisim.result import Result
 from tisim.scene import Scene
@@ -27,8 +26,8 @@ class Timed:
         """Steps, sums of forces and rejections, per particle and start."""
         steps, sums, rejections = 0.0, 0.0, 0.0
         for result in self.results:
-            n, alone = len(result.start["mass"]), independent(result.scene.effects)
-            evaluations = result.scene.stepper.evaluations
+            n, stepper = len(result.start["mass"]), result.scene.stepper
+            alone, evaluations = stepper.independent(result.scene.effects), stepper.evaluations
             steps += result.work["particle_steps"] / n
             sums += evaluations(result.work, n, alone)
             # A rejection is of those that a sum of forces is of: of one particle, or of all.

@@ -138,14 +138,12 @@ def _steppers(scene: Scene, dt: float) -> list[Stepper]:
     kinds.load(steppers)
     asked = {_kind(scene.stepper)}
     found = []
-    # By name, whatever has been imported first.
-    for _, kind in sorted(Stepper.known().items()):
-        for stepper in kind.alternatives(scene.effects, dt):
-            if type(stepper.control) is type(scene.stepper.control):
-                stepper = stepper.model_copy(update={"control": scene.stepper.control})
-            if _kind(stepper) not in asked:
-                asked.add(_kind(stepper))
-                found.append(stepper)
+    for stepper in scene.stepper.rivals(scene.effects, dt):
+        if type(stepper.control) is type(scene.stepper.control):
+            stepper = stepper.model_copy(update={"control": scene.stepper.control})
+        if _kind(stepper) not in asked:
+            asked.add(_kind(stepper))
+            found.append(stepper)
     return found
 
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
-from tisim.effect import Effect
+from tisim.domain import Domain
+from tisim.effect import Effect, Force, Mutual, Settled, Source
 from tisim.program import Item
 from tisim.spec import Spec
 from tisim.state import Field, State
@@ -18,8 +19,8 @@ class Parts:
     """What a stepper makes a step of. All are bound to the state; a tuple is empty where nothing is to do.
 
     control : decides how long the next step may be. domain, operators, near : as bound; near is None
-    without a pair list. singles : forces on single particles. forced, turning : whether there are forces, and
-    torques. independent : whether particles neither feel each other nor are changed by operators.
+    without a pair list. singles : forces on single particles. sources : external fields. forced, turning :
+    whether there are forces, and torques. independent : whether the stepper may take each particle by itself.
     owned : memory that the stepper has allocated, what it is, and for what; it adds to the list.
 
     lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
@@ -40,10 +41,16 @@ class Parts:
     trial_forces: tuple[Item, ...]
     summed: Any
     singles: tuple[Any, ...]
+    sources: tuple[Any, ...]
     forced: bool
     turning: bool
     independent: bool
     owned: list[tuple[Any, str, str]] = field(default_factory=list)
+
+
+def single(effect: Effect) -> bool:
+    """Whether it is of each particle by itself."""
+    return isinstance(effect, Force | Source | Settled) and not isinstance(effect, Mutual)
 
 
 class Stepper(Spec):
@@ -64,11 +71,25 @@ class Stepper(Spec):
         """Of its error in dt, for smooth forces."""
         return 2
 
+    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
+        """InputError when it cannot step a scene of these; by default it can."""
+
+    def independent(self, effects: Sequence[Effect]) -> bool:
+        """Whether it may take each particle by itself: by default, when they feel nothing of each other and
+        only forces change them."""
+        return all(single(effect) for effect in effects)
+
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         """Those of this kind that ``tisim cost`` tries in a scene of these effects, with steps of about dt
         (s); none by default."""
         return ()
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
+        """What ``tisim cost`` tries beside this one: by default the alternatives of every kind."""
+        # By name, whatever has been imported first.
+        kinds = [kind for _, kind in sorted(Stepper.known().items())]
+        return tuple(stepper for kind in kinds for stepper in kind.alternatives(effects, dt))
 
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         """Forces summed for a particle, the mean over particles, from the counts of a run; one a step by

@@ -1,0 +1,83 @@
+"""Brownian dynamics of D. L. Ermak and J. A. McCammon, J. Chem. Phys. 69, 1352 (1978)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from tisim.domain import Domain
+from tisim.effect import Effect, Force, Operator, PairEvent, PairForce, Source
+from tisim.errors import must
+from tisim.forces import FORCE
+from tisim.program import Item
+from tisim.spec import parameter
+from tisim.state import Field
+from tisim.steppers.alone import Stretch
+from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.fluid import Fluid
+from tisim.steppers.phases import Clock
+from tisim.steppers.stepper import Parts, Stepper, single
+from tisim.steppers.together import Drift, Proceed, Scatter, Separate
+from tisim.steppers.wandering import OWN, EndWandering, Wander
+
+
+class Brownian(Stepper):
+    """dr_i = u(r_i) dt + dt/(kT) sum_j D_ij F_j + R_i, R normal with mean 0 and <R_i R_j> = 2 D_ij dt.
+
+    u is the sum of all sources of a flow velocity, F the sum of forces, D that at the start of the step. For
+    spheres so small that they have no inertia; ``velocity`` is that of drift in the last step,
+    u + sum_j D_ij F_j / kT. Its mean is exact to first order in dt, and so is every statistic (weak order 1).
+
+    temperature : T; viscosity : eta, of the fluid, which has no inertia either; infinite, and at rest but for
+    u. Particles whose field ``fixed`` is 1 stay where they are. Spheres do not rotate: refused are torques,
+    and also what asks for velocities, which particles here do not have: drag, and what happens in an impact.
+
+    Particles that do not feel each other, and that operators change one by one, take steps of their own and
+    meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
+
+    Source: B16 Eqs (6.1)-(6.16).
+    """
+
+    temperature: float = parameter("K", ge=0)
+    viscosity: float = parameter("Pa s", gt=0)
+    control: DriftLimit
+
+    keeps: ClassVar = ("windows", "stretch_windows", "stuck")
+
+    @property
+    def order(self) -> int:
+        return 1
+
+    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
+        for effect in effects:
+            name = f"effects.{effect.kind()}"
+            turns = effect.offers("torque") if isinstance(effect, Force) else False
+            turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
+            must(not turns, name, "without torques in a scene stepped by brownian", name)
+            drags = isinstance(effect, Force) and effect.offers("velocity_jacobian")
+            drags = drags or isinstance(effect, PairEvent)
+            rule = "one that does not depend on velocity in a scene stepped by brownian"
+            must(not drags, name, rule, name)
+
+    def independent(self, effects: Sequence[Effect]) -> bool:
+        return all(isinstance(effect, Force | Source) or _one_by_one(effect) for effect in effects)
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
+        return ()
+
+    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+        return (FORCE, *OWN) if independent else (FORCE,)
+
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        s, fluid = parts.s, Fluid(parts, self)
+        if parts.independent:
+            return (Stretch(s, parts.control), Wander(parts, fluid), EndWandering(parts))
+        interaction = Separate(fluid)
+        drift = (*interaction.phases(), Drift(fluid, interaction, parts.control))
+        move = (Clock(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
+        return (*drift, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
+
+
+def _one_by_one(effect: Effect) -> bool:
+    """Whether it changes each particle by itself, and a world as a whole never."""
+    return isinstance(effect, Operator) and not effect.offers("world")

@@ -1,0 +1,66 @@
+"""How long a step of Brownian dynamics may be: from how far forces would push particles in it."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from tisim._taichi import ti
+from tisim.errors import must
+from tisim.knob import Knob
+from tisim.spec import parameter
+from tisim.steppers.controller import Controller
+
+MOST = 1e9
+"""Steps of one longest step at most: a particle by itself numbers them with 32 bits."""
+
+
+class DriftLimit(Controller):
+    """Steps in which no force pushes a particle farther than ``drift`` radii, and of ``longest`` at most.
+
+    The velocity that is limited is that which forces give, sum_j D_ij F_j / kT, at the start of the step; so
+    the step depends on nothing that is random in it, and its noise has the law of a step given beforehand.
+    The flow is left out: it pushes neighbours alike, and to resolve it is up to ``longest``. What noise does
+    in a step is not limited either: a particle diffuses by sqrt(2 D dt) into the potential of another before
+    it feels that, and is pushed out again in steps of at most ``drift`` radii. So overlaps stay bounded
+    whatever the step, but for right statistics of contacts, ``longest`` has to keep sqrt(2 D dt) below the
+    range over which the potential changes by kT.
+
+    drift : in radii. longest : also what particles by themselves meet at multiples of. shortest : a force
+    that asks for less stops its world, with time and particle.
+    """
+
+    longest: float = parameter("s", gt=0)
+    shortest: float = parameter("s", 1e-12, gt=0)
+    drift: float = parameter("", 0.05, gt=0)
+
+    keeps: ClassVar = ("steepest",)
+    knobs: ClassVar[tuple[Knob, ...]] = (Knob(longest=1, drift=1), Knob(longest=1, converges=False))
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        must(self.longest >= self.shortest, "drift_limit.longest", "at least shortest", self.longest)
+        allowed = f"at least longest/{MOST:.0e}"
+        must(self.shortest * MOST >= self.longest, "drift_limit.shortest", allowed, self.shortest)
+        return self
+
+    @ti.func
+    def rate(self, s, w, i, velocity):
+        """1 over the step that a particle allows which forces move at ``velocity`` (m/s). 1/s, f64."""
+        return ti.cast(velocity.norm() / (self.drift(w) * s.radius[w, i]), ti.f64)
+
+    @ti.func
+    def hopeless(self, w, rate):
+        """Whether that step is too short; also true of NaN."""
+        return not (rate * ti.cast(self.shortest(w), ti.f64) <= 1.0)
+
+    @ti.func
+    def step(self, w, rate):
+        """The step for this rate. s, f64."""
+        longest = ti.cast(self.longest(w), ti.f64)
+        return longest / ti.max(1.0, rate * longest)
+
+    @ti.func
+    def next(self, s, w, horizon):
+        return self.step(w, s.steepest[w])

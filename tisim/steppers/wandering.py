@@ -1,0 +1,131 @@
+"""Brownian particles that do not feel each other: each takes its own steps, many of them in one go.
+
+They meet at every multiple of the longest step, a window, which is what counts as a step of the world (see
+alone.py). A step of a particle is numbered by its window and within it, so that how many windows a launch
+takes them through makes no difference to the noise either.
+"""
+
+from tisim._taichi import ti
+from tisim.program import PerParticle, Phase
+from tisim.state import LOST, NOT_FINITE, STEEP, Field
+from tisim.steppers.alone import LITTLE, beginning
+
+OWN = (
+    Field("own_time", "s", 1, "keep", scratch=True),
+    Field("own_fault", "", 1, "keep", integer=True, scratch=True),
+)
+"""How far a particle has come, and what has stopped it: a status of the world, or 0."""
+
+
+class Wander(PerParticle):
+    """A particle through the windows of a launch."""
+
+    long = True
+
+    def __init__(self, parts, fluid) -> None:
+        super().__init__(parts.s)
+        self.fluid, self.control, self.domain = fluid, parts.control, parts.domain
+        self.operators, self.summed, self.forced = parts.operators, parts.summed, parts.forced
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        taken, going = 0, self.able(w, i)
+        for k in range(ti.cast(s.stretch_windows[w], ti.i32)):
+            if going > 0:
+                window = s.windows[w] + k
+                begin = beginning(s, self.control, w, window)
+                taken += self.window(w, i, window, begin, beginning(s, self.control, w, window + 1) - begin)
+                going = self.able(w, i)
+        ti.atomic_add(s.particle_steps[w], taken)
+
+    @ti.func
+    def able(self, w, i):
+        """Whether there is anything to do for it: it is there, can move, and nothing has stopped it."""
+        s = self.s
+        there = s.mass[w, i] > 0.0 and s.own_fault[w, i] == 0
+        return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
+
+    @ti.func
+    def window(self, w, i, window, begin, length):
+        """A particle through a window, to the end of which it gets unless stopped; its steps."""
+        s = self.s
+        elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+        number, taken, going = ti.cast(window, ti.i64) << 32, 0, 1
+        while elapsed < length and going > 0:
+            if ti.static(self.forced):
+                self.summed.alone(w, i, begin + elapsed)
+            pushed = self.fluid.pushed(w, i)
+            rate = self.control.rate(s, w, i, pushed)
+            if self.control.hopeless(w, rate):
+                self.stop(w, i, STEEP, begin + elapsed)
+            else:
+                wanted = self.control.step(w, rate)
+                last = wanted * (1.0 + LITTLE) >= length - elapsed
+                dt = ti.select(last, length - elapsed, wanted)
+                self.move(w, i, pushed, begin + elapsed, dt, number + taken)
+                taken += 1
+                # The rounding error of the sum is carried along (W. Kahan 1965).
+                step = dt - carry
+                total = elapsed + step
+                carry = (total - elapsed) - step
+                elapsed = ti.select(last, length, total)
+            going = self.able(w, i)
+        return taken
+
+    @ti.func
+    def move(self, w, i, pushed, t, dt, number):
+        """r += dt (u + F/(6 pi eta R)) + sqrt(2 D dt) g, and what operators do to it."""
+        s, step = self.s, ti.cast(dt, self.s.real)
+        s.velocity[w, i] = self.fluid.flow(w, i, t) + pushed
+        width = ti.sqrt(2.0 * step * self.fluid.diffusivity(w, i))
+        s.position[w, i] += step * s.velocity[w, i] + width * self.fluid.normals(w, i, number)
+        for operator in ti.static(self.operators):
+            operator.particle(s, w, i, step)
+        r = s.position[w, i]
+        # Not below infinity: also true of NaN.
+        if not (r.norm_sqr() < ti.math.inf):
+            self.stop(w, i, NOT_FINITE, t)
+        elif self.domain.lost(w, r):
+            self.stop(w, i, LOST, t)
+        else:
+            s.position[w, i] = self.domain.wrap(w, r)
+
+    @ti.func
+    def stop(self, w, i, fault, t):
+        """It goes no further, and its world ends with the launch."""
+        s = self.s
+        s.own_fault[w, i], s.own_time[w, i] = fault, ti.cast(t, s.real)
+        ti.atomic_max(s.stuck[w], 1.0)
+
+
+class EndWandering(Phase):
+    """The windows are done; or the first particle to be stopped is found."""
+
+    def __init__(self, parts) -> None:
+        self.s, self.control, self.summed, self.forced = parts.s, parts.control, parts.summed, parts.forced
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.windows[w] += s.stretch_windows[w]
+        before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
+        s.dt[w] = s.time[w] - before
+        s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
+        s.events[w] = 0
+        if s.stuck[w] > 0.0:
+            self.accuse(w)
+
+    @ti.func
+    def accuse(self, w):
+        """The particle that was stopped first, when, and the largest force on it then."""
+        s = self.s
+        first = -1
+        for i in range(s.count[w]):
+            if s.own_fault[w, i] > 0 and (first < 0 or s.own_time[w, i] < s.own_time[w, ti.max(first, 0)]):
+                first = i
+        s.time[w] = ti.cast(s.own_time[w, first], ti.f64)
+        s.failed[w] = s.own_fault[w, first]
+        s.culprit[w] = s.id[w, first]
+        if ti.static(self.forced):
+            s.blame[w] = self.summed.largest(w, first)
