@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 from tisim.domain import Domain
 from tisim.effect import Effect, Force, Operator, PairEvent, PairForce, Source
@@ -14,7 +14,10 @@ from tisim.spec import parameter
 from tisim.state import Field
 from tisim.steppers.alone import Stretch
 from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.exact_noise import GAUSS, Exact
+from tisim.steppers.fast_noise import SUMS, Fast
 from tisim.steppers.fluid import Fluid
+from tisim.steppers.mobility import Mobility, Oseen, RotnePrager
 from tisim.steppers.phases import Clock
 from tisim.steppers.stepper import Parts, Stepper, single
 from tisim.steppers.together import Drift, Proceed, Scatter, Separate
@@ -29,8 +32,14 @@ class Brownian(Stepper):
     u + sum_j D_ij F_j / kT. Its mean is exact to first order in dt, and so is every statistic (weak order 1).
 
     temperature : T; viscosity : eta, of the fluid, which has no inertia either; infinite, and at rest but for
-    u. Particles whose field ``fixed`` is 1 stay where they are. Spheres do not rotate: refused are torques,
-    and also what asks for velocities, which particles here do not have: drag, and what happens in an impact.
+    u. hydrodynamics : what D_ij is for i != j, zero or a tensor (mobility.py). noise : by Cholesky's
+    decomposition, or by the truncated expansion, in N^2 operations (fast_noise.py). A world in which the
+    matrix is not positive definite fails, with time and particle: that happens with Oseen's tensor at
+    distances below some 3/2 R. "fast" sees only pairs for which it is not.
+
+    Particles whose field ``fixed`` is 1 stay where they are, and take no part in D. Spheres do not rotate:
+    refused are torques, and also what asks for velocities, which particles here do not have: drag, and what
+    happens in an impact. Interaction is refused in a periodic box, as the tensors are of an infinite fluid.
 
     Particles that do not feel each other, and that operators change one by one, take steps of their own and
     meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
@@ -41,8 +50,10 @@ class Brownian(Stepper):
     temperature: float = parameter("K", ge=0)
     viscosity: float = parameter("Pa s", gt=0)
     control: DriftLimit
+    hydrodynamics: Literal["none", "oseen", "rotne-prager"] = "none"
+    noise: Literal["exact", "fast"] = "exact"
 
-    keeps: ClassVar = ("windows", "stretch_windows", "stuck")
+    keeps: ClassVar = ("windows", "stretch_windows", "stuck", "beta")
 
     @property
     def order(self) -> int:
@@ -58,24 +69,43 @@ class Brownian(Stepper):
             drags = drags or isinstance(effect, PairEvent)
             rule = "one that does not depend on velocity in a scene stepped by brownian"
             must(not drags, name, rule, name)
+        fits = self.hydrodynamics == "none" or not domain.periodic()
+        must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
-        return all(isinstance(effect, Force | Source) or _one_by_one(effect) for effect in effects)
+        alone = all(isinstance(effect, Force | Source) or _one_by_one(effect) for effect in effects)
+        return alone and self.hydrodynamics == "none"
 
     def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
-        return ()
+        if self.hydrodynamics == "none":
+            return ()
+        return (self.model_copy(update={"noise": "fast" if self.noise == "exact" else "exact"}),)
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        return (FORCE, *OWN) if independent else (FORCE,)
+        if independent:
+            return (FORCE, *OWN)
+        if self.hydrodynamics == "none":
+            return (FORCE,)
+        return (FORCE, GAUSS) if self.noise == "exact" else (FORCE, *SUMS)
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, fluid = parts.s, Fluid(parts, self)
         if parts.independent:
             return (Stretch(s, parts.control), Wander(parts, fluid), EndWandering(parts))
-        interaction = Separate(fluid)
+        interaction = self._interaction(parts, fluid)
         drift = (*interaction.phases(), Drift(fluid, interaction, parts.control))
         move = (Clock(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
         return (*drift, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
+
+    def _interaction(self, parts: Parts, fluid: Fluid) -> Any:
+        if self.hydrodynamics == "none":
+            return Separate(fluid)
+        mobility = Mobility(fluid, Oseen() if self.hydrodynamics == "oseen" else RotnePrager())
+        if self.noise == "fast":
+            return Fast(fluid, mobility, parts.domain)
+        exact = Exact(fluid, mobility, parts.domain)
+        parts.owned.append((exact, "diffusion matrix", self.kind()))
+        return exact
 
 
 def _one_by_one(effect: Effect) -> bool:
