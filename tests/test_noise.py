@@ -44,6 +44,14 @@ def _numbers(words: ti.types.ndarray(), uniform: ti.types.ndarray(), normal: ti.
             normal[n, k] = z[k]
 
 
+@ti.kernel
+def _normals(words: ti.types.ndarray(), normal: ti.types.ndarray()):
+    for n in range(words.shape[0]):
+        z = noise.normals(noise.Words([words[n, 0], words[n, 1], words[n, 2], words[n, 3]]))
+        for k in ti.static(range(4)):
+            normal[n, k] = z[k]
+
+
 def philox(counters, keys):
     counters = np.ascontiguousarray(counters, np.uint32)
     out = np.zeros((len(counters), 4), np.uint32)
@@ -162,3 +170,23 @@ def test_extreme_words_stay_inside_the_open_interval():
     assert (uniform < 1).all()
     assert np.isfinite(normal).all()
     assert normal.max() == pytest.approx(np.sqrt(-2 * np.log(2.0**-54)), rel=1e-12)
+
+
+def test_four_normal_numbers_are_those_of_box_and_muller():
+    """From one word a length, sqrt(-2 ln u); from another an angle in the first quadrant, and two signs."""
+    draw = np.random.default_rng(2)
+    ends = [[0] * 4, [ONES] * 4, [2, 3, 2**31, 2**30]]
+    words = np.vstack([draw.integers(0, 2**32, (100_000, 4)), ends]).astype(np.uint32)
+    found = np.zeros((len(words), 4))
+    _normals(words, found)
+    for k in (0, 2):
+        length = np.sqrt(-2 * np.log((words[:, k] + 0.5) / 2**32))
+        angle = np.pi / 2 * ((words[:, k + 1] >> 2) + 0.5) / 2**30
+        first, second = 1.0 - (words[:, k + 1] & 2), 1.0 - 2.0 * (words[:, k + 1] & 1)
+        np.testing.assert_allclose(found[:, k], length * first * np.cos(angle), rtol=0, atol=5e-11)
+        np.testing.assert_allclose(found[:, k + 1], length * second * np.sin(angle), rtol=0, atol=5e-11)
+    drawn = found[:-3]
+    for column in drawn.T:
+        assert stats.kstest(column, "norm").pvalue > 0.01
+    correlation = np.corrcoef(np.hstack([drawn, drawn**2]).T)
+    assert np.abs(correlation - np.diag(np.diag(correlation))).max() < 5 / np.sqrt(len(drawn))

@@ -5,7 +5,7 @@ as 1, 2, 3", SC11 (2011): ten rounds turn a 128-bit counter and a 64-bit key int
 is stored and nothing is shared between threads, so the number of threads cannot matter.
 """
 
-from __future__ import annotations
+from math import factorial, log, pi, sqrt
 
 from tisim._taichi import ti
 
@@ -70,15 +70,57 @@ def normal(words):
     return ti.Vector([size * ti.cos(angle), size * ti.sin(angle)], dt=ti.f64)
 
 
+LOG_2, QUARTER, ROOT = log(2), pi / 2, sqrt(0.5)
+ROOT_BITS = 0x3FE6A09E667F3BCD
+"""Of ROOT as f64."""
+ARTANH = tuple(1 / k for k in range(1, 14, 2))
+COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(7))
+SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(6))
+"""Of the series of artanh(x)/x, cos x and sin(x)/x, in x^2."""
+
+
+@ti.func
+def _series(x, coefficients: ti.template()):  # type: ignore[valid-type]
+    """c_0 + x (c_1 + x (c_2 + ...))."""
+    total = ti.cast(coefficients[-1], ti.f64)
+    for c in ti.static(coefficients[-2::-1]):
+        total = total * x + ti.cast(c, ti.f64)
+    return total
+
+
+@ti.func
+def _length(word):
+    """sqrt(-2 ln u) of u = (word + 1/2)/2^32: of a vector of two normal numbers, to some 11 digits.
+
+    u = m 2^e with m next to 1, and ln m = 2 artanh((m - 1)/(m + 1)): what compilers vectorise.
+    """
+    number = ti.bit_cast(ti.cast(word, ti.f64) + 0.5, ti.i64)
+    e = (number - ti.i64(ROOT_BITS)) >> ti.i64(52)
+    m = ti.bit_cast(number - (e << ti.i64(52)), ti.f64)
+    z = (m - 1.0) / (m + 1.0)
+    octaves = ti.cast(e - ti.i64(32), ti.f64) * ti.cast(LOG_2, ti.f64)
+    return ti.sqrt(-2.0 * (octaves + 2.0 * z * _series(z * z, ARTANH)))
+
+
+@ti.func
+def _direction(word):
+    """A point on the unit circle, to some 11 digits: in the first quadrant by 30 bits, then two signs.
+
+    cos and sin of pi/4 + x by the series of x.
+    """
+    x = (ti.cast(word >> ti.u32(2), ti.f64) + 0.5) * ti.cast(QUARTER / 2**30, ti.f64)
+    x -= ti.cast(QUARTER / 2, ti.f64)
+    c = ti.cast(ROOT, ti.f64) * _series(x * x, COSINE)
+    s = ti.cast(ROOT, ti.f64) * x * _series(x * x, SINE)
+    first, second = 1.0 - ti.cast(word & ti.u32(2), ti.f64), 1.0 - 2.0 * ti.cast(word & ti.u32(1), ti.f64)
+    return ti.Vector([first * (c - s), second * (c + s)], dt=ti.f64)
+
+
 @ti.func
 def normals(words):
     """Four independent standard normal numbers from four words, of 32 random bits each. f64.
 
-    Half the price of ``normal``; none is larger than 6.7, which one in 4e10 should be.
+    As ``normal`` at a fraction of its price; none is larger than 6.8, which one in 1e11 should be.
     """
-    scale = ti.cast(1.0 / 4294967296.0, ti.f64)
-    u = (ti.cast(words, ti.f64) + 0.5) * scale
-    turn = ti.cast(6.283185307179586, ti.f64)
-    a, b = ti.sqrt(-2.0 * ti.log(u[0])), ti.sqrt(-2.0 * ti.log(u[2]))
-    p, q = turn * u[1], turn * u[3]
-    return ti.Vector([a * ti.cos(p), a * ti.sin(p), b * ti.cos(q), b * ti.sin(q)], dt=ti.f64)
+    a, b = _length(words[0]) * _direction(words[1]), _length(words[2]) * _direction(words[3])
+    return ti.Vector([a[0], a[1], b[0], b[1]], dt=ti.f64)

@@ -1,5 +1,8 @@
 """Brownian particles without hydrodynamic interaction, against closed forms."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -149,6 +152,44 @@ def test_same_bits_on_both_schedules_alone_in_a_batch_and_in_portions(together):
     check_same(usual[2], simulation.results()[2])
     assert usual[2].work["particle_steps"] > 1500
     assert not np.array_equal(usual[1].state["position"], usual[2].state["position"])
+
+
+ELSEWHERE = """
+import sys
+import numpy as np
+from tests.steppers import test_brownian
+from tisim import runtime
+runtime.start(threads=1)
+found = {name: call() for name, call in test_brownian.PLACES.items()}
+np.savez(sys.argv[1], **found)
+"""
+
+
+def places(together, **more):
+    """Where particles are at the end of a run of forty worlds, each phase a launch over all of them: fewer
+    than a thousand would all be one thread's."""
+    more = {"trap": 200.0, "dt": 1e-3, "drift": 0.3, "steps": 6, **more}
+    draw = np.random.default_rng(1)
+    make = [colloids(draw.uniform(-1e-6, 1e-6, (40, 3)), together, seed=k, **more) for k in range(40)]
+    results = simulate(make, worlds=40, capacity=40, schedule="particle")
+    return np.array([result.state["position"] for result in results])
+
+
+PLACES = {
+    "by themselves": lambda: places(False),
+    "exact": lambda: places(False, hydrodynamics="rotne-prager"),
+    "fast": lambda: places(True, hydrodynamics="rotne-prager", noise="fast"),
+}
+
+
+@pytest.mark.long
+def test_same_bits_with_one_thread_and_two(tmp_path):
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(tmp_path / "found.npz")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    with np.load(tmp_path / "found.npz") as single:
+        for name, call in PLACES.items():
+            np.testing.assert_array_equal(call(), single[name], err_msg=name)
 
 
 @both

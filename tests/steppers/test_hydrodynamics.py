@@ -8,8 +8,12 @@ from tests.scenes import compiled, simulate
 from tests.steppers.colloids import DIFFUSIVITY, HEAT, MOBILITY, RADIUS, SIGMAS, VISCOSITY, Stop, colloids
 from tests.steppers.mobility_twin import expansion, matrix, oseen, rotne_prager
 from tisim import Box
+from tisim.accuracy.methods import methods
+from tisim.accuracy.quantity import usual
+from tisim.accuracy.reference import attempts
 from tisim.checkpoint import restore, save
 from tisim.errors import InputError
+from tisim.steppers.brownian import Brownian
 
 WORLDS, CAPACITY = 8, 40
 SOFTNESS = 1 / (6 * np.pi * VISCOSITY)
@@ -265,6 +269,18 @@ def test_interaction_does_not_change_where_particles_are_in_equilibrium():
     results = simulate(scenes, 64, n)
     places = np.array([result.state["position"] for result in results]) / RADIUS
     assert (places**2).mean() == pytest.approx(1.0, abs=0.02 + SIGMAS * np.sqrt(2 / places.size))
+
+
+def test_cost_sets_exact_and_fast_noise_side_by_side():
+    """Both noises, each with its length of steps, and no stepper of particles that have inertia; what is
+    compared is a statistic."""
+    made = make(lattice(0), trap=20.0)
+    found = methods(made, 1e-4, 1e-6, (1.0, 0.0), ("f64",), 8)
+    turned = {(type(m.base.stepper), m.base.stepper.noise, *m.knob.orders) for m in found if m.knob}
+    assert {(Brownian, noise, "longest", "drift") for noise in ("exact", "fast")} <= turned
+    assert {kind for kind, *_ in turned} == {Brownian}
+    assert [attempt.method.base.stepper.noise for attempt in attempts(found, 0.0)] == ["exact"] * 2
+    assert [quantity.random for quantity in usual(made)] == [True]
 
 
 def test_interaction_in_a_periodic_box_is_refused():

@@ -79,12 +79,21 @@ def kinetic_energy(result: Result) -> float:
     return 0.5 * float((result.state["mass"] * (result.state["velocity"] ** 2).sum(axis=1)).sum())
 
 
+def mean_square(result: Result) -> float:
+    """Mean square displacement, m^2."""
+    return float((displacement(result) ** 2).sum(axis=1).mean())
+
+
 def usual(scene: Scene) -> tuple[Quantity, ...]:
     """What is compared unless something else is asked for: where particles have moved to.
 
     Impacts and operators may remove particles, and after some impacts no path can be followed: there it is
-    the mean kinetic energy over random starts. InputError where there is nothing random.
+    the mean kinetic energy over random starts. InputError where there is nothing random. Of paths that are
+    random themselves it is the mean square displacement.
     """
+    if scene.stepper.random:
+        must(not scene.domain.joined(), "quantities", "given for random paths in a box", "none")
+        return (Quantity("mean square displacement", mean_square, random=True),)
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
         # Where opposite faces are joined a place jumps; a velocity does not.
         jumps = scene.domain.joined()

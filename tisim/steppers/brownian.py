@@ -53,6 +53,7 @@ class Brownian(Stepper):
     hydrodynamics: Literal["none", "oseen", "rotne-prager"] = "none"
     noise: Literal["exact", "fast"] = "exact"
 
+    random: ClassVar = True
     keeps: ClassVar = ("windows", "stretch_windows", "stuck", "beta")
 
     @property

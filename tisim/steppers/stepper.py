@@ -58,12 +58,13 @@ class Stepper(Spec):
 
     As with effects, ``counts`` names counters, ``keeps`` quantities of a world, and in a kernel a parameter
     is a function of the world. Before the first step ``force`` and ``torque`` are those of
-    the start.
+    the start. ``random`` says that it draws random numbers, so that only statistics converge.
     """
 
     contract: ClassVar[bool] = True
     counts: ClassVar[tuple[str, ...]] = ()
     keeps: ClassVar[tuple[str, ...]] = ()
+    random: ClassVar[bool] = False
     control: StepControl
 
     @property
