@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
 from tisim.domain import Domain
-from tisim.effect import Effect, Force, Operator, PairEvent, PairForce, Source
+from tisim.effect import Effect, Force, Operator, PairEvent, PairForce
 from tisim.errors import must
 from tisim.forces import FORCE
 from tisim.program import Item
@@ -74,7 +74,7 @@ class Brownian(Stepper):
         must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
-        alone = all(isinstance(effect, Force | Source) or _one_by_one(effect) for effect in effects)
+        alone = all(single(effect) or _one_by_one(effect) for effect in effects)
         return alone and self.hydrodynamics == "none"
 
     def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
