@@ -33,7 +33,7 @@ class Stepping(Operator):
     needs = (Field("leap", "m", 3, "keep"),)
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         s.position[w, i] += s.leap[w, i]
 
 
@@ -43,7 +43,7 @@ class Growing(Operator):
     needs = ("radius", Field("growth", "m/s", 1, "keep"))
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         s.radius[w, i] += s.growth[w, i] * dt
 
 
@@ -53,7 +53,7 @@ class Poison(Operator):
     axis: int = 0
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         if s.steps[w] == 20 and i == 7:
             s.position[w, i][self.axis] = ti.sqrt(-s.mass[w, i])
 
@@ -201,7 +201,7 @@ class Leave(Operator):
     """Removes the last particle in the first step."""
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         if s.id[w, i] == 2 and s.steps[w] == 1:
             s.remove(w, i)
 

@@ -45,7 +45,7 @@ class RandomKicks(Operator):
     sigma: float = parameter("m/s^1.5", ge=0)
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         a = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 0))
         b = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 1))
         kick = self.sigma(w) * ti.sqrt(dt) * ti.cast(ti.Vector([a[0], a[1], b[0]]), s.real)

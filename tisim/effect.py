@@ -246,8 +246,8 @@ class Operator(Effect):
     contract: ClassVar[bool] = True
 
     @ti.func
-    def particle(self, s, w, i, dt):
-        """Change particle i alone, after a step of dt seconds."""
+    def particle(self, s, w, i, t, dt):
+        """Change particle i alone, after a step of dt (s) that ended at t (s, f64)."""
 
     @ti.func
     def world(self, s, w):

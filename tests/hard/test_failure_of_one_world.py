@@ -20,7 +20,7 @@ class Poison(Operator):
     overflow: float = parameter("", 0.0)
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         if s.steps[w] == self.at_step(w) and s.id[w, i] == self.victim(w):
             if self.velocity(w) > 0.0:
                 s.velocity[w, i][1] = ti.math.nan

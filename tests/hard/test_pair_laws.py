@@ -187,7 +187,7 @@ class Vanish(Operator):
     at_step: float = parameter("", 3.0)
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         if s.steps[w] == self.at_step(w):
             s.remove(w, i)
 

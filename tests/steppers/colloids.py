@@ -45,7 +45,7 @@ class Stop(Operator):
     place: float = parameter("m")
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         if s.position[w, i][0] > self.place(w) and s.fixed[w, i] == 0:
             s.fixed[w, i] = 1
             s.velocity[w, i] = 0.0 * s.velocity[w, i]

@@ -16,9 +16,8 @@ class Capture(Operator):
     It sets three fields of the particle. fixed : 1; a start may fix particles too, which are not counted.
     captured_by : the magnet, counted from 0 through the lists of the scene in order; -1 for none.
     captured_at : s, the end of the step in which it touched; -1 for a free one.
-    ``work["captures"]`` counts them, ``measures["captured_fraction"]`` is their part of all particles. They
-    still act on others. One that a step brings into a magnet goes to the nearest point outside, so steps must
-    be short beside the magnet. Source: B16 section 6.3.
+    ``work["captures"]`` counts them. They still act on others. One that a step brings into a magnet goes to the
+    nearest point outside, so steps must be short beside the magnet. Source: B16 section 6.3.
     """
 
     needs: ClassVar = (
@@ -28,14 +27,13 @@ class Capture(Operator):
         Field("captured_at", "s", 1, "keep", default=-1.0),
     )
     counts: ClassVar = ("captures",)
-    keeps: ClassVar = ("captured_fraction",)
     requires: ClassVar = (Magnets,)
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"bodies": tuple(peer.bodies() for peer in peers if isinstance(peer, Magnets))}
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         if s.fixed[w, i] == 0:
             r, radius = s.position[w, i], s.radius[w, i]
             before, by, least, place = 0, -1, radius, r
@@ -49,17 +47,9 @@ class Capture(Operator):
             if by >= 0:
                 s.fixed[w, i] = 1
                 s.captured_by[w, i] = by
+                s.captured_at[w, i] = ti.cast(t, s.real)
                 s.position[w, i] = place
                 s.velocity[w, i] = 0.0 * r
                 if ti.static(hasattr(s, "spin")):
                     s.spin[w, i] = 0.0 * r
                 ti.atomic_add(s.captures[w], 1)
-
-    @ti.func
-    def world(self, s, w):
-        fraction = ti.cast(s.captures[w], ti.f64) / ti.max(s.count[w], 1)
-        if fraction != s.captured_fraction[w]:
-            s.captured_fraction[w] = fraction
-            for i in range(s.count[w]):
-                if s.captured_by[w, i] >= 0 and s.captured_at[w, i] < 0.0:
-                    s.captured_at[w, i] = ti.cast(s.time[w], s.real)

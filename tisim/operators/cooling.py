@@ -40,7 +40,7 @@ class Cooling(Operator):
         return {"heating": next(peer for peer in peers if isinstance(peer, Heating))}
 
     @ti.func
-    def particle(self, s, w, i, dt):
+    def particle(self, s, w, i, t, dt):
         capacity = s.mass[w, i] * self.heating.heat_capacity(w)
         per_kelvin = dt * 4.0 * ti.math.pi * s.radius[w, i] ** 2 / capacity
         a, c = STEFAN_BOLTZMANN * self.emissivity(w) * per_kelvin, self.convection(w) * per_kelvin

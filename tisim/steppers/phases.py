@@ -93,7 +93,7 @@ class Operate(PerParticle):
         s = self.s
         before, size = s.position[w, i], s.radius[w, i]
         for operator in ti.static(self.operators):
-            operator.particle(s, w, i, ti.cast(s.dt[w], s.real))
+            operator.particle(s, w, i, s.time_before[w] + s.dt[w], ti.cast(s.dt[w], s.real))
         after = s.position[w, i]
         grown = ti.cast(s.radius[w, i] - size, ti.f64)
         arrive(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)

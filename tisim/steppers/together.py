@@ -67,7 +67,7 @@ class Scatter(PerParticle):
             z = self.interaction.scattered(w, i)
             s.position[w, i] = before + dt * s.velocity[w, i] + ti.sqrt(2.0 * dt) * z
         for operator in ti.static(self.operators):
-            operator.particle(s, w, i, dt)
+            operator.particle(s, w, i, s.time[w] + s.dt[w], dt)
         after = s.position[w, i]
         moved, grown = ti.cast(after - before, ti.f64), ti.cast(s.radius[w, i] - size, ti.f64)
         arrive(s, self.domain, w, i, after, moved, grown)

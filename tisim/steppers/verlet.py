@@ -61,7 +61,7 @@ class Move(PerParticle):
         before, size = s.position[w, i], s.radius[w, i]
         s.position[w, i] = before + dt * s.velocity[w, i]
         for operator in ti.static(self.operators):
-            operator.particle(s, w, i, dt)
+            operator.particle(s, w, i, s.time[w] + s.dt[w], dt)
         after, moved = (
             s.position[w, i],
             ti.cast(s.position[w, i] - before, ti.f64) - s.axes(s.frame, w) * s.dt[w],

@@ -81,7 +81,7 @@ class Wander(PerParticle):
         width = ti.sqrt(2.0 * step * self.fluid.diffusivity(w, i))
         s.position[w, i] += step * s.velocity[w, i] + width * self.fluid.normals(w, i, number)
         for operator in ti.static(self.operators):
-            operator.particle(s, w, i, step)
+            operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]
         # Not below infinity: also true of NaN.
         if not (r.norm_sqr() < ti.math.inf):
