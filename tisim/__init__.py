@@ -1,5 +1,6 @@
 """tisim: clouds of interacting particles, simulated in batches of worlds."""
 
+from tisim.packing.around_cylinder import RandomAroundCylinder
 from tisim.packing.placement import Lattice, RandomInBall, RandomInBox, RandomInDomain
 from tisim.particles import Cloud, Particles
 from tisim.pulses import Blast
@@ -17,6 +18,7 @@ __all__ = [
     "Lattice",
     "Open",
     "Particles",
+    "RandomAroundCylinder",
     "RandomInBall",
     "RandomInBox",
     "RandomInDomain",

@@ -1,0 +1,88 @@
+"""Magnetic colloids that a magnetised fibre captures (B16 chapter 6).
+
+B16 is the thesis behind this case: particles of table 6.1 in water about one steel cylinder in a field of 1 T
+along x, at an angle to its axis. The cylinder is saturated, in the direction that the model of Stoner and
+Wohlfarth gives. Particles are so dilute that they do not feel each other, and superparamagnetic: their moment
+is along the field. One that touches the cylinder stays.
+
+The paper draws its start regions TOP and SIDE without saying how wide they are. Here they are one cylinder
+radius wide and together the whole layer around it, in which ``part`` chooses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tisim import Cloud, RandomAroundCylinder, Scene
+from tisim.effects.magnetophoresis import Magnetophoresis
+from tisim.effects.moment import FixedMoment
+from tisim.operators.capture import Capture
+from tisim.sources.cylinder import Cylinder, MagneticCylinders
+from tisim.sources.stoner_wohlfarth import magnetisation
+from tisim.sources.uniform import MagneticField
+from tisim.spec import Vector
+from tisim.steppers.brownian import Brownian
+from tisim.steppers.drift_limit import DriftLimit
+
+DIAMETER, SATURATION, FLUX = 600e-6, 985e3, 1.0
+"""Of the cylinder, m and A/m; of the field along x, T (B16 section 6.3)."""
+TEMPERATURE, VISCOSITY, DURATION, NUMBER = 298.0, 1e-3, 50.0, 100
+"""K, Pa s, s, and particles of a run (B16 section 6.3)."""
+MOMENT = {25: 0.016e-16, 50: 0.344e-16, 75: 0.870e-16, 100: 0.662e-16, 125: 5.151e-16, 212: 19.35e-16}
+"""A m^2, by hydrodynamic radius in nm (B16 table 6.1)."""
+DENSITY = 1500.0
+"""kg/m^3. Without inertia and gravity it makes no difference."""
+STRIDE, LONGEST = 2e-6, 0.05
+"""How far (m) and how long (s) a particle goes in a step at most: the field changes over 300 um."""
+
+
+def axis(angle: float) -> Vector:
+    """Of a cylinder at an angle (degrees) to the field, which is along x."""
+    return float(np.cos(np.radians(angle))), 0.0, float(np.sin(np.radians(angle)))
+
+
+def fibre(along: Vector, aspect: float, flux: Vector = (FLUX, 0.0, 0.0)) -> Cylinder:
+    """A saturated cylinder of length over diameter ``aspect`` at the origin, in a field (T)."""
+    radius, length = DIAMETER / 2, aspect * DIAMETER
+    m = magnetisation(along, radius, length, SATURATION, flux)
+    return Cylinder(axis=along, radius=radius, length=length, magnetisation=m)
+
+
+def scene(
+    nanometres: int = 125,
+    angle: float = 90.0,
+    aspect: float = 5 / 3,
+    part: str = "all",
+    number: int = NUMBER,
+    duration: float = DURATION,
+    seed: int = 0,
+) -> Scene:
+    """Particles of a radius of table 6.1 about a cylinder at an angle (degrees) to the field."""
+    body = fibre(axis(angle), aspect)
+    radius = nanometres * 1e-9
+    return Scene(
+        name="capture",
+        particles=Cloud(
+            number=number,
+            radius=radius,
+            density=DENSITY,
+            placement=RandomAroundCylinder(
+                axis=body.axis, radius=body.radius, length=body.length, thickness=body.radius, part=part
+            ),
+            quantities={"saturation_moment": MOMENT[nanometres]},
+        ),
+        effects=(
+            MagneticField(constant=(FLUX, 0.0, 0.0)),
+            MagneticCylinders(cylinders=(body,)),
+            FixedMoment(),
+            Magnetophoresis(),
+            Capture(),
+        ),
+        stepper=Brownian(
+            temperature=TEMPERATURE,
+            viscosity=VISCOSITY,
+            control=DriftLimit(longest=LONGEST, shortest=1e-9, drift=STRIDE / radius),
+        ),
+        duration=duration,
+        seed=seed,
+    )

@@ -1,0 +1,87 @@
+"""Where particles lie at the start beside a cylinder (B16 Fig. 6.2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import field_validator
+from scipy.spatial import cKDTree
+
+from tisim.domain import Domain
+from tisim.errors import InputError, must
+from tisim.packing.placement import Placement
+from tisim.spec import Vector, parameter
+
+ROUNDS = 200
+"""Of as many tries as there are spheres, before the region counts as full."""
+
+
+class RandomAroundCylinder(Placement):
+    """Random sequential addition of spheres that lie wholly in a layer around a cylinder, or in part of it.
+
+    centre; axis : of any length but 0; radius, length : of the cylinder. thickness : of the layer, which is
+    what a cylinder larger by it on all sides has more. part : "side", beside the lateral surface; "top",
+    beyond both ends, from the axis to the outer side; or "all" of the layer, which is both.
+    Source: the regions SIDE and TOP of B16 section 6.3. The paper draws how they lie and says how wide they
+    are in a figure only; here they are as wide as the caller says, and together leave nothing out.
+    """
+
+    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+    axis: Vector = parameter("", (0.0, 0.0, 1.0))
+    radius: float = parameter("m", gt=0)
+    length: float = parameter("m", gt=0)
+    thickness: float = parameter("m", gt=0)
+    part: Literal["all", "top", "side"] = "all"
+
+    @field_validator("axis", mode="after")
+    @classmethod
+    def _direction(cls, axis: Vector) -> Vector:
+        must(0 < np.linalg.norm(axis) < np.inf, "random_around_cylinder.axis", "a direction", axis)
+        return axis
+
+    def volume(self) -> float:
+        """Of the part, m^3."""
+        outer = np.pi * (self.radius + self.thickness) ** 2
+        side = (outer - np.pi * self.radius**2) * self.length
+        return float((self.part != "top") * side + (self.part != "side") * 2 * outer * self.thickness)
+
+    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
+        must(self.thickness > 2 * radius, "thickness", f"above a diameter, {2 * radius:g} m", self.thickness)
+        generator = np.random.default_rng([seed, 0x6C61796572])
+        found = np.empty((0, 3))
+        for _ in range(ROUNDS):
+            found = _apart(np.vstack([found, self._tries(number, radius, generator)]), 2 * radius)[:number]
+            if len(found) == number:
+                break
+        else:
+            raise InputError(
+                f"cloud.number must be at most what finds room around the cylinder, {len(found)} here; "
+                f"received {number}"
+            )
+        return self._turned(found) + np.asarray(self.centre)
+
+    def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
+        """Points of the part, evenly, in a frame whose z axis is that of the cylinder; at least one. m."""
+        outer, half = self.radius + self.thickness - radius, self.length / 2
+        top = half + self.thickness - radius
+        points = generator.uniform((-outer, -outer, -top), (outer, outer, top), (4 * number + 16, 3))
+        rho, z = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
+        beside = (rho > self.radius + radius) & (z < half - radius * (self.part == "side"))
+        beyond = z > half + radius
+        kept = {"side": beside, "top": beyond}.get(self.part, beside | beyond)
+        return points[kept & (rho < outer)][:number]
+
+    def _turned(self, points: np.ndarray) -> np.ndarray:
+        axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        first = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+        first /= np.linalg.norm(first)
+        return points @ np.stack([first, np.cross(axis, first), axis])
+
+
+def _apart(points: np.ndarray, distance: float) -> np.ndarray:
+    """Without those nearer than a distance (m) to one that comes before."""
+    kept = np.ones(len(points), bool)
+    for i, j in sorted(cKDTree(points).query_pairs(distance)):
+        kept[j] &= not kept[i]
+    return points[kept]
