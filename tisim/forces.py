@@ -66,7 +66,7 @@ class SumForces(PairSum):
     def alone(self, w, i, t):
         """The force on i, at a time of its own, where particles do not feel each other."""
         for settling in ti.static(self.settlings):
-            settling.set(w, i, t)
+            settling.set(self.s, w, i, t)
         self.write(w, i, self.singles(w, i, t))
 
     @ti.func

@@ -56,10 +56,10 @@ class Settling:
         return ((SetAgain if again else Set)(self, trial),)
 
     @ti.func
-    def set(self, w, i, t):
-        """Settle that of particle i."""
+    def set(self, s, w, i, t):
+        """Settle that of particle i, as it is in s."""
         nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
-        self.value[w, i] = self.effect.response(self.s, w, i, nothing, t)
+        self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
 
 class Set(PerParticle):
@@ -71,7 +71,7 @@ class Set(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        self.settling.set(w, i, self.s.time[w])
+        self.settling.set(self.s, w, i, self.s.time[w])
         if ti.static(not self.trial):
             self.check(w, i)
 
