@@ -1,6 +1,6 @@
 """Magnetic colloids that a magnetised fibre captures (B16 chapter 6).
 
-B16 is the thesis behind this case: particles of table 6.1 in water about one steel cylinder in a field of 1 T
+B16 is R. J. Baars, thesis, Utrecht University (2016): particles of table 6.1 in water about one steel cylinder in a field of 1 T
 along x, at an angle to its axis. The cylinder is saturated, in the direction that the model of Stoner and
 Wohlfarth gives. Particles are so dilute that they do not feel each other, and superparamagnetic: their moment
 is along the field. One that touches the cylinder stays.
@@ -11,9 +11,15 @@ radius wide and together the whole layer around it, in which ``part`` chooses.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from cases.case import Case, Check, Size
+from cases.statistics import Claim
 from tisim import Cloud, RandomAroundCylinder, Scene
+from tisim.batches import Progress
 from tisim.effects.magnetophoresis import Magnetophoresis
 from tisim.effects.moment import FixedMoment
 from tisim.operators.capture import Capture
@@ -23,6 +29,11 @@ from tisim.sources.uniform import MagneticField
 from tisim.spec import Vector
 from tisim.steppers.brownian import Brownian
 from tisim.steppers.drift_limit import DriftLimit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tisim.frames import Frames
 
 DIAMETER, SATURATION, FLUX = 600e-6, 985e3, 1.0
 """Of the cylinder, m and A/m; of the field along x, T (B16 section 6.3)."""
@@ -34,6 +45,14 @@ DENSITY = 1500.0
 """kg/m^3. Without inertia and gravity it makes no difference."""
 STRIDE, LONGEST = 2e-6, 0.05
 """How far (m) and how long (s) a particle goes in a step at most: the field changes over 300 um."""
+
+
+SIZES = {
+    "default": Size("100 particles of 125 nm about a short transverse cylinder, 50 s", {}),
+    "longitudinal": Size("the same about one along the field", {"angle": 0.0}),
+    "long": Size("about a transverse cylinder of length 20 D", {"aspect": 20.0}),
+    "25nm": Size("100 particles of 25 nm, which take far longer", {"nanometres": 25}),
+}
 
 
 def axis(angle: float) -> Vector:
@@ -86,3 +105,41 @@ def scene(
         duration=duration,
         seed=seed,
     )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """The scene of a size."""
+    return scene(seed=seed, **CASE.size(size).scene)
+
+
+def check() -> Iterator[Check | Claim]:
+    """What B16 concludes of one cylinder."""
+    from cases import capture_statistics
+
+    yield from capture_statistics.check()
+
+
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """Trajectories and captured fraction of a run."""
+    from cases import capture_pictures
+
+    return capture_pictures.pictures(found)
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """Field, capture volume, and captured fraction by angle, size and aspect ratio."""
+    from cases import capture_pictures
+
+    return capture_pictures.figures(size, progress)
+
+
+CASE = Case(
+    name="capture",
+    title="Magnetic colloids captured by a magnetised fibre (B16)",
+    source="R. J. Baars, thesis, Utrecht University (2016), chapter 6",
+    sizes=SIZES,
+    scene=scene_for,
+    check=check,
+    pictures=pictures,
+    figures=figures,
+)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import cases
+from cases.statistics import Claim
 from optimize.problem import Problem
 from tisim.accuracy.quantity import Quantity
 from tisim.batches import Progress
@@ -32,6 +33,12 @@ class Check:
     @property
     def ok(self) -> bool:
         return abs(self.measured - self.expected) <= self.bound
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Measured, expected, off by, allowed; for people."""
+        off = abs(self.measured - self.expected)
+        return f"{self.measured:.10g}", f"{self.expected:.10g}", f"{off:.1e}", f"{self.bound:.1e}"
 
 
 @dataclass(frozen=True)
@@ -60,7 +67,7 @@ class Case:
     source: str
     sizes: Mapping[str, Size]
     scene: Callable[[str, int], Scene]
-    check: Callable[[], Iterator[Check]]
+    check: Callable[[], Iterator[Check | Claim]]
     problem: Callable[[str, str], Problem] | None = None
     variants: tuple[str, ...] = ()
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None

@@ -16,8 +16,8 @@ class Capture(Operator):
     It sets three fields of the particle. fixed : 1; a start may fix particles too, which are not counted.
     captured_by : the magnet, counted from 0 through the lists of the scene in order; -1 for none.
     captured_at : s, the end of the step in which it touched; -1 for a free one.
-    ``work["captures"]`` counts them. They still act on others. One that a step brings into a magnet goes to the
-    nearest point outside, so steps must be short beside the magnet. Source: B16 section 6.3.
+    ``work["captures"]`` counts them. They still act on others. One that a step brings into a magnet goes to
+    the nearest point outside, so steps must be short beside the magnet. Source: B16 section 6.3.
     """
 
     needs: ClassVar = (

@@ -37,7 +37,7 @@ class RandomAroundCylinder(Placement):
     @field_validator("axis", mode="after")
     @classmethod
     def _direction(cls, axis: Vector) -> Vector:
-        must(0 < np.linalg.norm(axis) < np.inf, "random_around_cylinder.axis", "a direction", axis)
+        must(0 < float(np.linalg.norm(axis)) < np.inf, "random_around_cylinder.axis", "a direction", axis)
         return axis
 
     def volume(self) -> float:

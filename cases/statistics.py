@@ -1,0 +1,61 @@
+"""Means of random runs, how well they are known, and what may be said of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import t as student
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of independent runs, and half the width of its confidence interval (CONFIDENCE)."""
+
+    value: float
+    half: float
+
+    @classmethod
+    def of(cls, runs: ArrayLike) -> Mean:
+        """Of two runs or more, by Student's t."""
+        values = np.asarray(runs, float)
+        error = values.std(ddof=1) / np.sqrt(len(values))
+        return cls(float(values.mean()), float(student.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * error))
+
+    def over(self, other: Mean) -> Mean:
+        """The ratio of two independent means, to first order in their errors."""
+        ratio = self.value / other.value
+        return Mean(ratio, abs(ratio) * float(np.hypot(self.half / self.value, other.half / other.value)))
+
+    def __sub__(self, other: Mean) -> Mean:
+        """The difference of two independent means."""
+        return Mean(self.value - other.value, float(np.hypot(self.half, other.half)))
+
+    def __str__(self) -> str:
+        return f"{self.value:.4g} ± {self.half:.2g}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement about random runs: right when all of the confidence interval lies in least..most."""
+
+    name: str
+    mean: Mean
+    least: float = -np.inf
+    most: float = np.inf
+
+    @property
+    def ok(self) -> bool:
+        return (
+            self.least <= self.mean.value - self.mean.half and self.mean.value + self.mean.half <= self.most
+        )
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Measured, expected, off by, allowed; for people."""
+        bounds = [f"above {self.least:.4g}"] * bool(np.isfinite(self.least))
+        bounds += [f"below {self.most:.4g}"] * bool(np.isfinite(self.most))
+        return str(self.mean), ", ".join(bounds), "", f"{CONFIDENCE:.0%} confidence"

@@ -1,0 +1,50 @@
+"""The field of sources at any points, as particles of a scene would feel it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tisim import runtime
+from tisim._taichi import ti
+from tisim.binding import Table, connect
+from tisim.effect import Effect, Source
+from tisim.errors import must
+
+
+@ti.kernel
+def _sample(fields: ti.template(), t: ti.f64, r: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[valid-type]
+    for i in range(r.shape[0]):
+        place = ti.Vector([r[i, 0], r[i, 1], r[i, 2]])
+        value, gradient = 0.0 * place, 0.0 * place.outer_product(place)
+        for field in ti.static(fields):
+            value += field.value(0, place, t)
+            gradient += field.gradient(0, place, t)
+        for a in ti.static(range(3)):
+            out[i, 0, a] = value[a]
+            for b in ti.static(range(3)):
+                out[i, 1 + b, a] = gradient[a, b]
+
+
+def sample(
+    effects: Sequence[Effect], quantity: str, points: ArrayLike, time: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """The sum of all sources of a quantity among effects, shape (n, 3), and its gradient, (n, 3, 3).
+
+    quantity : its standard name, such as "magnetic_flux_density" (T). points : m, shape (n, 3). time : s.
+    [k, a, b] of the gradient is the derivative of component a along axis b, per metre.
+    InputError where there is no source of it, or for points of another shape.
+    """
+    real = runtime.current().real
+    places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)
+    must(places.ndim == 2 and places.shape[1] == 3, "points", "of shape (n, 3)", places.shape)
+    given = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
+    must(bool(given), "effects", f"with a source of {quantity}", [effect.kind() for effect in effects])
+    table = Table(given, 1, real)
+    bound = tuple(table.bind(source) for source in given)
+    connect(bound)
+    table.write([given])
+    out = np.zeros((len(places), 4, 3), places.dtype)
+    _sample(bound, time, places, out)
+    table.destroy()
+    return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
