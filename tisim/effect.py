@@ -180,8 +180,8 @@ class Mutual(Settled, Pairwise):
 
     Settled by sweeps over all particles at once (the method of Jacobi), each starting from the last values,
     also those of the last step, until no particle changes by more than ``tolerance`` times the largest
-    value. A world in which ``sweeps`` do not suffice fails, and says so; with ``sweeps`` of 0 there is one
-    sweep per step and no such test.
+    value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so; with ``sweeps`` of 0
+    there is one sweep per step and no such test.
 
     relaxation : the part a of its way that a sweep goes, q = (1 - a) q + a response. Where the others act by
     a linear law, with real eigenvalues L, sweeps converge if 1 - 2/a < L < 1 for all of them. There is no

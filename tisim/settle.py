@@ -2,6 +2,8 @@
 
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import Mutual, Settled
@@ -9,6 +11,9 @@ from tisim.halves import Halves
 from tisim.pairs import PairSum
 from tisim.program import Item, PerParticle, Phase, Repeat
 from tisim.state import UNSETTLED, State
+
+ROUNDING = 4.0
+"""Changes of so many units in the last place are none: sweeps in f32 may go on with them for ever."""
 
 
 @ti.func
@@ -208,6 +213,7 @@ class Take(PerParticle):
     def __init__(self, settling: MutualSettling, trial: bool) -> None:
         super().__init__(settling.s)
         self.settling, self.effect, self.trial = settling, settling.effect, trial
+        self.least = ROUNDING * float(np.finfo(np.float64 if settling.s.real == ti.f64 else np.float32).eps)
 
     @ti.func
     def run(self, w, i):
@@ -217,7 +223,8 @@ class Take(PerParticle):
         if change > a.changes[0][w]:
             ti.atomic_max(a.changes[0][w], change)
         if ti.static(self.effect.sweeps > 0):
-            on = change > self.effect.relaxation(w) * self.effect.tolerance(w) * a.largest[w]
+            tolerance = ti.max(self.effect.relaxation(w) * self.effect.tolerance(w), self.least)
+            on = change > tolerance * a.largest[w]
             if on and a.sweeps[w] + 1 < self.effect.sweeps:
                 ti.atomic_max(a.again[w], 1)
             elif on:

@@ -12,10 +12,13 @@ from tisim.accuracy.methods import exchanged, finest, methods, parts
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import Row, cheapest, decades
 from tisim.accuracy.words import expression, options
+from tisim.effects.moment import InducedMoment
+from tisim.effects.mutual_moment import MutualInducedMoment
 from tisim.effects.near_field import NearField, TruncatedNearField
 from tisim.effects.tether import Tether
 from tisim.errors import InputError
 from tisim.knob import Knob
+from tisim.sources.uniform import MagneticField
 from tisim.spec import parameter
 from tisim.steppers.controller import FixedStep
 from tisim.steppers.stepper import Stepper
@@ -117,6 +120,17 @@ def test_a_cut_off_is_tried_against_the_law_that_has_none():
     assert changed.replace({"effects.truncated_near_field": cuts[0].model_dump()}).effects == (cuts[0],)
     # One that a scene asks for is its law.
     assert "TruncatedNearField" not in found(scene.model_copy(update={"effects": (cuts[0],)}))
+
+
+def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():
+    law = MutualInducedMoment(susceptibility=2.0)
+    scene = oscillator().model_copy(update={"effects": (MagneticField(), law)})
+    alone, once = found(scene)["InducedMoment"].settings
+    assert [setting.words for setting in (alone, once)] == ["InducedMoment", "sweeps=0"]
+    assert alone.scene.effects[1] == InducedMoment(susceptibility=2.0)
+    words = options(scene, alone.scene)
+    assert words[:2] == ["--without", "mutual_induced_moment"]
+    assert words[2:] == ["--set", "effects.induced_moment={susceptibility = 2.0}"]
 
 
 def test_a_part_is_exchanged_in_its_place():

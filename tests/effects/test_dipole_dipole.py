@@ -127,7 +127,7 @@ def induced(place, b, law=None, radius=1.0, domain=None, **more):
 
 
 def solved(one, r, radius):
-    """Induced moments by one linear solve, and the energy -1/2 sum m . B of the applied field."""
+    """Induced moments by one linear solve, and the energy -1/2 sum m.B of the applied field."""
     chi = one.effects[2].susceptibility
     gain = 4 * np.pi / MU_0 * chi / (3 + chi) * radius**3
     b, n = flux_density(one.effects, r), len(r)
@@ -165,7 +165,7 @@ def test_two_touching_spheres():
 def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_their_energy(rng):
     """A chain of three, bent, and clouds of five; in an uneven field, of which no force is left out.
 
-    The energy of linear spheres is -1/2 sum m . B_0. Its gradient is the whole force: of the field on the
+    The energy of linear spheres is -1/2 sum m.B_0. Its gradient is the whole force: of the field on the
     moments and of the moments on each other, though none of the two is it alone.
     """
     chain = np.array([[0, 0, 0], [1.9, 0.7, 0], [3.5, 1.9, 0.3]])

@@ -14,7 +14,7 @@ from tisim.effects.dipole_dipole import DipoleDipole
 from tisim.effects.magnetophoresis import Magnetophoresis
 from tisim.effects.mie import Mie
 from tisim.effects.moment import FixedMoment, LangevinMoment
-from tisim.effects.mutual_moment import MutualInducedMoment
+from tisim.effects.mutual_moment import MutualInducedMoment, MutualLangevinMoment
 from tisim.effects.near_field import NearField
 from tisim.langevin import langevin_ratio
 from tisim.sources.uniform import MagneticField
@@ -31,6 +31,13 @@ ARGUMENTS = np.concatenate(
 def _ratios(x: ti.types.ndarray(), out: ti.types.ndarray()):
     for k in range(x.shape[0]):
         out[k] = langevin_ratio(x[k])
+
+
+def spheres(place, **options):
+    """Of mu_r = 1e6 and 1 m, in a uniform field."""
+    law = MutualInducedMoment(susceptibility=1e6 - 1, **options)
+    laws = (MagneticField(constant=(0, 0, 1)), law)
+    return scene(place, 0 * place, laws, radius=1.0, mass=1.0)
 
 
 def ratios(real=np.float32):
@@ -129,13 +136,6 @@ def test_dipoles_at_contact_and_closer(rng):
         (state,) = loads([at([[0.5, 0.5, 0.5], [0.7, 0.5, 0.5], [0.5, 2, 2]], moments)])
         np.testing.assert_allclose(state["force"][0], [expected, 0, 0], rtol=1e-12, atol=1e-20)
     assert SIDE > 2
-
-
-def spheres(place, **options):
-    """Of mu_r = 1e6 and 1 m, in a uniform field."""
-    law = MutualInducedMoment(susceptibility=1e6 - 1, **options)
-    laws = (MagneticField(constant=(0, 0, 1)), law)
-    return scene(place, 0 * place, laws, radius=1.0, mass=1.0)
 
 
 def settled(made, capacity=128):
@@ -279,3 +279,36 @@ def test_a_pair_that_snaps_together_keeps_its_energy():
     assert (np.diff(np.sign(np.diff(gaps))) != 0).sum() > 30
     assert gaps.min() < bottom < 2.55 < gaps.max() < 2.601
     np.testing.assert_allclose(energies, energies[0], rtol=1e-3)
+
+
+def colloids():
+    """Of B16's largest and smallest particles at contact: forces (N), moments. Then a dense lattice, which
+    settles to rounding though it is asked for less than single precision has."""
+    effects = (
+        MagneticField(constant=(0.3, 0, 0.4)),
+        MutualLangevinMoment(temperature=298.0),
+        DipoleDipole(),
+        Mie(epsilon=100 * K_B * 298.0),
+    )
+    found = []
+    for radius, moment in ((25e-9, 0.016e-16), (212e-9, 19.35e-16)):
+        place = 1.9 * radius * np.array([[0, 0, 0], [0.6, 0, 0.8]])
+        quantities = {"saturation_moment": moment, "domain_moment": 2e-19}
+        made = scene(place, 0 * place, effects, radius=radius, dt=1e-12, quantities=quantities)
+        (result,) = simulate([made], capacity=4)
+        state = by_id(result)
+        assert result.status.ok, result.status.reason
+        found += [state[name].tolist() for name in ("force", "moment")]
+    draw = np.random.default_rng(0)
+    lattice = 2.06 * np.argwhere(np.ones((4, 4, 4))) + 0.02 * draw.normal(size=(64, 3))
+    (result,) = settled([spheres(lattice, relaxation=0.75, tolerance=1e-12)])
+    assert result.status.reason == "running", result.status.reason
+    return [*found, (MU_0 * result.state["moment"]).tolist()]
+
+
+@pytest.mark.long
+def test_single_precision_holds_the_numbers_of_nanometres(single):
+    """Moments of 1e-18 A m^2, energies of 1e-19 J: nothing becomes zero or infinite on the way; as in f64."""
+    for rough, fine in zip(single("hard.test_magnetism", "colloids"), colloids(), strict=True):
+        assert np.abs(fine).max() > 0
+        close(np.array(rough), np.array(fine), 2e-5)

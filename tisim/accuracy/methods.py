@@ -179,7 +179,8 @@ def _laws(scene: Scene, kind: str, laws: Sequence[Spec], starts: int) -> Method:
             for name in type(law).model_fields
             if getattr(own, name, None) != getattr(law, name)
         ]
-        settings.append(Setting(exchanged(scene, f"effects.{kind}", law), ", ".join(differ), starts=starts))
+        words = ", ".join(differ) or type(law).__name__
+        settings.append(Setting(exchanged(scene, f"effects.{kind}", law), words, starts=starts))
     name = type(laws[0]).__name__
     return Method(name, tuple(settings), (1.0,) * len(laws), scene)
 

@@ -13,9 +13,9 @@ CUTS = (10.0, 20.0, 30.0, 60.0)
 
 
 class DipoleDipole(PairForce):
-    """F_i = -grad_i U, U = -mu_0 / (4 pi) (3 (m_i . n)(m_j . n) - m_i . m_j) / d^3, over all pairs.
+    """F_i = -grad_i U, U = -mu_0 / (4 pi) (3 (m_i.n)(m_j.n) - m_i.m_j) / d^3, over all pairs.
 
-    That is -3 mu_0 / (4 pi d^4) [(m_i . n) m_j + (m_j . n) m_i + (m_i . m_j) n - 5 (m_i . n)(m_j . n) n] with
+    That is -3 mu_0 / (4 pi d^4) [(m_i.n) m_j + (m_j.n) m_i + (m_i.m_j) n - 5 (m_i.n)(m_j.n) n] with
     n from i to j and the ``moment`` of each that another effect has set, held fixed. The force is not along
     n: it turns the pair as a whole, against the torques m x B of the fields on the moments. These are not
     given to the particles, as moments turn inside them; where they lie along the field of all sources and
@@ -37,12 +37,11 @@ class DipoleDipole(PairForce):
     def between(self, s, w, i, j, separation, distance):
         """Force on i by j. N."""
         inverse = 1.0 / distance
-        n = inverse * separation
-        # Each by its half of d^-4: in f32 the product of two moments of 1e-17 A m^2 is nothing.
-        a, b = inverse * inverse * s.moment[w, i], inverse * inverse * s.moment[w, j]
+        n, square = inverse * separation, inverse * inverse
+        # In this order: in f32 the product of two moments of 1e-20 A m^2 is nothing.
+        a, b = s.moment[w, i], (3.0 * mu_0 / (4.0 * ti.math.pi) * square * square) * s.moment[w, j]
         along_a, along_b = a.dot(n), b.dot(n)
-        near = along_a * b + along_b * a + (a.dot(b) - 5.0 * along_a * along_b) * n
-        return -3.0 * mu_0 / (4.0 * ti.math.pi) * near
+        return (5.0 * along_a * along_b - a.dot(b)) * n - along_a * b - along_b * a
 
 
 class TruncatedDipoleDipole(DipoleDipole):

@@ -10,10 +10,10 @@ from tisim.effects.moment import MOMENT
 
 
 class Magnetophoresis(Force):
-    """F = (m . grad) B, B the sum of all sources, m the ``moment`` that another effect has set.
+    """F = (m.grad) B, B the sum of all sources, m the ``moment`` that another effect has set.
 
-    Where B is free of curl, as it is where no current flows, this is grad(m . B) with m held fixed; of a
-    moment that goes with B it is half of grad(m . B) with m varying, MagneticBodyForce. What moments do to
+    Where B is free of curl, as it is where no current flows, this is grad(m.B) with m held fixed; of a
+    moment that goes with B it is half of grad(m.B) with m varying, MagneticBodyForce. What moments do to
     each other is DipoleDipole. Source: B16 Eqs (6.20), (7.1).
     """
 

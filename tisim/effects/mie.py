@@ -25,7 +25,7 @@ class Mie(PairForce):
     cutoff : in sigma; left out, at the bottom of the well: repulsion alone, which ends smoothly there.
     Elsewhere the force jumps at the cut-off.
 
-    Source: G. Mie, Ann. Phys. 316 (1903) 657-697; B16 Eqs (6.18), (6.19).
+    Source: B16 Eqs (6.18), (6.19), after Mie (1903).
     """
 
     needs = ("radius",)

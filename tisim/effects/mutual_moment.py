@@ -12,7 +12,7 @@ from tisim.effects.moment import InducedMoment, LangevinMoment, Moment
 
 
 class MutualMoment(Mutual, Moment):
-    """m_i = law(B(r_i) + sum_j B_j(r_i)), B_j = mu_0 / (4 pi d^3) (3 (m_j . n) n - m_j), a dipole's field.
+    """m_i = law(B(r_i) + sum_j B_j(r_i)), B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j), a dipole's field.
 
     A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,
     matter as well. In a periodic box only the nearest image of a particle acts.

@@ -1,0 +1,109 @@
+"""Time of one sum of the forces between dipoles over all pairs, beside a numba loop.
+
+    python tests/benchmarks/dipole_dipole.py [--number 1000] [--precision f64] [--threads 1] [--repeats 9]
+
+Moments in any direction on a disturbed lattice. The time of tisim is that of a whole step, numba's that of
+the sum alone. Tries alternate; the ratio is the median over them. TISIM_BACKEND=quadrants chooses the other
+kernel compiler.
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
+
+import numba
+import numpy as np
+
+from tisim import Particles, Scene, Simulation, runtime
+from tisim.effects.dipole_dipole import DipoleDipole
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.verlet import Verlet
+
+
+@numba.njit(parallel=True, fastmath=True, error_model="numpy")
+def forces(x, y, z, a, b, c, scale, fx, fy, fz):
+    """B16 (6.23) for moments (a, b, c); all of one type."""
+    one = x.dtype.type(1)
+    five = x.dtype.type(5)
+    for i in numba.prange(len(x)):
+        xi, yi, zi, ai, bi, ci = x[i], y[i], z[i], a[i], b[i], c[i]
+        sx = sy = sz = one - one
+        for j in range(len(x)):
+            dx, dy, dz = x[j] - xi, y[j] - yi, z[j] - zi
+            square = dx * dx + dy * dy + dz * dz
+            # Particle i itself adds nothing.
+            mask = one if j != i else one - one
+            square = square if j != i else one
+            v = one / np.sqrt(square)
+            nx, ny, nz = dx * v, dy * v, dz * v
+            p = ai * nx + bi * ny + ci * nz
+            q = a[j] * nx + b[j] * ny + c[j] * nz
+            along = ai * a[j] + bi * b[j] + ci * c[j] - five * p * q
+            size = mask * v * v * v * v
+            sx += size * (p * a[j] + q * ai + along * nx)
+            sy += size * (p * b[j] + q * bi + along * ny)
+            sz += size * (p * c[j] + q * ci + along * nz)
+        fx[i], fy[i], fz[i] = scale * sx, scale * sy, scale * sz
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--number", type=int, default=1000)
+    parser.add_argument("--precision", choices=("f64", "f32"), default="f64")
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument("--steps", type=int, default=50, help="of each try")
+    asked = parser.parse_args()
+    settings = runtime.start(precision=asked.precision, threads=asked.threads).settings
+    numba.set_num_threads(asked.threads)
+    draw, n = np.random.default_rng(0), asked.number
+    side = int(np.ceil(n ** (1 / 3)))
+    place = np.argwhere(np.ones((side,) * 3))[:n] + draw.uniform(-0.2, 0.2, (n, 3))
+    moment = 1e3 * draw.normal(size=(n, 3))
+    made = Scene(
+        particles=Particles(
+            position=place,
+            velocity=0 * place,
+            radius=0.1,
+            mass=1.0,
+            density=None,
+            quantities={"moment": moment},
+        ),
+        effects=(DipoleDipole(),),
+        stepper=Verlet(control=FixedStep(dt=1e-12)),
+        duration=1.0,
+    )
+    simulation = Simulation(made)
+    simulation.load([made])
+    real = np.float64 if asked.precision == "f64" else np.float32
+    columns = [np.ascontiguousarray(column, real) for column in (*place.T, *moment.T)]
+    out = [np.empty(n, real) for _ in range(3)]
+
+    def peer(steps: int) -> None:
+        for _ in range(steps):
+            forces(*columns, real(-3e-7), *out)
+
+    ways = {"tisim": simulation.program.advance, "numba": peer}
+    times: dict[str, list[float]] = {name: [] for name in ways}
+    for way in ways.values():
+        way(2)
+    off = np.abs(simulation.s.read("force")[0] - np.stack(out, axis=1)).max() / np.abs(out).max()
+    for _ in range(asked.repeats):
+        for name, way in ways.items():
+            began = time.perf_counter()
+            way(asked.steps)
+            times[name].append((time.perf_counter() - began) / asked.steps)
+    ratio = np.median(np.array(times["numba"]) / np.array(times["tisim"]))
+    print(f"{n} dipoles, {settings}; forces agree to {off:.1e}")
+    for name, taken in times.items():
+        print(f"{name}: {1e3 * np.median(taken):.3f} ms, {n * (n - 1) / np.median(taken):.3g} pairs/s")
+    print(f"tisim is {ratio:.2f} times as fast as numba")
+
+
+if __name__ == "__main__":
+    main()
