@@ -13,7 +13,7 @@ from cases.statistics import Claim
 from optimize.problem import Problem
 from tisim.accuracy.quantity import Quantity
 from tisim.batches import Progress
-from tisim.errors import must
+from tisim.errors import InputError, must
 from tisim.frames import Frames
 from tisim.scene import Scene
 
@@ -91,3 +91,12 @@ def find(name: str) -> Case:
     known = every()
     must(name in known, "case", f"one of {', '.join(known)}", name)
     return known[name]
+
+
+def inverse(name: str, size: str, variant: str | None) -> tuple[Problem, Size]:
+    """The inverse problem of a case (its first variant for None), and the size with the search's settings."""
+    case = find(name)
+    chosen = case.size(size)
+    if case.problem is None:
+        raise InputError(f"case must be one with an inverse problem; received {name!r}")
+    return case.problem(size, variant or case.variants[0]), chosen

@@ -5,21 +5,17 @@ from __future__ import annotations
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from tisim import request
 from tisim.durable import replace_file
-from tisim.errors import InputError, RunError, must
+from tisim.errors import RunError, must
 from tisim.interrupt import Interrupt
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads
 from tisim.output import writable
 from tisim.terminal import err, out, stopping
-
-if TYPE_CHECKING:
-    from cases.case import Size as CaseSize
-    from optimize.problem import Problem
 
 Executor = Annotated[
     str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
@@ -55,13 +51,14 @@ def optimize(
     executor: Executor = "batch",
 ) -> None:
     """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
+    from cases.case import inverse
     from optimize.executors import made
     from optimize.folder import FILE, clear
     from optimize.session import session
     from optimize.settings import Settings, fit, proposed
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
-    problem, chosen = _problem(case, size, variant)
+    problem, chosen = inverse(case, size or "default", variant)
     wishes = {
         "seed": seed,
         "generations": generations,
@@ -106,11 +103,12 @@ def compare(
     executor: Executor = "batch",
 ) -> None:
     """Compare search methods on a case at equal numbers of runs. Given again, it goes on."""
+    from cases.case import inverse
     from optimize import comparison
     from optimize.cache import Cache
     from optimize.executors import made
 
-    problem, chosen = _problem(case, size, variant)
+    problem, chosen = inverse(case, size or "default", variant)
     base = request.nested(chosen.search, request.below("search", request.assignments(changes or ())))
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
@@ -138,17 +136,6 @@ def compare(
     out().print(comparison.table(problem, found))
     replace_file(place / "compare.csv", comparison.as_csv(problem, found))
     out().print(f"written  {place / 'compare.csv'}", highlight=False, markup=False)
-
-
-def _problem(case: str, size: str | None, variant: str | None) -> tuple[Problem, CaseSize]:
-    """The inverse problem of a case, and the size of it that gives the settings of a search."""
-    from cases.case import find
-
-    found = find(case)
-    chosen = found.size(size or "default")
-    if found.problem is None:
-        raise InputError(f"case must be one with an inverse problem; received {case!r}")
-    return found.problem(size or "default", variant or found.variants[0]), chosen
 
 
 def cache(
