@@ -22,7 +22,7 @@ WRONG = [
     (["run", "agglomeration", "--size", "huge"], "size must be one of small, default, paper; received"),
     (["explain", "nosuch"], "case must be one of"),
     (["check", "nosuch"], "case must be one of agglomeration, blast, vibration; received 'nosuch'"),
-    (["optimize", "agglomeration", "--population", "1"], "search.options.population must be at least 2; received 1"),
+    (["optimize", "agglomeration", "--population", "1"], "options.population must be at least 2; received 1"),
     (["optimize", "agglomeration", "--variant", "x"], "variant must be one of paper, fragmenting; received"),
     (["optimize", "agglomeration", "--set", "block=2"], "--set must be of the form search.KEY=VALUE"),
     (["optimize", "agglomeration", "--set", "search.blok=2"], "search.blok must be a known key; received 2"),
