@@ -92,8 +92,8 @@ class Table:
         self.field = ti.field(real)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, worlds).dense(ti.j, max(1, self.slots)).place(self.field)
-        self._tree = builder.finalize()
-        self._next = 0
+        self._trees = [builder.finalize()]
+        self._next, self.array_bytes = 0, 0
 
     def bind(self, part: Part) -> Part:
         """A copy of a part, of the same class, whose parameters are functions of the world."""
@@ -105,7 +105,19 @@ class Table:
             bound.__dict__[name] = self._bind_rows(kind, slot)
             slot += 1 + _width(kind) * room(len(getattr(part, name)))
         self._next = slot
+        for name, values in part.lookups().items():
+            bound.__dict__[name] = self._place(values)
         return bound
+
+    def _place(self, values: np.ndarray) -> Any:
+        """An array in device memory."""
+        column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
+        builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
+        self._trees.append(builder.finalize())
+        held = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
+        column.from_numpy(held)
+        self.array_bytes += held.nbytes
+        return column
 
     def _bind_rows(self, kind: type[Spec], slot: int) -> Spec:
         """The one bound row that stands for a list."""
@@ -133,7 +145,8 @@ class Table:
 
     def destroy(self) -> None:
         """Give the memory back."""
-        self._tree.destroy()
+        for tree in self._trees:
+            tree.destroy()
 
 
 def connect(bound: Sequence[Any]) -> None:

@@ -119,6 +119,8 @@ def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
         yield Memory(name, size, "every scene" if name in core else users[name])
     real = 8 if simulation.runtime.precision == "f64" else 4
     yield Memory("parameter table", simulation.worlds * simulation.table.slots * real, "effects' parameters")
+    if simulation.table.array_bytes:
+        yield Memory("tables, of all worlds", simulation.table.array_bytes, "effects that look numbers up")
     for part, name, why in simulation.made.memory:
         yield Memory(name, part.bytes(), why)
 

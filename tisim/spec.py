@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Self, get_args, get_origin
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
@@ -88,6 +89,11 @@ class Spec(Checked):
         varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
         fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
         return (type(self), *fixed, *((name, room(len(getattr(self, name)))) for name, _ in self.lists()))
+
+    def lookups(self) -> dict[str, np.ndarray]:
+        """Numbers that a kernel looks up, the same in every world, ``self.NAME[i, j]``; made for what is
+        compiled, so of the options that are no parameters. By name, of shape (rows, columns)."""
+        return {}
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         """Attributes to set on the bound copy, chosen among the bound effects of the scene."""

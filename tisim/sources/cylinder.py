@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any, Self
+
 import numpy as np
-from pydantic import field_validator
+from pydantic import Field as Option
+from pydantic import field_validator, model_validator
 
 from tisim._taichi import ti
-from tisim.effect import parameter
-from tisim.errors import must
+from tisim.effect import Effect, parameter
+from tisim.errors import InputError, must
 from tisim.sources import cylinder_field
+from tisim.sources.cylinder_end import ClosedEnds
+from tisim.sources.cylinder_table import TabulatedEnds, table
 from tisim.sources.magnets import MU_0, Body, Magnets
 from tisim.spec import Vector
 
@@ -65,7 +70,7 @@ class Cylinder(Body):
     @ti.func
     def shape(self, w, k, rho, z):
         """The six functions of ``cylinder_field``."""
-        return cylinder_field.shape(rho, z, self.radius(w, k), 0.5 * self.length(w, k))
+        return cylinder_field.shape(rho, z, self.radius(w, k), 0.5 * self.length(w, k), self.ends)
 
     @ti.func
     def flux_density(self, w, k, r):
@@ -95,10 +100,36 @@ class MagneticCylinders(Magnets):
     """B of uniformly magnetised cylinders: the sum over all of them. They do not magnetise each other.
 
     cylinders : any number of them, which may differ per world.
-    Field and gradient are closed forms in complete elliptic integrals, with series about the axis and far
-    away; relative errors stay below 1e-12 for lengths of 1/50 to 1000 radii. Where the field has no value -
-    on the surface, where it jumps, and at the rims, where it grows as a logarithm - it is finite.
+    table_digits : with these many digits the field is read from a table, made when a scene is compiled, where
+        its error is measured; cylinders must then be at least as long as their radius.
+    Without it field and gradient are closed forms in complete elliptic integrals, with series about the axis
+    and far away; relative errors stay below 1e-12 for lengths of 1/10 to 2000 radii. Where the field has no
+    value - on the surface, where it jumps, and at the rims, where it grows as a logarithm - it is finite.
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
     cylinders: tuple[Cylinder, ...]
+    table_digits: int | None = Option(None, ge=2, le=6)
+
+    @model_validator(mode="after")
+    def _fit_for_a_table(self) -> Self:
+        for k, one in enumerate(self.cylinders if self.table_digits else ()):
+            rule = f"at least the radius, {one.radius:g} m, with table_digits"
+            must(one.length >= one.radius, f"magnetic_cylinders.cylinders.{k}.length", rule, one.length)
+        return self
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        if self.table_digits is not None:
+            return ()
+        try:
+            return tuple(type(self)(cylinders=self.cylinders, table_digits=digits) for digits in (3, 4, 5))
+        except InputError:
+            return ()
+
+    def lookups(self) -> dict[str, np.ndarray]:
+        return {} if self.table_digits is None else {"cells": table(self.table_digits)[0]}
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        digits, cells = self.table_digits, self.__dict__.get("cells")
+        self.cylinders.__dict__["ends"] = ClosedEnds() if digits is None else TabulatedEnds(cells, digits)
+        return super().connect(peers)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from tisim._taichi import ti
-from tisim.sources.cylinder_end import small
-
-FAR = 36.0
-"""(distance from the centre / distance of the rim from it)^2 from where the series is used."""
 
 
 @ti.func
-def far_away(rho, z, radius, half):
+def far_away(rho, z, radius, half, small):
     """What ``cylinder_field.shape`` gives, at distances r > a = sqrt(R^2 + L^2).
+
+    small : powers of (a/r)^2 below this are left out.
 
     W = sum over even n of w_n P_n(z/r) / r^(n+1), w_n = R^2 a^(n+1) P'_(n+2)(L/a) / ((n+1) (n+2) (n+3)): on
     the axis W_zz is closed and 1 / sqrt((z + L)^2 + R^2) generates Legendre polynomials. Each derivative
@@ -28,7 +26,7 @@ def far_away(rho, z, radius, half):
     power = 1.0 + 0.0 * c
     zz, over, turn, cross, zzz, bend = 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c, 0.0 * c
     n, ratio = 0.0 * c, square / (distance * distance)
-    while power > ti.static(small()):
+    while power > small:
         inverse = 1.0 / ((n + 1.0) * (n + 2.0) * (n + 3.0))
         second, third = (n + 1.0) * (n + 3.0) * inverse, (n + 1.0) * (n + 2.0) * inverse
         a, b, lead = 2.0 * n + 3.0, 2.0 * n + 5.0, dq

@@ -7,26 +7,23 @@ functions of rho and z for the field and three more for its gradient:
     W_zz,  W_rho / rho,  rho (W_rho / rho)_rho / rho,  W_rho z / rho,  W_zzz,  W_rho zz / rho
 """
 
-from __future__ import annotations
-
 from tisim._taichi import ti
-from tisim.sources.cylinder_end import end
-from tisim.sources.cylinder_far import FAR, far_away
+from tisim.sources.cylinder_far import far_away
 
 
 @ti.func
-def shape(rho, z, radius, half):
-    """The six functions, as a vector. Lengths in one unit."""
+def shape(rho, z, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+    """The six functions, as a vector. Lengths in one unit. ends : closed or tabulated."""
     six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
-    if rho * rho + z * z > FAR * (radius * radius + half * half):
-        six = far_away(rho, z, radius, half)
+    if rho * rho + z * z > ends.far * (radius * radius + half * half):
+        six = far_away(rho, z, radius, half, ends.small)
     else:
-        six = close_by(rho, z, radius, half)
+        six = close_by(rho, z, radius, half, ends)
     return six
 
 
 @ti.func
-def close_by(rho, z, radius, half):
+def close_by(rho, z, radius, half, ends: ti.template()):  # type: ignore[valid-type]
     """The difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
     side, height = ti.select(z < 0.0, -1.0, 1.0), ti.abs(z)
     between = height < half
@@ -34,7 +31,7 @@ def close_by(rho, z, radius, half):
     # A loop, so that what is long is compiled once.
     for k in range(2):
         near = k > 0
-        one = end(rho, ti.abs(height + ti.select(near, -half, half)), radius)
+        one = ends.at(rho, ti.abs(height + ti.select(near, -half, half)), radius)
         odd, even = ti.select(near and not between, -1.0, 1.0), ti.select(near, -side, side)
         six += ti.Vector([odd, odd, odd, even, even, odd]) * one
     if between:

@@ -1,0 +1,103 @@
+"""The field of a magnetised cylinder beside magpylib: error, and points per second on one core, in one run.
+
+    python tests/benchmarks/cylinder_field.py [--points 100000] [--repeats 7]
+
+Field, or field and gradient, exact or from tables. magpylib has no gradient: six more fields, by central
+differences. Runs are interleaved, the fastest of each counts. Points lie around a cylinder of L/D 5/3 (B16 table
+6.2), within three diameters, as particles about to be captured do.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import magpylib
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from tisim import runtime
+from tisim._taichi import ti
+from tisim.binding import Table, connect
+from tisim.sources.cylinder import Cylinder, MagneticCylinders
+
+RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
+
+
+@ti.kernel
+def field(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
+    for i in range(r.shape[0]):
+        b = source.value(0, ti.cast(ti.Vector([r[i, 0], r[i, 1], r[i, 2]]), float), 0.0)
+        for a in ti.static(range(3)):
+            out[i, 0, a] = b[a]
+
+
+@ti.kernel
+def both(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
+    for i in range(r.shape[0]):
+        place = ti.cast(ti.Vector([r[i, 0], r[i, 1], r[i, 2]]), float)
+        b, slope = source.value_and_gradient(0, place, 0.0)
+        for a in ti.static(range(3)):
+            out[i, 0, a] = b[a]
+            for c in ti.static(range(3)):
+                out[i, 1 + c, a] = slope[a, c]
+
+
+def bound(digits):
+    source = MagneticCylinders(
+        cylinders=[Cylinder(radius=RADIUS, length=LENGTH, magnetisation=M)], table_digits=digits
+    )
+    table = Table([source], 1, runtime.current().real)
+    made = table.bind(source)
+    connect([made])
+    table.write([[source]])
+    return made
+
+
+def compare(points, repeats):
+    magnet = magpylib.magnet.Cylinder(magnetization=M, dimension=(2 * RADIUS, LENGTH))
+    step = 1e-5 * RADIUS
+
+    def differences(r):
+        steps = [s * step * np.eye(3)[c] for c in range(3) for s in (1, -1)]
+        magnet.getB(r)
+        return [magnet.getB(r + d) for d in steps]
+
+    rng = np.random.default_rng(0)
+    r = rng.uniform(-6 * RADIUS, 6 * RADIUS, (points, 3))
+    r = np.ascontiguousarray(r[(np.hypot(*r.T[:2]) > RADIUS) | (np.abs(r[:, 2]) > LENGTH / 2)])
+    runs = {"magpylib, field": lambda: magnet.getB(r), "magpylib, and gradient": lambda: differences(r)}
+    out = {}
+    for name, digits in (("exact", None), ("4 digits", 4), ("3 digits", 3)):
+        source = bound(digits)
+        for what, kernel in (("field", field), ("field and gradient", both)):
+            out[f"{name}, {what}"] = np.zeros((len(r), 4, 3))
+            runs[f"{name}, {what}"] = lambda k=kernel, s=source, o=out[f"{name}, {what}"]: k(s, r, o)
+    for run in runs.values():
+        run()
+    best = dict.fromkeys(runs, np.inf)
+    for _ in range(repeats):
+        for name, run in runs.items():
+            began = time.perf_counter()
+            run()
+            best[name] = min(best[name], time.perf_counter() - began)
+    expected = magnet.getB(r)
+    for name, seconds in best.items():
+        peer = best["magpylib, and gradient" if "gradient" in name else "magpylib, field"]
+        error = ""
+        if name in out:
+            off = np.linalg.norm(out[name][:, 0] - expected, axis=1) / np.linalg.norm(expected, axis=1)
+            error = f"  largest error of B against magpylib {off.max():.1e}, median {np.median(off):.1e}"
+        rate = len(r) / seconds
+        print(f"{name:28s} {rate:10.3g} points/s  {1e9 / rate:6.0f} ns  {peer / seconds:6.1f} x{error}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--points", type=int, default=100_000)
+    parser.add_argument("--repeats", type=int, default=7)
+    chosen = parser.parse_args()
+    runtime.start(device="cpu", threads=1)
+    print(runtime.backend(), magpylib.__version__)
+    compare(chosen.points, chosen.repeats)
