@@ -27,7 +27,8 @@ def limits() -> tuple[float, float]:
 def elliptic(kc, m, gamma, rest):
     """K, (2 (2 - m) K - 4 E) / (m^2 K), 2 gamma^2 (Pi - K) / (n K), and 1 less the last.
 
-    kc > 0; gamma in 0..1, not 0; rest : n - m + gamma^2 n, which the caller knows without cancellation. The
+    For two kc side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0; rest : n - m + gamma^2 n,
+    which the caller knows without cancellation. The
     second is sigma = sum_i 2^i c_i^2 / m^2 (i = 1, 2, ...), so that E = K (1 - m/2 - m^2 sigma/2).
     """
     met = ti.static(limits()[0])
@@ -38,7 +39,7 @@ def elliptic(kc, m, gamma, rest):
     other, p = 0.0 * kc, 0.5 * pole / gamma
     a, g, scale = 0.5 * (1.0 + kc), ti.sqrt(kc), 1.0 / (m * m)
     k = 0
-    while ti.abs(a - g) > met * a and k < ITERATIONS:
+    while (ti.abs(a - g) - met * a).max() > 0.0 and k < ITERATIONS:
         product = a * g
         pole = p * p + product
         inverse = 1.0 / (pole * p)

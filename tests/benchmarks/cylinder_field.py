@@ -3,8 +3,8 @@
     python tests/benchmarks/cylinder_field.py [--points 100000] [--repeats 7]
 
 Field, or field and gradient, exact or from tables. magpylib has no gradient: six more fields, by central
-differences. Runs are interleaved, the fastest of each counts. Points lie around a cylinder of L/D 5/3 (B16 table
-6.2), within three diameters, as particles about to be captured do.
+differences. Runs are interleaved, the fastest of each counts. Points lie around a cylinder of L/D 5/3 (B16
+6.3), within three diameters, as particles about to be captured do.
 """
 
 import argparse

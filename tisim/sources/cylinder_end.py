@@ -29,15 +29,31 @@ def small() -> float:
 
 
 @ti.func
-def end(rho, u, radius):
-    """The six numbers of an end; rho >= 0, u >= 0, radius > 0 in one unit of length."""
+def two_ends(rho, u, radius):
+    """The six numbers of two ends, (6, 2); rho >= 0, both u >= 0, radius > 0 in one unit of length.
+
+    Side by side, as each waits for its own divisions and roots.
+    """
     far = u * u + radius * radius
-    six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
-    if rho * rho < SLIM * far:  # noqa: SIM108 - a conditional expression works out both
-        six = near_axis(rho, u, radius, far)
-    else:
-        six = off_axis(rho, u, radius)
-    return six
+    slim = rho * rho < SLIM * far
+    both = ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)])
+    if not (slim[0] and slim[1]):
+        both = off_axis(rho, u, radius)
+    for k in range(2):
+        first = k == 0
+        if ti.select(first, slim[0], slim[1]):
+            one = near_axis(rho, ti.select(first, u[0], u[1]), radius, ti.select(first, far[0], far[1]))
+            for i in ti.static(range(6)):
+                both[i, 0] = ti.select(first, one[i], both[i, 0])
+                both[i, 1] = ti.select(first, both[i, 1], one[i])
+    return both
+
+
+@ti.func
+def end(rho, u, radius):
+    """The six numbers of one end."""
+    both = two_ends(rho, ti.Vector([u, u]), radius)
+    return ti.Vector([both[i, 0] for i in ti.static(range(6))])
 
 
 class ClosedEnds:
@@ -53,8 +69,8 @@ class ClosedEnds:
         self.small = small()
 
     @ti.func
-    def at(self, rho, u, radius):
-        return end(rho, u, radius)
+    def both(self, rho, u, radius):
+        return two_ends(rho, u, radius)
 
 
 @ti.func
@@ -106,7 +122,7 @@ def near_axis(rho, u, radius, far):
 
 @ti.func
 def off_axis(rho, u, radius):
-    """Closed forms in complete elliptic integrals, put into the sums of ``elliptic``.
+    """Closed forms in complete elliptic integrals, put into the sums of ``elliptic``; of two ends, (6, 2).
 
     The second derivatives are B16 Eqs (5.3)-(5.6), (5.20)-(5.22), the third those of a current loop (W. R.
     Smythe, Static and Dynamic Electricity, 1950, section 7.10).
@@ -139,7 +155,7 @@ def off_axis(rho, u, radius):
     e = 1.0 - 0.5 * m - 0.5 * m * m * sigma
     rim = (square * reach - (gap * total + u * u) * e) / radius
     away = 2.0 * radius + 2.0 * m * rho * sigma - total * m * (1.0 + m * sigma)
-    return ti.Vector(
+    return ti.Matrix.rows(
         [
             uu - ti.select(inside, 0.5, 0.0),
             over + 0.25 * ti.select(inside, 1.0, ratio),

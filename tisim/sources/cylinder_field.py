@@ -27,13 +27,18 @@ def close_by(rho, z, radius, half, ends: ti.template()):  # type: ignore[valid-t
     """The difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
     side, height = ti.select(z < 0.0, -1.0, 1.0), ti.abs(z)
     between = height < half
-    six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
-    # A loop, so that what is long is compiled once.
-    for k in range(2):
-        near = k > 0
-        one = ends.at(rho, ti.abs(height + ti.select(near, -half, half)), radius)
-        odd, even = ti.select(near and not between, -1.0, 1.0), ti.select(near, -side, side)
-        six += ti.Vector([odd, odd, odd, even, even, odd]) * one
+    pair = ends.both(rho, ti.Vector([height + half, ti.abs(height - half)]), radius)
+    odd = ti.select(between, 1.0, -1.0)
+    six = ti.Vector(
+        [
+            pair[0, 0] + odd * pair[0, 1],
+            pair[1, 0] + odd * pair[1, 1],
+            pair[2, 0] + odd * pair[2, 1],
+            side * (pair[3, 0] - pair[3, 1]),
+            side * (pair[4, 0] - pair[4, 1]),
+            pair[5, 0] + odd * pair[5, 1],
+        ]
+    )
     if between:
         if rho < radius:
             six[1] -= 0.5

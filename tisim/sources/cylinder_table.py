@@ -105,6 +105,11 @@ class TabulatedEnds:
         self.shift = 23 - self.parts.bit_length() + 1
 
     @ti.func
+    def both(self, rho, u, radius):
+        a, b = self.at(rho, u[0], radius), self.at(rho, u[1], radius)
+        return ti.Matrix([[a[i], b[i]] for i in ti.static(range(6))])
+
+    @ti.func
     def at(self, rho, u, radius):
         x, y = rho / radius - 1.0, u / radius
         square = x * x + y * y
