@@ -24,23 +24,22 @@ def limits() -> tuple[float, float]:
 
 
 @ti.func
-def elliptic(kc, m, gamma, rest):
-    """K, (2 (2 - m) K - 4 E) / (m^2 K), 2 gamma^2 (Pi - K) / (n K), and 1 less the last.
+def elliptic(kc, over_m, gamma, rest):
+    """K, sigma with E = K (1 - m/2 - m^2 sigma/2), 2 gamma^2 (Pi - K) / (n K), and 1 less the last.
 
-    For two kc side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0; rest : n - m + gamma^2 n,
-    which the caller knows without cancellation. The
-    second is sigma = sum_i 2^i c_i^2 / m^2 (i = 1, 2, ...), so that E = K (1 - m/2 - m^2 sigma/2).
+    For two kc side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0. over_m : 1/m. rest :
+    n - m + gamma^2 n, which the caller knows without cancellation. sigma = sum_i 2^i c_i^2 / m^2, i >= 1.
     """
     met = ti.static(limits()[0])
     square = gamma * gamma
-    pole = square + kc
-    sigma = 0.5 / (1.0 + kc) ** 2
-    third, weight = 2.0 * square / pole, 0.5 * rest / (pole * pole)
-    other, p = 0.0 * kc, 0.5 * pole / gamma
-    a, g, scale = 0.5 * (1.0 + kc), ti.sqrt(kc), 1.0 / (m * m)
+    over_pole, over_both = 1.0 / (square + kc), 1.0 / (1.0 + kc)
+    sigma = 0.5 * over_both * over_both
+    third, weight = 2.0 * square * over_pole, 0.5 * rest * over_pole * over_pole
+    other, p = 0.0 * kc, 0.5 / (gamma * over_pole)
+    a, g, scale = 0.5 * (1.0 + kc), ti.sqrt(kc), over_m * over_m
     k = 0
     while (ti.abs(a - g) - met * a).max() > 0.0 and k < ITERATIONS:
-        product = a * g
+        product, apart = a * g, a - g
         pole = p * p + product
         inverse = 1.0 / (pole * p)
         share = product * p * inverse
@@ -49,10 +48,10 @@ def elliptic(kc, m, gamma, rest):
         weight *= 0.5 - share
         p = 0.5 * pole * pole * inverse
         scale *= 2.0
-        sigma += 0.5 * scale * (a - g) ** 2
+        sigma += 0.5 * scale * apart * apart
         a, g = 0.5 * (a + g), ti.sqrt(product)
         k += 1
-    sigma += scale * (a - g) ** 2
+    sigma += scale * (a - g) * (a - g)
     mean = 0.5 * (a + g)
     # The means have met: the rest of the sums over p in closed form.
     last = 2.0 * weight / (mean + p)

@@ -128,30 +128,35 @@ def off_axis(rho, u, radius):
     Smythe, Static and Dynamic Electricity, 1950, section 7.10).
     """
     least = ti.static(limits()[1])
-    total, gap = rho + radius, rho - radius
+    total, gap, product = rho + radius, rho - radius, rho * radius
+    inside = gap < 0.0
+    # Each division once.
+    over_rho, over_total, over_product = 1.0 / rho, 1.0 / total, 0.25 / product
     wide = total * total
     reach = u * u + wide
-    s = ti.sqrt(reach)
-    beta, m, n = u / s, 4.0 * rho * radius / reach, 4.0 * rho * radius / wide
-    inside = gap < 0.0
-    size = ti.max(ti.abs(gap) / total, least)
+    over_s = 1.0 / ti.sqrt(reach)
+    over_reach = over_s * over_s
+    beta, m, n = u * over_s, 4.0 * product * over_reach, 4.0 * product * over_total * over_total
+    size = ti.max(ti.abs(gap) * over_total, least)
     gamma = ti.select(inside, -size, size)
-    kc = ti.max(ti.sqrt((u * u + gap * gap) / reach), least)
-    k, sigma, third, other = elliptic(kc, m, size, n * (size * size + beta * beta))
+    over_gamma = 1.0 / gamma
+    kc = ti.max(ti.sqrt(u * u + gap * gap) * over_s, least)
+    k, sigma, third, other = elliptic(kc, reach * over_product, size, n * (size * size + beta * beta))
     k /= ti.math.pi
     # The same difference twice: each loses digits where the other does not.
     lift = ti.select(
         gamma < 0.5,
-        1.0 - 0.5 * (1.0 + gamma) * (third / gamma),
-        0.5 * ((1.0 + gamma) * other - (1.0 - gamma)) / gamma,
+        1.0 - 0.5 * (1.0 + gamma) * (third * over_gamma),
+        0.5 * ((1.0 + gamma) * other - (1.0 - gamma)) * over_gamma,
     )
     uu = 0.5 * beta * (1.0 - gamma) * k * lift
-    ratio = radius * radius / (rho * rho)
-    over = -2.0 * radius * radius / wide * beta * k * (wide / reach * sigma + other / n)
-    slope = (1.0 - gamma) * (1.0 + 0.5 * (1.0 - gamma) * third / gamma) + 2.0 * m * sigma
-    turn = 2.0 * radius * radius / (wide * n) * beta * k * slope
+    ratio = radius * over_rho * (radius * over_rho)
+    part = 2.0 * radius * over_total * (radius * over_total) * beta * k
+    over = -part * wide * (over_reach * sigma + over_product * other)
+    slope = (1.0 - gamma) * (1.0 + 0.5 * (1.0 - gamma) * (third * over_gamma)) + 2.0 * m * sigma
+    turn = part * wide * over_product * slope
     square = kc * kc
-    volume = radius * k / (reach * s)
+    over_square, volume = 1.0 / square, radius * k * over_reach * over_s
     e = 1.0 - 0.5 * m - 0.5 * m * m * sigma
     rim = (square * reach - (gap * total + u * u) * e) / radius
     away = 2.0 * radius + 2.0 * m * rho * sigma - total * m * (1.0 + m * sigma)
@@ -159,9 +164,9 @@ def off_axis(rho, u, radius):
         [
             uu - ti.select(inside, 0.5, 0.0),
             over + 0.25 * ti.select(inside, 1.0, ratio),
-            (turn - 0.5 * ti.select(inside, 0.0, ratio)) / rho,
+            (turn - 0.5 * ti.select(inside, 0.0, ratio)) * over_rho,
             -4.0 * radius * volume * sigma,
-            0.5 * volume / square * ti.select(m < 0.5, away, rim),
-            2.0 * radius * u * volume / (reach * square) * (1.0 - sigma * (2.0 - m)),
+            0.5 * volume * over_square * ti.select(m < 0.5, away, rim),
+            2.0 * radius * u * volume * over_reach * over_square * (1.0 - sigma * (2.0 - m)),
         ]
     )

@@ -106,8 +106,14 @@ class TabulatedEnds:
 
     @ti.func
     def both(self, rho, u, radius):
-        a, b = self.at(rho, u[0], radius), self.at(rho, u[1], radius)
-        return ti.Matrix([[a[i], b[i]] for i in ti.static(range(6))])
+        both = ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)])
+        # A loop, so that what is long is compiled once.
+        for k in range(2):
+            first = k == 0
+            one = self.at(rho, ti.select(first, u[0], u[1]), radius)
+            for i in ti.static(range(6)):
+                both[i, 0], both[i, 1] = ti.select(first, one[i], both[i, 0]), one[i]
+        return both
 
     @ti.func
     def at(self, rho, u, radius):
@@ -133,7 +139,7 @@ class TabulatedEnds:
         row = ((octave - 127 - NEAREST) * self.parts + part) * self.slants + number
         cell = 2 * row + ti.cast(x >= 0.0, ti.i32)
         six = ti.Vector([0.0 * p, 0.0, 0.0, 0.0, 0.0, 0.0])
-        for a in ti.static(range(self.terms)):
+        for a in range(self.terms):
             line = ti.Vector([0.0 * p, 0.0, 0.0, 0.0, 0.0, 0.0])
             for b in ti.static(range(self.terms)):
                 for k in ti.static(range(6)):
