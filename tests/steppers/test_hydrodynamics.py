@@ -57,6 +57,21 @@ def pairs():
             )
 
 
+@tensors
+def test_tensors_have_no_divergence(hydrodynamics):
+    """sum_b dD_ab/dr_b = 0 in every branch, by central differences: nothing is to be added to the drift."""
+    places = [(1.0, 1.0, 2.5), (1.0, 3.0, 4.2)]
+    if hydrodynamics == "rotne-prager":
+        places += [(1.0, 1.0, 1.2), (1.0, 3.0, 2.7), (1.0, 3.0, 1.5)]
+    for one, other, distance in places:
+        found, h = np.zeros(3), 1e-5
+        for b in range(3):
+            shift = h * np.eye(3)[b]
+            blocks = [TENSORS[hydrodynamics](distance * DIRECTION + x, one, other) for x in (shift, -shift)]
+            found += (blocks[0] - blocks[1])[:, b] / (2 * h)
+        np.testing.assert_allclose(found, 0, atol=1e-9)
+
+
 @noises
 @tensors
 def test_velocities_that_forces_give_at_once(hydrodynamics, noise):
@@ -256,7 +271,7 @@ def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_p
 @pytest.mark.long
 def test_interaction_does_not_change_where_particles_are_in_equilibrium():
     """Spheres that overlap as they like, in traps as wide as they are: each coordinate is still of variance
-    kT/k. Were the noise not that of D, or had D a divergence, it would not be."""
+    kT/k, as drift and noise come from the same matrix."""
     rate = DIFFUSIVITY / RADIUS**2
     n, steps = 20, 400
     draw = np.random.default_rng(8)

@@ -78,16 +78,12 @@ class Push(PairSum):
         self.fluid = exact.fluid
 
     @ti.func
-    def start(self, w, i, t):
-        return self.fluid.pushed(w, i)
-
-    @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        return effect.pushed(w, i, j, separation, effect.pair(w, i, j, distance))
+        return effect.times(effect.pair(w, i, j, distance), separation, self.s.force[w, j])
 
     @ti.func
     def finish(self, w, i, total, t):
-        self.s.velocity[w, i] = total
+        self.s.velocity[w, i] = self.fluid.pushed(w, i) + self.fluid.softness(w) * total
 
 
 class Fill(PerParticle):
@@ -104,7 +100,7 @@ class Fill(PerParticle):
             r = m.domain.separation(w, s.position[w, j], s.position[w, i])
             parts = ti.Vector([ti.cast(1.0, s.real), ti.cast(0.0, s.real)])
             if i != j:
-                parts = m.mobility.pair(w, i, j, r.norm())
+                parts = ti.sqrt(s.radius[w, i] * s.radius[w, j]) * m.mobility.pair(w, i, j, r.norm())
             for a, b in ti.static(ti.ndrange(3, 3)):
                 m.matrix[w, 3 * j + b, 3 * i + a] = (parts[0] if a == b else 0.0) + parts[1] * r[a] * r[b]
 

@@ -63,37 +63,33 @@ class Couple(PairSum):
         self.components = 10 if self.sound else 11
 
     @ti.func
-    def start(self, w, i, t):
-        total = ti.Vector.zero(self.s.real, self.components)
-        pushed = self.fluid.pushed(w, i)
-        for k in ti.static(range(3)):
-            total[k] = pushed[k]
-        return total
-
-    @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        r, g = separation, self.s.gauss[w, j]
+        r, size = separation, self.s.radius[w, j]
         parts = effect.pair(w, i, j, distance)
-        pushed = effect.pushed(w, i, j, r, parts)
-        noise = parts[0] * g + parts[1] * r.dot(g) * r
+        pushed = effect.times(parts, r, self.s.force[w, j])
+        noise = effect.times(parts, r, ti.sqrt(size) * self.s.gauss[w, j])
         a, b, square = parts[0], parts[1], distance * distance
+        along = a + b * square
         total = ti.Vector.zero(self.s.real, self.components)
         for k in ti.static(range(3)):
             total[k], total[3 + k] = pushed[k], noise[k]
-            # The row of (a I + b r r^T)^2 on the diagonal.
-            total[6 + k] = a * a + (2.0 * a * b + b * b * square) * r[k] * r[k]
-        total[9] = 3.0 * a + b * square
-        if ti.static(not self.sound):
-            total[10] = ti.select(a + b * square < 1.0, 0.0, 1.0)
+            # The diagonal of (a I + b r r^T)^2.
+            total[6 + k] = size * (a * a + (a + along) * b * r[k] * r[k])
+        total[9] = ti.sqrt(size) * (2.0 * a + along)
+        for k in ti.static(range(10, self.components)):
+            total[k] = ti.select(along * along * size * self.s.radius[w, i] < 1.0, 0.0, 1.0)
         return total
 
     @ti.func
     def finish(self, w, i, total, t):
         s = self.s
+        size = s.radius[w, i]
+        pushed = self.fluid.pushed(w, i)
         for k in ti.static(range(3)):
-            s.velocity[w, i][k], s.coupled_noise[w, i][k] = total[k], total[3 + k]
-            s.coupling_squares[w, i][k] = total[6 + k]
-        s.coupling[w, i] = total[9]
+            s.velocity[w, i][k] = pushed[k] + self.fluid.softness(w) * total[k]
+            s.coupled_noise[w, i][k] = ti.sqrt(size) * total[3 + k]
+            s.coupling_squares[w, i][k] = size * total[6 + k]
+        s.coupling[w, i] = ti.sqrt(size) * total[9]
         for k in ti.static(range(10, self.components)):
             if total[k] > 0.0:
                 s.fail(w, INDEFINITE, i)

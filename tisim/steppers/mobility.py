@@ -43,44 +43,46 @@ class RotnePrager:
     @ti.func
     def of(self, one, other, r):
         """a (1/m) and b (1/m^3) for two radii at a distance. m."""
-        s = one + other
-        # In units of s, which keeps powers within what f32 can hold.
-        x, d, p = ti.max(r / s, NEAR), ti.abs(one - other) / s, one * other / (s * s)
-        square, cube = x * x, x * x * x
-        sizes = 1.0 - 2.0 * p
-        far = 0.75 / x
-        a, b = far * (1.0 + sizes / (3.0 * square)), far * (1.0 - sizes / square)
+        # In units of s, which keeps powers within what f32 can hold; few divisions, as these take longest.
+        unit = 1.0 / (one + other)
+        x, d, p = ti.max(r * unit, NEAR), ti.abs(one - other) * unit, one * other * unit * unit
+        v, half = 1.0 / x, 0.5 / p
+        square, inverse, sizes = x * x, v * v, 1.0 - 2.0 * p
         around, within = d * d + 3.0 * square, d * d - square
         apart, inside = x > 1.0, x <= ti.max(d, NEAR)
-        a = ti.select(apart, a, (1.0 - around * around / (16.0 * cube)) / (2.0 * p))
-        b = ti.select(apart, b, 3.0 * within * within / (32.0 * cube * p))
-        a = ti.select(inside, s / ti.max(one, other), a)
+        a = ti.select(
+            apart,
+            0.75 * v * (1.0 + sizes * inverse / 3.0),
+            half * (1.0 - around * around * inverse * v / 16.0),
+        )
+        b = ti.select(
+            apart, 0.75 * v * (1.0 - sizes * inverse), half * within * within * inverse * v * 3.0 / 16.0
+        )
+        # The larger radius is (1 + d)/2 in these units.
+        a = ti.select(inside, 2.0 / (1.0 + d), a)
         b = ti.select(inside, 0.0, b)
-        return ti.Vector([a / s, b / square / s / (s * s)])
+        return ti.Vector([a * unit, b * inverse * unit * (unit * unit)])
 
 
 @ti.data_oriented
 class Mobility:
-    """The matrix of a world, each block over sqrt(D_ii D_jj): 1 on its diagonal; 0 between particles of which
-    one cannot move."""
+    """The blocks of a world over kT/(6 pi eta), 1/m; 0 between particles of which one cannot move."""
 
     short_ranged = False
 
     def __init__(self, fluid, tensor) -> None:
-        self.s, self.fluid, self.sound = fluid.s, fluid, tensor.sound
-        self.tensor = tensor
+        self.s, self.fluid, self.sound, self.tensor = fluid.s, fluid, tensor.sound, tensor
 
     @ti.func
     def pair(self, w, i, j, distance):
-        """The coefficients of I and of r r^T (1/m^2) of a block."""
+        """a (1/m) and b (1/m^3) of a block."""
         s = self.s
-        one, other = s.radius[w, i], s.radius[w, j]
-        moving = ti.cast(self.fluid.mobile(w, i) * self.fluid.mobile(w, j), s.real)
-        return moving * ti.sqrt(one * other) * self.tensor.of(one, other, distance)
+        parts = self.tensor.of(s.radius[w, i], s.radius[w, j], distance)
+        if ti.static(self.fluid.holds):
+            parts *= ti.cast(self.fluid.mobile(w, i) * self.fluid.mobile(w, j), s.real)
+        return parts
 
     @ti.func
-    def pushed(self, w, i, j, separation, parts):
-        """Velocity that the force on j gives i, D_ij F_j / kT. m/s."""
-        s = self.s
-        f = self.fluid.softness(w) / ti.sqrt(s.radius[w, i] * s.radius[w, j]) * s.force[w, j]
-        return parts[0] * f + parts[1] * separation.dot(f) * separation
+    def times(self, parts, r, vector):
+        """A block times a vector."""
+        return parts[0] * vector + parts[1] * r.dot(vector) * r

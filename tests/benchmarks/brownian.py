@@ -1,0 +1,162 @@
+"""Brownian steps per second beside numba and LAPACK, all in one run.
+
+    python tests/benchmarks/brownian.py [--repeats 5] [--threads 2] [--small]
+
+Spheres in a trap. Without interaction: 100 in each of 30 worlds, and many in one. With Rotne and Prager's
+tensor: 100 in each of 30 worlds, noise exact and fast. Peers: brownian_numba.py. Times are medians of runs that
+alternate, without compilation. Every program is checked to give the variance of its Euler steps.
+"""
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+# Small parallel loops get slow where tbb is installed and numba prefers it.
+os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numba
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from tests.benchmarks import brownian_numba as peer
+from tests.steppers.colloids import DIFFUSIVITY, RADIUS, colloids
+from tisim import Simulation, runtime
+
+RATE, DT = 100.0, 1e-4
+PULL, WIDTH = RATE * DT, float(np.sqrt(2 * DIFFUSIVITY * DT))
+WORLDS, NUMBER = 30, 100
+SPREAD = float(np.sqrt(DIFFUSIVITY / RATE))
+
+
+def start(worlds: int, number: int, apart: float) -> np.ndarray:
+    """Places in the trap's own distribution, m, wider by a factor where spheres should be apart."""
+    return apart * SPREAD * np.random.default_rng(1).standard_normal((worlds, number, 3))
+
+
+def ours(
+    places: np.ndarray, steps: int, **options: str
+) -> tuple[Callable[[], float], Callable[[], np.ndarray]]:
+    """A run that returns its wall seconds, and where it has got to."""
+    scenes = []
+    for w, place in enumerate(places):
+        made = colloids(place, trap=RATE, dt=DT, steps=steps, seed=w, **options)
+        trap = tuple(effect for effect in made.effects if effect.kind() == "trap")
+        scenes.append(made.model_copy(update={"effects": trap}))
+    simulation = Simulation(scenes[0], worlds=len(scenes))
+
+    def run() -> float:
+        simulation.load(scenes)
+        simulation.run()
+        return simulation.wall_s
+
+    return run, lambda: np.array([result.state["position"] for result in simulation.results()])
+
+
+def theirs(
+    places: np.ndarray, call: Callable[[np.ndarray], None]
+) -> tuple[Callable[[], float], Callable[[], np.ndarray]]:
+    """The same for a function that changes an array of places."""
+    kept = [places]
+
+    def run() -> float:
+        kept[0] = places.copy()
+        began = time.perf_counter()
+        call(kept[0])
+        return time.perf_counter() - began
+
+    return run, lambda: kept[0]
+
+
+def compare(title: str, programs: dict, particle_steps: int, repeats: int, variance: float) -> None:
+    """Print what each does a second, and ours over theirs."""
+    times: dict[str, list[float]] = {name: [] for name in programs}
+    for name, (run, _) in programs.items():
+        run()
+    for _ in range(repeats):
+        for name, (run, _) in programs.items():
+            times[name].append(run())
+    first = None
+    print(f"\n{title}")
+    for name, (_, end) in programs.items():
+        reached = float(np.mean(end() ** 2)) / variance
+        rate = particle_steps / float(np.median(times[name]))
+        first = first or rate
+        spread = (max(times[name]) - min(times[name])) / float(np.median(times[name]))
+        print(f"  {name:34s} {rate:10.3g} particle-steps/s  spread {spread:4.0%}  ours/this {first / rate:6.2f}"
+              f"  variance {reached:.3f} of its own")  # fmt: skip
+
+
+def main() -> None:
+    """Run and print."""
+    ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    ask.add_argument("--repeats", type=int, default=5)
+    ask.add_argument("--threads", type=int, default=runtime.cores())
+    ask.add_argument("--small", action="store_true", help="a tenth of the steps")
+    given = ask.parse_args()
+    runtime.start(threads=given.threads)
+    numba.set_num_threads(given.threads)
+    less = 10 if given.small else 1
+    print(f"{runtime.backend()}, numba {numba.__version__}, numpy {np.__version__}, {given.threads} threads")
+
+    for worlds, number, steps in ((WORLDS, NUMBER, 4000 // less), (1, 100_000, 100 // less)):
+        places = start(worlds, number, 1.0)
+        flat = places.reshape(-1, 3)
+        programs = {
+            "tisim": ours(places, steps),
+            "numba, vectorised": theirs(
+                flat.T.copy(), lambda r, n=steps: peer.by_blocks(r, n, PULL, WIDTH, 7)
+            ),
+            "numba, its own normal numbers": theirs(
+                flat, lambda r, n=steps: peer.by_library(r, n, PULL, WIDTH)
+            ),
+        }
+        variance = DIFFUSIVITY / RATE / (1 - PULL / 2)
+        compare(
+            f"without interaction, {worlds} x {number}",
+            programs,
+            flat.shape[0] * steps,
+            given.repeats,
+            variance,
+        )
+
+    apart, steps = 20.0, max(2, 40 // less)
+    places = start(WORLDS, NUMBER, apart)
+    draw = np.random.default_rng(3)
+    variance = (apart * SPREAD) ** 2
+    with threadpool_limits(limits=given.threads):
+        programs = {
+            "tisim, exact": ours(places, steps, hydrodynamics="rotne-prager"),
+            "numba and LAPACK, exact": theirs(
+                places, lambda r: peer.exact(r, steps, RADIUS, PULL, WIDTH, draw)
+            ),
+        }
+        compare(
+            f"Rotne-Prager, {WORLDS} x {NUMBER}, exact",
+            programs,
+            places.size // 3 * steps,
+            given.repeats,
+            variance,
+        )
+    programs = {
+        "tisim, fast": ours(places, steps, hydrodynamics="rotne-prager", noise="fast"),
+        "numba, fast": theirs(
+            np.ascontiguousarray(places.transpose(0, 2, 1)),
+            lambda r: peer.fast(r, steps, RADIUS, PULL, WIDTH),
+        ),
+    }
+    compare(
+        f"Rotne-Prager, {WORLDS} x {NUMBER}, fast",
+        programs,
+        places.size // 3 * steps,
+        given.repeats,
+        variance,
+    )
+
+
+if __name__ == "__main__":
+    main()
