@@ -58,8 +58,11 @@ class DriftLimit(Controller):
     @ti.func
     def step(self, w, rate):
         """The step for this rate. s, f64."""
-        longest = ti.cast(self.longest(w), ti.f64)
-        return longest / ti.max(1.0, rate * longest)
+        dt = ti.cast(self.longest(w), ti.f64)
+        # A branch that is mostly not taken: others need not wait for the force.
+        if rate * dt > 1.0:
+            dt = 1.0 / rate
+        return dt
 
     @ti.func
     def next(self, s, w, horizon):

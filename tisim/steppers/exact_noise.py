@@ -83,7 +83,9 @@ class Push(PairSum):
 
     @ti.func
     def finish(self, w, i, total, t):
-        self.s.velocity[w, i] = self.fluid.pushed(w, i) + self.fluid.softness(w) * total
+        self.s.velocity[w, i] = (
+            self.fluid.pushed(w, i, self.fluid.mobility(w, i)) + self.fluid.softness(w) * total
+        )
 
 
 class Fill(PerParticle):

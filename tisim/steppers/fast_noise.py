@@ -84,7 +84,7 @@ class Couple(PairSum):
     def finish(self, w, i, total, t):
         s = self.s
         size = s.radius[w, i]
-        pushed = self.fluid.pushed(w, i)
+        pushed = self.fluid.pushed(w, i, self.fluid.mobility(w, i))
         for k in ti.static(range(3)):
             s.velocity[w, i][k] = pushed[k] + self.fluid.softness(w) * total[k]
             s.coupled_noise[w, i][k] = ti.sqrt(size) * total[3 + k]

@@ -44,11 +44,16 @@ class Fluid:
         return PER_KELVIN * self.temperature(w)
 
     @ti.func
-    def pushed(self, w, i):
-        """Velocity that the force on i gives it, F/(6 pi eta R) (B16 Eq. 6.1). m/s."""
+    def mobility(self, w, i):
+        """1/(6 pi eta R) (B16 Eq. 6.1). s/kg."""
+        return self.softness(w) / self.s.radius[w, i]
+
+    @ti.func
+    def pushed(self, w, i, mobility):
+        """Velocity that the force on i gives it. m/s."""
         velocity = 0.0 * self.s.velocity[w, i]
         if ti.static(self.forced):
-            velocity = self.softness(w) / self.s.radius[w, i] * self.s.force[w, i]
+            velocity = mobility * self.s.force[w, i]
         return velocity
 
     @ti.func
@@ -62,7 +67,7 @@ class Fluid:
     @ti.func
     def diffusivity(self, w, i):
         """D_ii = kT/(6 pi eta R) (B16 Eq. 6.8). m^2/s."""
-        return self.heat(w) * self.softness(w) / self.s.radius[w, i]
+        return self.heat(w) * self.mobility(w, i)
 
     @ti.func
     def normals(self, w, i, step):

@@ -20,7 +20,7 @@ class Separate:
     @ti.func
     def pushed(self, w, i):
         """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
-        return self.fluid.pushed(w, i)
+        return self.fluid.pushed(w, i, self.fluid.mobility(w, i))
 
     @ti.func
     def scattered(self, w, i):

@@ -15,6 +15,8 @@ OWN = (
     Field("own_fault", "", 1, "keep", integer=True, scratch=True),
 )
 """How far a particle has come, and what has stopped it: a status of the world, or 0."""
+AHEAD = 8
+"""Windows for which the noise of the first step, mostly the only one, is drawn at once: in vectors."""
 
 
 class Wander(PerParticle):
@@ -30,14 +32,25 @@ class Wander(PerParticle):
     @ti.func
     def run(self, w, i):
         s = self.s
-        taken, going = 0, self.able(w, i)
-        for k in range(ti.cast(s.stretch_windows[w], ti.i32)):
+        taken, going, windows = 0, self.able(w, i), ti.cast(s.stretch_windows[w], ti.i32)
+        for first in range((windows + AHEAD - 1) // AHEAD):
             if going > 0:
-                window = s.windows[w] + k
-                begin = beginning(s, self.control, w, window)
-                taken += self.window(w, i, window, begin, beginning(s, self.control, w, window + 1) - begin)
-                going = self.able(w, i)
+                kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
+                for lane in range(AHEAD):
+                    g = self.fluid.normals(w, i, self.number(s.windows[w] + first * AHEAD + lane))
+                    for k in ti.static(range(3)):
+                        kicks[k][lane] = g[k]
+                for lane in range(ti.min(AHEAD, windows - first * AHEAD)):
+                    if going > 0:
+                        kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
+                        taken += self.window(w, i, s.windows[w] + first * AHEAD + lane, kick)
+                        going = self.able(w, i)
         ti.atomic_add(s.particle_steps[w], taken)
+
+    @ti.func
+    def number(self, window):
+        """Of the first step in a window."""
+        return ti.cast(window, ti.i64) << 32
 
     @ti.func
     def able(self, w, i):
@@ -47,39 +60,44 @@ class Wander(PerParticle):
         return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
 
     @ti.func
-    def window(self, w, i, window, begin, length):
-        """A particle through a window, to the end of which it gets unless stopped; its steps."""
-        s = self.s
+    def window(self, w, i, window, kick):
+        """A particle through a window, to the end of which it gets unless stopped; its steps. ``kick`` are
+        the normal numbers of the first of them."""
+        begin = beginning(self.s, self.control, w, window)
+        length = beginning(self.s, self.control, w, window + 1) - begin
         elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        number, taken, going = ti.cast(window, ti.i64) << 32, 0, 1
+        taken, going, g = 0, 1, kick
+        mobility = self.fluid.mobility(w, i)
         while elapsed < length and going > 0:
             if ti.static(self.forced):
                 self.summed.alone(w, i, begin + elapsed)
-            pushed = self.fluid.pushed(w, i)
-            rate = self.control.rate(s, w, i, pushed)
+            pushed = self.fluid.pushed(w, i, mobility)
+            rate = self.control.rate(self.s, w, i, pushed)
             if self.control.hopeless(w, rate):
                 self.stop(w, i, STEEP, begin + elapsed)
             else:
-                wanted = self.control.step(w, rate)
-                last = wanted * (1.0 + LITTLE) >= length - elapsed
-                dt = ti.select(last, length - elapsed, wanted)
-                self.move(w, i, pushed, begin + elapsed, dt, number + taken)
-                taken += 1
+                dt, left = self.control.step(w, rate), length - elapsed
                 # The rounding error of the sum is carried along (W. Kahan 1965).
                 step = dt - carry
                 total = elapsed + step
                 carry = (total - elapsed) - step
-                elapsed = ti.select(last, length, total)
+                if dt * (1.0 + LITTLE) >= left:
+                    dt, total = left, length
+                if taken > 0:
+                    g = self.fluid.normals(w, i, self.number(window) + taken)
+                self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
+                elapsed = total
+                taken += 1
             going = self.able(w, i)
         return taken
 
     @ti.func
-    def move(self, w, i, pushed, t, dt, number):
+    def move(self, w, i, mobility, pushed, t, dt, g):
         """r += dt (u + F/(6 pi eta R)) + sqrt(2 D dt) g, and what operators do to it."""
         s, step = self.s, ti.cast(dt, self.s.real)
         s.velocity[w, i] = self.fluid.flow(w, i, t) + pushed
-        width = ti.sqrt(2.0 * step * self.fluid.diffusivity(w, i))
-        s.position[w, i] += step * s.velocity[w, i] + width * self.fluid.normals(w, i, number)
+        width = ti.sqrt(2.0 * step * self.fluid.heat(w) * mobility)
+        s.position[w, i] += step * s.velocity[w, i] + width * g
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]
