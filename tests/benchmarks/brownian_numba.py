@@ -102,46 +102,48 @@ def by_blocks(r, steps, pull, width, seed):
                         z[i] += g - pull * z[i]
 
 
-@numba.njit(parallel=True, **FAST)
+@numba.njit(**FAST)
 def fill(r, radius, matrix):
-    """Rotne and Prager's matrix over 1/(6 pi eta), equal radii; r (worlds, n, 3), matrix (worlds, 3n, 3n)."""
+    """Rotne and Prager's matrix over 1/(6 pi eta), equal radii; r (n, 3), matrix (3n, 3n)."""
+    n = len(r)
+    for i in range(n):
+        for j in range(n):
+            a, b, dx, dy, dz = 1 / radius, 0.0, 0.0, 0.0, 0.0
+            if i != j:
+                dx, dy, dz = r[j, 0] - r[i, 0], r[j, 1] - r[i, 1], r[j, 2] - r[i, 2]
+                square = dx * dx + dy * dy + dz * dz
+                d = math.sqrt(square)
+                if d > 2 * radius:
+                    a = 0.75 / d * (1 + 2 * radius**2 / (3 * square))
+                    b = 0.75 / d * (1 - 2 * radius**2 / square) / square
+                else:
+                    a = (1 - 9 * d / (32 * radius)) / radius
+                    b = 3 * d / (32 * radius**2) / square
+            m = matrix
+            m[3 * i, 3 * j], m[3 * i + 1, 3 * j + 1], m[3 * i + 2, 3 * j + 2] = (
+                a + b * dx * dx,
+                a + b * dy * dy,
+                a + b * dz * dz,
+            )
+            m[3 * i, 3 * j + 1] = m[3 * i + 1, 3 * j] = b * dx * dy
+            m[3 * i, 3 * j + 2] = m[3 * i + 2, 3 * j] = b * dx * dz
+            m[3 * i + 1, 3 * j + 2] = m[3 * i + 2, 3 * j + 1] = b * dy * dz
+
+
+@numba.njit(parallel=True, **FAST)
+def exact(r, steps, radius, pull, width):
+    """dr = -pull R D r + width sqrt(R) C g; r (worlds, n, 3). A thread to a world, LAPACK on that thread."""
     worlds, n, _ = r.shape
     for w in numba.prange(worlds):
-        for i in range(n):
-            for j in range(n):
-                a, b, dx, dy, dz = 1 / radius, 0.0, 0.0, 0.0, 0.0
-                if i != j:
-                    dx, dy, dz = r[w, j, 0] - r[w, i, 0], r[w, j, 1] - r[w, i, 1], r[w, j, 2] - r[w, i, 2]
-                    square = dx * dx + dy * dy + dz * dz
-                    d = math.sqrt(square)
-                    if d > 2 * radius:
-                        a = 0.75 / d * (1 + 2 * radius**2 / (3 * square))
-                        b = 0.75 / d * (1 - 2 * radius**2 / square) / square
-                    else:
-                        a = (1 - 9 * d / (32 * radius)) / radius
-                        b = 3 * d / (32 * radius**2) / square
-                m = matrix[w]
-                m[3 * i, 3 * j], m[3 * i + 1, 3 * j + 1], m[3 * i + 2, 3 * j + 2] = (
-                    a + b * dx * dx,
-                    a + b * dy * dy,
-                    a + b * dz * dz,
-                )
-                m[3 * i, 3 * j + 1] = m[3 * i + 1, 3 * j] = b * dx * dy
-                m[3 * i, 3 * j + 2] = m[3 * i + 2, 3 * j] = b * dx * dz
-                m[3 * i + 1, 3 * j + 2] = m[3 * i + 2, 3 * j + 1] = b * dy * dz
-
-
-def exact(r, steps, radius, pull, width, draw):
-    """dr = -pull R D r + width sqrt(R) C g with LAPACK; pull and width are those of a sphere by itself."""
-    worlds, n, _ = r.shape
-    matrix = np.empty((worlds, 3 * n, 3 * n))
-    for _ in range(steps):
-        fill(r, radius, matrix)
-        factor = np.linalg.cholesky(matrix)
-        noise = draw.standard_normal((worlds, 3 * n, 1))
-        flat = r.reshape(worlds, 3 * n, 1)
-        shift = -pull * radius * (matrix @ flat) + width * math.sqrt(radius) * (factor @ noise)
-        r += shift.reshape(r.shape)
+        matrix, noise = np.empty((3 * n, 3 * n)), np.empty(3 * n)
+        for _ in range(steps):
+            fill(r[w], radius, matrix)
+            factor = np.linalg.cholesky(matrix)
+            for k in range(3 * n):
+                noise[k] = np.random.standard_normal()
+            drift = np.dot(matrix, r[w].copy().reshape(3 * n))
+            shift = width * math.sqrt(radius) * np.dot(factor, noise) - pull * radius * drift
+            r[w] += shift.reshape(n, 3)
 
 
 @numba.njit(parallel=True, **FAST)
