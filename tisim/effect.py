@@ -19,7 +19,8 @@ Rules
    where the particle is; the driver settles it before forces are summed. A ``Mutual`` one depends on that of
    all others too, such as an induced dipole.
 8. An ``Operator`` changes the state between steps: ``particle`` for each particle on its own (it may write
-   only that particle), then ``world`` once per world, serially (it may add particles and remove them).
+   only that particle), then ``world`` once per world, serially (it may add particles and remove them). One
+   that defines no ``world`` leaves a stepper free to take each particle through many steps by itself.
 9. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
    exclusive access to both, earliest first (see events.py); it may remove either.
 10. ``connect`` returns what an effect wants to know of the other bound effects; ``requires`` names the
@@ -247,7 +248,10 @@ class Operator(Effect):
 
     @ti.func
     def particle(self, s, w, i, t, dt):
-        """Change particle i alone, after a step of dt (s) that ended at t (s, f64)."""
+        """Change particle i alone, after a step of dt seconds that ends at t (s, f64).
+
+        ``s.time[w]`` is not that of a particle that takes steps of its own.
+        """
 
     @ti.func
     def world(self, s, w):

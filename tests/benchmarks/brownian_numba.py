@@ -1,9 +1,11 @@
 """Brownian spheres in a trap, in numba and NumPy: what the stepper is compared with.
 
-``by_blocks``: without interaction, a counter-based generator and Box and Muller's numbers by series, on arrays
-of particles so that every line is vectorised. ``by_library``: the same with numba's own normal numbers.
-``interacting``: Rotne and Prager's matrix filled in numba, factored by LAPACK; or the truncated expansion.
+``by_blocks``: without interaction, a counter-based generator and Box and Muller's numbers by series, on
+arrays of particles, so that every loop is vectorised. ``by_library``: the same with numba's own numbers.
+``exact``: Rotne and Prager's matrix filled in numba, factored by LAPACK. ``fast``: the truncated expansion.
 """
+# The legacy normal numbers are those that numba draws in parallel loops.
+# ruff: noqa: NPY002
 
 import math
 

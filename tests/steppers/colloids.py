@@ -38,9 +38,9 @@ class Shear(Source):
 
 
 class Stop(Operator):
-    """Fixes what has got beyond a place along x."""
+    """Fixes what has got beyond a place along x, and notes when."""
 
-    needs = (Field("fixed", "", 1, "keep", integer=True),)
+    needs = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
     counts = ("stops",)
     place: float = parameter("m")
 
@@ -48,6 +48,7 @@ class Stop(Operator):
     def particle(self, s, w, i, t, dt):
         if s.position[w, i][0] > self.place(w) and s.fixed[w, i] == 0:
             s.fixed[w, i] = 1
+            s.stopped_at[w, i] = ti.cast(t, s.real)
             s.velocity[w, i] = 0.0 * s.velocity[w, i]
             ti.atomic_add(s.stops[w], 1)
 

@@ -211,7 +211,7 @@ def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
     check_same(*ends)
 
 
-@both
+@pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_what_is_fixed_stays_and_the_others_go_on(together):
     """In a flow along x, particles are stopped by an operator, after the very step that brings them there."""
     shear, dt, place = 10.0, 1e-3, 1.05e-6
@@ -226,6 +226,8 @@ def test_what_is_fixed_stays_and_the_others_go_on(together):
     fixed = result.state["fixed"] == 1
     assert fixed.tolist() == [False] + [True] * 7
     assert result.work["stops"] == 7
+    when = dt * np.argmax(path > place, axis=1)
+    np.testing.assert_allclose(result.state["stopped_at"], when, rtol=1e-12)
     assert np.abs(result.state["velocity"][fixed]).max() == 0
 
 

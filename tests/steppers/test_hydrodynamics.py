@@ -20,8 +20,9 @@ SOFTNESS = 1 / (6 * np.pi * VISCOSITY)
 TENSORS = {"oseen": oseen, "rotne-prager": rotne_prager}
 DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
 
+long = pytest.mark.long
 noises = pytest.mark.parametrize("noise", ["exact", "fast"])
-tensors = pytest.mark.parametrize("hydrodynamics", ["oseen", "rotne-prager"])
+tensors = pytest.mark.parametrize("hydrodynamics", [pytest.param("oseen", marks=long), "rotne-prager"])
 
 
 def crowd(seed, n=12, side=6.0, sizes=4.0):
@@ -57,7 +58,7 @@ def pairs():
             )
 
 
-@tensors
+@pytest.mark.parametrize("hydrodynamics", TENSORS)
 def test_tensors_have_no_divergence(hydrodynamics):
     """sum_b dD_ab/dr_b = 0 in every branch, by central differences: nothing is to be added to the drift."""
     places = [(1.0, 1.0, 2.5), (1.0, 3.0, 4.2)]
@@ -192,6 +193,7 @@ def test_what_the_expansion_leaves_out():
     assert 0.2 < off(*cloud(100, 20.0)) < 0.3
 
 
+@long
 @noises
 def test_noise_and_drift_leave_out_what_is_fixed(noise):
     """The first of the spheres is beyond the place, and fixed in the first step: it drags nobody any more."""
@@ -218,6 +220,7 @@ def test_noise_and_drift_leave_out_what_is_fixed(noise):
     np.testing.assert_allclose(shift, kicks, rtol=0, atol=1e-9 * np.abs(kicks).max())
 
 
+@long
 @noises
 def test_oseen_tensor_of_near_spheres_is_refused(noise):
     """Not positive definite below 3/2 R: that world stops, with time and particle, the others go on."""
@@ -244,7 +247,7 @@ def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
         assert apart < 1e-4 * RADIUS
 
 
-@pytest.mark.long
+@long
 @noises
 def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_path):
     scenes = [
@@ -268,7 +271,7 @@ def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_p
             np.testing.assert_array_equal(other.state[name], values, err_msg=name)
 
 
-@pytest.mark.long
+@long
 def test_interaction_does_not_change_where_particles_are_in_equilibrium():
     """Spheres that overlap as they like, in traps as wide as they are: each coordinate is still of variance
     kT/k, as drift and noise come from the same matrix."""

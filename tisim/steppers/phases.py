@@ -82,7 +82,7 @@ class Listen(Phase):
 
 
 class Operate(PerParticle):
-    """What operators do to single particles after the step."""
+    """What operators do to single particles after the step, which began at ``time_before``."""
 
     def __init__(self, parts) -> None:
         super().__init__(parts.s)

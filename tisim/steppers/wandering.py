@@ -9,6 +9,7 @@ from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
 from tisim.state import LOST, NOT_FINITE, STEEP, Field
 from tisim.steppers.alone import LITTLE, beginning
+from tisim.steppers.registers import Registers
 
 OWN = (
     Field("own_time", "s", 1, "keep", scratch=True),
@@ -26,12 +27,15 @@ class Wander(PerParticle):
 
     def __init__(self, parts, fluid) -> None:
         super().__init__(parts.s)
-        self.fluid, self.control, self.domain = fluid, parts.control, parts.domain
-        self.operators, self.summed, self.forced = parts.operators, parts.summed, parts.forced
+        self.registers = Registers(parts.s, ("position", "velocity", "force"), ())
+        self.own, self.control, self.domain = self.registers.state, parts.control, parts.domain
+        self.fluid, self.summed = self.registers.given(fluid), self.registers.given(parts.summed)
+        self.operators, self.forced = parts.operators, parts.forced
 
     @ti.func
     def run(self, w, i):
         s = self.s
+        self.registers.load(w, i)
         taken, going, windows = 0, self.able(w, i), ti.cast(s.stretch_windows[w], ti.i32)
         for first in range((windows + AHEAD - 1) // AHEAD):
             if going > 0:
@@ -45,6 +49,7 @@ class Wander(PerParticle):
                         kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
                         taken += self.window(w, i, s.windows[w] + first * AHEAD + lane, kick)
                         going = self.able(w, i)
+        self.registers.store(w, i)
         ti.atomic_add(s.particle_steps[w], taken)
 
     @ti.func
@@ -72,7 +77,7 @@ class Wander(PerParticle):
             if ti.static(self.forced):
                 self.summed.alone(w, i, begin + elapsed)
             pushed = self.fluid.pushed(w, i, mobility)
-            rate = self.control.rate(self.s, w, i, pushed)
+            rate = self.control.rate(self.own, w, i, pushed)
             if self.control.hopeless(w, rate):
                 self.stop(w, i, STEEP, begin + elapsed)
             else:
@@ -94,7 +99,7 @@ class Wander(PerParticle):
     @ti.func
     def move(self, w, i, mobility, pushed, t, dt, g):
         """r += dt (u + F/(6 pi eta R)) + sqrt(2 D dt) g, and what operators do to it."""
-        s, step = self.s, ti.cast(dt, self.s.real)
+        s, step = self.own, ti.cast(dt, self.s.real)
         s.velocity[w, i] = self.fluid.flow(w, i, t) + pushed
         width = ti.sqrt(2.0 * step * self.fluid.heat(w) * mobility)
         s.position[w, i] += step * s.velocity[w, i] + width * g
