@@ -1,9 +1,9 @@
 """Magnetic colloids that a magnetised fibre captures (B16 chapter 6).
 
-B16 is R. J. Baars, thesis, Utrecht University (2016): particles of table 6.1 in water about one steel cylinder
+B16 is R. J. Baars, thesis, Utrecht University (2016): particles of table 6.1 in water about a steel cylinder
 in a field of 1 T along x, at an angle to its axis. The cylinder is saturated, in the direction that the model
-of Stoner and Wohlfarth gives. Particles are so dilute that they do not feel each other, and superparamagnetic:
-their moment is along the field. One that touches the cylinder stays.
+of Stoner and Wohlfarth gives. Particles are so dilute that they do not feel each other; their moment is along
+the field. One that touches the cylinder stays.
 
 The paper draws its start regions TOP and SIDE without saying how wide they are. Here they are one cylinder
 radius wide and together the whole layer around it, in which ``part`` chooses.
