@@ -110,6 +110,7 @@ def test_killed_worker_loses_nothing(away, here):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("away", ["dask"], indirect=True)
 def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     evaluator, pids = away
     settings = Settings(seed=2, generations=2, options={"population": 8, "parents": 2})
@@ -236,7 +237,7 @@ def alive(group):
 @pytest.mark.long
 def test_ctrl_c_of_the_terminal_stops_the_command_and_all_its_workers(tmp_path):
     """SIGINT to the whole group, as a terminal sends it."""
-    command = ("optimize", "agglomeration", "--size", "small", "--generations", "500")
+    command = ("optimize", "drift", "--generations", "5000")
     folder = tmp_path / "s"
     with worker(
         "tisim", *command, "--executor", "processes:2", "--out", folder,
