@@ -11,7 +11,7 @@ from tisim.sources.flow import DarcyFlow, UniformFlow, kozeny_carman
 from tisim.steppers.implicit_control import ErrorControl
 from tisim.steppers.trapezoid import Trapezoid
 
-FORMS = [("fibres", "packing", 4.0), ("spheres", "pores", 6.0)]
+FORMS = [("fibres", "packing", 4.0), pytest.param("spheres", "pores", 6.0, marks=pytest.mark.long)]
 
 
 @pytest.mark.parametrize(("packed", "mean", "per_size"), FORMS)
