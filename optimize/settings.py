@@ -97,7 +97,9 @@ def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> d
 
     base : of the case. method : by name; None for the case's, or what its objectives need.
     """
-    usual = base.get("method", "nsga2" if problem.several else "genetic")
+    usual = base.get("method", "genetic")
+    if method is None and problem.several and not find(usual).several:
+        method = "nsga2"
     if method is None or issubclass(find(method).Options, find(usual).Options):
         return {**base, "method": method or usual}
     return {**{key: value for key, value in base.items() if key != "options"}, "method": method}
