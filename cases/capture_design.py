@@ -212,7 +212,7 @@ def details(design: Mapping[str, float], result: Result) -> dict[str, float]:
 
 
 def caught(result: Result) -> Figure:
-    """The channel from the side and as the flow sees it: fibres, and where particles began and were caught."""
+    """The channel from the side and as the flow sees it: fibres, and where particles began and ended."""
     figure = empty(10.4, 6.6)
     side, front = figure.subplots(2, 1, sharex=True)
     state, start = result.state, result.start

@@ -1,0 +1,43 @@
+"""Fields at any points, without a run."""
+
+import numpy as np
+import pytest
+
+from tisim.effects.lorentz import Lorentz
+from tisim.errors import InputError
+from tisim.runtime import current
+from tisim.sources.sample import sample
+from tisim.sources.sphere import MagneticSpheres, Sphere
+from tisim.sources.uniform import ElectricField, MagneticField
+
+
+def test_sum_of_the_sources_of_one_quantity():
+    m, radius = np.array([0.0, 2e5, 1e5]), 0.5
+    sphere = MagneticSpheres(spheres=[Sphere(radius=radius, magnetisation=tuple(m))])
+    uniform = MagneticField(constant=(1.0, 0, 0), amplitude=(0.5, 0, 0), omega=(np.pi, 0, 0))
+    points = np.array([[1.0, 0.2, -0.4], [-0.3, 2.0, 1.0]])
+    effects = (Lorentz(), uniform, ElectricField(constant=(9.0, 9.0, 9.0)), sphere)
+    found, slope = sample(effects, "magnetic_flux_density", points, time=0.5)
+
+    def dipole(r):
+        d = np.linalg.norm(r)
+        moment = 4 / 3 * np.pi * radius**3 * m
+        return 1e-7 * (3 * r * (moment @ r) / d**5 - moment / d**3)
+
+    precise = current().precision == "f64"
+    expected = [np.array([1.5, 0, 0]) + dipole(r) for r in points]
+    np.testing.assert_allclose(found, expected, rtol=1e-8 if precise else 1e-5)
+    step = 1e-5
+    for r, gradient in zip(points, slope, strict=True):
+        for axis in range(3):
+            ahead, behind = r.copy(), r.copy()
+            ahead[axis], behind[axis] = r[axis] + step, r[axis] - step
+            wanted = (dipole(ahead) - dipole(behind)) / (2 * step)
+            np.testing.assert_allclose(gradient[:, axis], wanted, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
+
+
+def test_nothing_to_sample_and_points_of_another_shape():
+    with pytest.raises(InputError, match="effects must be with a source of magnetic_flux_density; received"):
+        sample((Lorentz(),), "magnetic_flux_density", [[0.0, 0, 0]])
+    with pytest.raises(InputError, match=r"points must be of shape \(n, 3\); received"):
+        sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [0.0, 0, 0])
