@@ -65,8 +65,8 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
         return {}
     frames = list(found)
     places = np.array([frame.arrays["position"] for frame in frames]) / MICRO
-    figure = empty(10.4, 4.8)
-    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+    figure = empty(9.4, 4.6)
+    left, right = figure.subplots(1, 2, width_ratios=(0.8, 1.0))
     norm = Normalize(0.0, found.times[-1])
     pieces = np.stack([places[:-1], places[1:]], axis=2)[..., [0, 2]].reshape(-1, 2, 2)
     when = np.repeat(found.times[1:], places.shape[1])

@@ -20,7 +20,7 @@ from tisim.result import Result
 
 PIXELS = 1400
 """Width of a panel as it is drawn; half of it as it is shown, so that edges are smooth."""
-SMALLEST = 2.0
+SMALLEST = 4.0
 """Least radius of a grain in those pixels: a smaller one would not be seen."""
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
 PLAIN = (0.36, 0.55, 0.73)

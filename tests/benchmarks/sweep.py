@@ -1,9 +1,10 @@
-"""The frequency sweep of the vibration case as one batch, and one frequency after the other.
+"""A sweep over the settings of a case as one batch, and one run after the other.
 
-    python tests/benchmarks/vibration_sweep.py [--near-field printed] [--sites 7] [--duration 2e-4]
+    python tests/benchmarks/sweep.py vibration    # the eight frequencies of Z13 Fig. 3, 343 particles
+    python tests/benchmarks/sweep.py capture      # 13 angles of a cylinder, 30 starts each (B16 section 6.3)
 
-All of Z13 Fig. 3. Both ways compile once, before the clock starts; runs alternate, and the ratio is the
-median over pairs of runs. TISIM_BACKEND=quadrants chooses the other kernel compiler.
+Both ways compile once, before the clock starts; they alternate, and the ratio is the median over pairs.
+TISIM_BACKEND=quadrants chooses the other kernel compiler.
 """
 
 import argparse
@@ -16,8 +17,17 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from cases.vibration import RATIOS, scene
+from cases import capture, vibration
 from tisim import Result, Scene, Simulation, runtime
+
+SWEEPS = {
+    "vibration": lambda: [vibration.scene(ratio, "printed", 2e-4) for ratio in vibration.RATIOS],
+    "capture": lambda: [
+        capture.scene(75, angle, 20.0, duration=5.0, seed=seed)
+        for angle in np.linspace(0.0, 90.0, 13)
+        for seed in range(30)
+    ],
+}
 
 
 def timed(simulation: Simulation, scenes: list[Scene]) -> tuple[float, list[Result]]:
@@ -37,14 +47,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--near-field", choices=("none", "printed", "equilibrium"), default="printed")
-    parser.add_argument("--sites", type=int, default=7)
-    parser.add_argument("--duration", type=float, default=2e-4)
+    parser.add_argument("case", choices=tuple(SWEEPS))
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
     args = parser.parse_args()
     runtime.start(threads=args.threads)
-    scenes = [scene(ratio, args.near_field, args.duration, args.sites) for ratio in RATIOS]
+    scenes = SWEEPS[args.case]()
     batch, single = Simulation(scenes[0], len(scenes)), Simulation(scenes[0], 1)
     together, apart = [], []
     for _ in range(args.repeats):
@@ -58,8 +66,8 @@ def main() -> None:
     )
     steps = sum(result.work["particle_steps"] for result in results)
     print(
-        f"{len(scenes)} frequencies, {args.sites**3} particles, {args.duration} s, near field "
-        f"{args.near_field}, {steps} particle-steps; {args.repeats} pairs of runs: median (range)"
+        f"{args.case}, {len(scenes)} runs of {len(results[0].state['mass'])} particles, "
+        f"{steps} particle-steps; {args.repeats} pairs: median (range)"
     )
     print(f"  one batch, schedule '{batch.schedule}'             {spread(together)} s")
     print(f"  one after the other, schedule '{single.schedule}'   {spread(apart)} s")
