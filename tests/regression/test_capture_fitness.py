@@ -1,7 +1,7 @@
 """The fitness functions of capture do not change by accident.
 
-Noise is a function of seed, particle and step, so which particles are caught is the same on every machine, but
-for those that rounding turns at the last moment.
+Noise is a function of seed, particle and step, so which particles are caught is the same on every machine,
+but for those that rounding turns at the last moment.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ GENES = ("flux", "field_angle", "aspect", "number", "spacing")
 
 
 def caught(**changed):
-    """Particles caught in each of the runs, shape (designs, starts), and the throughput (m^3/s) of the first."""
+    """Particles caught in each run, shape (designs, starts), and the throughput (m^3/s) of the first."""
     problem = capture_design.problem("throughput")
     free = {"speed": SPEED, "radius": 125.0}
     designs = [{**dict(zip(GENES, design, strict=True)), **free, **changed} for design in CAUGHT]
