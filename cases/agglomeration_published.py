@@ -17,8 +17,8 @@ from rich.table import Table
 import tisim
 from cases.agglomeration import cost, scene
 from cases.agglomeration_strings import PUBLISHED, designs
-from optimize.student import student_t
 from tisim import Scene
+from tisim.confidence import half_width
 from tisim.steppers.controller import ApproachTime
 from tisim.steppers.verlet import Verlet
 
@@ -51,7 +51,7 @@ CHANGES: Mapping[str, Callable[[Scene], Scene]] = {
 def estimate(scenes: list[Scene]) -> tuple[float, float]:
     """Mean Pi and half of its 95 % confidence interval."""
     values = np.array([cost(result) for result in tisim.run(scenes)])
-    return float(values.mean()), float(student_t(len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values)))
+    return float(values.mean()), float(half_width(values))
 
 
 def main() -> None:

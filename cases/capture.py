@@ -20,6 +20,7 @@ from cases.case import Case, Check, Size
 from cases.statistics import Claim
 from optimize.problem import Problem
 from tisim import Cloud, RandomAroundCylinder, Scene
+from tisim.accuracy.quantity import Quantity
 from tisim.batches import Progress
 from tisim.effects.magnetophoresis import Magnetophoresis
 from tisim.effects.moment import FixedMoment
@@ -143,6 +144,13 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     return capture_pictures.figures(size, progress)
 
 
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Paths are random; what counts is how many are caught."""
+    from cases.capture_statistics import fraction
+
+    return (Quantity("captured fraction", lambda result: fraction(result.state), random=True),)
+
+
 def problem(size: str, variant: str) -> Problem:
     """The filter that catches the most; of the same size whatever ``size`` is."""
     from cases import capture_design
@@ -158,6 +166,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
+    quantities=quantities,
     problem=problem,
     variants=("fraction", "hard", "throughput"),
     pictures=pictures,

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
 
-CONFIDENCE = 0.95
+from tisim.confidence import CONFIDENCE, half_width
 
 
 @dataclass(frozen=True)
@@ -21,9 +20,7 @@ class Mean:
     @classmethod
     def of(cls, runs: ArrayLike) -> Mean:
         """Of two runs or more, by Student's t."""
-        values = np.asarray(runs, float)
-        error = values.std(ddof=1) / np.sqrt(len(values))
-        return cls(float(values.mean()), float(student.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * error))
+        return cls(float(np.mean(np.asarray(runs, float))), float(half_width(runs)))
 
     def over(self, other: Mean) -> Mean:
         """The ratio of two independent means, to first order in their errors."""

@@ -16,7 +16,7 @@ from optimize.estimate import Estimate, settled_after
 from optimize.problem import Problem
 from optimize.record import canonical
 from optimize.runs import Evaluator, Runs, Sample
-from optimize.student import student_t
+from tisim.confidence import half_width
 from tisim.errors import must
 from tisim.spec import Checked
 
@@ -192,5 +192,4 @@ def _beats(one: Sample, other: Sample) -> bool:
     if n < 2:
         return False
     lead = np.array(other.costs[:n]) - np.array(one.costs[:n])
-    unsure = student_t(n - 1) * np.std(lead, axis=0, ddof=1) / math.sqrt(n)
-    return bool(np.all(np.mean(lead, axis=0) > unsure))
+    return bool(np.all(np.mean(lead, axis=0) > half_width(lead)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from optimize.student import student_t
+from tisim.confidence import half_width
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Estimate:
         n = len(values)
         mean = float(np.cumsum(values)[-1] / n)  # summed as in settled_after, to the last bit
         std = float(np.std(values, ddof=1)) if n > 1 else math.nan
-        half_width = student_t(n - 1) * std / math.sqrt(n) if n > 1 else math.nan
-        return cls(mean, std, half_width, n, settled)
+        unsure = float(half_width(values)) if n > 1 else math.nan
+        return cls(mean, std, unsure, n, settled)
 
 
 def settled_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:

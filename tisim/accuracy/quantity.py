@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
+from tisim.confidence import half_width
 from tisim.effect import Operator, PairEvent
 from tisim.errors import must
 from tisim.result import Result
 from tisim.scene import Scene
 
 Value = Callable[[Result], "np.ndarray | float"]
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -56,11 +55,7 @@ def estimate(quantity: Quantity, results: Sequence[Result]) -> Estimate:
 
 def mean(values: np.ndarray) -> Estimate:
     """Mean over the first axis and its interval by Student's t; values of shape (n, components), n > 1."""
-    n = len(values)
-    spread = float(np.linalg.norm(values.std(axis=0, ddof=1)))
-    return Estimate(
-        values.mean(axis=0), float(student.ppf(0.5 + CONFIDENCE / 2, n - 1)) * spread / float(np.sqrt(n))
-    )
+    return Estimate(values.mean(axis=0), float(np.linalg.norm(half_width(values))))
 
 
 def displacement(result: Result) -> np.ndarray:

@@ -1,0 +1,21 @@
+"""How well the mean of independent runs is known."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import t as student
+
+CONFIDENCE = 0.95
+
+
+def half_width(values: ArrayLike, confidence: float = CONFIDENCE) -> Any:
+    """Half of the confidence interval of the mean over the first axis, by Student's t; inf for one value.
+
+    Spread over further axes is that of each component by itself.
+    """
+    found = np.asarray(values, float)
+    n = len(found)
+    if n < 2:
+        return np.full(found.shape[1:], np.inf)[()]
+    return student.ppf(0.5 + confidence / 2, n - 1) * found.std(axis=0, ddof=1) / np.sqrt(n)
