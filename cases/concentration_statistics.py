@@ -1,0 +1,100 @@
+"""Chains of magnetic colloids, and when the first of them reach the fibre: B16 section 6.4.6."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from cases import concentration
+from cases.capture_statistics import grouped
+from cases.case import Check
+from cases.concentration import chain_length, coupling
+from cases.statistics import Claim, Mean
+from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
+from tisim.particles import Arrays
+from tisim.result import Result
+
+GAMMA = {25: 1.0, 75: 109.0, 125: 825.0}
+"""B16 Eq. (6.25) by radius in nm; the text gives the first and the last, 75 nm is by the same formula."""
+CONTACT = 1.15
+"""Diameters within which particles count as in contact."""
+CHAINS = {"number": 48, "duration": 1e-3}
+"""While chains form, nothing comes near the cylinder: 75 nm go 0.1 um in that time."""
+CAPTURE = {"number": 16, "duration": 0.45, "hydrodynamics": "rotne-prager"}
+DILUTE, DENSE = 0.005, 0.5
+"""g/mL."""
+EARLY = 0.05
+"""s, in which none of 75 nm is captured."""
+
+
+def chain(state: Arrays, moment: np.ndarray) -> float:
+    """Mean number of particles of a chain, singles included."""
+    diameter = 2 * float(state["radius"][0])
+    return mean_size(len(moment), head_to_tail(state["position"], moment, diameter))
+
+
+def grown(result: Result) -> float:
+    """By how much chains are longer at the end than at the start, where some particles lie so by chance."""
+    moment = result.state["moment"]
+    return chain(result.state, moment) - chain(result.start, moment)
+
+
+def held(state: Arrays) -> float:
+    """Part of the particles that are captured, or hang on one that is, in contact with each other.
+
+    A chain that stands on the cylinder touches it with one particle only.
+    """
+    reach = CONTACT * 2 * float(state["radius"][0])
+    cluster = labels(len(state["position"]), near(state["position"], reach))
+    return float(np.isin(cluster, cluster[state["fixed"] > 0]).mean())
+
+
+def first(result: Result) -> float:
+    """When the first particle was captured, s; the whole duration if none was."""
+    at = result.state["captured_at"]
+    return float(at[at >= 0].min(initial=result.time))
+
+
+def results(settings: Sequence[dict[str, Any]], repeats: int) -> list[list[Result]]:
+    """Of ``concentration.scene`` with each of the settings, from as many starts."""
+    scenes = [concentration.scene(**given, seed=seed) for given in settings for seed in range(repeats)]
+    return grouped(scenes, repeats)
+
+
+def check(repeats: int = 4) -> Iterator[Check | Claim]:
+    """Chains by size and concentration; capture by orientation and concentration."""
+    for size, gamma in GAMMA.items():
+        yield Check(f"{size} nm: Gamma (B16)", coupling(size), gamma, 0.01 * gamma)
+    yield from of_chains(repeats)
+    yield from of_capture(repeats)
+
+
+def of_chains(repeats: int) -> Iterator[Claim]:
+    """Chains for Gamma >> 1, none for 25 nm."""
+    settings = [{"nanometres": size, "concentration": c, **CHAINS} for size in GAMMA for c in (0.5, 2.0)]
+    for given, found in zip(settings, results(settings, repeats), strict=True):
+        size, c = int(given["nanometres"]), float(given["concentration"])
+        longer = Mean.of([grown(result) for result in found])
+        name = f"{size} nm, {c:g} g/mL: chains after 1 ms longer by (Eq. 6.26: {chain_length(size, c):.1g})"
+        yield Claim(name, longer, most=0.5) if size == 25 else Claim(name, longer, least=1.0)
+
+
+def of_capture(repeats: int) -> Iterator[Claim]:
+    """75 nm that feel each other's flow: nothing is captured at first; the transverse cylinder takes almost
+    twice as long; and the more concentrated sample is captured sooner."""
+    settings = [
+        {"angle": angle, "concentration": c, **CAPTURE} for angle in (0.0, 90.0) for c in (DILUTE, DENSE)
+    ]
+    found = [Mean.of([first(result) for result in group]) for group in results(settings, repeats)]
+    (thin, thick), (thin_across, thick_across) = found[:2], found[2:]
+    yield Claim("75 nm, 0.5 g/mL, longitudinal: first capture, s (B16 0.1 to 0.25)", thick, least=EARLY)
+    ratio = thick_across.over(thick)
+    yield Claim("transverse over longitudinal (B16: almost 2)", ratio, 1.5, 2.5)
+    for name, dilute, dense in (
+        ("longitudinal", thin, thick),
+        ("transverse", thin_across, thick_across),
+    ):
+        later = dilute - dense
+        yield Claim(f"{name}: first capture at {DILUTE:g} g/mL later than at {DENSE:g}, s", later, least=0.0)

@@ -1,0 +1,103 @@
+"""Concentrated samples: how they are placed, and what chains are."""
+
+import numpy as np
+import pytest
+
+from cases import concentration
+from cases.concentration import DISTANCE, coupling, longest, scene, side
+from cases.concentration_statistics import held
+from tisim import run
+from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0])
+@pytest.mark.parametrize("concentration", [0.005, 2.0])
+def test_samples_have_the_concentration_and_lie_above_the_rim(angle, concentration):
+    made = scene(angle=angle, concentration=concentration, number=500)
+    state = made.particles.arrays(made.domain, 0)
+    body = made.effects[1].cylinders[0]
+    along = state["position"] @ np.asarray(body.axis)
+    d = side(500, 75e-9, concentration)
+    assert state["mass"].sum() / d**3 == pytest.approx(1e3 * concentration)
+    low, high = state["position"].min(axis=0), state["position"].max(axis=0)
+    assert (high - low <= d).all()
+    assert (high - low > 0.9 * d).all()
+    assert along.min() >= body.length / 2 + DISTANCE
+    assert along.min() < body.length / 2 + DISTANCE + 0.1 * d
+    across = (low + high) / 2 - (low + high) / 2 @ np.asarray(body.axis) * np.asarray(body.axis)
+    assert np.linalg.norm(across) == pytest.approx(body.radius, abs=0.1 * d)
+
+
+def test_coupling_is_the_energy_that_binds_two_at_contact():
+    """mu_0 m^2 / (2 pi d^3), in k T, and B16's numbers: 1 for 25 nm, 825 for the largest there."""
+    assert coupling(25) == pytest.approx(1.0, abs=0.005)
+    assert coupling(125) == pytest.approx(825, rel=0.001)
+
+
+def test_noise_moves_a_particle_by_a_tenth_of_its_radius_in_the_longest_step():
+    for radius in (25e-9, 125e-9):
+        diffusivity = 1.380649e-23 * 298 / (6 * np.pi * 1e-3 * radius)
+        assert np.sqrt(2 * diffusivity * longest(radius)) == pytest.approx(0.1 * radius)
+
+
+def test_near_pairs_are_those_of_a_double_loop():
+    position = np.random.default_rng(1).uniform(size=(60, 3))
+    expected = [
+        (i, j)
+        for i in range(60)
+        for j in range(i + 1, 60)
+        if np.linalg.norm(position[i] - position[j]) <= 0.2
+    ]
+    assert len(expected) > 10
+    np.testing.assert_array_equal(near(position, 0.2), expected)
+
+
+def test_pairs_bound_head_to_tail_by_energy():
+    """Against B16 Eq. (6.21), pair by pair."""
+    draw = np.random.default_rng(2)
+    position, moment = draw.uniform(size=(80, 3)) * 4, draw.normal(size=(80, 3))
+    moment[:, 0] += 2
+    unit = moment / np.linalg.norm(moment, axis=1, keepdims=True)
+    expected = []
+    for i in range(80):
+        for j in range(i + 1, 80):
+            r = position[i] - position[j]
+            d = np.linalg.norm(r)
+            u = -(3 * (r @ unit[i]) * (r @ unit[j]) / d**5 - unit[i] @ unit[j] / d**3)
+            if u <= 0.5 * -2.0 / 0.9**3:
+                expected.append((i, j))
+    assert len(expected) > 10
+    np.testing.assert_array_equal(head_to_tail(position, moment, 0.9), expected)
+
+
+def test_chains_and_singles():
+    x = np.array([0.0, 1.0, 2.0, 5.0, 0.0, 9.0])
+    position = np.stack([x, [0, 0, 0, 0, 1.0, 0], np.zeros(6)], axis=1)
+    pairs = head_to_tail(position, np.tile([1.0, 0, 0], (6, 1)), 1.0)
+    np.testing.assert_array_equal(pairs, [(0, 1), (1, 2)])
+    cluster = labels(6, pairs)
+    assert len(set(cluster[:3])) == 1
+    assert len(set(cluster)) == 4
+    assert mean_size(6, pairs) == 1.5
+    assert mean_size(6, pairs[:0]) == 1.0
+
+
+def test_held_is_what_hangs_on_a_captured_one():
+    position = np.array([[0, 0, 0], [2.1, 0, 0], [4.2, 0, 0], [9, 0, 0], [11, 0, 0]], float)
+    state = {"position": position, "radius": np.ones(5), "fixed": np.array([1, 0, 0, 0, 0])}
+    assert held(state) == 3 / 5
+    assert held({**state, "fixed": np.zeros(5, int)}) == 0
+
+
+@pytest.mark.slow
+def test_every_size_runs():
+    """A few steps of each kind; the longest of them take days."""
+    for size in concentration.SIZES:
+        made = concentration.scene_for(size, 0).replace({"duration": 2e-6})
+        assert run(made).status.ok, size
+
+
+@pytest.mark.slow
+def test_what_is_claimed_holds():
+    for claim in concentration.check():
+        assert claim.ok, (claim.name, *claim.cells)

@@ -1,0 +1,1 @@
+"""What positions of particles say about their arrangement, in NumPy."""
