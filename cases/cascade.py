@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from tisim.frames import Frames
 
+Orientation = Literal["optimal", "directions", "angles"]
 STAGE = {25: 10.0, 125: 0.5}
 """Delta t_run, s, by radius in nm (B16 section 6.4.5)."""
 SHARE = 0.9
@@ -48,7 +49,7 @@ class Cascade:
 
     nanometres: int = 125
     stage: float = 0.5
-    orientation: Literal["optimal", "directions", "angles"] = "directions"
+    orientation: Orientation = "directions"
     aspect: float = 20.0
     thickness: float = 1.0
     gap: float = 0.0

@@ -6,13 +6,14 @@ import csv
 import io
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cases.cascade import SHARE, STAGE, Cascade, captured_at, time_to
-from cases.cascade_statistics import BESIDE, OFF, PUBLISHED
+from cases.cascade import SHARE, STAGE, Cascade, Orientation, captured_at, time_to
+from cases.cascade_statistics import OFF, ORIENTATIONS, PUBLISHED, RANDOM
 from cases.statistics import Mean
 from tisim.batches import Progress
 from tisim.figure import empty, plain
@@ -24,7 +25,7 @@ FEW = 20
 STAGES = (0.05, 0.5, 2.0, 10.0)
 """s, of 125 nm (B16 Fig. 6.11b)."""
 COLOURS = {25: "#cc6677", 125: "#4477aa"}
-LINES = {"optimal": "-", "directions": ":", "angles": "--"}
+LINES: dict[Orientation, str] = {"optimal": "-", "directions": ":", "angles": "--"}
 
 Found = Mapping[Cascade, np.ndarray]
 
@@ -32,13 +33,13 @@ Found = Mapping[Cascade, np.ndarray]
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """cascade.png, cascade.csv: all cascades whatever ``size`` is."""
     runs = [
-        Cascade(n, STAGE[n], how, aspect, **layer)
-        for layer, aspect in ((OFF, 20.0), (BESIDE, 20.0), (BESIDE, 5 / 3))
+        Cascade(n, STAGE[n], how, aspect, gap=gap)
+        for gap, aspect in ((OFF, 20.0), (0.0, 20.0), (0.0, 5 / 3))
         for n in PUBLISHED
         for how in LINES
     ]  # fmt: skip
     stages = [
-        Cascade(125, stage, how, **OFF) for stage in STAGES for how in ("optimal", "directions")
+        Cascade(125, stage, how, gap=OFF) for stage in STAGES for how in ORIENTATIONS[:2]
     ]  # fmt: skip
     wanted = list(dict.fromkeys([*runs, *stages]))
     times = captured_at(wanted, FEW, SHOWN, progress=progress)
@@ -52,7 +53,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     return {"cascade.png": figure, "cascade.csv": table(found)}
 
 
-def curve(axis: Axes, times: np.ndarray, label: str, **style: object) -> None:
+def curve(axis: Axes, times: np.ndarray, label: str, **style: Any) -> None:
     """Captured fraction in time, the mean over repeats."""
     when = np.sort(times[np.isfinite(times)])
     share = np.arange(1, len(when) + 1) / times.size
@@ -63,7 +64,7 @@ def curve(axis: Axes, times: np.ndarray, label: str, **style: object) -> None:
 def of_size(axis: Axes, found: Found, nanometres: int) -> None:
     """Random and optimal cascade of a size (B16 Fig. 6.11a), and its times to 90 %."""
     for how, line in LINES.items():
-        one = Cascade(nanometres, STAGE[nanometres], how, **OFF)
+        one = Cascade(nanometres, STAGE[nanometres], how, gap=OFF)
         label = {"optimal": "optimal", "directions": "random direction", "angles": "random angle"}[how]
         curve(axis, found[one], label, color=COLOURS[nanometres], linestyle=line)
     axis.axhline(SHARE, color="0.6", lw=0.8)
@@ -78,9 +79,9 @@ def of_size(axis: Axes, found: Found, nanometres: int) -> None:
 def of_stage(axis: Axes, found: Found) -> None:
     """125 nm with stages of different lengths (B16 Fig. 6.11b)."""
     for stage, colour in zip(STAGES, ("#aa3377", "#4477aa", "#228833", "#ccbb44"), strict=True):
-        for how in ("optimal", "directions"):
+        for how in ORIENTATIONS[:2]:
             label = f"{stage:g} s" if how == "optimal" else ""
-            curve(axis, found[Cascade(125, stage, how, **OFF)], label, color=colour, linestyle=LINES[how])
+            curve(axis, found[Cascade(125, stage, how, gap=OFF)], label, color=colour, linestyle=LINES[how])
     axis.axhline(SHARE, color="0.6", lw=0.8)
     axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02), xlim=(0, 40))
     axis.set_title("125 nm by length of a stage; dotted: random direction", fontsize=10)
@@ -94,7 +95,7 @@ def of_ratio(axis: Axes, found: Found) -> None:
     names = {(r.aspect, r.gap): f"L/D {r.aspect:.3g},\n{r.gap:g} R off" for r in bases}
     places = {key: k for k, key in enumerate(names)}
     for base in bases:
-        for how, mark, shift in (("directions", "o", -0.08), ("angles", "D", 0.08)):
+        for how, mark, shift in zip(RANDOM, "oD", (-0.08, 0.08), strict=True):
             m = ratio(found, replace(base, orientation=how))
             x = places[base.aspect, base.gap] + shift + (0.2 if base.nanometres == 25 else -0.2)
             axis.errorbar(x, m.value, m.half, color=COLOURS[base.nanometres], marker=mark, ms=4, capsize=2)

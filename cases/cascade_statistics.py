@@ -6,18 +6,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from cases.capture_statistics import REPEATS
-from cases.cascade import SHARE, STAGE, Cascade, captured_at, time_to
+from cases.cascade import SHARE, STAGE, Cascade, Orientation, captured_at, time_to
 from cases.statistics import Claim, Mean
 
 PUBLISHED = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
 """s to 90 %, random and optimal, by radius in nm (B16 section 6.4.5)."""
 SHORT, LONG = 0.05, 10.0
 """Stages of 125 nm, s, beside 0.5 s (B16 Fig. 6.11b)."""
-BESIDE = {"thickness": 1.0, "gap": 0.0}
-"""The layer of the case capture: right beside the cylinder."""
-OFF = {"thickness": 1.0, "gap": 0.15}
-"""A layer off the surface, chosen so that the optimal cascades take about as long as in B16, at both sizes:
-that of 25 nm over that of 125 nm sets the gap, either of them the thickness."""
+OFF = 0.15
+"""Gap, in radii of the cylinder, with which the optimal cascades take as long as in B16, at both sizes: the
+larger it is, the longer that of 25 nm takes beside that of 125 nm."""
+GAPS = (0.0, OFF)
+RANDOM: tuple[Orientation, ...] = ("directions", "angles")
+ORIENTATIONS: tuple[Orientation, ...] = ("optimal", *RANDOM)
 
 Means = dict[Cascade, Mean]
 
@@ -30,13 +31,13 @@ def means(cascades: Sequence[Cascade], repeats: int) -> Means:
 
 def check(repeats: int = REPEATS) -> Iterator[Claim]:
     """The random cascade beside the optimal one, and the length of a stage; with confidence intervals."""
-    bases = [Cascade(n, STAGE[n], "optimal", **layer) for layer in (BESIDE, OFF) for n in PUBLISHED]
+    bases = [Cascade(n, STAGE[n], "optimal", gap=gap) for gap in GAPS for n in PUBLISHED]
     short = [replace(base, aspect=5 / 3) for base in bases[:2]]
-    wanted = [replace(one, orientation=how) for one in bases for how in ("optimal", "directions", "angles")]
-    wanted += [replace(one, orientation=how) for one in short for how in ("optimal", "directions")]
+    wanted = [replace(one, orientation=how) for one in bases for how in ORIENTATIONS]
+    wanted += [replace(one, orientation=how) for one in short for how in ORIENTATIONS]
     stages = [
-        Cascade(125, stage, how, **layer)
-        for layer in (BESIDE, OFF) for stage in (SHORT, LONG) for how in ("optimal", "directions")
+        Cascade(125, stage, how, gap=gap)
+        for gap in GAPS for stage in (SHORT, LONG) for how in ORIENTATIONS[:2]
     ]  # fmt: skip
     found = means([*wanted, *stages], repeats)
     for base in bases:
@@ -59,9 +60,9 @@ def of_orientation(found: Means, base: Cascade) -> Iterator[Claim]:
     name, ratio = name_of(base), random / best
     bounds = (0.75 * best, 1.25 * best) if base.gap else (0.0, 0.75 * best)
     yield Claim(f"{name}: s to 90 %, optimal (B16 {best:g})", found[base], *bounds)
-    for how, low, high in (("directions", 1.0, 1.25 * ratio), ("angles", 0.75 * ratio, 2 * ratio)):
+    for how, bounds in zip(RANDOM, ((1.0, 1.25 * ratio), (0.75 * ratio, 2 * ratio)), strict=True):
         ours = found[replace(base, orientation=how)].over(found[base])
-        yield Claim(f"{name}: random over optimal, all {how} alike (B16 {ratio:.1f})", ours, low, high)
+        yield Claim(f"{name}: random over optimal, all {how} alike (B16 {ratio:.1f})", ours, *bounds)
 
 
 def stage_claim(found: Means, one: Cascade) -> Claim:

@@ -7,6 +7,7 @@ import io
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,7 +25,7 @@ from tisim.frames import Frames, frames
 from tisim.particles import Arrays
 
 MICRO = 1e-6
-SHOWN = {"number": 125, "duration": 2e-3}
+SHOWN: dict[str, Any] = {"number": 125, "duration": 2e-3}
 """What snapshots are of."""
 CONCENTRATIONS = (0.005, 0.5, 2.0)
 """g/mL, of the curves."""

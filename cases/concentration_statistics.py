@@ -20,9 +20,9 @@ GAMMA = {25: 1.0, 75: 109.0, 125: 825.0}
 """B16 Eq. (6.25) by radius in nm; the text gives the first and the last, 75 nm is by the same formula."""
 CONTACT = 1.15
 """Diameters within which particles count as in contact."""
-CHAINS = {"number": 48, "duration": 1e-3}
+CHAINS: dict[str, Any] = {"number": 48, "duration": 1e-3}
 """While chains form, nothing comes near the cylinder: 75 nm go 0.1 um in that time."""
-CAPTURE = {"number": 16, "duration": 0.45, "hydrodynamics": "rotne-prager"}
+CAPTURE: dict[str, Any] = {"number": 16, "duration": 0.45, "hydrodynamics": "rotne-prager"}
 DILUTE, DENSE = 0.005, 0.5
 """g/mL."""
 EARLY = 0.05
