@@ -35,6 +35,8 @@ STAGE = {25: 10.0, 125: 0.5}
 """Delta t_run, s, by radius in nm (B16 section 6.4.5)."""
 SHARE = 0.9
 """Of the particles, up to which capture is timed."""
+MOST = 1000
+"""Stages after which a cascade is given up."""
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}),
@@ -94,7 +96,7 @@ def captured_at(
     progress: Progress | None = None,
 ) -> list[np.ndarray]:
     """When each particle was captured, s from the start of the cascade; inf for those still free when
-    ``share`` had been. One array (repeats, number) for each cascade, rows sorted.
+    ``share`` had been, or after MOST stages. One array (repeats, number) for each cascade, rows sorted.
 
     A stage of all cascades and repeats that are not done is one batch of worlds. RunError when one fails.
     """
@@ -104,8 +106,10 @@ def captured_at(
         for k, one in enumerate(cascades)
         for repeat in range(repeats)
     ]
-    passed = 0
-    while going := [row for row in rows if np.isfinite(row[1]).mean() < share]:
+    for passed in range(MOST):
+        going = [row for row in rows if np.isfinite(row[1]).mean() < share]
+        if not going:
+            break
         found = run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going])
         for (one, at, _), result in zip(going, found, strict=True):
             if not result.status.ok:
@@ -115,7 +119,6 @@ def captured_at(
             first = int(np.isfinite(at).sum())
             caught = np.sort(when[when >= 0])
             at[first : first + len(caught)] = passed * one.stage + caught
-        passed += 1
         if progress:
             progress(min(1.0, float(np.mean([np.isfinite(at).mean() for _, at, _ in rows])) / share))
     return times

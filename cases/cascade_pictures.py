@@ -22,7 +22,7 @@ SHOWN = 0.97
 """Share of the particles up to which curves go."""
 FEW = 20
 """Repeats."""
-STAGES = (0.05, 0.5, 2.0, 10.0)
+STAGES = (0.1, 0.5, 2.0, 10.0)
 """s, of 125 nm (B16 Fig. 6.11b)."""
 COLOURS = {25: "#cc6677", 125: "#4477aa"}
 LINES: dict[Orientation, str] = {"optimal": "-", "directions": ":", "angles": "--"}

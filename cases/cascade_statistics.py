@@ -11,7 +11,7 @@ from cases.statistics import Claim, Mean
 
 PUBLISHED = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
 """s to 90 %, random and optimal, by radius in nm (B16 section 6.4.5)."""
-SHORT, LONG = 0.05, 10.0
+SHORT, LONG = 0.1, 10.0
 """Stages of 125 nm, s, beside 0.5 s (B16 Fig. 6.11b)."""
 OFF = 0.15
 """Gap, in radii of the cylinder, with which the optimal cascades take as long as in B16, at both sizes: the

@@ -42,6 +42,14 @@ def test_cascades_that_are_done_wait_for_none(stages):
     assert [len(stage) for stage in stages] == [2, 1, 1, 1]
 
 
+def test_a_cascade_that_captures_too_little_is_given_up(stages, monkeypatch):
+    monkeypatch.setattr(cascade, "MOST", 2)
+    (times,) = captured_at([Cascade(number=10)], 1)
+    assert np.isfinite(times).sum() == 6
+    assert time_to(0.9, times) == np.inf
+    assert len(stages) == 2
+
+
 def test_time_to_a_share_is_that_of_the_particle_that_makes_it():
     times = np.array([np.arange(1.0, 11.0), [1.0, 2.0, *[np.inf] * 8]])
     np.testing.assert_array_equal(time_to(0.9, times), [9.0, np.inf])
