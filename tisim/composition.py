@@ -13,7 +13,7 @@ from tisim.halves import Halves
 from tisim.history import History, Remember, memory_fields
 from tisim.neighbours import Neighbours
 from tisim.program import Item
-from tisim.settle import settling
+from tisim.settle_mutual import settling
 from tisim.state import Field, State
 from tisim.steppers.phases import Finish
 from tisim.steppers.stepper import Parts, Stepper
