@@ -29,7 +29,9 @@ SHOWN: dict[str, Any] = {"number": 125, "duration": 2e-3}
 """What snapshots are of."""
 CONCENTRATIONS = (0.005, 0.5, 2.0)
 """g/mL, of the curves."""
-FEW, FRAMES = 3, 90
+SPAN = 0.6
+"""s, of the curves."""
+FEW, FRAMES = 2, 90
 """Repeats of a curve, and its points."""
 
 
@@ -91,7 +93,7 @@ def captured(progress: Progress) -> Curves:
     """Times (s), part that touched the cylinder and part held by it, by angle (degrees) and g/mL."""
     keys = [(angle, c) for angle in (0.0, 90.0) for c in CONCENTRATIONS]
     scenes = [
-        concentration.scene(angle=angle, concentration=c, seed=seed, **CAPTURE)
+        concentration.scene(angle=angle, concentration=c, seed=seed, **{**CAPTURE, "duration": SPAN})
         for angle, c in keys for seed in range(FEW)
     ]  # fmt: skip
     curves = {}
