@@ -32,6 +32,24 @@ def test_saturates_sooner_along_a_long_axis():
     assert size((0.0, 0.0, 0.0)) == 0.0
 
 
+@pytest.mark.parametrize("field", [(0.05, 0.0, 0.05), (0.3, 0.0, 0.3), (0.8, 0.0, 0.4), (4.0, 0.0, 3.0)])
+@pytest.mark.parametrize("aspect", [5 / 3, 20.0])
+def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
+    n, b = demagnetising_factor(1.0, 2 * aspect), np.array(field)
+    factors = np.array([(1 - n) / 2, (1 - n) / 2, n])
+
+    def energy(m):
+        return (MU_0 / 2 * factors * m**2 - m * b).sum(axis=-1)
+
+    found = np.array(magnetisation((0, 0, 1), 1.0, 2 * aspect, SATURATION, field))
+    assert np.linalg.norm(found) <= SATURATION * (1 + 1e-12)
+    size, angle = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, np.pi / 2, 1801))
+    tried = SATURATION * size[..., None] * np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
+    least = tried[np.unravel_index(energy(tried).argmin(), size.shape)]
+    assert energy(found) <= energy(least) + 1e-12 * np.abs(energy(least))
+    np.testing.assert_allclose(found, least, atol=0.01 * SATURATION)
+
+
 def test_what_is_no_magnet_is_refused():
     with pytest.raises(InputError, match="axis of a cylinder must be a direction"):
         magnetisation((0, 0, 0), 1.0, 1.0, SATURATION, (0, 0, 1))

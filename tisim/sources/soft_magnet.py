@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from tisim.errors import must
+from tisim.sources import stoner_wohlfarth
 from tisim.sources.magnets import MU_0
 from tisim.sources.stoner_wohlfarth import demagnetising_factor
 from tisim.spec import Vector
@@ -18,9 +19,11 @@ def magnetisation(
 ) -> Vector:
     """M (A/m) of a body without hysteresis and of a permeability without end, in a uniform field B_0 (T).
 
-    Its own field cancels the applied one inside, N M = B_0/mu_0 along each axis, until |M| is ``saturation``;
-    from there on M keeps its size. N is the mean over the volume. Long bodies saturate in weaker fields along
-    their axis than across, where N is near 1/2.
+    It minimises shape and Zeeman energy, mu_0/2 M.N M - M.B_0 per volume, among all M of size ``saturation``
+    at most. So its own field cancels the applied one inside, N M = B_0/mu_0 along each axis, until it is
+    saturated; from there on M turns towards the field, as of a body that always is (stoner_wohlfarth.py).
+    N is the mean over the volume. Long bodies saturate in weaker fields along their axis than across, where
+    N is near 1/2.
     Source: R. M. Bozorth, D. M. Chapin, J. Appl. Phys. 13 (1942) 320.
     InputError for an axis of length 0, or a cylinder or saturation that is not above 0.
     """
@@ -31,5 +34,6 @@ def magnetisation(
     direction, field = np.asarray(axis, float) / size, np.asarray(flux_density, float)
     along = (field @ direction) * direction
     m = (along / n + (field - along) / (0.5 * (1 - n))) / MU_0
-    m *= min(1.0, saturation / max(float(np.linalg.norm(m)), 1e-300))
+    if np.linalg.norm(m) > saturation:
+        return stoner_wohlfarth.magnetisation(axis, radius, length, saturation, flux_density)
     return float(m[0]), float(m[1]), float(m[2])
