@@ -64,7 +64,7 @@ FIBRES = (
     Gene("flux", "T", 0.05, 1.0),
     Gene("field_angle", "degrees", 0.0, 90.0),
     Gene("aspect", "L/D", 5 / 3, 20.0, "log"),
-    Gene("number", "fibres", 0.5, 12.5),
+    Gene("number", "fibres", 0.51, 12.49),
     Gene("spacing", "D", 1.2, 6.0),
 )
 HARD = Gene("magnetisation_angle", "degrees", 0.0, 90.0)
@@ -107,9 +107,10 @@ class Filter:
     def places(self) -> list[Vector]:
         """Centres of the fibres, m: layer after layer, each from its middle outwards.
 
-        InputError when there is not wire enough, or when no layer holds a fibre.
+        InputError when there is not wire enough, or no fibre.
         """
         count = round(self.number)
+        must(count >= 1, "number of fibres", "at least 1", count)
         must(count * self.length <= WIRE * (1 + 1e-9), "wire", f"at most {WIRE:g} m", count * self.length)
         across, along = self.spacing * DIAMETER, self.length + (self.spacing - 1) * DIAMETER
         columns = _row(1 + int((WIDTH - DIAMETER) / across), across)

@@ -112,6 +112,16 @@ def test_wire_is_limited():
         Filter(aspect=20.0, number=1.6).places()
 
 
+def test_every_string_of_the_search_has_a_fibre():
+    """Also those on the bounds, to which methods clip."""
+    genome = capture_design.problem("fraction").genome
+    for end in (0.0, 1.0):
+        number = genome.decode([end] * len(genome))["number"]
+        assert 1 <= len(Filter(number=number).places()) <= 12
+    with pytest.raises(InputError, match="number of fibres must be at least 1; received 0"):
+        Filter(number=0.5).scene(0)
+
+
 @pytest.mark.slow
 def test_search_finds_transverse_and_short(tmp_path):
     """B16's conclusions, found by a search that knows nothing of them."""
