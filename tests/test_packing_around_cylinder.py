@@ -33,7 +33,7 @@ def test_spheres_lie_wholly_in_their_part_and_fill_it_evenly(part):
     assert len(cKDTree(points).query_pairs(2 * radius * (1 - 1e-12))) == 0
     assert ((rho <= 0.9 - radius) & (z <= 1.9 - radius)).all()
     beyond = z > 1.5
-    outside = np.where(beyond, z - 1.5, rho - 0.5)
+    outside = np.hypot(np.maximum(rho - 0.5, 0.0), np.maximum(z - 1.5, 0.0))
     assert outside.min() >= radius * (1 - 1e-9)
     share = placement.model_copy(update={"part": "top"}).volume() / placement.volume()
     expected = {"all": share, "top": 1.0, "side": 0.0}[part]
@@ -51,9 +51,18 @@ def test_volumes():
     assert sum(parts) == pytest.approx(placement.volume())
 
 
+@pytest.mark.parametrize("part", ["all", "top", "side"])
+def test_a_thin_layer_around_a_long_cylinder_has_room(part):
+    placement = RandomAroundCylinder(radius=1.0, length=40.0, thickness=1e-3, part=part)
+    points = placement.centres(200, 1e-4, Open(), 0)
+    assert len(points) == 200
+
+
 def test_no_room():
     with pytest.raises(InputError, match="thickness must be above a diameter"):
         RandomAroundCylinder(**CYLINDER).centres(1, 0.3, Open(), 0)
+    with pytest.raises(InputError, match="length must be above a diameter"):
+        RandomAroundCylinder(**{**CYLINDER, "length": 0.1}, part="side").centres(1, 0.1, Open(), 0)
     with pytest.raises(InputError, match=r"cloud.number must be at most what finds room around the cylinder"):
         RandomAroundCylinder(**CYLINDER).centres(2000, 0.1, Open(), 0)
     with pytest.raises(InputError, match="axis must be a direction"):

@@ -47,7 +47,9 @@ class RandomAroundCylinder(Placement):
         return float((self.part != "top") * side + (self.part != "side") * 2 * outer * self.thickness)
 
     def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        must(self.thickness > 2 * radius, "thickness", f"above a diameter, {2 * radius:g} m", self.thickness)
+        rule = f"above a diameter, {2 * radius:g} m"
+        must(self.thickness > 2 * radius, "thickness", rule, self.thickness)
+        must(self.part != "side" or self.length > 2 * radius, "length", rule, self.length)
         generator = np.random.default_rng([seed, 0x6C61796572])
         found = np.empty((0, 3))
         for _ in range(ROUNDS):
@@ -62,15 +64,20 @@ class RandomAroundCylinder(Placement):
         return self._turned(found) + np.asarray(self.centre)
 
     def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
-        """Points of the part, evenly, in a frame whose z axis is that of the cylinder; at least one. m."""
-        outer, half = self.radius + self.thickness - radius, self.length / 2
-        top = half + self.thickness - radius
-        points = generator.uniform((-outer, -outer, -top), (outer, outer, top), (4 * number + 16, 3))
-        rho, z = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
-        beside = (rho > self.radius + radius) & (z < half - radius * (self.part == "side"))
-        beyond = z > half + radius
-        kept = {"side": beside, "top": beyond}.get(self.part, beside | beyond)
-        return points[kept & (rho < outer)][:number]
+        """Points of the part, evenly, in a frame whose z axis is that of the cylinder. m."""
+        inner, outer = self.radius + radius, self.radius + self.thickness - radius
+        # Half of what lies beside, with the corners where they belong to the part; then what lies beyond.
+        height = self.length / 2 + (-radius if self.part == "side" else radius)
+        depth = self.thickness - 2 * radius
+        side = (self.part != "top") * (outer**2 - inner**2) * height
+        top = (self.part != "side") * outer**2 * depth
+        beside = generator.random(number) * (side + top) < side
+        rho = np.sqrt(generator.uniform(np.where(beside, inner**2, 0.0), outer**2))
+        part = generator.random(number)
+        z = np.where(beside, part * height, self.length / 2 + radius + part * depth)
+        angle = generator.uniform(0.0, 2 * np.pi, number)
+        up = generator.choice([-1.0, 1.0], number)
+        return np.stack([rho * np.cos(angle), rho * np.sin(angle), up * z], axis=1)
 
     def _turned(self, points: np.ndarray) -> np.ndarray:
         axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
