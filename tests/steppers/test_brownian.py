@@ -10,7 +10,9 @@ from scipy import stats
 from tests.scenes import compiled, simulate
 from tests.steppers.colloids import DIFFUSIVITY, RADIUS, SIGMAS, Stop, colloids, run
 from tisim.checkpoint import restore, save
+from tisim.effects.contact_dissipation import ContactDissipation
 from tisim.effects.drag import StokesDrag
+from tisim.effects.hertz import Hertz
 from tisim.effects.impact import Impact
 from tisim.errors import InputError
 
@@ -258,11 +260,19 @@ def test_overlapping_pair_is_pushed_apart_in_short_steps():
     assert result.work["steps"] >= overlap / (2 * drift * RADIUS) + 15
 
 
-@pytest.mark.parametrize("effect", [StokesDrag(viscosity=1e-3), Impact(hardness=1e5)])
-def test_what_needs_velocities_is_refused(effect):
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (StokesDrag(viscosity=1e-3),),
+        (Impact(hardness=1e5),),
+        (ContactDissipation(damping=1.0), Hertz(young=1e6, poisson=0.3)),
+    ],
+    ids=["drag", "impact", "dissipation"],
+)
+def test_what_needs_velocities_is_refused(effects):
     rule = "must be one that does not depend on velocity in a scene stepped by brownian"
-    with pytest.raises(InputError, match=rf"effects.{effect.kind()} {rule}"):
-        colloids(np.zeros((1, 3)), extra=(effect,))
+    with pytest.raises(InputError, match=rf"effects.{effects[0].kind()} {rule}"):
+        colloids(np.zeros((1, 3)), extra=effects)
 
 
 def test_bad_limits_are_refused():

@@ -222,6 +222,21 @@ def test_noise_and_drift_leave_out_what_is_fixed(noise):
 
 @long
 @noises
+def test_any_number_but_0_fixes(noise):
+    position, radius = crowd(3, 10)
+    free = [0] * 8
+    scenes = [
+        make((position, radius), noise=noise, trap=100.0, steps=2, dt=1e-9, seed=4, extra=(Stop(place=1.0),),
+             quantities={"fixed": [number, number, *free]})
+        for number in (1, 2)
+    ]  # fmt: skip
+    one, two = run(scenes)
+    np.testing.assert_array_equal(one.state["position"], two.state["position"])
+    np.testing.assert_array_equal(one.state["position"][:2], position[:2])
+
+
+@long
+@noises
 def test_oseen_tensor_of_near_spheres_is_refused(noise):
     """Not positive definite below 3/2 R: that world stops, with time and particle, the others go on."""
     places = [(np.array([[9, 0, 0], [0, 0, 0], [gap, 0, 0]]) * RADIUS, [RADIUS] * 3) for gap in (1.499, 1.6)]

@@ -37,9 +37,10 @@ class Brownian(Stepper):
     matrix is not positive definite fails, with time and particle: that happens with Oseen's tensor at
     distances below some 3/2 R. "fast" sees only pairs for which it is not.
 
-    Particles whose field ``fixed`` is 1 stay where they are, and take no part in D. Spheres do not rotate:
-    refused are torques, and also what asks for velocities, which particles here do not have: drag, and what
-    happens in an impact. Interaction is refused in a periodic box, as the tensors are of an infinite fluid.
+    Particles whose field ``fixed`` is not 0 stay where they are, and take no part in D. Spheres do not
+    rotate: refused are torques, and also what asks for velocities, which particles here do not have: drag,
+    loss in contact, and what happens in an impact. Interaction is refused in a periodic box, as the tensors
+    are of an infinite fluid.
 
     Particles that do not feel each other, and that operators change one by one, take steps of their own and
     meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
@@ -67,7 +68,7 @@ class Brownian(Stepper):
             turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
             must(not turns, name, "without torques in a scene stepped by brownian", name)
             drags = isinstance(effect, Force) and effect.offers("velocity_jacobian")
-            drags = drags or isinstance(effect, PairEvent)
+            drags = drags or isinstance(effect, PairEvent) or "velocity" in effect.needed()
             rule = "one that does not depend on velocity in a scene stepped by brownian"
             must(not drags, name, rule, name)
         fits = self.hydrodynamics == "none" or not domain.periodic()

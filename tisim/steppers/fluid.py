@@ -16,7 +16,7 @@ PER_KELVIN = scipy.constants.k
 class Fluid:
     """At rest but for the flow, and infinite.
 
-    In a scene with the field ``fixed``, particles for which that is 1 stay where they are.
+    In a scene with the field ``fixed``, particles for which that is not 0 stay where they are.
     """
 
     def __init__(self, parts, stepper) -> None:
@@ -30,7 +30,7 @@ class Fluid:
         """1 for a particle that can move, else 0."""
         mobile = 1
         if ti.static(self.holds):
-            mobile = 1 - self.s.fixed[w, i]
+            mobile = ti.select(self.s.fixed[w, i] == 0, 1, 0)
         return mobile
 
     @ti.func
