@@ -5,6 +5,7 @@ import pytest
 
 from tests.scenes import flow, scene
 from tisim import Box, Cloud, Particles, Scene
+from tisim.effect import Operator
 from tisim.effects.friction import Friction
 from tisim.effects.heating import DeformationWork, Heating
 from tisim.effects.impact import Impact
@@ -182,6 +183,16 @@ class TestRequires:
             cloud(effects=effects)
         assert str(fault.value).startswith(message)
         assert "; received " in str(fault.value)
+
+    def test_a_contract_that_nobody_has_met_yet_is_named(self):
+        class Unmet(Operator):
+            contract = True
+
+        class Lonely(Operator):
+            requires = (Unmet,)
+
+        with pytest.raises(InputError, match=r"^effects\.lonely must be used together with unmet; received"):
+            cloud(effects=(Lonely(),))
 
     def test_quantities_that_effects_need_must_be_given(self):
         from tisim import Simulation

@@ -188,6 +188,7 @@ def _step(place: Any, step: str, key: str) -> Any:
 
 
 def _names(kind: type[Spec]) -> list[str]:
-    """Of an effect in files, or of those known that are made after a contract."""
-    contract = bool(kind.__dict__.get("contract"))
-    return [f"effects.{name}" for name in (sorted(kind.known()) if contract else [kind.kind()])]
+    """Of an effect in files, or of those known that are made after a contract; its own if none are."""
+    if not kind.__dict__.get("contract"):
+        return [f"effects.{kind.kind()}"]
+    return [f"effects.{name}" for name in sorted(kind.known())] or [kind.kind()]
