@@ -13,6 +13,8 @@ from tisim.accuracy.quantity import usual
 from tisim.accuracy.reference import attempts
 from tisim.checkpoint import restore, save
 from tisim.errors import InputError
+from tisim.runtime import memory
+from tisim.simulation import Simulation
 from tisim.steppers.brownian import Brownian
 
 WORLDS, CAPACITY = 8, 40
@@ -314,6 +316,13 @@ def test_cost_sets_exact_and_fast_noise_side_by_side():
     assert {kind for kind, *_ in turned} == {Brownian}
     assert [attempt.method.base.stepper.noise for attempt in attempts(found, 0.0)] == ["exact"] * 2
     assert [quantity.random for quantity in usual(made)] == [True]
+
+
+def test_matrices_for_which_there_is_no_room_are_refused():
+    made = make((np.zeros((1, 3)), np.array([RADIUS])))
+    capacity = int(np.sqrt(memory() / 4) / 3) + 100
+    with pytest.raises(InputError, match=r"memory for diffusion matrices must be within the \d+ GB"):
+        Simulation(made, capacity=capacity)
 
 
 def test_interaction_in_a_periodic_box_is_refused():

@@ -3,7 +3,9 @@
 D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 multiplications; the matrix is kept.
 """
 
+from tisim import runtime
 from tisim._taichi import ti
+from tisim.errors import must
 from tisim.pairs import PairSum
 from tisim.program import PerParticle, Phase
 from tisim.state import INDEFINITE, Field
@@ -16,11 +18,17 @@ LANES = 32
 
 @ti.data_oriented
 class Exact:
-    """The matrix of every world, over sqrt(D_ii D_jj); then C^T in its place, a row for each column of C."""
+    """The matrix of every world, over sqrt(D_ii D_jj); then C^T in its place, a row for each column of C.
+
+    InputError where all of them are more than the machine has room for.
+    """
 
     def __init__(self, fluid, mobility, domain) -> None:
         self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
         self.rows = -(-3 * self.s.capacity // LANES) * LANES
+        rule = f"within the {runtime.memory() / 1e9:.0f} GB of this machine"
+        fits = self.bytes() <= runtime.memory()
+        must(fits, "memory for diffusion matrices", rule, f"{self.bytes() / 1e9:.0f} GB")
         self.matrix = ti.field(self.s.real)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, self.s.worlds).dense(ti.jk, (self.rows, self.rows)).place(self.matrix)
