@@ -21,6 +21,7 @@ from cases.capture_statistics import (
     Settings,
     even,
     fraction,
+    fractions,
     isotropic,
     mean,
     results,
@@ -235,9 +236,9 @@ def by_size(axis: Axes, sizes: Group) -> None:
 def by_aspect(axis: Axes, aspects: Group) -> None:
     found = iter(aspects)
     for n, colour in zip((50, 125, 212), ("#228833", "#4477aa", "#cc6677"), strict=True):
-        groups = [[mean(next(found)[1]) for _ in ANGLES] for _ in ASPECTS]
-        bars(axis, ASPECTS, [even(group) for group in groups], colour, f"{n} nm")
-        axis.plot(ASPECTS, [isotropic(group).value for group in groups], ":", color=colour, lw=1.2)
+        groups = [np.array([fractions(next(found)[1]) for _ in ANGLES]) for _ in ASPECTS]
+        bars(axis, ASPECTS, [Mean.of(even(group)) for group in groups], colour, f"{n} nm")
+        axis.plot(ASPECTS, [isotropic(group).mean() for group in groups], ":", color=colour, lw=1.2)
     axis.set(xlabel="L/D", ylabel="captured in 50 s", ylim=(0.4, 1.0), xscale="log")
     axis.set_xticks([2, 5, 10, 20], ["2", "5", "10", "20"])
     axis.minorticks_off()

@@ -1,7 +1,9 @@
 """What fraction of the particles of the case capture is caught: sweeps over its settings, many repeats each.
 
 All runs of a sweep are the worlds of one batch. A run knows when each of its particles was captured, so the
-fraction at any earlier time needs no run of its own.
+fraction at any earlier time needs no run of its own. Start k is the same for all settings, up to what they
+change: fractions of one start are not independent of each other, so settings are compared and averaged start
+by start.
 """
 
 from __future__ import annotations
@@ -53,29 +55,27 @@ def fraction(state: Arrays, time: float = np.inf) -> float:
     return float(((at >= 0) & (at <= time)).mean())
 
 
+def fractions(found: Sequence[Result], time: float = np.inf) -> np.ndarray:
+    """Captured fraction by a time of each start."""
+    return np.array([fraction(result.state, time) for result in found])
+
+
 def mean(found: Sequence[Result], time: float = np.inf) -> Mean:
     """Captured fraction by a time, over repeats."""
-    return Mean.of([fraction(result.state, time) for result in found])
+    return Mean.of(fractions(found, time))
 
 
-def isotropic(means: Sequence[Mean]) -> Mean:
-    """The mean over directions that are all equally likely, from those at ANGLES: weights sin(alpha)."""
+def isotropic(by_angle: np.ndarray) -> np.ndarray:
+    """The mean over directions that are all equally likely, of each start, from those at ANGLES, (angles,
+    starts): weights sin(alpha)."""
     weights = np.sin(np.radians(ANGLES))
     weights[[0, -1]] /= 2
-    return weighted(means, weights)
+    return np.average(by_angle, axis=0, weights=weights)
 
 
-def even(means: Sequence[Mean]) -> Mean:
-    """The mean over angles that are all equally likely, as over the curves of B16 Fig. 6.7."""
-    return weighted(means, np.ones(len(means)))
-
-
-def weighted(means: Sequence[Mean], weights: np.ndarray) -> Mean:
-    """Sum of independent means with weights, which are scaled to 1."""
-    parts = weights / weights.sum()
-    value = sum(part * m.value for part, m in zip(parts, means, strict=True))
-    half = np.sqrt(sum((part * m.half) ** 2 for part, m in zip(parts, means, strict=True)))
-    return Mean(float(value), float(half))
+def even(by_angle: np.ndarray) -> np.ndarray:
+    """The mean over angles that are all equally likely, as over the curves of B16 Fig. 6.7, of each start."""
+    return by_angle.mean(axis=0)
 
 
 def check(repeats: int = REPEATS) -> Iterator[Check | Claim]:
@@ -97,9 +97,10 @@ def of_orientation(repeats: int) -> Iterator[Claim]:
     found = iter(results(settings, repeats))
     for size in sizes:
         for part, name in (("all", "both regions"), ("top", "TOP"), ("side", "SIDE")):
-            along, across = mean(next(found)), mean(next(found))
+            along, across = fractions(next(found)), fractions(next(found))
             limits = {"most": 0.0} if part == "top" else {"least": 0.0}
-            yield Claim(f"{size} nm, {name}: transverse minus longitudinal", across - along, **limits)
+            gain = Mean.of(across - along)
+            yield Claim(f"{size} nm, {name}: transverse minus longitudinal", gain, **limits)
 
 
 def of_aspect(repeats: int) -> Iterator[Claim]:
@@ -109,11 +110,11 @@ def of_aspect(repeats: int) -> Iterator[Claim]:
     settings = [
         {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in aspects for angle in ANGLES
     ]
-    found = [mean(group) for group in results(settings, repeats)]
-    short, long = found[: len(ANGLES)], found[len(ANGLES) :]
-    yield Claim("125 nm, L/D 5/3 minus 20, longitudinal", short[0] - long[0], least=0.0)
-    yield Claim("125 nm, L/D 5/3 minus 20, even mean over angles", even(short) - even(long), least=0.0)
-    yield Claim("the same, all directions equally likely", isotropic(short) - isotropic(long), most=0.0)
+    found = np.array([fractions(group) for group in results(settings, repeats)])
+    gain = found[: len(ANGLES)] - found[len(ANGLES) :]
+    yield Claim("125 nm, L/D 5/3 minus 20, longitudinal", Mean.of(gain[0]), least=0.0)
+    yield Claim("125 nm, L/D 5/3 minus 20, even mean over angles", Mean.of(even(gain)), least=0.0)
+    yield Claim("the same, all directions equally likely", Mean.of(isotropic(gain)), most=0.0)
 
 
 def of_size(repeats: int) -> Iterator[Claim]:
