@@ -113,7 +113,7 @@ class Filter:
         must(count >= 1, "number of fibres", "at least 1", count)
         must(count * self.length <= WIRE * (1 + 1e-9), "wire", f"at most {WIRE:g} m", count * self.length)
         across, along = self.spacing * DIAMETER, self.length + (self.spacing - 1) * DIAMETER
-        columns = _row(1 + int((WIDTH - DIAMETER) / across), across)
+        columns = _row(1 + int((WIDTH - DIAMETER) / across + 1e-9), across)
         rows = _row(1 + int((HEIGHT - self.length) / along + 1e-9), along)
         layer = sorted(product(columns, rows), key=lambda at: (at[0] ** 2 + at[1] ** 2, at))
         layers = ((x, k * across, z) for k in range(count) for x, z in layer)

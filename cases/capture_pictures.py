@@ -150,7 +150,8 @@ def field() -> Figure:
 
 
 def volume() -> Figure:
-    """Magnetic force on a particle of 50 nm towards the cylinder, where above LEAST_FORCE (B16 Fig. 6.3)."""
+    """Magnetic force on a particle of 50 nm towards the cylinder, where above LEAST_FORCE (B16 Fig. 6.3;
+    there magnetised along the field, here as Stoner and Wohlfarth say)."""
     figure = empty(10.4, 6.6)
     grid = figure.subplots(2, 3)
     for row, aspect in zip(grid, (5 / 3, 20 / 3), strict=True):

@@ -8,8 +8,9 @@ The paper's side of the cube, cbrt(rho V_p / c), leaves out N; here it is cbrt(N
 particles have the concentration c. It gives c in g/mL, and in the caption of Fig. 6.13 in mg/L; here it is
 g/mL. At 2 g/mL that is a volume fraction of 0.4; centres, not whole spheres, lie within the cube.
 
-Steps are as short as contacts ask for, not the cylinder: spheres that dipoles press together jump on the
-steep Mie potential by what noise gives them in a step, which at 75 nm takes steps below 1 us.
+Steps are as short as contacts ask for, not the cylinder: noise moves a particle by DIFFUSION radii in one, 10
+us at 75 nm. That holds chains together, no more: the distance of a bound pair of 75 nm then spreads by 0.09
+of a diameter, where it is 0.005 in equilibrium and 0.007 with a tenth of DIFFUSION and DRIFT.
 """
 
 from __future__ import annotations

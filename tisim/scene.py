@@ -63,6 +63,9 @@ class Scene(Spec):
                     f"used together with {' or '.join(_names(needed))}",
                     ", ".join(other.kind() for other in present),
                 )
+            for other in present:
+                alone = not issubclass(other, kind.excludes)
+                must(alone, f"effects.{kind.kind()}", f"used without {other.kind()}", other.kind())
             must(
                 not isinstance(self.stepper.control, kind.unfit),
                 "stepper.control",

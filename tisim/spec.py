@@ -103,6 +103,8 @@ class Spec(Checked):
     """Set by a class that is no part of a scene itself, only what parts are made after."""
     requires: ClassVar[tuple[type[Spec], ...]] = ()
     """Effects without which this one means nothing."""
+    excludes: ClassVar[tuple[type[Spec], ...]] = ()
+    """Effects that cannot be in a scene with this one."""
     unfit: ClassVar[tuple[type[Spec], ...]] = ()
     """Step controls that do not see what this effect needs them to."""
     knobs: ClassVar[tuple[Knob, ...]] = ()

@@ -30,6 +30,9 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         names = ", ".join(sorted(missing))
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
     n = len(start["mass"])
+    if "fixed" in start and start["fixed"].shape == (n,):
+        rest = not np.any(start["velocity"][start["fixed"] != 0])
+        must(rest, "particles.velocity", "0 where particles are fixed", "one that moves")
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             _check(f, start[f.name], n)

@@ -6,6 +6,7 @@ import pytest
 from tests.scenes import compiled, scene, simulate
 from tisim import Scene
 from tisim.effects.gravity import Gravity
+from tisim.effects.impact import Impact
 from tisim.effects.magnetic_body_force import MagneticBodyForce
 from tisim.effects.tether import Tether
 from tisim.errors import InputError
@@ -145,3 +146,13 @@ def test_it_needs_a_magnet_and_files_give_it_back():
         [[0, 0, 5]], [[0, 0, 0]], (MagneticCylinders(cylinders=[Cylinder(radius=1, length=1)]), Capture())
     )
     assert Scene.from_dict(made.to_dict()).digest() == made.digest()
+
+
+def test_what_is_fixed_is_at_rest_and_stays():
+    body = MagneticCylinders(cylinders=[Cylinder(radius=1.0, length=2.0)])
+    place, speed = [[3.0, 0, 0]], [[1.0, 0, 0]]
+    moving = scene(place, speed, (body, Capture()), quantities={"fixed": [1]})
+    with pytest.raises(InputError, match=r"particles.velocity must be 0 where particles are fixed"):
+        simulate([moving], capacity=1)
+    with pytest.raises(InputError, match=r"effects.capture must be used without impact; received impact"):
+        scene(place, speed, (body, Capture(), Impact(hardness=1.0)))

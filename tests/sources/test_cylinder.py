@@ -3,12 +3,12 @@
 import magpylib
 import numpy as np
 import pytest
+from scipy.constants import mu_0
 from scipy.spatial.transform import Rotation
 
 from tests.sources.fields import WORLDS, fields, relative
 from tests.sources.published import by_quadrature, field_and_gradient
 from tisim.sources.cylinder import Cylinder, MagneticCylinders
-from tisim.sources.magnets import MU_0
 
 M = (0.3e6, -0.5e6, 0.8e6)
 
@@ -201,17 +201,17 @@ def test_limits():
     places = np.array([[[0.3, 0.2, 0], [3.0, 0, 0], [0, 3.0, 0], [0, -0.5, 40.0]]])
     b, _ = fields([long], places)
     expected = [[m - h, 0, 0], [h / 9, 0, 0], [-h / 9, 0, 0], [m - h, 0, 0]]
-    np.testing.assert_allclose(b[0], MU_0 * np.array(expected), rtol=0, atol=1e-9 * MU_0 * m)
+    np.testing.assert_allclose(b[0], mu_0 * np.array(expected), rtol=0, atol=1e-9 * mu_0 * m)
     heights = np.array([0.0, 0.5, 1.999, 2.001, 7.0])
     b, _ = fields([one(2.0, m=(m, 0, 0))], np.array([[[0, 0, z] for z in heights]]))
     up, down = heights + 2, heights - 2
     axis = -m / 4 * (up / np.hypot(up, 1) - down / np.hypot(down, 1)) + m * (heights < 2)
-    np.testing.assert_allclose(b[0][:, 0], MU_0 * axis, rtol=1e-13)
+    np.testing.assert_allclose(b[0][:, 0], mu_0 * axis, rtol=1e-13)
     far = np.array([[[3e4, 0, 4e4], [0, 5e6, 0], [1e9, 2e9, -2e9]]])
     b, _ = fields([one(2.0)], far)
     moment = np.array(M) * np.pi * 4.0
     r = np.linalg.norm(far[0], axis=1)[:, None]
-    dipole = MU_0 / (4 * np.pi) * (3 * far[0] * (far[0] @ moment)[:, None] / r**5 - moment / r**3)
+    dipole = mu_0 / (4 * np.pi) * (3 * far[0] * (far[0] @ moment)[:, None] / r**5 - moment / r**3)
     np.testing.assert_allclose(b[0], dipole, rtol=0, atol=1e-8 * np.linalg.norm(dipole[0]))
     assert relative(b[0][1:], dipole[1:]).max() < 1e-11
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.constants import mu_0
 
 from tisim.errors import InputError
-from tisim.sources.magnets import MU_0
 from tisim.sources.soft_magnet import magnetisation
 from tisim.sources.stoner_wohlfarth import demagnetising_factor
 
@@ -18,7 +18,7 @@ def test_inside_a_weak_field_is_cancelled(aspect):
     m = np.array(magnetisation(AXIS, 1.0, 2 * aspect, SATURATION, tuple(b)))
     n, along = demagnetising_factor(1.0, 2 * aspect), np.array(AXIS)
     own = -n * (m @ along) * along - (1 - n) / 2 * (m - (m @ along) * along)
-    np.testing.assert_allclose(b / MU_0 + own, 0.0, atol=1e-9 * np.linalg.norm(b) / MU_0)
+    np.testing.assert_allclose(b / mu_0 + own, 0.0, atol=1e-9 * np.linalg.norm(b) / mu_0)
 
 
 def test_saturates_sooner_along_a_long_axis():
@@ -27,7 +27,7 @@ def test_saturates_sooner_along_a_long_axis():
 
     assert size((0.0, 0.0, 0.1)) == pytest.approx(SATURATION)
     # Across N is near 1/2, so that it takes mu_0 M_s / 2 = 0.62 T.
-    assert size((0.1, 0.0, 0.0)) == pytest.approx(0.1 / (MU_0 * 0.5), rel=0.05)
+    assert size((0.1, 0.0, 0.0)) == pytest.approx(0.1 / (mu_0 * 0.5), rel=0.05)
     assert size((0.7, 0.0, 0.0)) == pytest.approx(SATURATION)
     assert size((0.0, 0.0, 0.0)) == 0.0
 
@@ -39,7 +39,7 @@ def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
     factors = np.array([(1 - n) / 2, (1 - n) / 2, n])
 
     def energy(m):
-        return (MU_0 / 2 * factors * m**2 - m * b).sum(axis=-1)
+        return (mu_0 / 2 * factors * m**2 - m * b).sum(axis=-1)
 
     found = np.array(magnetisation((0, 0, 1), 1.0, 2 * aspect, SATURATION, field))
     assert np.linalg.norm(found) <= SATURATION * (1 + 1e-12)

@@ -2,9 +2,9 @@
 
 import magpylib
 import numpy as np
+from scipy.constants import mu_0
 
 from tests.sources.fields import fields, relative
-from tisim.sources.magnets import MU_0
 from tisim.sources.sphere import MagneticSpheres, Sphere
 
 
@@ -40,5 +40,5 @@ def test_inside_and_at_the_centre():
     b, slope = fields(
         [MagneticSpheres(spheres=[Sphere(radius=2, magnetisation=m)])], [[[0, 0, 0], [0, 1, 1]]]
     )
-    np.testing.assert_allclose(b[0], np.array([m, m]) * 2 / 3 * MU_0, rtol=1e-15)
+    np.testing.assert_allclose(b[0], np.array([m, m]) * 2 / 3 * mu_0, rtol=1e-15)
     assert (slope == 0).all()

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.constants import mu_0
 
 from tests.sources.fields import fields
 from tisim.errors import InputError
 from tisim.sources.cylinder import Cylinder, MagneticCylinders
-from tisim.sources.magnets import MU_0
 from tisim.sources.stoner_wohlfarth import demagnetising_factor, magnetisation
 
 SATURATION = 985e3
@@ -31,7 +31,7 @@ def test_it_is_the_mean_of_the_field_inside():
     share = weight * (1 - x) * 0.5
     points = np.array([[np.sqrt(r), 0, h] for r in rho2 for h in z])
     magnet = MagneticCylinders(
-        cylinders=[Cylinder(radius=1, length=2 * half, magnetisation=(0, 0, 1 / MU_0))]
+        cylinders=[Cylinder(radius=1, length=2 * half, magnetisation=(0, 0, 1 / mu_0))]
     )
     h = fields([magnet], points[None])[0][0, :, 2].reshape(60, 60) - 1
     assert -share @ h @ share == pytest.approx(demagnetising_factor(1.0, 2 * half), rel=1e-5)
@@ -41,7 +41,7 @@ def test_along_the_easy_axis_and_across_it():
     """Along: it stays. Across: sin(psi) = B / B_K up to B_K = mu_0 M (1 - 3N)/2, then it is saturated."""
     m = magnetisation((0, 0, 2), 1.0, 10.0, SATURATION, (0, 0, 0.1))
     np.testing.assert_allclose(m, (0, 0, SATURATION), atol=1e-9 * SATURATION)
-    threshold = MU_0 * SATURATION * (1 - 3 * demagnetising_factor(1.0, 10.0)) / 2
+    threshold = mu_0 * SATURATION * (1 - 3 * demagnetising_factor(1.0, 10.0)) / 2
     for part in (0.1, 0.5, 0.99, 1.5):
         m = np.array(magnetisation((0, 0, 1), 1.0, 10.0, SATURATION, (part * threshold, 0, 0))) / SATURATION
         assert m[0] == pytest.approx(min(part, 1.0), abs=1e-12)
@@ -50,7 +50,7 @@ def test_along_the_easy_axis_and_across_it():
     # A flat one lies in its plane whatever points along, until that is strong.
     m = np.array(magnetisation((0, 0, 1), 1.0, 0.2, SATURATION, (0, 1e-3, 0.1))) / SATURATION
     assert m[2] == pytest.approx(
-        0.1 / (MU_0 * SATURATION * (3 * demagnetising_factor(1.0, 0.2) - 1) / 2), rel=0.01
+        0.1 / (mu_0 * SATURATION * (3 * demagnetising_factor(1.0, 0.2) - 1) / 2), rel=0.01
     )
     assert m[1] > 0.9
 
@@ -69,7 +69,7 @@ def test_no_direction_is_better(rng):
         def energy(m, n=n, e=e, field=field):
             along = m @ e
             across = (m * m).sum(axis=-1) - along**2
-            return MU_0 / 2 * (n * along**2 + (1 - n) / 2 * across) - m @ field
+            return mu_0 / 2 * (n * along**2 + (1 - n) / 2 * across) - m @ field
 
         side = field - (field @ e) * e
         side /= np.linalg.norm(side)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim._taichi import ti
-from tisim.effect import Operator
+from tisim.effect import Operator, PairEvent
 from tisim.sources.magnets import Magnets
 from tisim.state import Field
 
@@ -17,7 +17,8 @@ class Capture(Operator):
     captured_by : the magnet, counted from 0 through the lists of the scene in order; -1 for none.
     captured_at : s, the end of the step in which it touched; -1 for a free one.
     ``work["captures"]`` counts them. They still act on others. One that a step brings into a magnet goes to
-    the nearest point outside, so steps must be short beside the magnet. Source: B16 section 6.3.
+    the nearest point outside, so steps must be short beside the magnet. Impacts, which would move it again,
+    are refused. Source: B16 section 6.3.
     """
 
     needs: ClassVar = (
@@ -28,6 +29,7 @@ class Capture(Operator):
     )
     counts: ClassVar = ("captures",)
     requires: ClassVar = (Magnets,)
+    excludes: ClassVar = (PairEvent,)
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"bodies": tuple(peer.bodies() for peer in peers if isinstance(peer, Magnets))}

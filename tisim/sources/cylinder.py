@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field as Option
 from pydantic import field_validator, model_validator
+from scipy.constants import mu_0
 
 from tisim._taichi import ti
 from tisim.effect import Effect, parameter
@@ -14,7 +15,7 @@ from tisim.errors import InputError, must
 from tisim.sources import cylinder_field
 from tisim.sources.cylinder_end import ClosedEnds
 from tisim.sources.cylinder_table import TabulatedEnds, table
-from tisim.sources.magnets import MU_0, Body, Magnets
+from tisim.sources.magnets import Body, Magnets
 from tisim.spec import Vector
 
 
@@ -83,7 +84,7 @@ class Cylinder(Body):
         six = self.shape(w, k, rho, z)
         m_across, m_along = self.magnetised(w, k)
         slope = cylinder_field.gradient(six, rho, outward, self.axis(w, k), m_across, m_along)
-        return self.density(w, k, six, rho, outward, z), MU_0 * slope
+        return self.density(w, k, six, rho, outward, z), mu_0 * slope
 
     @ti.func
     def density(self, w, k, six, rho, outward, z):
@@ -93,7 +94,7 @@ class Cylinder(Body):
         b = across + along * self.axis(w, k)
         if rho < self.radius(w, k) and ti.abs(z) < 0.5 * self.length(w, k):
             b += self.magnetisation(w, k)
-        return MU_0 * b
+        return mu_0 * b
 
 
 class MagneticCylinders(Magnets):

@@ -8,9 +8,6 @@ from tisim._taichi import ti
 from tisim.effect import Source, parameter
 from tisim.spec import Spec, Vector
 
-MU_0 = 1.25663706127e-6
-"""Magnetic constant, N/A^2 (CODATA 2022)."""
-
 
 class Body(Spec):
     """A solid body that may be magnetised. Bound, its functions are of the world and the row of the list."""

@@ -6,10 +6,10 @@ Plain NumPy on what a scene is made of: ``Cylinder(..., magnetisation=magnetisat
 from __future__ import annotations
 
 import numpy as np
+from scipy.constants import mu_0
 
 from tisim.errors import must
 from tisim.sources import stoner_wohlfarth
-from tisim.sources.magnets import MU_0
 from tisim.sources.stoner_wohlfarth import demagnetising_factor
 from tisim.spec import Vector
 
@@ -33,7 +33,7 @@ def magnetisation(
     n = demagnetising_factor(radius, length)
     direction, field = np.asarray(axis, float) / size, np.asarray(flux_density, float)
     along = (field @ direction) * direction
-    m = (along / n + (field - along) / (0.5 * (1 - n))) / MU_0
+    m = (along / n + (field - along) / (0.5 * (1 - n))) / mu_0
     if np.linalg.norm(m) > saturation:
         return stoner_wohlfarth.magnetisation(axis, radius, length, saturation, flux_density)
     return float(m[0]), float(m[1]), float(m[2])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from scipy.constants import mu_0
+
 from tisim._taichi import ti
 from tisim.effect import parameter
-from tisim.sources.magnets import MU_0, Body, Magnets
+from tisim.sources.magnets import Body, Magnets
 
 
 class Sphere(Body):
@@ -25,7 +27,7 @@ class Sphere(Body):
 
     @ti.func
     def flux(self, w, k, r):
-        d, m, radius = r - self.centre(w, k), MU_0 * self.magnetisation(w, k), self.radius(w, k)
+        d, m, radius = r - self.centre(w, k), mu_0 * self.magnetisation(w, k), self.radius(w, k)
         size = d.norm()
         b, slope = 2.0 / 3.0 * m, 0.0 * r.outer_product(r)
         if size >= radius:

@@ -6,10 +6,10 @@ Plain NumPy on what a scene is made of: ``Cylinder(..., magnetisation=magnetisat
 from __future__ import annotations
 
 import numpy as np
+from scipy.constants import mu_0
 from scipy.special import ellipe, ellipk
 
 from tisim.errors import must
-from tisim.sources.magnets import MU_0
 from tisim.spec import Vector
 
 
@@ -53,7 +53,7 @@ def magnetisation(
     if not np.linalg.norm(across) > 0:
         across = np.cross(along, np.cross([1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0], along))
     across /= np.linalg.norm(across)
-    anisotropy = 0.5 * MU_0 * saturation * (1 - 3 * demagnetising_factor(radius, length))
+    anisotropy = 0.5 * mu_0 * saturation * (1 - 3 * demagnetising_factor(radius, length))
     psi = _angle(anisotropy, float(field @ along), float(field @ across))
     m = saturation * (np.cos(psi) * along + np.sin(psi) * across)
     return float(m[0]), float(m[1]), float(m[2])
