@@ -154,5 +154,5 @@ def test_what_is_fixed_is_at_rest_and_stays():
     moving = scene(place, speed, (body, Capture()), quantities={"fixed": [1]})
     with pytest.raises(InputError, match=r"particles.velocity must be 0 where particles are fixed"):
         simulate([moving], capacity=1)
-    with pytest.raises(InputError, match=r"effects.capture must be used without impact; received impact"):
+    with pytest.raises(InputError, match=r"effects.capture must be used without impact; received 'impact'"):
         scene(place, speed, (body, Capture(), Impact(hardness=1.0)))
