@@ -163,6 +163,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
+    quantities=capture.quantities,
     pictures=pictures,
     figures=figures,
 )

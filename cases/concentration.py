@@ -176,6 +176,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
+    quantities=capture.quantities,
     pictures=pictures,
     figures=figures,
 )

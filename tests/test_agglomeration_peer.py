@@ -57,8 +57,11 @@ def apart(result, final):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("hardness", "even", "steps", "tolerance"),
-    [(1, False, 40, 1e-9), (1, True, 200, 1e-9), (200, False, 25, 1e-9)],
-    ids=["adaptive", "even steps", "hard grains"],
+    [
+        pytest.param(1, False, 40, 1e-9, id="adaptive"),
+        pytest.param(1, True, 200, 1e-9, id="even steps"),
+        pytest.param(200, False, 25, 1e-9, id="hard grains"),
+    ],
 )
 def test_every_step_has_the_same_events_and_particles(simulation, hardness, even, steps, tolerance):
     if runtime.current().precision != "f64":

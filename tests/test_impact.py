@@ -9,8 +9,13 @@ from tisim.effects.friction import Friction
 from tisim.effects.heating import DeformationWork, Heating
 from tisim.effects.reaction import Reaction
 
+QUICK = ("impact", "all")
 
-@pytest.fixture(scope="module", params=COMBINATIONS, ids=str)
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in COMBINATIONS],
+)
 def impacts(request):
     """The same random pairs under each combination of laws, as the worlds of one batch."""
     kinds = COMBINATIONS[request.param]

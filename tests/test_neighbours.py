@@ -202,7 +202,7 @@ def test_results_do_not_depend_on_the_skin(rng, outcome):
     same(usual, outcome(start, AHEAD=0.0, LISTED=2))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_results_do_not_depend_on_lists_at_all(rng, outcome):
     """With steps of one length, cell lists and looking at all pairs give the same bits."""
     start = crowd(rng, fixed(4e-6))

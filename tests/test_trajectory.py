@@ -119,6 +119,7 @@ def test_a_failed_run_ends_with_its_last_good_state(tmp_path):
     assert np.isfinite(found[-1].arrays["position"]).all()
 
 
+@pytest.mark.slow
 def test_scenes_of_different_structure_go_to_one_file(tmp_path):
     mixed = [scene([(k * 1e-3, 0, 0)], [(1.0, 0, 0)], dt=1e-4, steps=4) for k in range(3)]
     mixed[1] = mixed[1].model_copy(update={"domain": Box(low=(-1,) * 3, high=(1,) * 3)})

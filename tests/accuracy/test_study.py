@@ -52,6 +52,7 @@ def order(rows):
     return -np.polyfit(np.log([r.steps for r in rows]), np.log([r.errors[0][0] for r in rows]), 1)[0]
 
 
+@pytest.mark.slow
 def test_every_stepper_shows_its_order_along_its_line(measured):
     assert {row.method for row in measured.rows} == set(STEPPERS)
     for method, expected in STEPPERS.items():

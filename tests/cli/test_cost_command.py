@@ -9,8 +9,9 @@ import pytest
 from tests.accuracy.scenes import only, oscillator
 from tisim.accuracy import files
 
+CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
 WRONG = [
-    (["nosuch"], "case must be one of agglomeration, blast, vibration, or a scene file ending in"),
+    (["nosuch"], f"case must be one of {CASES}, or a scene file ending in"),
     (["vibration", "--size", "huge"], "size must be one of alone, default, equilibrium"),
     (["vibration", "--set", "effects.warp.speed=9"], "effects.warp.speed must be a setting of this scene"),
     (["vibration", "--without", "warp"], "effect to leave out must be one of"),

@@ -2,8 +2,10 @@
 
 import pytest
 
+CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
+
 WRONG = [
-    (["run", "nosuch"], "case must be one of agglomeration, blast, vibration, or a scene file ending in"),
+    (["run", "nosuch"], f"case must be one of {CASES}, or a scene file ending in"),
     (["run", "none.toml"], "scene file must exist; received 'none.toml'"),
     (["run", "FLOW", "--size", "small"], "--size must be given for a case only; received 'small'"),
     (["run", "FLOW", "--set", "hardness"], "--set must be key=value; received 'hardness'"),
@@ -21,7 +23,7 @@ WRONG = [
     (["run", "FLOW", "--resume"], "output folder must be one that an interrupted run has left"),
     (["run", "agglomeration", "--size", "huge"], "size must be one of small, default, paper; received"),
     (["explain", "nosuch"], "case must be one of"),
-    (["check", "nosuch"], "case must be one of agglomeration, blast, vibration; received 'nosuch'"),
+    (["check", "nosuch"], f"case must be one of {CASES}; received 'nosuch'"),
     (["optimize", "agglomeration", "--population", "1"], "options.population must be at least 2; received 1"),
     (["optimize", "agglomeration", "--variant", "x"], "variant must be one of paper, fragmenting; received"),
     (["optimize", "agglomeration", "--set", "block=2"], "--set must be of the form search.KEY=VALUE"),

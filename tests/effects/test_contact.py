@@ -130,7 +130,9 @@ COMBINATIONS = {
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", COMBINATIONS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name == "all" else pytest.mark.slow) for name in COMBINATIONS]
+)
 def test_contact_is_its_numpy_twin(name, rng):
     """Random heaps, all worlds of one batch; forces and torques; momentum and angular momentum."""
     kinds = COMBINATIONS[name]

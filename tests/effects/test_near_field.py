@@ -73,7 +73,7 @@ def test_every_strength(strength, signed, rng):
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("exponents", [(0, 6), (2.0, 13), (1.5, 2.25)])
+@pytest.mark.parametrize("exponents", [(0, 6), (2.0, 13), pytest.param((1.5, 2.25), marks=pytest.mark.slow)])
 def test_exponents(exponents, rng):
     check([
         cloud(rng, NearField(**coefficients(rng), beta1=exponents[0], beta2=exponents[1]))

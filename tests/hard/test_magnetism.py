@@ -306,7 +306,7 @@ def colloids():
     return [*found, (MU_0 * result.state["moment"]).tolist()]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_single_precision_holds_the_numbers_of_nanometres(single):
     """Moments of 1e-18 A m^2, energies of 1e-19 J: nothing becomes zero or infinite on the way; as in f64."""
     for rough, fine in zip(single("hard.test_magnetism", "colloids"), colloids(), strict=True):

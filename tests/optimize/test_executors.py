@@ -234,7 +234,7 @@ def alive(group):
     return found
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_ctrl_c_of_the_terminal_stops_the_command_and_all_its_workers(tmp_path):
     """SIGINT to the whole group, as a terminal sends it."""
     command = ("optimize", "drift", "--generations", "5000")

@@ -184,7 +184,7 @@ PLACES = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_same_bits_with_one_thread_and_two(tmp_path):
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(tmp_path / "found.npz")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
@@ -213,7 +213,7 @@ def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
     check_same(*ends)
 
 
-@pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_what_is_fixed_stays_and_the_others_go_on(together):
     """In a flow along x, particles are stopped by an operator, after the very step that brings them there."""
     shear, dt, place = 10.0, 1e-3, 1.05e-6

@@ -265,7 +265,7 @@ def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
 
 
 @long
-@noises
+@pytest.mark.parametrize("noise", ["exact", pytest.param("fast", marks=pytest.mark.slow)])
 def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_path):
     scenes = [
         make(crowd(k, 35), noise=noise, trap=300.0, drift=0.2, dt=1e-3, steps=20, seed=k) for k in range(8)
@@ -288,6 +288,7 @@ def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_p
             np.testing.assert_array_equal(other.state[name], values, err_msg=name)
 
 
+@pytest.mark.slow
 @long
 def test_interaction_does_not_change_where_particles_are_in_equilibrium():
     """Spheres that overlap as they like, in traps as wide as they are: each coordinate is still of variance
