@@ -182,6 +182,7 @@ def test_parts_of_a_start_are_settings():
         scene.replace({"particles.placement.kind": "heap"})
 
 
+@pytest.mark.slow
 def test_a_blast_runs():
     scene = Scene(
         particles=Cloud(

@@ -141,7 +141,7 @@ def twin(start, steps, stiffness, grip):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("schedule", ["world", "particle"])
+@pytest.mark.parametrize("schedule", [pytest.param("world", marks=pytest.mark.slow), "particle"])
 def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
     made = grains()

@@ -264,7 +264,7 @@ def synthetic(k):
     return Frame(1e-3 * k, 10 * k, arrays)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for kill in range(2):

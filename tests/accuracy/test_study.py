@@ -27,7 +27,7 @@ from tisim.steppers.implicit_control import ErrorControl, IterationControl
 from tisim.steppers.trapezoid import Trapezoid
 from tisim.steppers.verlet import Verlet
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 STEPPERS = {
     "Verlet, FixedStep: dt": 2,
     "Trapezoid, ErrorControl: error, tolerance": 2,
@@ -52,7 +52,6 @@ def order(rows):
     return -np.polyfit(np.log([r.steps for r in rows]), np.log([r.errors[0][0] for r in rows]), 1)[0]
 
 
-@pytest.mark.slow
 def test_every_stepper_shows_its_order_along_its_line(measured):
     assert {row.method for row in measured.rows} == set(STEPPERS)
     for method, expected in STEPPERS.items():
@@ -108,7 +107,6 @@ def test_the_reference_is_no_worse_than_it_says(measured):
     assert measured.truths[1].error < 20 * off
 
 
-@pytest.mark.slow
 def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypatch):
     """On a rotation the trapezoidal rule with equal steps and Boris' stepper agree, at any step."""
     limits = {"first": 0.02, "longest": 0.02, "shortest": 1e-9, "tolerance": 1e-4}
@@ -250,7 +248,6 @@ def test_nothing_to_compare_is_told(verlet_only):
         study(oscillator(), (still,), precisions=("f64",), coarser=0)
 
 
-@pytest.mark.slow
 def test_single_precision_is_a_line_of_its_own_and_the_runtime_as_before(verlet_only):
     before = runtime.current()
     found = study(oscillator(), (KNOWN,), precisions=("f64", "f32"), repeats=1, finer=2)

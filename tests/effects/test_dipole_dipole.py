@@ -84,7 +84,7 @@ def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
     balanced({**state, "torque": turning})
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_near_pairs_only(rng):
     """Up to so many radii; also over the pair list, where sizes are unlike."""
     few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 10)))) for _ in range(WORLDS)]
@@ -187,7 +187,7 @@ def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_
         close(state["force"], expected, 1e-7)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_langevin_moments_in_each_others_field(rng):
     """Each has the moment that the field at its place gives it, that of the others included; where the field
     is weak it is not that of the sources alone."""

@@ -77,14 +77,14 @@ def test_induced_moments_are_those_of_magnetised_spheres(rng):
 
 STEPPERS = [
     pytest.param(Verlet(control=FixedStep(dt=1e-3)), id="verlet"),
-    pytest.param(Boris(control=FixedStep(dt=1e-3)), id="boris", marks=pytest.mark.long),
+    pytest.param(Boris(control=FixedStep(dt=1e-3)), id="boris", marks=pytest.mark.slow),
     pytest.param(
         Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-9, first=1e-3, longest=1e-2)),
         id="trapezoid, each particle alone",
-        marks=pytest.mark.long,
+        marks=pytest.mark.slow,
     ),
     pytest.param(
-        Collocation(control=StageControl(error=1e-10, first=1e-3)), id="collocation", marks=pytest.mark.long
+        Collocation(control=StageControl(error=1e-10, first=1e-3)), id="collocation", marks=pytest.mark.slow
     ),
 ]
 

@@ -201,7 +201,7 @@ def energy(state, wall, b):
     return 0.5 * (state["velocity"] ** 2).sum() - 0.5 * (state["moment"] @ b).sum() + wall(gap)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_trial_state_in_which_nothing_converges_is_given_up():
     """Two spheres fly at each other in a field and bounce off; a first step so long that it ends with both in
     each other, where moments have no end, is tried again with a shorter one. Energy stays; nothing fails.
@@ -245,7 +245,7 @@ def test_a_trial_state_in_which_nothing_converges_is_given_up():
     assert energy(by_id(result), wall, b) == pytest.approx(energy(by_id(start), wall, b), rel=1e-4)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_pair_that_snaps_together_keeps_its_energy():
     """Head to tail, from rest, onto hard spheres and off again, twenty times: Mie(30, 15) takes the blows."""
     size, bottom, steps = 4e3, 2 * 2 ** (1 / 15), 300

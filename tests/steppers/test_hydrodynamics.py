@@ -22,9 +22,9 @@ SOFTNESS = 1 / (6 * np.pi * VISCOSITY)
 TENSORS = {"oseen": oseen, "rotne-prager": rotne_prager}
 DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
 
-long = pytest.mark.long
+slow = pytest.mark.slow
 noises = pytest.mark.parametrize("noise", ["exact", "fast"])
-tensors = pytest.mark.parametrize("hydrodynamics", [pytest.param("oseen", marks=long), "rotne-prager"])
+tensors = pytest.mark.parametrize("hydrodynamics", [pytest.param("oseen", marks=slow), "rotne-prager"])
 
 
 def crowd(seed, n=12, side=6.0, sizes=4.0):
@@ -195,7 +195,7 @@ def test_what_the_expansion_leaves_out():
     assert 0.2 < off(*cloud(100, 20.0)) < 0.3
 
 
-@long
+@slow
 @noises
 def test_noise_and_drift_leave_out_what_is_fixed(noise):
     """The first of the spheres is beyond the place, and fixed in the first step: it drags nobody any more."""
@@ -222,7 +222,7 @@ def test_noise_and_drift_leave_out_what_is_fixed(noise):
     np.testing.assert_allclose(shift, kicks, rtol=0, atol=1e-9 * np.abs(kicks).max())
 
 
-@long
+@slow
 @noises
 def test_any_number_but_0_fixes(noise):
     position, radius = crowd(3, 10)
@@ -237,7 +237,7 @@ def test_any_number_but_0_fixes(noise):
     np.testing.assert_array_equal(one.state["position"][:2], position[:2])
 
 
-@long
+@slow
 @noises
 def test_oseen_tensor_of_near_spheres_is_refused(noise):
     """Not positive definite below 3/2 R: that world stops, with time and particle, the others go on."""
@@ -264,7 +264,7 @@ def test_spheres_in_one_place_and_a_heap_of_them_stay_finite(noise):
         assert apart < 1e-4 * RADIUS
 
 
-@long
+@slow
 @pytest.mark.parametrize("noise", ["exact", pytest.param("fast", marks=pytest.mark.slow)])
 def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_path):
     scenes = [
@@ -289,7 +289,7 @@ def test_same_bits_whatever_the_schedule_the_batch_and_the_portions(noise, tmp_p
 
 
 @pytest.mark.slow
-@long
+@slow
 def test_interaction_does_not_change_where_particles_are_in_equilibrium():
     """Spheres that overlap as they like, in traps as wide as they are: each coordinate is still of variance
     kT/k, as drift and noise come from the same matrix."""

@@ -39,7 +39,7 @@ def test_schedules_agree_and_momentum_is_kept():
     assert np.abs(a.state["velocity"] - a.start["velocity"]).max() > 1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_acceleration_finds_the_same_solution_in_fewer_iterations():
     """Anderson's: forces that repel stiffly and torques; less than 0.8 of the work, to 1e-9 m."""
     plain, mixed = (
