@@ -58,7 +58,7 @@ def apart(result, final):
 @pytest.mark.parametrize(
     ("hardness", "even", "steps", "tolerance"),
     [
-        pytest.param(1, False, 40, 1e-9, id="adaptive"),
+        pytest.param(1, False, 40, 1e-9, id="adaptive", marks=pytest.mark.slow),
         pytest.param(1, True, 200, 1e-9, id="even steps"),
         pytest.param(200, False, 25, 1e-9, id="hard grains"),
     ],

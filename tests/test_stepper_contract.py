@@ -144,6 +144,7 @@ def test_its_parameters_may_differ_per_world_and_are_written_to_files():
     assert a.work["corrections"] < b.work["corrections"] / 2
 
 
+@pytest.mark.slow
 def test_lists_and_forces_in_an_iteration():
     """Short-ranged forces over lists that are made anew within it, and the same over all pairs."""
     results = []

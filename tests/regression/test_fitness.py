@@ -39,7 +39,7 @@ def test_same_settings_give_the_same_fitness_to_the_last_bit(values):
         assert max(fitness_record.deviations(values, record).values()) < STANDARD_ERRORS
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_other_schedule_gives_the_same_fitness_to_the_last_bit(values):
     from cases import agglomeration
 
