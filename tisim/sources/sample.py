@@ -12,18 +12,25 @@ from tisim.effect import Effect, Source
 from tisim.errors import must
 
 
-@ti.kernel
-def _sample(fields: ti.template(), t: ti.f64, r: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[valid-type]
-    for i in range(r.shape[0]):
-        place = ti.Vector([r[i, 0], r[i, 1], r[i, 2]])
-        value, gradient = 0.0 * place, 0.0 * place.outer_product(place)
-        for field in ti.static(fields):
-            value += field.value(0, place, t)
-            gradient += field.gradient(0, place, t)
-        for a in ti.static(range(3)):
-            out[i, 0, a] = value[a]
-            for b in ti.static(range(3)):
-                out[i, 1 + b, a] = gradient[a, b]
+@ti.data_oriented
+class _Sum:
+    """The sum of bound sources."""
+
+    def __init__(self, fields: tuple[Source, ...]) -> None:
+        self.fields = fields
+
+    @ti.kernel
+    def at(self, t: ti.f64, r: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[valid-type]
+        for i in range(r.shape[0]):
+            place = ti.Vector([r[i, 0], r[i, 1], r[i, 2]])
+            value, gradient = 0.0 * place, 0.0 * place.outer_product(place)
+            for field in ti.static(self.fields):
+                value += field.value(0, place, t)
+                gradient += field.gradient(0, place, t)
+            for a in ti.static(range(3)):
+                out[i, 0, a] = value[a]
+                for b in ti.static(range(3)):
+                    out[i, 1 + b, a] = gradient[a, b]
 
 
 def sample(
@@ -45,6 +52,6 @@ def sample(
     connect(bound)
     table.write([given])
     out = np.zeros((len(places), 4, 3), places.dtype)
-    _sample(bound, time, places, out)
+    _Sum(bound).at(time, places, out)
     table.destroy()
     return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
