@@ -174,6 +174,7 @@ class EndStretch(Phase):
         before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
         s.dt[w] = s.time[w] - before
         s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
+        s.events[w] = 0
         if s.stuck[w] > 0.0:
             self.accuse(w)
 

@@ -6,9 +6,9 @@ takes them through makes no difference to the noise either.
 """
 
 from tisim._taichi import ti
-from tisim.program import PerParticle, Phase
+from tisim.program import PerParticle
 from tisim.state import LOST, NOT_FINITE, STEEP, Field
-from tisim.steppers.alone import LITTLE, beginning
+from tisim.steppers.alone import LITTLE, EndStretch, beginning
 from tisim.steppers.registers import Registers
 
 OWN = (
@@ -122,22 +122,12 @@ class Wander(PerParticle):
         ti.atomic_max(s.stuck[w], 1.0)
 
 
-class EndWandering(Phase):
+class EndWandering(EndStretch):
     """The windows are done; or the first particle to be stopped is found."""
 
     def __init__(self, parts) -> None:
-        self.s, self.control, self.summed, self.forced = parts.s, parts.control, parts.summed, parts.forced
-
-    @ti.func
-    def run(self, w, _k):
-        s = self.s
-        s.windows[w] += s.stretch_windows[w]
-        before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
-        s.dt[w] = s.time[w] - before
-        s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
-        s.events[w] = 0
-        if s.stuck[w] > 0.0:
-            self.accuse(w)
+        super().__init__(parts)
+        self.forced = parts.forced
 
     @ti.func
     def accuse(self, w):
