@@ -25,6 +25,7 @@ def pair(rng):
     )
 
 
+@pytest.mark.long
 def test_two_bonded_grains_become_one_sphere(rng):
     """Mass, momentum, volume, energy and centre of mass are those of the two; one particle is left."""
     for result in run([pair(rng) for _ in range(60)]):

@@ -62,6 +62,7 @@ def test_a_start_outside_the_box_is_refused():
         run([drift([[5.0, 0, 0]], [[0.0, 0, 0]])])
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
     """A joined box with images has contacts across its faces; Z04's control volume has not."""
@@ -74,7 +75,7 @@ def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
     assert seen == [1, 0]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_leave_the_box_in_one_step_and_meet_inside_it():
     """Both cross the face, one of them twice over; wrapped, they overlap, and collide once there."""
     box = Box(low=(0.0,) * 3, high=(1.0,) * 3, images=False)

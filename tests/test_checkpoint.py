@@ -19,7 +19,7 @@ def flow(seed=3, number=100, heat_capacity=500.0):
     )
 
 
-@pytest.fixture(scope="module", params=["world", "particle"])
+@pytest.fixture(scope="module", params=["world", pytest.param("particle", marks=pytest.mark.slow)])
 def simulation(request):
     made = Simulation(flow(), worlds=2, schedule=request.param)
     yield made
@@ -30,6 +30,7 @@ def ends(simulation):
     return [(r.state, r.work, r.time, r.status) for r in simulation.results()]
 
 
+@pytest.mark.long
 def test_goes_on_to_the_same_bits(simulation, tmp_path):
     scenes = [flow(3), flow(4)]
     simulation.load(scenes)

@@ -52,6 +52,7 @@ def test_without_any_effect_nothing_of_effects_is_compiled():
     assert not {"Open*", "Bid*", "Resolve*", "Rearrange", "SumForces"} & set(found.phases)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_memory_is_what_is_allocated():
     flow = agglomeration(BEST, 1, grains=60)

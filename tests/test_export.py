@@ -32,6 +32,7 @@ def every_frame(path, world=0):
         return list(found)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_meshio_reads_what_paraview_would(file, tmp_path):
     opened = export(file, "vtk", tmp_path)
@@ -50,6 +51,7 @@ def test_meshio_reads_what_paraview_would(file, tmp_path):
         np.testing.assert_array_equal(cells.data[:, 0], np.arange(len(mesh.points)))
 
 
+@pytest.mark.long
 def test_ase_reads_the_extended_xyz(file, tmp_path):
     read = ase.io.read(export(file, "xyz", tmp_path), index=":", format="extxyz")
     for atoms, frame in zip(read, every_frame(file), strict=True):

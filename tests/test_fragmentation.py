@@ -16,6 +16,7 @@ def break_speed(gamma, radius=2 * RADIUS, e=0.0, pieces=8):
     return np.sqrt(6 * gamma * (pieces ** (1 / 3) - 1) / (DENSITY * radius * (1 - e * e)))
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_speed_that_halves_the_radius_closed_form():
     """Z04 (5.4): eight pieces need v = sqrt(6 gamma / (rho b0 (1 - e^2))), to 1e-10 of it."""

@@ -9,7 +9,7 @@ from tisim.effects.friction import Friction
 from tisim.effects.heating import DeformationWork, Heating
 from tisim.effects.reaction import Reaction
 
-QUICK = ("impact", "all")
+QUICK = ("all",)
 
 
 @pytest.fixture(

@@ -125,7 +125,7 @@ def solved(state, chi=CHI):
     return m, force + SLOPE * m[:, :1], matrix
 
 
-@pytest.mark.parametrize("schedule", ["world", "particle"])
+@pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
 def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
     """At the start and after 20 steps, in two worlds that need different numbers of sweeps; and the force."""
     made = [cloud(1, tolerance=1e-13), cloud(2, chi=5.0, tolerance=1e-13)]
@@ -149,6 +149,7 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
     simulation.close()
 
 
+@pytest.mark.long
 def test_what_does_not_converge_is_a_clear_failure():
     """Sweeps of too strong a coupling grow without bound: the world stops and says which effect it was, and
     by how much they grow, which tends to the spectral radius: as in NumPy."""
@@ -178,6 +179,7 @@ def test_what_does_not_converge_is_a_clear_failure():
     np.testing.assert_array_equal(result.state["position"], result.start["position"])
 
 
+@pytest.mark.slow
 def test_one_sweep_a_step_when_asked():
     """``sweeps=0``: one sweep at the start and one in each step, started from the last values."""
     made = cloud(1, sweeps=0)
@@ -209,7 +211,7 @@ class Potential(Mutual):
         return 1.0 + total
 
 
-@pytest.mark.parametrize("schedule", ["world", "particle"])
+@pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
 def test_a_number_settles_too_and_without_any_force(schedule):
     """Two at distance d: phi = 1/(1 - strength/d). Nothing in the scene needs a force, so there is none."""
     effects = (Potential(strength=0.1, tolerance=1e-14),)

@@ -38,6 +38,10 @@ DOMAINS = {
     "control volume": Box(low=(-1.0, -2.0, 0.0), high=(1.0, 2.0, 1.0), images=False),
     "open": Open(),
 }
+SOME = [
+    pytest.param(domain, id=name, marks=[pytest.mark.slow] if name == "control volume" else [])
+    for name, domain in DOMAINS.items()
+]
 LOW, HIGH = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 1.0])
 
 
@@ -100,7 +104,8 @@ def near_pairs(position, radius, domain, horizon):
     return {tuple(pair) for pair in pairs.tolist()}
 
 
-@pytest.mark.parametrize("domain", DOMAINS.values(), ids=DOMAINS)
+@pytest.mark.long
+@pytest.mark.parametrize("domain", SOME)
 def test_every_near_pair_is_offered_once_by_its_larger_member(rng, domain):
     """At the start, and after each of several steps in which some move far and most do not."""
     names, scenes = [], []

@@ -71,7 +71,7 @@ def test_an_operator_sees_every_world_once_a_step():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", [SoftShell, SoftShellOfAll])
+@pytest.mark.parametrize("kind", [pytest.param(SoftShell, marks=pytest.mark.slow), SoftShellOfAll])
 def test_lists_follow_particles_that_operators_move(kind):
     """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
     grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -124,11 +124,8 @@ def test_lists_follow_particles_that_grow(rng):
     np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("schedule", "axis", "images"),
-    [("world", 0, True), pytest.param("particle", 2, False, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("schedule", "axis", "images"), [("world", 0, True), ("particle", 2, False)])
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
     """More particles than look at all pairs; the bad one belongs to no cell."""
     wanted = scene(
@@ -150,6 +147,7 @@ def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images,
     assert all(np.isfinite(values).all() for values in result.state.values())
 
 
+@pytest.mark.slow
 def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
     """Two grains bond in the last step, one just outside the other's side of the box."""
     wanted = scene(
@@ -176,6 +174,7 @@ class Teleport(Operator):
             s.disturb(w)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_lists_follow_what_operators_do_to_the_world(rng):
     """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
@@ -206,6 +205,7 @@ class Leave(Operator):
             s.remove(w, i)
 
 
+@pytest.mark.slow
 def test_step_control_sees_the_pairs_that_a_removal_leaves():
     """Gap 0.8 m at 1 m/s: 0.5 s, the longest step, and then the 0.3 s that are left until surfaces meet."""
     wanted = scene(

@@ -69,6 +69,7 @@ def test_saturated_packing_has_no_room_left(rng, periodic):
     assert tree.query(places)[0].max() < 2 * RADIUS
 
 
+@pytest.mark.slow
 def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
     """0.38413; for 700 spheres a single packing is off by about 0.002."""
     region = box(np.zeros(3), np.ones(3), periodic=True)
@@ -78,6 +79,7 @@ def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
     assert np.mean(fractions) == pytest.approx(SATURATION, abs=0.002)
 
 
+@pytest.mark.slow
 def test_filling_voids_is_the_same_process_as_trying_everywhere():
     """Mean number of neighbours within 1.1 diameters at the same volume fraction, by either way."""
     region = box(np.zeros(3), np.ones(3), periodic=True)

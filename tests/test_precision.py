@@ -40,6 +40,7 @@ def test_single_precision_stays_finite_and_keeps_mass_and_energy(elsewhere, w):
     assert (state["position"] < high.astype(np.float32)).all()
 
 
+@pytest.mark.long
 def test_single_and_double_precision_agree_on_how_much_merges(elsewhere):
     """Chaotic trajectories part, and in few of 240 worlds (measured: 3) the number of grains left too."""
     single, double = (elsewhere[f"{name}/left"] for name in ("single precision", "one thread"))
@@ -59,7 +60,7 @@ def rebounds_of_cold_grains():
     return found
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_grains_too_hard_for_single_precision_rebound(single):
     """exp(Q / (R T)) is capped where hardness still fits f32: nothing turns into a NaN that bonds."""
     assert single("test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3

@@ -44,7 +44,8 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("delay", [0.0, pytest.param(0.15, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.0, 0.15])
 def test_sigkill_and_resume_end_as_if_never_stopped(whole, tmp_path, delay):
     folder = tmp_path / "cut"
     running = begin(folder)

@@ -74,6 +74,7 @@ def test_both_schedules(usual):
         same(a, b)
 
 
+@pytest.mark.slow
 def test_alone_and_in_a_batch_of_240(usual):
     """A batch of one, with no more room than each needs."""
     capacity = max(scene.capacity() for scene in WORLDS)
@@ -82,6 +83,7 @@ def test_alone_and_in_a_batch_of_240(usual):
         same(a, alone)
 
 
+@pytest.mark.long
 def test_one_thread_and_two(usual, elsewhere):
     for w, result in enumerate(usual):
         for name, values in result.state.items():

@@ -25,7 +25,9 @@ def shells(kind, rng, images):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("schedule", "images"), [("world", True), ("particle", False)])
+@pytest.mark.parametrize(
+    ("schedule", "images"), [("world", True), pytest.param("particle", False, marks=pytest.mark.slow)]
+)
 def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, schedule):
     """Through many lists made anew: same trajectories to rounding, and momentum conserved to rounding."""
     results = []
@@ -140,8 +142,8 @@ def twin(start, steps, stiffness, grip):
     return v, spin
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("schedule", [pytest.param("world", marks=pytest.mark.slow), "particle"])
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
     made = grains()
@@ -169,6 +171,7 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
         np.testing.assert_array_equal(again.state[name], result.state[name])
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_what_is_remembered_is_bounded_and_forgotten():
     """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""

@@ -1,6 +1,7 @@
 """How long a step is: fixed, cut to end on time, at its floor, at its ceiling."""
 
 import numpy as np
+import pytest
 
 from tests.scenes import HEAT_CAPACITY, RADIUS, by_id, check_sums, compiled, fixed, scene, simulate
 from tisim.effects.heating import Heating
@@ -39,6 +40,7 @@ def row():
     )
 
 
+@pytest.mark.slow
 def test_step_control_at_its_floor():
     """Gaps far smaller than v times the shortest step: the step rests on its floor, the run ends."""
     simulation = compiled(row(), 8, 16)

@@ -157,6 +157,7 @@ def test_lists_and_forces_in_an_iteration():
     np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_what_settles_in_an_iteration_is_an_iteration_in_an_iteration():
     """Induced dipoles, in every correction of every step: the same bits on both schedules, worlds at odds."""
     made = [implicit(cloud(1), tolerance=1e-13), implicit(cloud(2, chi=5.0), tolerance=1e-12)]

@@ -67,8 +67,8 @@ def states():
     return seen
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("schedule", [pytest.param("world", marks=pytest.mark.slow), "particle"])
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_a_run_is_the_same_to_the_last_bit_with_a_trajectory(tmp_path, schedule):
     made = simulation(schedule)
     made.load(FLOWS)
@@ -80,6 +80,7 @@ def test_a_run_is_the_same_to_the_last_bit_with_a_trajectory(tmp_path, schedule)
             np.testing.assert_array_equal(values, plain[w].state[name], err_msg=name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("world", [0, 1])
 def test_frames_are_the_first_states_at_or_after_the_wanted_times(file, states, world):
     times = np.array([t for t, _ in states[world]])

@@ -43,6 +43,7 @@ def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
     assert both.uncertainty == pytest.approx(np.sqrt(2) * one.uncertainty, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_more_starts_buy_a_smaller_error(drifts):
     """The error that is certain falls as the square root of the starts, and bounds the true one."""

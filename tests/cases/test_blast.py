@@ -18,6 +18,7 @@ def test_start_has_the_speed_and_the_energy_of_the_paper():
     np.testing.assert_allclose(start["charge"], SPECIFIC_CHARGE * start["mass"])
 
 
+@pytest.mark.long
 def test_the_field_makes_an_ellipsoid_of_the_sphere():
     """Across the field particles circle and get nowhere; along it they fly as if there were none."""
     still, field = simulate(
@@ -34,6 +35,7 @@ def test_the_field_makes_an_ellipsoid_of_the_sphere():
     assert across.max() == pytest.approx(2 * SPEED / rate * abs(np.sin(rate * 0.3 / 2)), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_contact_conserves_momentum_and_takes_energy():
     """Without air and field: touching spheres exchange momentum, and dissipate."""
     made = scene(0.0, contact=True, number=60, duration=0.02)

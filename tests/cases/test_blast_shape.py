@@ -106,6 +106,7 @@ def test_search_recovers_the_field_up_to_sign(tmp_path):
     assert np.degrees(np.arccos(cosine)) < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_pictures_of_a_run(tmp_path):
     path = tmp_path / "trajectory.h5"

@@ -93,6 +93,7 @@ def test_weights_of_directions():
     np.testing.assert_allclose(capture_statistics.even(squares), 0.5, atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_interval_of_a_mean_over_angles_knows_that_starts_are_shared():
     """Fractions at neighbouring angles rise and fall together, start by start."""

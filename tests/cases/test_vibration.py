@@ -8,7 +8,12 @@ from tests.scenes import simulate
 
 
 @pytest.mark.parametrize(
-    "near_field", ["none", "printed", pytest.param("equilibrium", marks=pytest.mark.slow)]
+    "near_field",
+    [
+        pytest.param("none", marks=pytest.mark.slow),
+        "printed",
+        pytest.param("equilibrium", marks=pytest.mark.slow),
+    ],
 )
 def test_centre_of_gravity_follows_the_closed_form(near_field):
     """27 particles at every ratio of Fig. 3; the printed near field throws them apart meanwhile."""

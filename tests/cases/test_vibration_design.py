@@ -56,6 +56,7 @@ def test_nothing_is_random_and_other_variants_are_refused():
         problem(variant="sing")
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("variant", vibration.VARIANTS)
 def test_search_improves_and_lands_on_the_resonance_or_far_from_it(variant, evaluator, tmp_path):

@@ -61,6 +61,7 @@ def test_constants_are_those_of_the_scene_or_none():
     assert constants(made.replace({"particles.mean_velocity": [1.0, 0.0, 0.0]})) is None
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_resonance_curve_of_runs_is_that_of_the_closed_form():
     """Both resonances; that of the fast one a little below, as in so short a time."""

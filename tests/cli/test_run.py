@@ -73,6 +73,7 @@ def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_pa
         assert np.isfinite(file["end/velocity"]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
     assert tisim("run", impacts, "--without", "impact")[0] == 0

@@ -37,6 +37,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
     assert (code, out.strip()) == (0, str(folder / "result.xyz"))
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
     assert tisim("run", toml, "--every", "5e-5", "--out", "whole")[0] == 0
@@ -59,6 +60,7 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
             np.testing.assert_array_equal(values, other.arrays[name])
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_a_run_without_frames_leaves_none_of_an_earlier_run(tisim, toml, tmp_path):
     assert tisim("run", toml, "--frames", 2)[0] == 0

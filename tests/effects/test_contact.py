@@ -171,6 +171,7 @@ def pair(effects, gap, radius, velocity=(0, 0), spin=None):
     )
 
 
+@pytest.mark.slow
 def test_a_grain_inside_another_is_not_pushed():
     """Where surfaces do not meet there is no contact area; nor is there a NaN."""
     made = [pair((Contact(stiffness=1e3),), gap, [1.0, 0.3]) for gap in (0.5, 0.7, 0.71, 1.3, 1.31)]
@@ -189,6 +190,7 @@ def test_light_contact_keeps_its_digits():
     np.testing.assert_allclose(state["force"][1, 0], expected, rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_friction_of_grains_that_roll_on_each_other():
     """Spins that make the surfaces move as one leave no friction; the opposite doubles the slip."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))

@@ -80,7 +80,14 @@ def test_drag_in_a_fluid_at_rest(kind, rng):
         assert ((state["force"] * state["velocity"]).sum(axis=1) < 0).all()
 
 
-@pytest.mark.parametrize("kind", [ConstantDrag, ChowDrag, StokesDrag])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(ConstantDrag, marks=pytest.mark.slow),
+        ChowDrag,
+        pytest.param(StokesDrag, marks=pytest.mark.slow),
+    ],
+)
 def test_drag_in_a_flow(kind, rng):
     """Relative to the flow at the place of each particle."""
     made = [cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)]

@@ -33,7 +33,14 @@ def lorentz_twin(made, state, t=0.0):
     return state["charge"][:, None] * (e + np.cross(state["velocity"], b))
 
 
-@pytest.mark.parametrize("kinds", [(ElectricField, MagneticField), (ElectricField,), (MagneticField,)])
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        (ElectricField, MagneticField),
+        pytest.param((ElectricField,), marks=pytest.mark.slow),
+        (MagneticField,),
+    ],
+)
 def test_lorentz_force(kinds, rng):
     """Both fields, oscillating, or one alone."""
     made = [

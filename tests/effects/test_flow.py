@@ -44,6 +44,7 @@ def test_permeability_is_that_of_blake_kozeny_and_carman():
     assert kozeny_carman(0.4, 1e-3 / 6, 5.0) == pytest.approx(0.4**3 * 1e-6 / (180 * 0.6**2), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_a_particle_takes_up_the_velocity_of_the_fluid():
     """v = v_f (1 - exp(-t/tau)), tau = m / (6 pi mu R), from rest."""
     tau, end = 2.0 / (6 * np.pi * 0.5 * 0.1), 3.0

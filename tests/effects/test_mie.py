@@ -57,12 +57,13 @@ def test_hard_spheres_of_b16_and_wells(rng):
     check([crowd(rng, Mie(epsilon=1.0, cutoff=cut)) for cut in (1.02, 1.3, 2.5)])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "m"), [(12, 6), (9.5, 4)])
 def test_other_powers(n, m, rng):
     check([crowd(rng, Mie(epsilon=1.0, n=n, m=m, cutoff=2.5)) for _ in range(WORLDS)])
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_over_the_pair_list(rng):
     """More than are looked through one by one."""

@@ -61,7 +61,11 @@ def coefficients(rng):
     return {"alpha1": rng.uniform(), "alpha2": rng.uniform()}
 
 
-STRENGTHS = [("plain", False), ("mass", True), ("area", False), ("volume", True), ("charge", True)]
+STRENGTHS = [("mass", True), ("charge", True)]
+STRENGTHS += [
+    pytest.param(*kind, marks=pytest.mark.slow)
+    for kind in (("plain", False), ("area", False), ("volume", True))
+]
 
 
 @pytest.mark.parametrize(("strength", "signed"), STRENGTHS)
@@ -73,7 +77,14 @@ def test_every_strength(strength, signed, rng):
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("exponents", [(0, 6), (2.0, 13), pytest.param((1.5, 2.25), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "exponents",
+    [
+        (0, 6),
+        pytest.param((2.0, 13), marks=pytest.mark.slow),
+        pytest.param((1.5, 2.25), marks=pytest.mark.slow),
+    ],
+)
 def test_exponents(exponents, rng):
     check([
         cloud(rng, NearField(**coefficients(rng), beta1=exponents[0], beta2=exponents[1]))
@@ -81,6 +92,7 @@ def test_exponents(exponents, rng):
     ])  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_near_pairs_only(rng):
     """Also over the pair list, which a world of more particles than it looks through one by one has."""

@@ -110,6 +110,7 @@ def rotations(request):
     return name, kinds
 
 
+@pytest.mark.long
 def test_rotation_for_ten_thousand_periods_and_in_long_steps(rotations):
     """Speed and radius to 1e-9, the phase that of the method; time ends where it was asked to."""
     name, kinds = rotations
@@ -143,6 +144,7 @@ def test_drift_across_both_fields(rotations):
         assert abs(v + 1j * DRIFT) == pytest.approx(DRIFT, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_sweeps_that_cannot_follow_the_rotation_say_so():
     """Five stages of w dt = 20: not a wrong number but a failure, which keeps the start."""

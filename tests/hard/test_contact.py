@@ -20,6 +20,7 @@ from tests.hard.grains import (
 )
 
 
+@pytest.mark.slow
 def test_head_on_beyond_the_speed_of_waves():
     """1e3 times sqrt(K R/m), the speed of waves: spheres go through each other, as the law has it, and keep
     their energy; with dissipation they lose c (closing speed) times the volume both have crossed."""

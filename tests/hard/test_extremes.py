@@ -20,6 +20,7 @@ def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", [0.0, 1e-300, 1e-12, 1e-6])
 def test_two_grains_in_one_place(part):
     """In one point there is no line of centres, and nothing happens; at any distance, an impact."""

@@ -15,6 +15,7 @@ def run(scenes):
     return simulate(scenes, worlds=BATCH, capacity=200, schedule="world")
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_all_particles_merge_into_one():
     """Everything bonds, images across the faces: one sphere of all mass, and it travels on, to rounding."""
@@ -29,6 +30,7 @@ def test_all_particles_merge_into_one():
     )
 
 
+@pytest.mark.long
 def test_a_long_violent_flow_keeps_its_sums_and_books():
     """Grains merge, break and cool for thousands of steps; nothing is lost."""
     worlds = [
@@ -51,6 +53,7 @@ def test_a_long_violent_flow_keeps_its_sums_and_books():
     assert sum(r.work["merges"] for r in results) > 100
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_fragments_of_one_grain_fill_every_slot():
     """Two grains of 32 break into all 64: exactly the room there is, nothing lost."""
@@ -71,6 +74,7 @@ class Optimist(Fragmentation):
         return 64
 
 
+@pytest.mark.slow
 def test_more_fragments_than_room_is_a_clear_failure():
     """The world stops, says so, names the grain, and keeps the last good state; others of the batch go on."""
     effects = (

@@ -46,6 +46,7 @@ def coupled(speed, iterations=200, q=3000.0, alpha=3e4, c=HEAT_CAPACITY, **more)
     return hit(speed, effects)
 
 
+@pytest.mark.slow
 def test_iterations_across_the_bond_threshold_settle():
     """A fine scan of speeds through the threshold: each impact settles, within its bound of iterations."""
     speeds = np.linspace(1.0, 40.0, 300)
@@ -62,6 +63,7 @@ def test_iterations_across_the_bond_threshold_settle():
     assert (np.diff(e) <= 1e-9).all()
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_unsettled_impacts_are_bounded_and_counted():
     """With too few iterations allowed the run goes on, within its bound, and it is reported."""
@@ -75,7 +77,7 @@ def test_unsettled_impacts_are_bounded_and_counted():
     assert sum(result.work["unsettled"] for result in results) >= 1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("temperature", [0.0, 1e-30, 1e-3, 1.0, 1e6, 1e9])
 def test_extreme_temperatures(temperature):
     """exp(Q / (R T)) overflows below 0.4 K; T^4 is 1e36 at 1e9 K. Books close and all stays finite."""

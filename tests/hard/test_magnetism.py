@@ -62,6 +62,7 @@ def test_langevins_function_is_right_to_rounding(real, request):
     assert np.abs(found[:-1] / expected - 1).max() < 4 * np.finfo(real).eps
 
 
+@pytest.mark.long
 def test_no_field_no_moment_and_no_force(rng):
     """Where B = 0 no direction is preferred; next to it the moment is whole, and elsewhere."""
     place = np.array([[0, 0, 0], [1e-12, 0, 0], [0, 0, 0], [1, 0, 0]])
@@ -153,6 +154,7 @@ def solve(place):
     return np.linalg.solve(matrix, np.tile([0, 0, gain], n)).reshape(n, 3)
 
 
+@pytest.mark.slow
 def test_mutual_induction_converges_or_says_that_it_cannot():
     """mu_r = 1e6. Two that overlap until 2 a = 2 R^3/d^3 exceeds 1, where their moments would grow without
     end; a long chain; dense lattices, whose eigenvalues below -1 relaxation takes in. The right moments, or a

@@ -89,6 +89,7 @@ def couples():
     return dict(zip(PLACES, results, strict=True))
 
 
+@pytest.mark.slow
 def test_contact_in_one_place_says_so(couples):
     """There is no line of centres: a failure that names the law and keeps the start."""
     bad = couples["one place"]
@@ -192,6 +193,7 @@ class Vanish(Operator):
             s.remove(w, i)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_a_world_that_loses_all_its_particles_runs_to_its_end():
     """Nothing is left to sum over, nor to measure distances by: no hang, no NaN, time goes on."""
@@ -220,7 +222,7 @@ def far_out():
     return found
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_single_precision_far_from_the_origin(single):
     """At 1e3 m the last digit of a place is 6e-5 m. Momentum is kept to rounding all the same, and forces are
     those of the places as they are held: near field and contact by NumPy."""

@@ -31,7 +31,7 @@ STEPPERS = {
 NAMES = [
     "trapezoid",
     pytest.param("anderson", marks=pytest.mark.slow),
-    pytest.param("collocation", marks=pytest.mark.long),
+    pytest.param("collocation", marks=pytest.mark.slow),
 ]
 
 
@@ -166,6 +166,7 @@ def test_a_force_that_comes_out_of_nothing(name):
         np.testing.assert_allclose(state["position"][:, 0], [-place, place], rtol=5e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_steps_that_a_contact_has_made_short_grow_again():
     """Grains that meet in mid-step, at any speed: they rebound, energy kept, in few steps. An old contraction

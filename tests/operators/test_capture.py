@@ -111,6 +111,7 @@ def test_against_the_twin(rng):
         np.testing.assert_array_equal(values, results[1].state[name])
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_what_is_fixed_takes_no_force():
     """Gravity and the magnet's pull act on the free one only; what a start fixes is no capture."""

@@ -8,6 +8,7 @@ from fake_runs import fake_record
 from optimize.cache import Cache, verify
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_sigkill_at_random_moments_loses_no_announced_evaluation(path):
     rng = random.Random(8)

@@ -109,7 +109,7 @@ def test_killed_worker_loses_nothing(away, here):
     same(dict(found), here[1])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("away", ["dask"], indirect=True)
 def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     evaluator, pids = away

@@ -43,8 +43,8 @@ def found(folder):
     return repr(tables), written, fitness
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), pytest.param(REAL, 20, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), (REAL, 20)])
 def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
     with begin(case, tmp_path / "whole") as search:
         search.communicate()

@@ -72,6 +72,7 @@ def test_any_number_of_threads_gives_the_same_fitness_to_the_last_bit(values):
     assert elsewhere("--threads", "3") == values
 
 
+@pytest.mark.long
 def test_the_bound_would_notice_a_change_of_physics(values):
     """Half as hard again, as f32 or another platform must not be: 7, 30 and 10 standard errors (measured).
 

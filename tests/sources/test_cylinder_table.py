@@ -27,7 +27,7 @@ def outside(rng, length, n=3000):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("digits", [3, 5])
+@pytest.mark.parametrize("digits", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_it_is_as_accurate_as_it_says(digits, rng):
     """Field and gradient, each relative to its own size; and no more accurate by a factor of a thousand."""
     points = np.array([outside(rng, length) for length in LENGTHS])

@@ -53,6 +53,7 @@ def test_who_gets_stuck_first_is_named_with_the_time_and_the_force(chunks):
     assert np.isfinite(stuck.state["position"]).all()
 
 
+@pytest.mark.slow
 def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bits(tmp_path):
     """A step of the world is a window; in one launch, in small ones, and from a checkpoint: the same bits."""
     made = charged(accurate(1e-5, longest=1e-2), 2.0, **DRIVEN)

@@ -136,7 +136,7 @@ def test_steps_of_its_own_leave_a_particle_the_right_distribution():
 
 
 @pytest.mark.long
-@both
+@pytest.mark.parametrize("together", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_same_bits_on_both_schedules_alone_in_a_batch_and_in_portions(together):
     def make(seed):
         place = np.random.default_rng(seed).uniform(-1e-6, 1e-6, (40, 3))
@@ -213,6 +213,7 @@ def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
     check_same(*ends)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("together", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_what_is_fixed_stays_and_the_others_go_on(together):
     """In a flow along x, particles are stopped by an operator, after the very step that brings them there."""
@@ -242,7 +243,7 @@ def test_a_force_that_is_too_steep_is_refused_with_time_and_particle(together):
     assert fine.status.ok, fine.status.reason
     reason = steep.status.reason
     assert "found at t = 0 s: a force so strong that it asks for a step shorter than the shortest" in reason
-    assert "at particle 1" in reason
+    assert "by effects.trap, at particle 1" in reason
     np.testing.assert_array_equal(steep.state["position"], steep.start["position"])
 
 

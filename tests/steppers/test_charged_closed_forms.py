@@ -56,7 +56,7 @@ def test_error_falls_as_the_square_of_the_step(name):
         assert errors[-1] < 1e-3, what
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("phi", "expected"), [(1.0, 1.0), (0.0, 1.0), (0.5, 2.0)])
 def test_order_of_the_implicit_stepper(phi, expected):
     """phi = 1/2 is of second order; implicit and explicit Euler are of first."""
@@ -72,6 +72,7 @@ def test_order_of_the_implicit_stepper(phi, expected):
     assert order(steps, errors) == pytest.approx(expected, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_error_asked_for_is_met_and_costs_work():
     """Error control over five decades: the error falls with what is asked, and work rises."""
     asked = 10.0 ** -np.arange(3, 8)

@@ -75,6 +75,7 @@ def test_coefficients():
         assert highest(stages) @ c ** (stages - 1) > 0.0
 
 
+@pytest.mark.slow
 def test_order_of_five_stages(runs):
     """2 s - 2 = 8, of a driven particle in a magnetic field."""
     errors = off(runs[f"steps {n}"] for n in ORDER_5)
@@ -195,6 +196,7 @@ def cloud_by_scipy(made, size=SIZE):
     return found.y[:, -1].reshape(2, *r.shape)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_pairs_in_a_box():
     """As by scipy to 1e-6; momentum is kept."""

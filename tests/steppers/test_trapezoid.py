@@ -19,6 +19,7 @@ def with_stepper(made, stepper, **more):
     return made.model_copy(update={"stepper": stepper, **more})
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_schedules_agree_and_momentum_is_kept():
     """Rejected attempts and new lists among the iterations: the same bits, momentum to rounding."""
@@ -88,6 +89,7 @@ def oscillator(stepper, duration=3.0, stiffness=4.0):
     )
 
 
+@pytest.mark.slow
 def test_a_step_too_long_is_rejected_not_blown_up():
     """dt_0 a thousand times too long: attempts are rejected until one converges, and the rest is right."""
     control = ErrorControl(first=10.0, longest=10.0, shortest=1e-9, error=1e-5, tolerance=1e-7)
@@ -97,6 +99,7 @@ def test_a_step_too_long_is_rejected_not_blown_up():
     assert result.state["position"][0, 0] == pytest.approx(np.cos(1e3 * 1e-2), abs=2e-3)
 
 
+@pytest.mark.long
 def test_what_cannot_be_solved_says_when_who_and_which_force():
     """The shortest step allowed is too long for the spring of one world; the other world goes on."""
     control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
@@ -126,6 +129,7 @@ def test_what_cannot_be_solved_together_says_so_too():
     assert np.isfinite(result.state["velocity"]).all()
 
 
+@pytest.mark.slow
 def test_rest_is_no_error():
     """No velocity and no force: 0/0 in the error norm; and a world without particles that move at all."""
     (result,) = simulate([oscillator(Trapezoid(), duration=1e-2, stiffness=0.0)], worlds=1)
@@ -147,6 +151,7 @@ def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
     assert result.work["solver_iterations"] <= 2 * result.work["particle_steps"]
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_time_does_not_drift():
     """A million steps of 1e-6 s end at one second exactly, the place of the oscillator being right."""

@@ -10,10 +10,17 @@ from tisim._taichi import ti
 from tisim.errors import must
 from tisim.knob import Knob
 from tisim.spec import parameter
+from tisim.state import NOT_FINITE, STEEP
 from tisim.steppers.controller import Controller
 
 MOST = 1e9
 """Steps of one longest step at most: a particle by itself numbers them with 32 bits."""
+
+
+@ti.func
+def fault(rate):
+    """What is wrong with a force that asks for steps of 1/rate which are too short."""
+    return ti.select(rate < ti.math.inf, STEEP, NOT_FINITE)
 
 
 class DriftLimit(Controller):

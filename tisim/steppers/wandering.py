@@ -7,8 +7,9 @@ takes them through makes no difference to the noise either.
 
 from tisim._taichi import ti
 from tisim.program import PerParticle
-from tisim.state import LOST, NOT_FINITE, STEEP, Field
+from tisim.state import LOST, NOT_FINITE, Field
 from tisim.steppers.alone import LITTLE, EndStretch, beginning
+from tisim.steppers.drift_limit import fault
 from tisim.steppers.registers import Registers
 
 OWN = (
@@ -79,7 +80,7 @@ class Wander(PerParticle):
             pushed = self.fluid.pushed(w, i, mobility)
             rate = self.control.rate(self.own, w, i, pushed)
             if self.control.hopeless(w, rate):
-                self.stop(w, i, STEEP, begin + elapsed)
+                self.stop(w, i, fault(rate), begin + elapsed)
             else:
                 dt, left = self.control.step(w, rate), length - elapsed
                 # The rounding error of the sum is carried along (W. Kahan 1965).
