@@ -239,11 +239,13 @@ def test_a_force_that_is_too_steep_is_refused_with_time_and_particle(together):
     """The spring of the second particle asks at once for a step below the shortest; other worlds go on."""
     place = np.array([[1e-9, 0, 0], [-1e-3, 0, 0]])
     limits = {"dt": 1e-3, "steps": 5, "drift": 1.0, "shortest": 1e-6}
-    steep, fine = run([colloids(place * k, together, trap=1e3, **limits) for k in (1, 1e-3)])
+    given = ((1, 1e3), (1e-3, 1e3), ([[0], [1]], 1e158))
+    steep, fine, mad = run([colloids(place * k, together, trap=trap, **limits) for k, trap in given])
     assert fine.status.ok, fine.status.reason
     reason = steep.status.reason
     assert "found at t = 0 s: a force so strong that it asks for a step shorter than the shortest" in reason
     assert "by effects.trap, at particle 1" in reason
+    assert "found at t = 0 s: a quantity is not finite, by effects.trap, at particle 1" in mad.status.reason
     np.testing.assert_array_equal(steep.state["position"], steep.start["position"])
 
 

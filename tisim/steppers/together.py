@@ -55,16 +55,17 @@ class Accuse(Phase):
     """A step that would have to be too short is not taken: whose it is, and the largest force on it."""
 
     def __init__(self, parts, drift) -> None:
-        self.s, self.drift, self.summed, self.forced = parts.s, drift, parts.summed, parts.forced
+        self.s, self.summed, self.forced = parts.s, parts.summed, parts.forced
+        self.fluid, self.interaction, self.control = drift.fluid, drift.interaction, drift.control
 
     @ti.func
     def run(self, w, _k):
-        s, drift = self.s, self.drift
-        if drift.control.hopeless(w, s.steepest[w]):
+        s = self.s
+        if self.control.hopeless(w, s.steepest[w]):
             worst = -1
             for i in range(s.count[w]):
-                rate = drift.control.rate(s, w, i, drift.interaction.pushed(w, i))
-                if worst < 0 and drift.fluid.mobile(w, i) > 0 and not (rate < s.steepest[w]):
+                rate = self.control.rate(s, w, i, self.interaction.pushed(w, i))
+                if worst < 0 and self.fluid.mobile(w, i) > 0 and not (rate < s.steepest[w]):
                     worst = i
             s.failed[w], s.culprit[w] = fault(s.steepest[w]), s.id[w, worst]
             if ti.static(self.forced):
