@@ -54,12 +54,12 @@ def apart(result, final):
     return max(np.abs(x[a] - result.state[name][b]).max() / np.abs(x).max() for name, x in final.items())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hardness", "even", "steps", "tolerance"),
     [
-        pytest.param(1, False, 40, 1e-9, id="adaptive", marks=pytest.mark.slow),
-        pytest.param(1, True, 200, 1e-9, id="even steps", marks=pytest.mark.slow),
+        pytest.param(1, False, 40, 1e-9, id="adaptive"),
+        pytest.param(1, True, 200, 1e-9, id="even steps"),
         pytest.param(200, False, 25, 1e-9, id="hard grains"),
     ],
 )
@@ -83,7 +83,7 @@ def test_every_step_has_the_same_events_and_particles(simulation, hardness, even
     assert counts[:, 2].min() >= 20
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_cost_of_a_design_is_the_same(simulation):
     """Mean Pi over 16 starts of 200 grains, whole runs, where events may part as rounding has it."""
     scenes, starts, given = prepare(BEST, 200)

@@ -53,7 +53,6 @@ def test_without_any_effect_nothing_of_effects_is_compiled():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_memory_is_what_is_allocated():
     flow = agglomeration(BEST, 1, grains=60)
     simulation = Simulation(flow)

@@ -33,7 +33,6 @@ def every_frame(path, world=0):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_meshio_reads_what_paraview_would(file, tmp_path):
     opened = export(file, "vtk", tmp_path)
     assert opened == tmp_path / "flow.pvd"

@@ -17,7 +17,6 @@ def break_speed(gamma, radius=2 * RADIUS, e=0.0, pieces=8):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_speed_that_halves_the_radius_closed_form():
     """Z04 (5.4): eight pieces need v = sqrt(6 gamma / (rho b0 (1 - e^2))), to 1e-10 of it."""
     gamma, hardness = 30.0, 4e5

@@ -75,6 +75,7 @@ def test_adhesion_speed_closed_form():
     assert above.work["bonds"] == 1
 
 
+@pytest.mark.slow
 def test_harder_or_lighter_or_slower_never_bonds_more(rng):
     """x = 1 - e rises with approach speed; a pair that bonds at one speed bonds at every higher one."""
     pair = draw(rng)

@@ -175,7 +175,6 @@ class Teleport(Operator):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_lists_follow_what_operators_do_to_the_world(rng):
     """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
     results = []

@@ -58,7 +58,7 @@ def test_a_thin_layer_around_a_long_cylinder_has_room(part):
     assert len(points) == 200
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_room():
     with pytest.raises(InputError, match="thickness must be above a diameter"):
         RandomAroundCylinder(**CYLINDER).centres(1, 0.3, Open(), 0)

@@ -18,7 +18,7 @@ def world(elsewhere, precision, w):
     return {key: values for key, values in found.items() if "/" not in key}, start
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("w", range(len(WORLDS)))
 def test_single_precision_stays_finite_and_keeps_mass_and_energy(elsewhere, w):
     state, start = world(elsewhere, "single precision", w)
@@ -66,6 +66,7 @@ def test_grains_too_hard_for_single_precision_rebound(single):
     assert single("test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3
 
 
+@pytest.mark.slow
 def test_cooling_is_as_right_as_single_precision_can_be(single):
     """From 0 K to 1e5 K; a stop criterion of double precision would be below the last digit here."""
     assert max(single("test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps

@@ -43,7 +43,6 @@ def whole(tmp_path_factory):
     return end_of(folder)
 
 
-@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.0, 0.15])
 def test_sigkill_and_resume_end_as_if_never_stopped(whole, tmp_path, delay):

@@ -172,7 +172,6 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_what_is_remembered_is_bounded_and_forgotten():
     """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
     made = grains()

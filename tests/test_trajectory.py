@@ -46,7 +46,7 @@ def every_frame(path, world=0):
         return list(found)
 
 
-@pytest.fixture(scope="module", params=["world", "particle"])
+@pytest.fixture(scope="module", params=["world", pytest.param("particle", marks=pytest.mark.slow)])
 def file(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("trajectory") / "flows.h5"
     recorded(path, request.param, every=5e-5)

@@ -44,7 +44,6 @@ def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_more_starts_buy_a_smaller_error(drifts):
     """The error that is certain falls as the square root of the starts, and bounds the true one."""
     found = Study(drift(), (ENERGY,), precisions=("f64",), repeats=1, starts=(8, len(drifts)), coarser=0)

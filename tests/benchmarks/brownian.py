@@ -26,11 +26,13 @@ import numba
 import numpy as np
 
 from tests.benchmarks import brownian_numba as peer
-from tests.steppers.colloids import DIFFUSIVITY, RADIUS, colloids
+from tests.steppers.colloids import DIFFUSIVITY, MOBILITY, RADIUS, colloids
 from tisim import Simulation, runtime
+from tisim.effects.tether import Tether
 
 RATE, DT = 100.0, 1e-4
 PULL, WIDTH = RATE * DT, float(np.sqrt(2 * DIFFUSIVITY * DT))
+TRAP = Tether(stiffness=(RATE / MOBILITY,) * 3)
 WORLDS, NUMBER = 30, 100
 SPREAD = float(np.sqrt(DIFFUSIVITY / RATE))
 
@@ -46,9 +48,10 @@ def ours(
     """A run that returns its wall seconds, and where it has got to."""
     scenes = []
     for w, place in enumerate(places):
-        made = colloids(place, trap=RATE, dt=DT, steps=steps, seed=w, **options)
-        trap = tuple(effect for effect in made.effects if effect.kind() == "trap")
-        scenes.append(made.model_copy(update={"effects": trap}))
+        made = colloids(
+            place, dt=DT, steps=steps, seed=w, quantities={"anchor": np.zeros_like(place)}, **options
+        )
+        scenes.append(made.model_copy(update={"effects": (TRAP,)}))
     simulation = Simulation(scenes[0], worlds=len(scenes))
 
     def run() -> float:

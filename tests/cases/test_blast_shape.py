@@ -107,7 +107,6 @@ def test_search_recovers_the_field_up_to_sign(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_pictures_of_a_run(tmp_path):
     path = tmp_path / "trajectory.h5"
     made = blast.scene(number=60, duration=0.06)

@@ -94,7 +94,6 @@ def test_weights_of_directions():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_interval_of_a_mean_over_angles_knows_that_starts_are_shared():
     """Fractions at neighbouring angles rise and fall together, start by start."""
     settings = [{"angle": angle, "number": 20, "duration": 10.0} for angle in (45.0, 50.0)]

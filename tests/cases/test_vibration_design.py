@@ -57,7 +57,6 @@ def test_nothing_is_random_and_other_variants_are_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.parametrize("variant", vibration.VARIANTS)
 def test_search_improves_and_lands_on_the_resonance_or_far_from_it(variant, evaluator, tmp_path):
     wished = {**vibration.SEARCH, "generations": 6}

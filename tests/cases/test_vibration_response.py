@@ -62,7 +62,6 @@ def test_constants_are_those_of_the_scene_or_none():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_resonance_curve_of_runs_is_that_of_the_closed_form():
     """Both resonances; that of the fast one a little below, as in so short a time."""
     fast = Sweep.of(fast_scenes(np.linspace(0.9, 1.1, 9)))

@@ -74,7 +74,6 @@ def test_failed_run_says_where_and_keeps_the_last_good_state(tisim, toml, tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_without_leaves_an_effect_out_of_the_scene_and_of_what_is_compiled(tisim, impacts, tmp_path):
     assert tisim("run", impacts, "--without", "impact")[0] == 0
     assert Scene.from_toml(tmp_path / "out" / "flow" / "scene.toml").effects == ()

@@ -38,7 +38,6 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
     assert tisim("run", toml, "--every", "5e-5", "--out", "whole")[0] == 0
     with monkeypatch.context() as patch:
@@ -61,7 +60,6 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_run_without_frames_leaves_none_of_an_earlier_run(tisim, toml, tmp_path):
     assert tisim("run", toml, "--frames", 2)[0] == 0
     assert tisim("run", toml, "--overwrite")[0] == 0

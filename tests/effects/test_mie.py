@@ -64,7 +64,6 @@ def test_other_powers(n, m, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_over_the_pair_list(rng):
     """More than are looked through one by one."""
     many = crowd(rng, Mie(epsilon=1.0, cutoff=1.8), n=400)

@@ -93,7 +93,6 @@ def test_exponents(exponents, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_near_pairs_only(rng):
     """Also over the pair list, which a world of more particles than it looks through one by one has."""
     made = [

@@ -145,7 +145,6 @@ def test_drift_across_both_fields(rotations):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_sweeps_that_cannot_follow_the_rotation_say_so():
     """Five stages of w dt = 20: not a wrong number but a failure, which keeps the start."""
     made = charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], equal_steps("collocation", 20.0 / W), 100.0)
@@ -184,7 +183,7 @@ ADAPTIVE = {
 
 
 @pytest.mark.parametrize(
-    ("name", "bound"), [("trapezoid", 1e-3), pytest.param("collocation", 1e-8, marks=pytest.mark.long)]
+    ("name", "bound"), [("trapezoid", 1e-3), pytest.param("collocation", 1e-8, marks=pytest.mark.slow)]
 )
 def test_like_charges_from_a_nanometre(name, bound):
     """Two electrons released at rest: k q^2/d comes out as kinetic energy, through six decades of distance,

@@ -16,7 +16,6 @@ def run(scenes):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_all_particles_merge_into_one():
     """Everything bonds, images across the faces: one sphere of all mass, and it travels on, to rounding."""
     made = flow(seed=5, grains=150, hardness=10.0, side=0.016, images=True, duration=0.05)
@@ -30,7 +29,7 @@ def test_all_particles_merge_into_one():
     )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_long_violent_flow_keeps_its_sums_and_books():
     """Grains merge, break and cool for thousands of steps; nothing is lost."""
     worlds = [
@@ -54,7 +53,6 @@ def test_a_long_violent_flow_keeps_its_sums_and_books():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_fragments_of_one_grain_fill_every_slot():
     """Two grains of 32 break into all 64: exactly the room there is, nothing lost."""
     radius = RADIUS * 32 ** (1 / 3)

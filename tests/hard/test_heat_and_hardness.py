@@ -64,7 +64,6 @@ def test_iterations_across_the_bond_threshold_settle():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_unsettled_impacts_are_bounded_and_counted():
     """With too few iterations allowed the run goes on, within its bound, and it is reported."""
     results = simulate(

@@ -62,7 +62,7 @@ def test_langevins_function_is_right_to_rounding(real, request):
     assert np.abs(found[:-1] / expected - 1).max() < 4 * np.finfo(real).eps
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_field_no_moment_and_no_force(rng):
     """Where B = 0 no direction is preferred; next to it the moment is whole, and elsewhere."""
     place = np.array([[0, 0, 0], [1e-12, 0, 0], [0, 0, 0], [1, 0, 0]])

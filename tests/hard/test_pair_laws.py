@@ -194,7 +194,6 @@ class Vanish(Operator):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_world_that_loses_all_its_particles_runs_to_its_end():
     """Nothing is left to sum over, nor to measure distances by: no hang, no NaN, time goes on."""
     places = np.random.default_rng(2).uniform(0, 1, (60, 3))

@@ -167,7 +167,6 @@ def test_a_force_that_comes_out_of_nothing(name):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_steps_that_a_contact_has_made_short_grow_again():
     """Grains that meet in mid-step, at any speed: they rebound, energy kept, in few steps. An old contraction
     of the sweeps must not keep steps as short as those in which they met."""

@@ -112,7 +112,6 @@ def test_against_the_twin(rng):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_what_is_fixed_takes_no_force():
     """Gravity and the magnet's pull act on the free one only; what a start fixes is no capture."""
     magnet = MagneticCylinders(cylinders=[Cylinder(radius=0.5, length=1, magnetisation=(0, 0, 1e6))])

@@ -9,7 +9,6 @@ from optimize.cache import Cache, verify
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_sigkill_at_random_moments_loses_no_announced_evaluation(path):
     rng = random.Random(8)
     announced = 0

@@ -90,6 +90,7 @@ def test_order_of_fewer_stages(stages, steps):
     assert order(steps, errors) == pytest.approx(2 * stages - 2, abs=0.3)
 
 
+@pytest.mark.slow
 def test_the_error_asked_for_is_met_and_costs_work(runs):
     """Over nine decades: the error is near or below that asked for, falls with it, and work rises."""
     results = [runs[f"error {e}"] for e in ERRORS]
@@ -197,7 +198,6 @@ def cloud_by_scipy(made, size=SIZE):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_pairs_in_a_box():
     """As by scipy to 1e-6; momentum is kept."""
     made = cloud(1e-8)

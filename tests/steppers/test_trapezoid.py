@@ -20,7 +20,6 @@ def with_stepper(made, stepper, **more):
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_schedules_agree_and_momentum_is_kept():
     """Rejected attempts and new lists among the iterations: the same bits, momentum to rounding."""
     made = with_stepper(
@@ -152,7 +151,6 @@ def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_time_does_not_drift():
     """A million steps of 1e-6 s end at one second exactly, the place of the oscillator being right."""
     made = oscillator(equal_steps(1e-6, tolerance=1e-6), duration=1.0)
