@@ -9,12 +9,16 @@ from scipy import stats
 
 from tests.scenes import compiled, simulate
 from tests.steppers.colloids import DIFFUSIVITY, RADIUS, SIGMAS, Stop, colloids, run
+from tisim import Box, Open, Simulation
 from tisim.checkpoint import restore, save
 from tisim.effects.contact_dissipation import ContactDissipation
 from tisim.effects.drag import StokesDrag
 from tisim.effects.hertz import Hertz
 from tisim.effects.impact import Impact
 from tisim.errors import InputError
+from tisim.steppers import brownian
+from tisim.steppers.abreast import Abreast
+from tisim.steppers.wandering import Wander
 
 MANY = 10_000
 
@@ -154,6 +158,31 @@ def test_same_bits_on_both_schedules_alone_in_a_batch_and_in_portions(together):
     check_same(usual[2], simulation.results()[2])
     assert usual[2].work["particle_steps"] > 1500
     assert not np.array_equal(usual[1].state["position"], usual[2].state["position"])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "domain",
+    [Open(), pytest.param(Box(low=(-1.1e-6,) * 3, high=(1.1e-6,) * 3), marks=pytest.mark.slow)],
+    ids=["open", "box"],
+)
+def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
+    """To the bit: where all take a window in one step, and where some do not."""
+    place = np.random.default_rng(2).uniform(-1e-6, 1e-6, (70, 3))
+    more = {"dt": 1e-3, "steps": 30, "drift": 0.3, "domain": domain}
+    scenes = [colloids(place, trap=trap, seed=1, **more) for trap in (2.0, 30.0, 300.0)]
+    found = []
+    for kind in (Abreast, Wander):
+        monkeypatch.setattr(brownian, "abreast", lambda parts, kind=kind: kind is Abreast)
+        simulation = Simulation(scenes[0], 3)
+        assert kind.__name__ in simulation.program.names()
+        simulation.load(scenes)
+        simulation.run()
+        found.append(simulation.results())
+    for many, single in zip(*found, strict=True):
+        check_same(many, single)
+    steps = [result.work["particle_steps"] / (70 * 30) for result in found[0]]
+    assert steps[0] == 1.0 < steps[1] < 2.0 < steps[2]
 
 
 ELSEWHERE = """

@@ -12,6 +12,7 @@ from tisim.forces import FORCE
 from tisim.program import Item
 from tisim.spec import parameter
 from tisim.state import Field
+from tisim.steppers.abreast import Abreast, abreast
 from tisim.steppers.alone import Stretch
 from tisim.steppers.drift_limit import DriftLimit
 from tisim.steppers.exact_noise import GAUSS, Exact
@@ -93,7 +94,8 @@ class Brownian(Stepper):
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, fluid = parts.s, Fluid(parts, self)
         if parts.independent:
-            return (Stretch(s, parts.control), Wander(parts, fluid), EndWandering(parts))
+            wander = Abreast if abreast(parts) else Wander
+            return (Stretch(s, parts.control), wander(parts, fluid), EndWandering(parts))
         interaction = self._interaction(parts, fluid)
         drift = Drift(fluid, interaction, parts.control)
         limited = (*interaction.phases(), drift, Accuse(parts, drift))

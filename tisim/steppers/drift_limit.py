@@ -58,6 +58,13 @@ class DriftLimit(Controller):
         return ti.cast(velocity.norm() / (self.drift(w) * s.radius[w, i]), ti.f64)
 
     @ti.func
+    def easy(self, s, w, i, velocity):
+        """Whether the longest step is one that a particle allows: without root and division, which take
+        longer than the rest of a step. False of NaN."""
+        reach, path = self.drift(w) * s.radius[w, i], self.longest(w) * velocity
+        return path.norm_sqr() < reach * reach
+
+    @ti.func
     def hopeless(self, w, rate):
         """Whether that step is too short; also true of NaN."""
         return not (rate * ti.cast(self.shortest(w), ti.f64) <= 1.0)

@@ -52,6 +52,11 @@ class Registers:
             value = ti.Vector.zero(self.state.real, 3)
             ti.static(local.hold(value))
 
+    def hold(self, *values: Any) -> None:
+        """Take these for what ``load`` would take from memory."""
+        for (_, local), value in zip(self.loaded, values, strict=True):
+            local.hold(value)
+
     @ti.func
     def store(self, w, i):
         """Put it back."""

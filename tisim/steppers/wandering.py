@@ -21,6 +21,14 @@ AHEAD = 8
 """Windows for which the noise of the first step, mostly the only one, is drawn at once: in vectors."""
 
 
+@ti.func
+def stepped(s, fluid: ti.template(), w, i, mobility, pushed, t, dt, g):  # type: ignore[valid-type]
+    """Velocity of drift, u + F/(6 pi eta R), and where a step leads: by dt times that + sqrt(2 D dt) g."""
+    velocity = fluid.flow(w, i, t) + pushed
+    width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
+    return velocity, s.position[w, i] + (dt * velocity + width * g)
+
+
 class Wander(PerParticle):
     """A particle through the windows of a launch."""
 
@@ -35,20 +43,26 @@ class Wander(PerParticle):
 
     @ti.func
     def run(self, w, i):
+        self.alone(w, i, 0)
+
+    @ti.func
+    def alone(self, w, i, begin):
+        """Particle i through the windows of the launch from the ``begin``-th on."""
         s = self.s
         self.registers.load(w, i)
         taken, going, windows = 0, self.able(w, i), ti.cast(s.stretch_windows[w], ti.i32)
-        for first in range((windows + AHEAD - 1) // AHEAD):
+        for ahead in range((windows - begin + AHEAD - 1) // AHEAD):
             if going > 0:
+                first = begin + ahead * AHEAD
                 kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
                 for lane in range(AHEAD):
-                    g = self.fluid.normals(w, i, self.number(s.windows[w] + first * AHEAD + lane))
+                    g = self.fluid.normals(w, i, self.number(s.windows[w] + first + lane))
                     for k in ti.static(range(3)):
                         kicks[k][lane] = g[k]
-                for lane in range(ti.min(AHEAD, windows - first * AHEAD)):
+                for lane in range(ti.min(AHEAD, windows - first)):
                     if going > 0:
                         kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
-                        taken += self.window(w, i, s.windows[w] + first * AHEAD + lane, kick)
+                        taken += self.window(w, i, s.windows[w] + first + lane, kick)
                         going = self.able(w, i)
         self.registers.store(w, i)
         ti.atomic_add(s.particle_steps[w], taken)
@@ -78,11 +92,14 @@ class Wander(PerParticle):
             if ti.static(self.forced):
                 self.summed.alone(w, i, begin + elapsed)
             pushed = self.fluid.pushed(w, i, mobility)
-            rate = self.control.rate(self.own, w, i, pushed)
-            if self.control.hopeless(w, rate):
-                self.stop(w, i, fault(rate), begin + elapsed)
-            else:
-                dt, left = self.control.step(w, rate), length - elapsed
+            dt, left = ti.cast(self.control.longest(w), ti.f64), length - elapsed
+            if not self.control.easy(self.own, w, i, pushed):
+                rate = self.control.rate(self.own, w, i, pushed)
+                dt = self.control.step(w, rate)
+                if self.control.hopeless(w, rate):
+                    self.stop(w, i, fault(rate), begin + elapsed)
+                    going = 0
+            if going > 0:
                 # The rounding error of the sum is carried along (W. Kahan 1965).
                 step = dt - carry
                 total = elapsed + step
@@ -94,16 +111,14 @@ class Wander(PerParticle):
                 self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
                 elapsed = total
                 taken += 1
-            going = self.able(w, i)
+                going = self.able(w, i)
         return taken
 
     @ti.func
     def move(self, w, i, mobility, pushed, t, dt, g):
-        """r += dt (u + F/(6 pi eta R)) + sqrt(2 D dt) g, and what operators do to it."""
+        """A step, and what operators do to it."""
         s, step = self.own, ti.cast(dt, self.s.real)
-        s.velocity[w, i] = self.fluid.flow(w, i, t) + pushed
-        width = ti.sqrt(2.0 * step * self.fluid.heat(w) * mobility)
-        s.position[w, i] += step * s.velocity[w, i] + width * g
+        s.velocity[w, i], s.position[w, i] = stepped(s, self.fluid, w, i, mobility, pushed, t, step, g)
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]
