@@ -8,9 +8,10 @@ The paper's side of the cube, cbrt(rho V_p / c), leaves out N; here it is cbrt(N
 particles have the concentration c. It gives c in g/mL, and in the caption of Fig. 6.13 in mg/L; here it is
 g/mL. At 2 g/mL that is a volume fraction of 0.4; centres, not whole spheres, lie within the cube.
 
-Steps are as short as contacts ask for, not the cylinder: noise moves a particle by DIFFUSION radii in one, 10
-us at 75 nm. That holds chains together, no more: the distance of a bound pair of 75 nm then spreads by 0.09
-of a diameter, where it is 0.005 in equilibrium and 0.007 with a tenth of DIFFUSION and DRIFT.
+Steps are as short as contacts ask for, not the cylinder: noise moves a particle by DIFFUSION radii in one,
+and forces by DRIFT. The distance of two of 75 nm that are bound then spreads by 0.03 of a diameter; it is
+0.008 with steps of a third of that, and 0.09 with three times as much, at which chains hold together all the
+same and are captured no later (``coarse``).
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ ASPECT, DISTANCE, CUTOFF = 20.0, 100e-6, 30.0
 """L/D; m from the end of the cylinder to the cube; radii within which dipoles act on each other."""
 WELL = 100 * Boltzmann * capture.TEMPERATURE
 """J: eps of the Mie potential."""
-DRIFT, DIFFUSION = 0.2, 0.1
+DRIFT, DIFFUSION = 0.05, 0.03
 """Radii that forces, and noise (its standard deviation), move a particle in a step at most."""
 DIGITS = 5
 """Of the cylinder's field, from its table."""
@@ -58,11 +59,11 @@ SIZES = {
     "25nm": Size("the same of 25 nm, which form no chains", {"nanometres": 25, "duration": 2e-3}),
     "flow": Size(
         "24 particles of 75 nm that feel each other's flow, until some are captured",
-        {"number": 24, "hydrodynamics": "rotne-prager", "duration": 0.3},
+        {"number": 24, "hydrodynamics": "rotne-prager", "duration": 0.3, "coarse": 3.0},
     ),
     "paper": Size(
         "500 of them, 1 s, as B16: days",
-        {"number": 500, "hydrodynamics": "rotne-prager", "duration": 1.0},
+        {"number": 500, "hydrodynamics": "rotne-prager", "duration": 1.0, "coarse": 3.0},
     ),
 }
 
@@ -84,14 +85,14 @@ def chain_length(nanometres: int, concentration: float) -> float:
     return float(np.sqrt(1e3 * concentration / DENSITY) * np.exp((coupling(nanometres) - 1) / 2))
 
 
-def longest(radius: float) -> float:
-    """Step (s) in which a sphere of a radius (m) diffuses by DIFFUSION radii: (DIFFUSION R)^2 / (2 D).
+def longest(radius: float, coarse: float = 1.0) -> float:
+    """Step (s) in which a sphere of a radius (m) diffuses by ``coarse`` DIFFUSION radii.
 
-    What is at contact then is not pushed far into the other before it feels that: farther by three times,
-    and 25 nm particles at 2 g/mL end up so deep in each other that no step is short enough.
+    What is at contact is not pushed far into the other before it feels that: with ``coarse`` of 10, 25 nm
+    particles at 2 g/mL end up so deep in each other that no step is short enough.
     """
     drag = 6 * np.pi * capture.VISCOSITY * radius
-    return float((DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * capture.TEMPERATURE))
+    return float((coarse * DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * capture.TEMPERATURE))
 
 
 def scene(
@@ -102,9 +103,13 @@ def scene(
     duration: float = 0.01,
     hydrodynamics: str = "none",
     distance: float = DISTANCE,
+    coarse: float = 1.0,
     seed: int = 0,
 ) -> Scene:
-    """A cube of particles at c g/mL, ``distance`` (m) beyond the end of a cylinder at an angle (degrees)."""
+    """A cube of particles at c g/mL, ``distance`` (m) beyond the end of a cylinder at an angle (degrees).
+
+    coarse : noise and forces move a particle so many times as far in a step.
+    """
     body = capture.fibre(capture.axis(angle), ASPECT)
     radius = nanometres * 1e-9
     half = side(number, radius, concentration) / 2
@@ -136,7 +141,7 @@ def scene(
             viscosity=capture.VISCOSITY,
             hydrodynamics=hydrodynamics,
             noise="exact" if hydrodynamics == "none" else "fast",
-            control=DriftLimit(longest=longest(radius), shortest=1e-12, drift=DRIFT),
+            control=DriftLimit(longest=longest(radius, coarse), shortest=1e-12, drift=coarse * DRIFT),
         ),
         duration=duration,
         seed=seed,

@@ -35,6 +35,7 @@ def test_speed_that_halves_the_radius_closed_form():
     assert len(broken.state["mass"]) == 16
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pieces", [2, 3, 5, 8])
 def test_default_threshold_lets_two_pieces_happen(pieces):
     """With b/b0 = 2^(-1/3) a grain breaks from dK for two pieces on, into as many as dK pays for."""

@@ -87,6 +87,7 @@ def refused():
     return said
 
 
+@pytest.mark.long
 def test_what_single_precision_cannot_hold_is_refused(single):
     """Not an infinite hardness, nor a mass of zero, which would make the particle vanish."""
     hardness, mass, temperature = single("test_precision", "refused")

@@ -46,6 +46,7 @@ def hung(rng, n, share=1.0):
     )
 
 
+@pytest.mark.long
 def test_each_world_has_its_own_number(rng):
     """None, one, and so many that the table is longer; the same bits alone."""
     worlds = [hung(rng, 5), hung(rng, 0), hung(rng, 1, share=0.5), hung(rng, 31)]

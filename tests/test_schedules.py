@@ -92,6 +92,7 @@ def test_one_thread_and_two(usual, elsewhere):
         assert elsewhere[f"one thread/{w}/work"].tolist() == work
 
 
+@pytest.mark.long
 def test_noise_with_one_thread_and_two(elsewhere):
     """Counter-based noise does not know which thread draws it: each particle a launch of its own here."""
     (result,) = simulate([kicked()], worlds=1, capacity=32, schedule="particle")

@@ -58,6 +58,7 @@ def test_step_control_at_its_floor():
     np.testing.assert_array_equal(order, np.arange(grains), "none has passed through another")
 
 
+@pytest.mark.long
 def test_a_grain_alone_takes_the_longest_step():
     """Nothing near anything: the step is its ceiling, and a grain alone crosses its time in few steps."""
     alone = scene([[0, 0, 0]], [[100.0, 0, 0]], row().effects, stepper=Verlet(), duration=0.01,

@@ -81,7 +81,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
         simulation.s.write(name, values)
     simulation.forget_lists()
     simulation.wall_s = wall_s
-    simulation.watch = Watch(simulation.s, simulation.scenes)
+    simulation.watch = Watch(simulation.s, simulation.scenes, simulation.made.inquest)
 
 
 def _agree(name: str, value: Any, received: Any) -> None:

@@ -11,6 +11,7 @@ from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
 from tisim.forces import FORCE, TORQUE, SumForces, SumForcesAgain, SumTrialForces, turning
 from tisim.halves import Halves
 from tisim.history import History, Remember, memory_fields
+from tisim.inquest import Inquest
 from tisim.neighbours import Neighbours
 from tisim.program import Item
 from tisim.settle_mutual import settling
@@ -53,6 +54,7 @@ class Composition:
     """What a step of a scene consists of.
 
     step : the items of a step. first : those that prepare the first one.
+    inquest : finds the force that has stopped a world.
     memory : what has been allocated beside the state, by what it is and for what.
     """
 
@@ -102,6 +104,7 @@ class Composition:
             turning=turning(self.forces, self.pair_forces),
             independent=stepper.independent(effects),
         )
+        self.inquest = Inquest(parts.summed)
         step: list[Item] = [*stepper.step(parts)]
         self.memory += tuple(parts.owned)
         first: list[Item] = [*lists, *parts.forces]

@@ -7,7 +7,7 @@ from tisim.domain import Domain
 from tisim.effect import Force, PairForce
 from tisim.halves import Halves
 from tisim.pairs import PairSum
-from tisim.state import Field, State
+from tisim.state import NOT_FINITE, Field, State
 
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
@@ -99,7 +99,7 @@ class SumForces(PairSum):
     def check(self, w, i, total):
         # Not below infinity: also true of NaN.
         if not (total.norm_sqr() < ti.math.inf):
-            self.find_fault(w, i)
+            self.s.suspect(w, NOT_FINITE, i)
 
     @ti.func
     def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
@@ -112,19 +112,6 @@ class SumForces(PairSum):
             effect.pair_force(s, w, i, j, separation, distance, t),
             effect.pair_torque(s, w, i, j, separation, distance, t),
         )
-
-    @ti.func
-    def find_fault(self, w, i):
-        """Say which force it was."""
-        s = self.s
-        t = s.time[w]
-        for effect in ti.static(self.forces):
-            if not (self.single(effect, w, i, t).norm_sqr() < ti.math.inf):
-                s.fault(w, i, effect.index)
-        for effect in ti.static(self.pair_forces):
-            for j in range(s.count[w]):
-                if not (self.of((effect,), w, i, j, t).norm_sqr() < ti.math.inf):
-                    s.fault(w, i, effect.index)
 
     @ti.func
     def largest(self, w, i):

@@ -17,7 +17,7 @@ from tisim.program import Nest, Program
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.starts import check_start, laid_out, volume
-from tisim.state import BOOKS, CLOCK, ENDED, MOTION, RUNNING, State, resolve_fields
+from tisim.state import BOOKS, CLOCK, ENDED, MOTION, NOBODY, RUNNING, State, resolve_fields
 from tisim.watch import Watch
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
@@ -107,7 +107,7 @@ class Simulation:
         self.s.hold.fill(np.inf)
         if self.first.items:
             self.first.advance(1)
-        self.watch = Watch(self.s, self.scenes)
+        self.watch = Watch(self.s, self.scenes, self.made.inquest)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.watch.look()
 
@@ -134,7 +134,7 @@ class Simulation:
         )
         self.s.approach_time.fill(np.inf)
         self.s.culprit.fill(2**31 - 1)
-        self.s.blame.fill(2**31 - 1)
+        self.s.blame.fill(NOBODY)
 
     def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:
         """Run every world to its end, or for at most ``steps`` more steps each.

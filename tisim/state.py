@@ -75,6 +75,11 @@ a quantity that particles settle among themselves does not settle; a particle ha
 place is lost; no step is short enough to be solved; a force asks for a step shorter than the shortest; a
 diffusion matrix is not positive definite."""
 
+NOBODY = 2**31 - 1
+"""For the index of the effect that is to blame: none."""
+ASKED = NOBODY - 1
+"""The same: a force, not yet known which."""
+
 CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
 BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id")
 MOTION = ("frame", "stride", "travel")
@@ -247,6 +252,12 @@ class State:
         lowest id is recorded, whatever the order of parallel work."""
         ti.atomic_max(self.failed[w], status)
         ti.atomic_min(self.culprit[w], self.id[w, i])
+
+    @ti.func
+    def suspect(self, w, status, i):
+        """Stop a world by a force on i; which of them, inquest.py finds out."""
+        self.fail(w, status, i)
+        ti.atomic_min(self.blame[w], ASKED)
 
     @ti.func
     def fault(self, w, i, effect):

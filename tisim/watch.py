@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from tisim.inquest import Inquest
 from tisim.result import Status
 from tisim.scene import Scene
 from tisim.state import (
+    ASKED,
     CROWDED,
     ENDED,
     FULL,
@@ -41,8 +43,8 @@ class Watch:
     faults : world -> (time found, s; what is wrong).
     """
 
-    def __init__(self, s: State, scenes: list[Scene]) -> None:
-        self.s, self.scenes = s, scenes
+    def __init__(self, s: State, scenes: list[Scene], inquest: Inquest) -> None:
+        self.s, self.scenes, self.inquest = s, scenes, inquest
         self.good = self._snapshot()
         self.faults: dict[int, tuple[float, str]] = {}
 
@@ -59,6 +61,8 @@ class Watch:
             bad = live & ~np.isfinite(now[f.name].reshape(worlds, self.s.capacity, -1)).all(axis=2)
             for w in map(int, np.flatnonzero(bad.any(axis=1))):
                 found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
+        if (self.s.read("blame") == ASKED).any():
+            self.inquest.hold()
         for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
             found[w] = self._fault(w, int(status[w]))
         for w, fault in found.items():

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from cases import concentration
-from cases.concentration import DISTANCE, coupling, longest, scene, side
-from cases.concentration_statistics import held
-from tisim import run
+from cases.capture import MOMENT
+from cases.concentration import DENSITY, DISTANCE, coupling, longest, scene, side
+from cases.concentration_statistics import CAPTURE, firsts, held, results
+from cases.statistics import Mean
+from tisim import Particles, Simulation, run
 from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
 
 
@@ -34,10 +36,10 @@ def test_coupling_is_the_energy_that_binds_two_at_contact():
     assert coupling(125) == pytest.approx(825, rel=0.001)
 
 
-def test_noise_moves_a_particle_by_a_tenth_of_its_radius_in_the_longest_step():
-    for radius in (25e-9, 125e-9):
+def test_noise_moves_a_particle_by_a_part_of_its_radius_in_the_longest_step():
+    for radius, coarse in ((25e-9, 1.0), (125e-9, 3.0)):
         diffusivity = 1.380649e-23 * 298 / (6 * np.pi * 1e-3 * radius)
-        assert np.sqrt(2 * diffusivity * longest(radius)) == pytest.approx(0.1 * radius)
+        assert np.sqrt(2 * diffusivity * longest(radius, coarse)) == pytest.approx(0.03 * coarse * radius)
 
 
 def test_near_pairs_are_those_of_a_double_loop():
@@ -95,6 +97,41 @@ def test_every_size_runs():
     for size in concentration.SIZES:
         made = concentration.scene_for(size, 0).replace({"duration": 2e-6})
         assert run(made).status.ok, size
+
+
+def spread(coarse):
+    """Standard deviation of the distance of a bound pair, in diameters, after it has come to equilibrium."""
+    made = scene(nanometres=75, number=2, coarse=coarse)
+    place = np.asarray(made.particles.placement.low) + np.array([[0.0, 0, 0], [1.5e-7, 0, 0]])
+    pair = Particles(
+        position=place, velocity=0 * place, radius=75e-9, density=DENSITY,
+        quantities={"saturation_moment": MOMENT[75]},
+    )  # fmt: skip
+    scenes = [made.model_copy(update={"particles": pair, "seed": seed}) for seed in range(16)]
+    simulation = Simulation(scenes[0], worlds=16)
+    simulation.load(scenes)
+    distance = []
+    for _ in range(100):
+        simulation.run(steps=20)
+        a, b = simulation.s.read("position")[:, :2].transpose(1, 0, 2)
+        distance.append(np.linalg.norm(b - a, axis=1) / 1.5e-7)
+    return np.std(distance[20:])
+
+
+@pytest.mark.slow
+def test_bound_pairs_spread_as_the_case_says():
+    assert spread(1.0) == pytest.approx(0.03, rel=0.2)
+    assert spread(1 / 3) == pytest.approx(0.008, rel=0.2)
+    assert spread(3.0) == pytest.approx(0.09, rel=0.2)
+
+
+@pytest.mark.slow
+def test_first_capture_does_not_depend_on_the_steps():
+    """Half as long ones: the same time within its confidence interval, start by start."""
+    settings = [{"concentration": 0.5, "angle": 0.0, **CAPTURE, "coarse": coarse} for coarse in (3.0, 1.5)]
+    usual, finer = (firsts(group) for group in results(settings, 4))
+    change = Mean.of(finer - usual)
+    assert abs(change.value) < change.half < 0.05
 
 
 @pytest.mark.slow

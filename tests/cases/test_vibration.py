@@ -7,6 +7,7 @@ from cases.vibration import RATIOS, SPACING, deviation, near_fields, scene
 from tests.scenes import simulate
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "near_field",
     [

@@ -7,7 +7,7 @@ difference to what they do.
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
-from tisim.state import STUCK
+from tisim.state import ASKED, STUCK
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.kept import kept
 from tisim.steppers.registers import Registers
@@ -165,7 +165,7 @@ class EndStretch(Phase):
     """The windows are done; or the first particle to be stuck is found."""
 
     def __init__(self, parts) -> None:
-        self.s, self.control, self.summed = parts.s, parts.control, parts.summed
+        self.s, self.control = parts.s, parts.control
 
     @ti.func
     def run(self, w, _k):
@@ -180,7 +180,7 @@ class EndStretch(Phase):
 
     @ti.func
     def accuse(self, w):
-        """The particle that got stuck first, when, and the largest force on it then."""
+        """The particle that got stuck first, and when."""
         s = self.s
         first = 0
         for i in range(s.count[w]):
@@ -189,4 +189,4 @@ class EndStretch(Phase):
         s.time[w] = ti.cast(s.own_time[w, first], ti.f64)
         s.failed[w] = STUCK
         s.culprit[w] = s.id[w, first]
-        s.blame[w] = self.summed.largest(w, first)
+        s.blame[w] = ASKED

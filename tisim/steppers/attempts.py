@@ -2,7 +2,7 @@
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase, Repeat
-from tisim.state import STUCK
+from tisim.state import ASKED, STUCK
 from tisim.steppers.kept import Kept
 from tisim.steppers.phases import note_stride
 
@@ -69,18 +69,21 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 
 @ti.func
-def accuse(s, summed: ti.template(), w):  # type: ignore[valid-type]
+def accuse(s, w):
     """The particle whose last iterate changed most, and the largest force on it."""
     worst, most = 0, s.iterate_change[w, 0]
     for i in range(s.count[w]):
         if s.iterate_change[w, i] > most:
             worst, most = i, s.iterate_change[w, i]
     s.culprit[w] = s.id[w, worst]
-    s.blame[w] = summed.largest(w, worst)
+    s.blame[w] = ASKED
 
 
 class GiveUp(PerParticle):
-    """An attempt that has failed leaves everything as it was."""
+    """An attempt that has failed leaves everything as it was, for the next one.
+
+    One that is hopeless is left as it is: there, which force it was can still be seen (inquest.py).
+    """
 
     conditional = True
 
@@ -90,7 +93,7 @@ class GiveUp(PerParticle):
 
     @ti.func
     def when(self, w):
-        return ti.select(self.s.verdict[w] == ACCEPTED, 0, 1)
+        return ti.select(self.s.verdict[w] == TRIED, 1, 0)
 
     @ti.func
     def run(self, w, i):

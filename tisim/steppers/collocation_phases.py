@@ -153,7 +153,7 @@ class Judge(Phase):
     def __init__(self, parts, sums, stages) -> None:
         self.s, self.control, self.sums, self.stages = parts.s, parts.control, sums, stages
         # Of the error, which falls as dt^(s + 1), over the displacement, which falls as dt.
-        self.summed, self.order = parts.summed, stages.number
+        self.order = stages.number
 
     @ti.func
     def run(self, w, _k):
@@ -222,7 +222,7 @@ class Judge(Phase):
             factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
             if self.control.hopeless(w, s.dt[w]):
                 s.verdict[w] = HOPELESS
-                accuse(s, self.summed, w)
+                accuse(s, w)
         s.next_dt[w] = s.dt[w] * factor
 
 

@@ -81,7 +81,7 @@ class Judge(Phase):
     """Is the iteration solved, to go on, or to be given up?"""
 
     def __init__(self, parts, sums) -> None:
-        self.s, self.control, self.sums, self.summed = parts.s, parts.control, sums, parts.summed
+        self.s, self.control, self.sums = parts.s, parts.control, sums
 
     @ti.func
     def run(self, w, _k):
@@ -105,7 +105,7 @@ class Judge(Phase):
                 s.verdict[w] = ACCEPTED
             elif self.control.hopeless(w, s.dt[w]):
                 s.verdict[w] = HOPELESS
-                accuse(s, self.summed, w)
+                accuse(s, w)
             factor = self.control.factor(w, self.control.aim(w), change, k, error)
             # A step that was not accepted would fail again in the same way if it were as long.
             s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))

@@ -26,8 +26,8 @@ class Parts:
     lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
     pairs remember, over ``dt``; once a step. forces : settle what is to be settled, and sum force and torque
     of the trial state; trial_forces : the same for a state that may be far from any solution, where a force
-    that is not finite is the stepper's to deal with, and ``summed`` to find out about. Lists and forces may
-    stand in an iteration, a ``Repeat``; positions must lie in the domain.
+    that is not finite is the stepper's to deal with. Lists and forces may stand in an iteration, a
+    ``Repeat``; positions must lie in the domain. summed : the sum itself, for particles by themselves.
     """
 
     s: State

@@ -2,6 +2,7 @@
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
+from tisim.state import ASKED
 from tisim.steppers.drift_limit import fault
 from tisim.steppers.phases import advance_clock, arrive
 
@@ -52,10 +53,10 @@ class Drift(PerParticle):
 
 
 class Accuse(Phase):
-    """A step that would have to be too short is not taken: whose it is, and the largest force on it."""
+    """A step that would have to be too short is not taken: whose it is."""
 
     def __init__(self, parts, drift) -> None:
-        self.s, self.summed, self.forced = parts.s, parts.summed, parts.forced
+        self.s, self.forced = parts.s, parts.forced
         self.fluid, self.interaction, self.control = drift.fluid, drift.interaction, drift.control
 
     @ti.func
@@ -69,7 +70,7 @@ class Accuse(Phase):
                     worst = i
             s.failed[w], s.culprit[w] = fault(s.steepest[w]), s.id[w, worst]
             if ti.static(self.forced):
-                s.blame[w] = self.summed.largest(w, worst)
+                s.blame[w] = ASKED
 
 
 class Scatter(PerParticle):

@@ -7,7 +7,7 @@ takes them through makes no difference to the noise either.
 
 from tisim._taichi import ti
 from tisim.program import PerParticle
-from tisim.state import LOST, NOT_FINITE, Field
+from tisim.state import ASKED, LOST, NOT_FINITE, Field
 from tisim.steppers.alone import LITTLE, EndStretch, beginning
 from tisim.steppers.drift_limit import fault
 from tisim.steppers.registers import Registers
@@ -147,7 +147,7 @@ class EndWandering(EndStretch):
 
     @ti.func
     def accuse(self, w):
-        """The particle that was stopped first, when, and the largest force on it then."""
+        """The particle that was stopped first, and when."""
         s = self.s
         first = -1
         for i in range(s.count[w]):
@@ -157,4 +157,4 @@ class EndWandering(EndStretch):
         s.failed[w] = s.own_fault[w, first]
         s.culprit[w] = s.id[w, first]
         if ti.static(self.forced):
-            s.blame[w] = self.summed.largest(w, first)
+            s.blame[w] = ASKED

@@ -1,0 +1,27 @@
+"""Which force it was that stopped a world: asked afterwards, by a kernel that is compiled only then.
+
+In the kernels of a step the laws of all forces would stand once more for it, and take as long to compile.
+"""
+
+from __future__ import annotations
+
+from tisim._taichi import ti
+from tisim.forces import SumForces
+from tisim.state import ASKED
+
+
+@ti.data_oriented
+class Inquest:
+    """Of the worlds of a batch that have failed by a force."""
+
+    def __init__(self, summed: SumForces) -> None:
+        self.s, self.summed = summed.s, summed
+
+    @ti.kernel
+    def hold(self):
+        """Blame the effect whose force on the culprit is largest, or not finite, as the world stands."""
+        for w in range(self.s.worlds):
+            if self.s.blame[w] == ASKED:
+                for i in range(self.s.count[w]):
+                    if self.s.id[w, i] == self.s.culprit[w]:
+                        self.s.blame[w] = self.summed.largest(w, i)
