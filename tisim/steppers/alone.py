@@ -12,7 +12,7 @@ from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.kept import kept
 from tisim.steppers.registers import Registers
 
-LAUNCH = 2**16
+LAUNCH = 2**20
 """Windows of a launch at most, of all particles together, where more than WINDOWS of them."""
 WINDOWS = 64
 LITTLE = 1e-6
