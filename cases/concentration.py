@@ -26,6 +26,7 @@ from cases import capture
 from cases.case import Case, Check, Size
 from cases.statistics import Claim
 from tisim import Cloud, Scene
+from tisim.accuracy.quantity import Quantity
 from tisim.batches import Progress
 from tisim.effects.dipole_dipole import TruncatedDipoleDipole
 from tisim.effects.magnetophoresis import Magnetophoresis
@@ -153,6 +154,14 @@ def scene_for(size: str, seed: int) -> Scene:
     return scene(seed=seed, **CASE.size(size).scene)
 
 
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """How many are caught, and how long chains are."""
+    from cases.concentration_statistics import chain
+
+    mean = Quantity("mean chain", lambda result: chain(result.state, result.state["moment"]), random=True)
+    return (mean, *capture.quantities(scene))
+
+
 def check() -> Iterator[Check | Claim]:
     """What B16 says of concentrated samples."""
     from cases import concentration_statistics
@@ -181,7 +190,7 @@ CASE = Case(
     sizes=SIZES,
     scene=scene_for,
     check=check,
-    quantities=capture.quantities,
+    quantities=quantities,
     pictures=pictures,
     figures=figures,
 )
