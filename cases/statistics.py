@@ -27,10 +27,6 @@ class Mean:
         ratio = self.value / other.value
         return Mean(ratio, abs(ratio) * float(np.hypot(self.half / self.value, other.half / other.value)))
 
-    def __sub__(self, other: Mean) -> Mean:
-        """The difference of two independent means."""
-        return Mean(self.value - other.value, float(np.hypot(self.half, other.half)))
-
     def __str__(self) -> str:
         return f"{self.value:.4g} ± {self.half:.2g}"
 

@@ -62,7 +62,7 @@ def test_a_start_outside_the_box_is_refused():
         run([drift([[5.0, 0, 0]], [[0.0, 0, 0]])])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
     """A joined box with images has contacts across its faces; Z04's control volume has not."""
     place, speed = [[-0.9995, 0, 0], [0.9995, 0, 0]], [[-1.0, 0, 0], [1.0, 0, 0]]

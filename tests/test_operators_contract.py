@@ -71,7 +71,7 @@ def test_an_operator_sees_every_world_once_a_step():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", [pytest.param(SoftShell, marks=pytest.mark.slow), SoftShellOfAll])
+@pytest.mark.parametrize("kind", [SoftShell, pytest.param(SoftShellOfAll, marks=pytest.mark.slow)])
 def test_lists_follow_particles_that_operators_move(kind):
     """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
     grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -124,8 +124,11 @@ def test_lists_follow_particles_that_grow(rng):
     np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("schedule", "axis", "images"), [("world", 0, True), ("particle", 2, False)])
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("schedule", "axis", "images"),
+    [("world", 0, True), pytest.param("particle", 2, False, marks=pytest.mark.slow)],
+)
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
     """More particles than look at all pairs; the bad one belongs to no cell."""
     wanted = scene(
@@ -204,7 +207,7 @@ class Leave(Operator):
             s.remove(w, i)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_step_control_sees_the_pairs_that_a_removal_leaves():
     """Gap 0.8 m at 1 m/s: 0.5 s, the longest step, and then the 0.3 s that are left until surfaces meet."""
     wanted = scene(

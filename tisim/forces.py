@@ -114,10 +114,9 @@ class SumForces(PairSum):
         )
 
     @ti.func
-    def largest(self, w, i):
+    def largest(self, w, i, t):
         """Index of the effect whose force on i is largest, or not finite, or settles to nothing finite."""
         s = self.s
-        t = s.time[w]
         most, found = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces):
             size = self.single(effect, w, i, t).norm()

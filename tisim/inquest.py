@@ -19,9 +19,9 @@ class Inquest:
 
     @ti.kernel
     def hold(self):
-        """Blame the effect whose force on the culprit is largest, or not finite, as the world stands."""
+        """Blame the effect whose force on the culprit is largest, or not finite, where it was when asked."""
         for w in range(self.s.worlds):
             if self.s.blame[w] == ASKED:
                 for i in range(self.s.count[w]):
                     if self.s.id[w, i] == self.s.culprit[w]:
-                        self.s.blame[w] = self.summed.largest(w, i)
+                        self.s.blame[w] = self.summed.largest(w, i, self.s.asked_at[w])

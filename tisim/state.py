@@ -80,7 +80,7 @@ NOBODY = 2**31 - 1
 ASKED = NOBODY - 1
 """The same: a force, not yet known which."""
 
-CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume")
+CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "asked_at")
 BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id")
 MOTION = ("frame", "stride", "travel")
 TALLIES = ("steps", "particle_steps")
@@ -257,7 +257,13 @@ class State:
     def suspect(self, w, status, i):
         """Stop a world by a force on i; which of them, inquest.py finds out."""
         self.fail(w, status, i)
+        self.ask(w, self.time[w])
+
+    @ti.func
+    def ask(self, w, t):
+        """Which force it was at t (s), as the world is now."""
         ti.atomic_min(self.blame[w], ASKED)
+        self.asked_at[w] = t
 
     @ti.func
     def fault(self, w, i, effect):

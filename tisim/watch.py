@@ -65,12 +65,17 @@ class Watch:
             self.inquest.hold()
         for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
             found[w] = self._fault(w, int(status[w]))
-        for w, fault in found.items():
-            self.faults.setdefault(w, (float(now["time"][w]), fault))
+        fresh = [w for w in found if w not in self.faults]
+        for w in fresh:
+            self.faults[w] = float(now["time"][w]), found[w]
         sound = np.array([w not in found for w in range(worlds)])
         for name, values in now.items():
             self.good[name][sound] = values[sound]
-        if found:
+        if fresh:
+            # So that a checkpoint holds it too, and not what has failed.
+            for name, values in now.items():
+                values[fresh] = self.good[name][fresh]
+                self.s.write(name, values)
             status[~sound & (status == RUNNING)] = NOT_FINITE
             self.s.write("status", status)
 

@@ -21,6 +21,7 @@ CAUGHT = {
     (0.1, 90.0, 2.0, 10.0, 3.0): (24, 29),
     (0.8, 90.0, 2.0, 10.0, 1.2): (25, 28),
     (0.8, 90.0, 2.0, 5.0, 3.0): (13, 31),
+    (0.5, 60.0, 3.0, 6.0, 2.5): (21, 35),
 }
 """Field (T), its angle (degrees), L/D, fibres and spacing (D) -> particles caught of two starts."""
 GENES = ("flux", "field_angle", "aspect", "number", "spacing")

@@ -7,11 +7,16 @@ from cases.charged_closed_forms import driven
 from tests.scenes import scene, simulate
 from tests.steppers.charged import PUSH, W, charged, equal_steps, final
 from tests.test_short_ranged import grains, shells
-from tests.throwaway import SoftShell, Trap
+from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import Simulation
+from tisim._taichi import ti
+from tisim.effect import Force, parameter
+from tisim.effects.gravity import Gravity
 from tisim.errors import InputError
+from tisim.steppers.collocation import Collocation
 from tisim.steppers.controller import FixedStep
 from tisim.steppers.implicit_control import ErrorControl, IterationControl
+from tisim.steppers.stage_control import StageControl
 from tisim.steppers.trapezoid import Trapezoid
 
 
@@ -125,6 +130,36 @@ def test_what_cannot_be_solved_together_says_so_too():
         "cannot be solved even at the shortest step, by effects.soft_shell, at particle"
         in result.status.reason
     )
+    assert np.isfinite(result.state["velocity"]).all()
+
+
+class Late(Force):
+    """None up to a time, then one that is not finite."""
+
+    when: float = parameter("s")
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return ti.select(t > self.when(w), ti.math.inf, 0.0) * s.velocity[w, i]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", [Trapezoid, pytest.param(Collocation, marks=pytest.mark.slow)])
+def test_the_force_is_that_of_the_time_at_which_the_step_fails(kind):
+    """Where the last good step ends, another force is the largest."""
+    control = {Trapezoid: IterationControl(first=0.05, longest=0.05, shortest=0.01),
+               Collocation: StageControl(first=0.05, longest=0.05, shortest=0.01)}[kind]  # fmt: skip
+    effects = (
+        Gravity(acceleration=(0.0, 0.0, -1.0)),
+        SoftShellOfAll(stiffness=1.0, width=0.1),
+        Late(when=0.52),
+    )
+    place, drift = [[0, 0, 0], [1, 0, 0]], [[1, 0, 0], [1, 0, 0]]
+    stepper = kind(control=control)
+    made = scene(place, drift, effects, mass=1.0, stepper=stepper, duration=1.0)
+    (result,) = simulate([made], worlds=1)
+    assert "by effects.late, at particle 0" in result.status.reason
+    assert 0.4 < float(result.status.reason.split()[4]) <= 0.52
     assert np.isfinite(result.state["velocity"]).all()
 
 

@@ -55,6 +55,8 @@ class Abreast(Wander):
             begin = beginning(s, self.control, w, s.windows[w] + done)
             dt = beginning(s, self.control, w, s.windows[w] + done + 1) - begin
             number, step = self.number(s.windows[w] + done), ti.cast(dt, s.real)
+            if not (dt > 0.0):
+                halted = 1
             for lane in range(LANES):
                 i = first + lane
                 f = 0.0 * s.force[w, i]

@@ -7,7 +7,7 @@ difference to what they do.
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
-from tisim.state import ASKED, STUCK
+from tisim.state import STUCK
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.kept import kept
 from tisim.steppers.registers import Registers
@@ -189,4 +189,4 @@ class EndStretch(Phase):
         s.time[w] = ti.cast(s.own_time[w, first], ti.f64)
         s.failed[w] = STUCK
         s.culprit[w] = s.id[w, first]
-        s.blame[w] = ASKED
+        s.ask(w, s.time[w])

@@ -2,7 +2,7 @@
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase, Repeat
-from tisim.state import ASKED, STUCK
+from tisim.state import STUCK
 from tisim.steppers.kept import Kept
 from tisim.steppers.phases import note_stride
 
@@ -70,13 +70,13 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 @ti.func
 def accuse(s, w):
-    """The particle whose last iterate changed most, and the largest force on it."""
+    """The particle whose last iterate changed most; which force on it is at fault, inquest.py finds out."""
     worst, most = 0, s.iterate_change[w, 0]
     for i in range(s.count[w]):
         if s.iterate_change[w, i] > most:
             worst, most = i, s.iterate_change[w, i]
     s.culprit[w] = s.id[w, worst]
-    s.blame[w] = ASKED
+    s.ask(w, s.time[w])
 
 
 class GiveUp(PerParticle):

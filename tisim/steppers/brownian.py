@@ -21,7 +21,7 @@ from tisim.steppers.fluid import Fluid
 from tisim.steppers.mobility import Mobility, Oseen, RotnePrager
 from tisim.steppers.phases import Clock
 from tisim.steppers.stepper import Parts, Stepper, single
-from tisim.steppers.together import Accuse, Drift, Proceed, Scatter, Separate
+from tisim.steppers.together import Drift, Proceed, Scatter, Separate
 from tisim.steppers.wandering import OWN, EndWandering, Wander
 
 
@@ -97,10 +97,9 @@ class Brownian(Stepper):
             wander = Abreast if abreast(parts) else Wander
             return (Stretch(s, parts.control), wander(parts, fluid), EndWandering(parts))
         interaction = self._interaction(parts, fluid)
-        drift = Drift(fluid, interaction, parts.control)
-        limited = (*interaction.phases(), drift, Accuse(parts, drift))
+        drift = (*interaction.phases(), Drift(fluid, interaction, parts.control))
         move = (Clock(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
-        return (*limited, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
+        return (*drift, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
 
     def _interaction(self, parts: Parts, fluid: Fluid) -> Any:
         if self.hydrodynamics == "none":

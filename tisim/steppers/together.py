@@ -2,7 +2,6 @@
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
-from tisim.state import ASKED
 from tisim.steppers.drift_limit import fault
 from tisim.steppers.phases import advance_clock, arrive
 
@@ -43,34 +42,12 @@ class Drift(PerParticle):
         if self.fluid.mobile(w, i) > 0:
             pushed = self.interaction.pushed(w, i)
             rate = self.control.rate(s, w, i, pushed)
-            # Not below infinity: also true of NaN.
-            if not (rate < ti.math.inf):
-                rate = ti.math.inf
-            if rate > s.steepest[w]:
+            if self.control.hopeless(w, rate):
+                s.suspect(w, fault(rate), i)
+            elif rate > s.steepest[w]:
                 ti.atomic_max(s.steepest[w], rate)
             velocity = self.fluid.flow(w, i, s.time[w]) + pushed
         s.velocity[w, i] = velocity
-
-
-class Accuse(Phase):
-    """A step that would have to be too short is not taken: whose it is."""
-
-    def __init__(self, parts, drift) -> None:
-        self.s, self.forced = parts.s, parts.forced
-        self.fluid, self.interaction, self.control = drift.fluid, drift.interaction, drift.control
-
-    @ti.func
-    def run(self, w, _k):
-        s = self.s
-        if self.control.hopeless(w, s.steepest[w]):
-            worst = -1
-            for i in range(s.count[w]):
-                rate = self.control.rate(s, w, i, self.interaction.pushed(w, i))
-                if worst < 0 and self.fluid.mobile(w, i) > 0 and not (rate < s.steepest[w]):
-                    worst = i
-            s.failed[w], s.culprit[w] = fault(s.steepest[w]), s.id[w, worst]
-            if ti.static(self.forced):
-                s.blame[w] = ASKED
 
 
 class Scatter(PerParticle):

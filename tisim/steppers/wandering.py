@@ -7,7 +7,7 @@ takes them through makes no difference to the noise either.
 
 from tisim._taichi import ti
 from tisim.program import PerParticle
-from tisim.state import ASKED, LOST, NOT_FINITE, Field
+from tisim.state import LOST, NOT_FINITE, Field
 from tisim.steppers.alone import LITTLE, EndStretch, beginning
 from tisim.steppers.drift_limit import fault
 from tisim.steppers.registers import Registers
@@ -87,8 +87,9 @@ class Wander(PerParticle):
         length = beginning(self.s, self.control, w, window + 1) - begin
         elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
         taken, going, g = 0, 1, kick
-        mobility = self.fluid.mobility(w, i)
         while elapsed < length and going > 0:
+            # An operator may have changed the radius in the last step.
+            mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
                 self.summed.alone(w, i, begin + elapsed)
             pushed = self.fluid.pushed(w, i, mobility)
@@ -157,4 +158,4 @@ class EndWandering(EndStretch):
         s.failed[w] = s.own_fault[w, first]
         s.culprit[w] = s.id[w, first]
         if ti.static(self.forced):
-            s.blame[w] = ASKED
+            s.ask(w, s.time[w])
