@@ -93,11 +93,11 @@ def test_cascade_is_what_its_stages_make_it():
     """All stages of an optimal cascade are alike: 1 - (1 - p)^k are captured after k, p from stages alone."""
     one = Cascade(orientation="optimal", number=400)
     draw = np.random.default_rng(5)
-    alone = [fraction(result.state) for result in run([one.scene(400, draw) for _ in range(8)])]
-    (times,) = captured_at([one], 8, share=0.7)
+    alone = [fraction(result.state) for result in run([one.scene(400, draw) for _ in range(12)])]
+    (times,) = captured_at([one], 12, share=0.7)
     p, k = np.mean(alone), 3
     caught = (times <= k * one.stage).mean(axis=1)
-    error = np.hypot(caught.std(ddof=1), k * (1 - p) ** (k - 1) * np.std(alone, ddof=1)) / np.sqrt(8)
+    error = np.hypot(caught.std(ddof=1), k * (1 - p) ** (k - 1) * np.std(alone, ddof=1)) / np.sqrt(12)
     assert abs(caught.mean() - (1 - (1 - p) ** k)) < 4 * error < 0.05
 
 
