@@ -89,8 +89,8 @@ def chain_length(nanometres: int, concentration: float) -> float:
 def longest(radius: float, coarse: float = 1.0) -> float:
     """Step (s) in which a sphere of a radius (m) diffuses by ``coarse`` DIFFUSION radii.
 
-    What is at contact is not pushed far into the other before it feels that: with ``coarse`` of 10, 25 nm
-    particles at 2 g/mL end up so deep in each other that no step is short enough.
+    What is at contact is not pushed far into the other before it feels that: with ``coarse`` of 5, 25 nm
+    particles at 2 g/mL soon lie so deep in each other that no step is short enough; with 3 they do not.
     """
     drag = 6 * np.pi * capture.VISCOSITY * radius
     return float((coarse * DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * capture.TEMPERATURE))

@@ -133,7 +133,7 @@ class Simulation:
             "volume", np.array([volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty)
         )
         self.s.approach_time.fill(np.inf)
-        self.s.culprit.fill(2**31 - 1)
+        self.s.culprit.fill(NOBODY)
         self.s.blame.fill(NOBODY)
 
     def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:

@@ -76,7 +76,7 @@ place is lost; no step is short enough to be solved; a force asks for a step sho
 diffusion matrix is not positive definite."""
 
 NOBODY = 2**31 - 1
-"""For the index of the effect that is to blame: none."""
+"""For the particle that has stopped a world, and the index of the effect that is to blame: none."""
 ASKED = NOBODY - 1
 """The same: a force, not yet known which."""
 

@@ -6,7 +6,7 @@ import pytest
 from cases import concentration
 from cases.capture import MOMENT
 from cases.concentration import DENSITY, DISTANCE, coupling, longest, scene, side
-from cases.concentration_statistics import CAPTURE, firsts, held, results
+from cases.concentration_statistics import CAPTURE, CHAINS, firsts, grown, held, results
 from cases.statistics import Mean
 from tisim import Particles, Simulation, run
 from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
@@ -132,6 +132,17 @@ def test_first_capture_does_not_depend_on_the_steps():
     usual, finer = (firsts(group) for group in results(settings, 4))
     change = Mean.of(finer - usual)
     assert abs(change.value) < change.half < 0.05
+
+
+@pytest.mark.slow
+def test_chains_do_not_depend_on_the_steps():
+    """Particles that move a third or three times as far in one: as long, within a confidence interval."""
+    settings = [{"concentration": 0.5, **CHAINS, "coarse": coarse} for coarse in (1.0, 1 / 3, 3.0)]
+    usual, *others = (np.array([grown(result) for result in group]) for group in results(settings, 16))
+    assert Mean.of(usual).value > 2
+    for other in others:
+        change = Mean.of(other - usual)
+        assert abs(change.value) < change.half < 0.5
 
 
 @pytest.mark.slow

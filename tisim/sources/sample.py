@@ -25,12 +25,13 @@ class _Sum:
             place = ti.Vector([r[i, 0], r[i, 1], r[i, 2]])
             value, gradient = 0.0 * place, 0.0 * place.outer_product(place)
             for field in ti.static(self.fields):
-                value += field.value(0, place, t)
-                gradient += field.gradient(0, place, t)
+                b, slope = field.value_and_gradient(0, place, t)
+                value += b
+                gradient += slope
             for a in ti.static(range(3)):
                 out[i, 0, a] = value[a]
-                for b in ti.static(range(3)):
-                    out[i, 1 + b, a] = gradient[a, b]
+                for c in ti.static(range(3)):
+                    out[i, 1 + c, a] = gradient[a, c]
 
 
 def sample(

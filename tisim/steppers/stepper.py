@@ -27,8 +27,8 @@ class Parts:
     pairs remember, over ``dt``; once a step. forces : settle what is to be settled, and sum force and torque
     of the trial state; trial_forces : the same for a state that may be far from any solution, where a force
     that is not finite is the stepper's to deal with. Lists and forces may stand in an iteration, a
-    ``Repeat``; positions must lie in the domain. summed : the sum itself, for
-    particles by themselves, and to find out which force is at fault.
+    ``Repeat``; positions must lie in the domain. summed : the sum itself, for particles by themselves, and to
+    find out which force is at fault.
     """
 
     s: State
