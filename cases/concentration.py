@@ -26,7 +26,7 @@ from cases import capture
 from cases.case import Case, Check, Size
 from cases.statistics import Claim
 from tisim import Cloud, Scene
-from tisim.accuracy.quantity import Quantity
+from tisim.accuracy.quantity import Quantity, usual
 from tisim.batches import Progress
 from tisim.effects.dipole_dipole import TruncatedDipoleDipole
 from tisim.effects.magnetophoresis import Magnetophoresis
@@ -155,10 +155,13 @@ def scene_for(size: str, seed: int) -> Scene:
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """How long chains are; before some tenths of a second nothing is caught."""
+    """How long chains are, and how far particles get; before some tenths of a second nothing is caught."""
     from cases.concentration_statistics import chain
 
-    return (Quantity("mean chain", lambda result: chain(result.state, result.state["moment"]), random=True),)
+    return (
+        Quantity("mean chain", lambda result: chain(result.state, result.state["moment"]), random=True),
+        *usual(scene),
+    )
 
 
 def check() -> Iterator[Check | Claim]:

@@ -20,7 +20,9 @@ from tisim.errors import InputError
 from tisim.knob import Knob
 from tisim.sources.uniform import MagneticField
 from tisim.spec import parameter
+from tisim.steppers.brownian import Brownian
 from tisim.steppers.controller import FixedStep
+from tisim.steppers.drift_limit import DriftLimit
 from tisim.steppers.stepper import Stepper
 from tisim.steppers.verlet import Verlet
 
@@ -103,6 +105,21 @@ def test_only_what_suits_a_scene_is_tried():
     assert {"Boris", "Trapezoid"} <= tried(charged(accurate(1e-3), 1.0))
     assert "Verlet" not in tried(charged(accurate(1e-3), 1.0))
     assert tried(drift()) == {"Verlet"}
+
+
+def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_chooses():
+    """Temperature and viscosity are not of its choice."""
+    fluid = Brownian(
+        temperature=298.0, viscosity=1e-3, control=DriftLimit(longest=1e-3), hydrodynamics="rotne-prager",
+        noise="fast",
+    )  # fmt: skip
+    names = list(found(oscillator().model_copy(update={"stepper": fluid})))
+    exact, fast = (
+        "Brownian(hydrodynamics='rotne-prager')",
+        "Brownian(hydrodynamics='rotne-prager', noise='fast')",
+    )
+    assert names[0] == f"{fast}, DriftLimit: longest, drift"
+    assert f"{exact}, DriftLimit: longest, drift" in names
 
 
 def test_a_cut_off_is_tried_against_the_law_that_has_none():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tisim import kinds, steppers
-from tisim.accuracy.words import expression
+from tisim.accuracy.words import given
 from tisim.errors import InputError
 from tisim.knob import Knob
 from tisim.scene import Scene
@@ -188,7 +188,8 @@ def _laws(scene: Scene, kind: str, laws: Sequence[Spec], starts: int) -> Method:
 def _title(scene: Scene, path: str) -> str:
     if not path.startswith("stepper"):
         return path.removeprefix("effects.")
-    stepper = scene.stepper
-    bare = expression(stepper.model_copy(update={"control": None}))
-    name = bare.replace("control=None", "").replace("(, ", "(").replace("()", "").replace(", )", ")")
+    # What any such stepper must be told, such as what fluid it is in, is no matter of method.
+    stepper, told = scene.stepper, type(scene.stepper).model_fields
+    chosen = [f"{k}={v!r}" for k, v in given(stepper).items() if k != "control" and not told[k].is_required()]
+    name = type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else "")
     return f"{name}, {type(stepper.control).__name__}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +19,8 @@ from tisim.figure import empty, plain
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
 """P. Tol's bright set, and one of his light one."""
 MARKERS = "osD^vP<>X"
+WIDTH = 80
+"""Characters of a line in the legend, which a panel has room for."""
 
 
 def save(study: Study, path: Path) -> Path:
@@ -58,7 +61,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
         style = "-" if all(row.precision == "f64" for row in rows) else "--"
         times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
         axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
-        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=method)
+        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=fill(method, WIDTH))
         for row in rows:
             _mark(axis, row, k, colour, marker)
     chosen = decades(study.rows, k)
