@@ -1,46 +1,30 @@
-"""Figures of the case capture: of one run, and of many."""
+"""Figures of the case capture: of one run, and of its magnet."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from cases import capture
-from cases.capture_statistics import (
-    ANGLES,
-    ASPECTS,
-    MICRO,
-    Settings,
-    even,
-    fraction,
-    fractions,
-    isotropic,
-    mean,
-    results,
-)
-from cases.statistics import Mean
+from cases import capture, capture_curves
+from cases.capture_statistics import MICRO
 from tisim import Scene
-from tisim.batches import Progress, share
+from tisim.batches import Progress
 from tisim.figure import empty, plain
 from tisim.frames import Frames
-from tisim.result import Result
 from tisim.sources.cylinder import Cylinder, MagneticCylinders
 from tisim.sources.sample import sample
 
 LEAST_FORCE = 0.5e-15
 """N, of what counts as capture volume (B16 section 6.4.1)."""
-FEW = 10
-"""Repeats of a figure; the checks take REPEATS."""
-PLANE = 181
-"""Points along a side of a map."""
+PLANE, SPACE = 181, 96
+"""Points along a side of a map, and of the box in which capture volume is counted."""
+BEYOND = 2.5e-3
+"""m, farther than the capture volume of 50 nm reaches."""
 
 
 def cylinder(scene: Scene) -> Cylinder:
@@ -94,36 +78,15 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """field.png, volume.png: of the magnet; capture.png, capture.csv: captured fractions, for particles of
     all sizes whatever ``size`` is."""
-    angles: list[Settings] = [
-        {"nanometres": n, "angle": a, "aspect": 20.0, "part": part}
-        for n in (75, 212) for part in ("top", "side") for a in ANGLES
-    ]  # fmt: skip
-    sizes: list[Settings] = [
-        {"nanometres": n, "angle": a, "aspect": 20.0} for n in capture.MOMENT for a in ANGLES
-    ]
-    aspects: list[Settings] = [
-        {"nanometres": n, "angle": a, "aspect": r} for n in (50, 125, 212) for r in ASPECTS for a in ANGLES
-    ]
-    parts = []
-    for done, settings in enumerate((angles, sizes, aspects)):
-        found = results(settings, FEW, share(progress, done, 3))
-        parts.append(list(zip(settings, found, strict=True)))
-    return {
-        "field.png": field(),
-        "volume.png": volume(),
-        "capture.png": captured(*parts),
-        "capture.csv": table([row for part in parts for row in part]),
-    }
+    return {"field.png": field(), "volume.png": volume(), **capture_curves.figures(progress)}
 
 
-def plane(scene: Scene, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of the xz plane, (PLANE, PLANE, 3) in m, and B (T) and its gradient (T/m) there."""
+def plane(reach: float) -> np.ndarray:
+    """Points of the xz plane up to reach (m) from the origin, (PLANE, PLANE, 3) in m."""
     line = np.linspace(-reach, reach, PLANE)
     x, z = np.meshgrid(line, line)
     # Off the plane of symmetry by next to nothing, so that no point lies on an edge.
-    points = np.stack([x, np.full_like(x, 1e-9), z], axis=-1)
-    b, slope = sample(scene.effects, "magnetic_flux_density", points.reshape(-1, 3))
-    return points, b.reshape(*x.shape, 3), slope.reshape(*x.shape, 3, 3)
+    return np.stack([x, np.full_like(x, 1e-9), z], axis=-1)
 
 
 def field() -> Figure:
@@ -132,7 +95,9 @@ def field() -> Figure:
     axes = figure.subplots(1, 3, sharey=True)
     for axis, angle in zip(axes, (0.0, 45.0, 90.0), strict=True):
         scene = capture.scene(angle=angle)
-        points, b, _ = plane(scene, 1.1e-3)
+        points = plane(1.1e-3)
+        b, _ = sample(scene.effects, "magnetic_flux_density", points.reshape(-1, 3))
+        b = b.reshape(points.shape)
         line = points[0, :, 0] / MICRO
         drawn = axis.pcolormesh(line, line, np.linalg.norm(b, axis=-1), cmap="viridis", vmin=0.3, vmax=2.0,
                                 shading="auto", rasterized=True)  # fmt: skip
@@ -158,10 +123,8 @@ def volume() -> Figure:
         for axis, angle in zip(row, (0.0, 45.0, 90.0), strict=True):
             scene = capture.scene(nanometres=50, angle=angle, aspect=aspect)
             body = cylinder(scene)
-            points, b, slope = plane(scene, 0.75 * body.length + 0.9e-3)
-            moment = capture.MOMENT[50] * b / np.linalg.norm(b, axis=-1, keepdims=True)
-            force = np.einsum("...ab,...b->...a", slope, moment)
-            inward = attraction(force, points, body)
+            points = plane(0.6 * body.length + 1.5e-3)
+            inward = pull(scene, points)
             line = points[0, :, 0] / MICRO
             shown = axis.pcolormesh(
                 line, line, np.ma.masked_less(inward, LEAST_FORCE), cmap="magma_r", shading="auto",
@@ -169,13 +132,36 @@ def volume() -> Figure:
             )  # fmt: skip
             outline(axis, body)
             axis.set(aspect="equal", xlim=(line[0], line[-1]), ylim=(line[0], line[-1]))
-            axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°", fontsize=10)
+            own = capture_volume(scene)
+            axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°: {own:.1f} times its volume", fontsize=10)
     for axis in grid[-1]:
         axis.set_xlabel("x, along the field (um)")
     for axis in grid[:, 0]:
         axis.set_ylabel("z (um)")
     figure.colorbar(shown, ax=grid, label="force towards the cylinder (N)", shrink=0.7)
     return figure
+
+
+def pull(scene: Scene, points: np.ndarray) -> np.ndarray:
+    """Magnetic force (N) on a particle of the scene towards its cylinder, at points (..., 3) in m."""
+    b, slope = sample(scene.effects, "magnetic_flux_density", points.reshape(-1, 3))
+    size = scene.particles.arrays(scene.domain, scene.seed)["saturation_moment"][0]
+    moment = size * b / np.linalg.norm(b, axis=-1, keepdims=True)
+    force = np.einsum("kab,kb->ka", slope, moment).reshape(points.shape)
+    return attraction(force, points, cylinder(scene))
+
+
+def capture_volume(scene: Scene) -> float:
+    """In which the cylinder draws a particle with LEAST_FORCE or more, over its own volume (B16 6.4.1).
+
+    From the middles of cells, SPACE along each side of a box that reaches BEYOND the cylinder.
+    """
+    body = cylinder(scene)
+    half = 0.5 * body.length * np.abs(body.axis) + BEYOND
+    lines = [h * ((2 * np.arange(SPACE) + 1) / SPACE - 1) for h in half]
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    part = float((pull(scene, points) >= LEAST_FORCE).mean())
+    return part * float(np.prod(2 * half)) / (np.pi * body.radius**2 * body.length)
 
 
 def attraction(force: np.ndarray, points: np.ndarray, body: Cylinder) -> np.ndarray:
@@ -189,72 +175,3 @@ def attraction(force: np.ndarray, points: np.ndarray, body: Cylinder) -> np.ndar
     distance = np.linalg.norm(away, axis=-1)
     towards = -(force * away).sum(axis=-1) / np.maximum(distance, 1e-30)
     return np.where(distance > 0, towards, 0.0)
-
-
-Group = Sequence[tuple[Mapping[str, float], Sequence[Result]]]
-
-
-def captured(angles: Group, sizes: Group, aspects: Group) -> Figure:
-    """Fraction in time by angle, TOP and SIDE (B16 Fig. 6.4); at the end by angle and size (6.6a), and by
-    aspect ratio (6.6b), there the even mean over angles."""
-    figure = empty(10.4, 8.6)
-    grid = figure.subplots(3, 2)
-    times = np.linspace(0.0, capture.DURATION, 101)
-    colours = colormaps["viridis"](np.linspace(0.0, 0.92, len(ANGLES)))
-    for k, axis in enumerate(grid[:2].flat):
-        group = angles[k * len(ANGLES) : (k + 1) * len(ANGLES)]
-        for (settings, found), colour in zip(group, colours, strict=True):
-            curve = np.mean([[fraction(r.state, t) for t in times] for r in found], axis=0)
-            axis.plot(times, curve, color=colour, lw=1.4, label=f"{settings['angle']:.0f}°")
-        settings = group[0][0]
-        axis.set_title(f"{settings['nanometres']} nm, {str(settings['part']).upper()}, L/D = 20", fontsize=10)
-        axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02))
-    grid[0, 0].legend(frameon=False, fontsize=8, ncols=2, title="axis to field", title_fontsize=8)
-    left, right = grid[2]
-    by_size(left, sizes)
-    by_aspect(right, aspects)
-    for axis in grid.flat:
-        plain(axis)
-    return figure
-
-
-def bars(axis: Axes, x: Sequence[float], means: Sequence[Mean], colour: object, label: str) -> None:
-    axis.errorbar(
-        x, [m.value for m in means], [m.half for m in means], color=colour, lw=1.3, marker="o", ms=3,
-        capsize=2, label=label,
-    )  # fmt: skip
-
-
-def by_size(axis: Axes, sizes: Group) -> None:
-    colours = colormaps["plasma"](np.linspace(0.0, 0.88, len(capture.MOMENT)))
-    for k, (n, colour) in enumerate(zip(capture.MOMENT, colours, strict=True)):
-        group = sizes[k * len(ANGLES) : (k + 1) * len(ANGLES)]
-        bars(axis, ANGLES, [mean(found) for _, found in group], colour, f"{n} nm")
-    axis.set(xlabel="angle of the axis to the field (°)", ylabel="captured in 50 s, L/D = 20", ylim=(0, 1.02))
-    axis.legend(frameon=False, fontsize=8, ncols=2)
-
-
-def by_aspect(axis: Axes, aspects: Group) -> None:
-    found = iter(aspects)
-    for n, colour in zip((50, 125, 212), ("#228833", "#4477aa", "#cc6677"), strict=True):
-        groups = [np.array([fractions(next(found)[1]) for _ in ANGLES]) for _ in ASPECTS]
-        bars(axis, ASPECTS, [Mean.of(even(group)) for group in groups], colour, f"{n} nm")
-        axis.plot(ASPECTS, [isotropic(group).mean() for group in groups], ":", color=colour, lw=1.2)
-    axis.set(xlabel="L/D", ylabel="captured in 50 s", ylim=(0.4, 1.0), xscale="log")
-    axis.set_xticks([2, 5, 10, 20], ["2", "5", "10", "20"])
-    axis.minorticks_off()
-    axis.set_title("even mean over angles; dotted: all directions equally likely", fontsize=9)
-    axis.legend(frameon=False, fontsize=8)
-
-
-def table(rows: Group) -> str:
-    """All of it as CSV."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"])
-    for settings, found in rows:
-        m = mean(found)
-        part = settings.get("part", "all")
-        writer.writerow([settings["nanometres"], settings["angle"], settings["aspect"], part, len(found),
-                         m.value, m.half])  # fmt: skip
-    return text.getvalue()

@@ -105,16 +105,20 @@ def of_orientation(repeats: int) -> Iterator[Claim]:
 
 def of_aspect(repeats: int) -> Iterator[Claim]:
     """Section 6.4.3: shorter cylinders capture a little more, averaged over angles; which is their inactive
-    lateral surface when they lie along the field. Averaged over directions it is the other way round."""
-    aspects = (ASPECTS[0], ASPECTS[-1])
+    lateral surface when they lie along the field. Averaged over directions it is the other way round, and
+    across the field too. Section 6.4.4: "relatively small" is L/D < 6."""
     settings = [
-        {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in aspects for angle in ANGLES
+        {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in ASPECTS for angle in ANGLES
     ]
     found = np.array([fractions(group) for group in results(settings, repeats)])
-    gain = found[: len(ANGLES)] - found[len(ANGLES) :]
+    shortest, short, medium, long = found.reshape(len(ASPECTS), len(ANGLES), repeats)
+    gain = shortest - long
     yield Claim("125 nm, L/D 5/3 minus 20, longitudinal", Mean.of(gain[0]), least=0.0)
+    yield Claim("125 nm, L/D 5/3 minus 20, transverse", Mean.of(gain[-1]), most=0.0)
     yield Claim("125 nm, L/D 5/3 minus 20, even mean over angles", Mean.of(even(gain)), least=0.0)
     yield Claim("the same, all directions equally likely", Mean.of(isotropic(gain)), most=0.0)
+    yield Claim("125 nm, L/D 10/3 minus 20, even mean over angles", Mean.of(even(short - long)), least=0.0)
+    yield Claim("125 nm, L/D 20/3 minus 20, even mean over angles", Mean.of(even(medium - long)), most=0.02)
 
 
 def of_size(repeats: int) -> Iterator[Claim]:

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
@@ -63,8 +64,7 @@ def snapshot(axis: Axes, state: Arrays) -> None:
     discs = EllipseCollection(size, size, np.zeros(len(position)), units="x", offsets=places[order],
                               offset_transform=axis.transData, edgecolor="0.3", lw=0.4)  # fmt: skip
     colour = np.ma.masked_array(chains * 7 % 20, alone)[order]
-    discs.set(cmap="tab20", clim=(0, 19), array=colour)
-    discs.cmap.set_bad("0.85")
+    discs.set(cmap=colormaps["tab20"].with_extremes(bad="0.85"), clim=(0, 19), array=colour)
     axis.add_collection(discs)
     axis.autoscale_view()
     reach = np.abs(places).max() + 2 * radius / MICRO

@@ -13,6 +13,7 @@ from cases.case import Check
 from cases.concentration import chain_length, coupling
 from cases.statistics import Claim, Mean
 from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
+from tisim.errors import RunError
 from tisim.particles import Arrays
 from tisim.result import Result
 
@@ -24,8 +25,12 @@ CONTACT = 1.15
 """Diameters within which particles count as in contact."""
 CHAINS: dict[str, Any] = {"number": 48, "duration": 1e-3}
 """While chains form, nothing comes near the cylinder: 75 nm go 0.1 um in that time."""
+FORMING = 1e-4
+"""s, after which the first chains have formed, and not all of them."""
 CAPTURE: dict[str, Any] = {"number": 16, "duration": 0.45, "hydrodynamics": "rotne-prager", "coarse": 3.0}
-DILUTE, DENSE = 0.005, 0.5
+LATE = 0.8
+"""s, by which also dilute particles have reached the cylinder."""
+DILUTE, DENSE, DENSEST = 0.005, 0.5, 2.0
 """g/mL."""
 ANGLES = {0.0: "longitudinal", 90.0: "transverse"}
 """Degrees."""
@@ -56,9 +61,11 @@ def held(state: Arrays) -> float:
 
 
 def first(result: Result) -> float:
-    """When the first particle was captured, s; the whole duration if none was."""
+    """When the first particle was captured, s; RunError if none was."""
     at = result.state["captured_at"]
-    return float(at[at >= 0].min(initial=result.time))
+    if not (at >= 0).any():
+        raise RunError(f"{result.scene.name}: nothing is captured within {result.time:g} s")
+    return float(at[at >= 0].min())
 
 
 def firsts(group: Sequence[Result]) -> np.ndarray:
@@ -81,13 +88,22 @@ def check(repeats: int = 4) -> Iterator[Check | Claim]:
 
 
 def of_chains(repeats: int) -> Iterator[Claim]:
-    """Chains for Gamma >> 1, none for 25 nm."""
-    settings = [{"nanometres": size, "concentration": c, **CHAINS} for size in SIZES for c in (0.5, 2.0)]
+    """Chains for Gamma >> 1, none for 25 nm; of 75 nm more, where they are more concentrated."""
+    settings = [
+        {"nanometres": size, "concentration": c, **CHAINS} for size in SIZES for c in (DENSE, DENSEST)
+    ]
     for given, found in zip(settings, results(settings, repeats), strict=True):
         size, c = int(given["nanometres"]), float(given["concentration"])
         longer = Mean.of([grown(result) for result in found])
         name = f"{size} nm, {c:g} g/mL: chains after 1 ms longer by (Eq. 6.26: {chain_length(size, c):.1g})"
         yield Claim(name, longer, most=0.5) if size == 25 else Claim(name, longer, least=1.0)
+    early = [{"concentration": c, **CHAINS, "duration": FORMING} for c in (DENSE, DENSEST)]
+    few, many = (
+        np.array([chain(result.state, result.state["moment"]) for result in group])
+        for group in results(early, repeats)
+    )
+    name = f"75 nm: mean chain after {FORMING:g} s, {DENSEST:g} g/mL minus {DENSE:g}"
+    yield Claim(name, Mean.of(many - few), least=0.0)
 
 
 def of_capture(repeats: int) -> Iterator[Claim]:
@@ -96,21 +112,24 @@ def of_capture(repeats: int) -> Iterator[Claim]:
 
     Start k lies alike in all settings, so they are compared start by start.
     """
-    settings = [{"angle": angle, "concentration": c, **CAPTURE} for angle in ANGLES for c in (DILUTE, DENSE)]
+    durations = {DILUTE: LATE, DENSE: CAPTURE["duration"], DENSEST: CAPTURE["duration"]}
+    settings = [
+        {"angle": angle, "concentration": c, **CAPTURE, "duration": end}
+        for angle in ANGLES for c, end in durations.items()
+    ]  # fmt: skip
     found = [firsts(group) for group in results(settings, repeats)]
-    dilute, dense = found[::2], found[1::2]
-    yield Claim(
-        "75 nm, 0.5 g/mL, longitudinal: first capture, s (B16 0.1 to 0.25)", Mean.of(dense[0]), least=EARLY
-    )
+    dilute, dense, densest = (found[k :: len(durations)] for k in range(len(durations)))
+    name = "75 nm, 0.5 g/mL, longitudinal: first capture, s (B16 0.1 to 0.25)"
+    yield Claim(name, Mean.of(dense[0]), least=EARLY)
     yield Claim("transverse over longitudinal (B16: almost 2)", Mean.of(dense[1] / dense[0]), least=1.5)
-    by = f"first capture at {DENSE:g} g/mL, sooner by, s"
-    for name, late, lone, soon in zip(ANGLES.values(), dilute, alone(repeats), dense, strict=True):
-        yield Claim(f"{name}: {by}, than at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
-        yield Claim(
-            f"{name}: {by}, than of particles that feel nothing of each other",
-            Mean.of(lone - soon),
-            least=0.0,
-        )
+    by = "first capture at {:g} g/mL, sooner by, s, than"
+    others = zip(ANGLES.values(), dilute, alone(repeats), dense, densest, strict=True)
+    for name, late, lone, soon, soonest in others:
+        than = f"{name}: {by.format(DENSE)}"
+        yield Claim(f"{than} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
+        yield Claim(f"{than} of particles that feel nothing of each other", Mean.of(lone - soon), least=0.0)
+        than = f"{name}: {by.format(DENSEST)}"
+        yield Claim(f"{than} at {DENSE:g} g/mL", Mean.of(soon - soonest), least=0.0)
 
 
 def alone(repeats: int) -> list[np.ndarray]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases import capture, capture_design, capture_pictures, capture_statistics
+from cases import capture, capture_curves, capture_design, capture_pictures, capture_statistics
 from cases.capture_design import HEIGHT, WIDTH, WIRE, Filter
 from cases.case import Check
 from cases.statistics import Claim, Mean
@@ -58,7 +58,7 @@ def test_transverse_captures_more_and_pictures_show_it(tmp_path):
     assert early == [capture_statistics.fraction(r.state) for r in short]
     assert capture_statistics.mean(across, 1.0).value < capture_statistics.mean(across).value
     group = [({"nanometres": 125, "angle": 90.0, "aspect": 5 / 3}, across)]
-    text = capture_pictures.table(group).splitlines()
+    text = capture_curves.table(group).splitlines()
     assert text[1].startswith("125,90.0,1.666")
     path = tmp_path / "trajectory.h5"
     run(capture.scene(number=40, duration=2.0), record=Recording(path, frames=8))

@@ -1,15 +1,18 @@
 """Concentrated samples: how they are placed, and what chains are."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from cases import concentration
 from cases.capture import MOMENT
 from cases.concentration import DENSITY, DISTANCE, coupling, longest, scene, side
-from cases.concentration_statistics import CAPTURE, CHAINS, firsts, grown, held, results
+from cases.concentration_statistics import CAPTURE, CHAINS, first, firsts, grown, held, results
 from cases.statistics import Mean
 from tisim import Particles, Simulation, run
 from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
+from tisim.errors import RunError
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])
@@ -89,6 +92,15 @@ def test_held_is_what_hangs_on_a_captured_one():
     state = {"position": position, "radius": np.ones(5), "fixed": np.array([1, 0, 0, 0, 0])}
     assert held(state) == 3 / 5
     assert held({**state, "fixed": np.zeros(5, int)}) == 0
+
+
+def test_first_capture_is_not_the_end_of_the_run():
+    at = {"captured_at": np.array([-1.0, 0.3, 0.2])}
+    result = SimpleNamespace(state=at, time=0.4, scene=SimpleNamespace(name="x"))
+    assert first(result) == 0.2
+    at["captured_at"][1:] = -1.0
+    with pytest.raises(RunError, match=r"x: nothing is captured within 0\.4 s"):
+        first(result)
 
 
 @pytest.mark.slow
