@@ -208,36 +208,43 @@ import numpy as np
 from tests.steppers import test_brownian
 from tisim import runtime
 runtime.start(threads=1)
-found = {name: call() for name, call in test_brownian.PLACES.items()}
-np.savez(sys.argv[1], **found)
+np.save(sys.argv[1], test_brownian.PLACES[sys.argv[2]]())
 """
 
 
-def places(together, **more):
-    """Where particles are at the end of a run of forty worlds, each phase a launch over all of them: fewer
-    than a thousand would all be one thread's."""
+def places(run, worlds, number, together=False, **more):
+    """Where particles are at the end. Each phase is a launch over all of them: fewer than a thousand would
+    all be one thread's."""
     more = {"trap": 200.0, "dt": 1e-3, "drift": 0.3, "steps": 6, **more}
     draw = np.random.default_rng(1)
-    make = [colloids(draw.uniform(-1e-6, 1e-6, (40, 3)), together, seed=k, **more) for k in range(40)]
-    results = simulate(make, worlds=40, capacity=40, schedule="particle")
+    starts = draw.uniform(-1e-6, 1e-6, (worlds, number, 3))
+    scenes = [colloids(start, together, seed=k, **more) for k, start in enumerate(starts)]
+    results = run(scenes)
     return np.array([result.state["position"] for result in results])
 
 
+def launched(scenes):
+    return simulate(scenes, worlds=40, capacity=40, schedule="particle")
+
+
 PLACES = {
-    "by themselves": lambda: places(False),
-    "exact": lambda: places(False, hydrodynamics="rotne-prager"),
-    "fast": lambda: places(True, hydrodynamics="rotne-prager", noise="fast"),
+    "by themselves": lambda: places(run, 5, 400),
+    "exact": lambda: places(launched, 40, 40, hydrodynamics="rotne-prager"),
+    "fast": lambda: places(launched, 40, 40, True, hydrodynamics="rotne-prager", noise="fast"),
 }
+slow = pytest.mark.slow
 
 
-@pytest.mark.slow
-def test_same_bits_with_one_thread_and_two(tmp_path):
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(tmp_path / "found.npz")]
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name", ["by themselves", pytest.param("exact", marks=slow), pytest.param("fast", marks=slow)]
+)
+def test_same_bits_with_one_thread_and_two(name, tmp_path):
+    file = tmp_path / "places.npy"
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file), name]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
-    with np.load(tmp_path / "found.npz") as single:
-        for name, call in PLACES.items():
-            np.testing.assert_array_equal(call(), single[name], err_msg=name)
+    np.testing.assert_array_equal(PLACES[name](), np.load(file))
 
 
 @both
