@@ -33,11 +33,14 @@ def optimize(
     seed: Seed = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
     method: Annotated[
-        str | None, typer.Option(help="genetic, restart, cma-es or random; nsga2 for several objectives.")
+        str | None,
+        typer.Option(help="genetic, restart, cma-es, nsga2 or random; for several objectives the last two."),
     ] = None,
     generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
     population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
-    target: Annotated[float | None, typer.Option(help="Stop at a fitness this low.")] = None,
+    target: Annotated[
+        float | None, typer.Option(help="Stop at a best value as good as this; for one objective.")
+    ] = None,
     budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
     budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
     changes: SearchChanges = None,

@@ -19,7 +19,7 @@ Out = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to; out/NAME by default.")
 ]
 Seed = Annotated[int | None, typer.Option(help="Of all that is random.")]
-Size = Annotated[str | None, typer.Option(help="Size of the case: small, default or paper.")]
+Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
 Device = Annotated[str, typer.Option(help="cpu or cuda.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
