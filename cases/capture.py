@@ -87,7 +87,12 @@ def scene(
     duration: float = DURATION,
     seed: int = 0,
 ) -> Scene:
-    """Particles of a radius of table 6.1 about a cylinder at an angle (degrees) to the field."""
+    """Particles of a radius of table 6.1 (nm) about a cylinder at an angle (degrees) to the field.
+
+    aspect : length of the cylinder over its diameter.
+    part : of the layer where particles start: "top", beyond both ends; "side", beside the rest; or "all".
+    duration : s.
+    """
     body = fibre(axis(angle), aspect)
     radius = nanometres * 1e-9
     return Scene(
