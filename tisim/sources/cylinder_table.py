@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev
 
 from tisim import runtime
 from tisim._taichi import ti
-from tisim.errors import must
+from tisim.errors import InputError
 from tisim.sources.cylinder_end import end
 
 NEAREST, FARTHEST = -40, 16
@@ -84,8 +84,7 @@ def _table(digits: int, generation: int) -> tuple[np.ndarray, tuple[int, int, in
         coefficients = _made(*grid)
         if SAFE * _error(coefficients) < 10.0**-digits:
             return coefficients.reshape(-1, 6 * (grid[0] + 1) ** 2), grid
-    must(False, "table_digits", f"fewer in {runtime.current().precision}", digits)
-    raise AssertionError
+    raise InputError(f"table_digits must be fewer in {runtime.current().precision}; received {digits}")
 
 
 def table(digits: int) -> tuple[np.ndarray, tuple[int, int, int]]:
