@@ -44,3 +44,13 @@ def relative(found, expected):
     """Length of the difference over that of the expected vector or matrix, for each point of one world."""
     axes = tuple(range(1, found.ndim))
     return np.sqrt(((found - expected) ** 2).sum(axes) / (expected**2).sum(axes))
+
+
+def steepness(field, gradient, points, half):
+    """What errors of a cylinder's gradient are relative to, at points of one world; along z, of radius 1.
+
+    In its middle the gradient passes through 0, but not what cancels there: B over the distance to the rim,
+    to which the radius is added across.
+    """
+    far = np.hypot(np.abs(np.hypot(*points.T[:2]) - 1) + 1, np.abs(points[:, 2]) - half)
+    return np.linalg.norm(gradient, axis=(1, 2)) + np.linalg.norm(field, axis=1) / far
