@@ -61,23 +61,20 @@ SEARCH = {
 SIZES = {
     "small": Size("500 particles that do not feel each other, 1 s", {"number": 500}, SEARCH),
     "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}, SEARCH),
-    "no_field": Size("the same without the field", {"flux": 0.0}, SEARCH),
-    "contact": Size("2000 particles in contact, 1 s", {"contact": True}, SEARCH),
-    "contact_no_field": Size("the same without the field", {"contact": True, "flux": 0.0}, SEARCH),
+    "no_field": Size("the same without the field", {"flux": 0.0}),
+    "contact": Size("2000 particles in contact, 1 s", {"contact": True}),
+    "contact_no_field": Size("the same without the field", {"contact": True, "flux": 0.0}),
     "near_field": Size(
         "2000 in contact and with the near field as printed, between all; some minutes",
         {"contact": True, "near": True},
-        SEARCH,
     ),
     "clumps": Size(
         "2000 in contact and with the near field of neighbours only",
         {"contact": True, "near": True, "cutoff": NEIGHBOURS},
-        SEARCH,
     ),
     "clumps_no_field": Size(
         "the same without the field",
         {"contact": True, "near": True, "cutoff": NEIGHBOURS, "flux": 0.0},
-        SEARCH,
     ),
 }
 

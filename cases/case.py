@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import cases
@@ -43,11 +43,15 @@ class Check:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a case is run. summary : for people; scene, search : settings of the two that differ."""
+    """How large a case is run.
+
+    summary : for people. scene : its settings that differ. search : those of the search; None where the
+    inverse problem is not of this size.
+    """
 
     summary: str
     scene: Mapping[str, Any]
-    search: Mapping[str, Any] = field(default_factory=dict)
+    search: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -93,10 +97,16 @@ def find(name: str) -> Case:
     return known[name]
 
 
-def inverse(name: str, size: str, variant: str | None) -> tuple[Problem, Size]:
-    """The inverse problem of a case (its first variant for None), and the size with the search's settings."""
+def inverse(name: str, size: str, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
+    """The inverse problem of a case (its first variant for None), and the settings of its search.
+
+    InputError when the case has none, or not of that size.
+    """
     case = find(name)
-    chosen = case.size(size)
+    search = case.size(size).search
     if case.problem is None:
         raise InputError(f"case must be one with an inverse problem; received {name!r}")
-    return case.problem(size, variant or case.variants[0]), chosen
+    if search is None:
+        sizes = ", ".join(key for key, one in case.sizes.items() if one.search is not None)
+        raise InputError(f"size must be one of {sizes} for the inverse problem; received {size!r}")
+    return case.problem(size, variant or case.variants[0]), search

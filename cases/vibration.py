@@ -67,13 +67,12 @@ SEARCH = {
 
 SIZES = {
     "alone": Size(
-        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}, SEARCH
+        "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}
     ),
     "default": Size("343 particles, the near field as printed, 0.005 s", {}, SEARCH),
     "equilibrium": Size(
         "343 particles, near field in balance with the six neighbours, 0.05 s",
         {"near_field": "equilibrium", "duration": 0.05},
-        SEARCH,
     ),
 }
 

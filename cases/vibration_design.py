@@ -60,7 +60,7 @@ def nearest(design: Mapping[str, float], drive: float = DRIVE) -> float:
 def problem(size: str = "default", variant: str = "resonate") -> Problem:
     """The field and binder that answer DRIVE the most ("resonate") or the least ("avoid") in DURATION.
 
-    The same at all sizes: a search runs one particle.
+    Of size "default" only: a search runs one particle.
     """
     must(variant in vibration.VARIANTS, "variant", f"one of {', '.join(vibration.VARIANTS)}", variant)
     aim, sign = ("largest", -1e3) if variant == "resonate" else ("smallest", 1e3)

@@ -61,7 +61,7 @@ def optimize(
     from optimize.settings import Settings, fit, proposed
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
-    problem, chosen = inverse(case, size or "default", variant)
+    problem, usual = inverse(case, size or "default", variant)
     wishes = {
         "seed": seed,
         "generations": generations,
@@ -72,7 +72,7 @@ def optimize(
         **request.below("search", request.assignments(changes or ())),
     }
     given = {key: value for key, value in wishes.items() if value is not None}
-    settings = Settings(**request.nested(proposed(problem, chosen.search, method), given))
+    settings = Settings(**request.nested(proposed(problem, usual, method), given))
     fit(problem, settings)
     place = folder or Path("out") / problem.name
     with closing(made(executor, device, precision, threads)) as evaluator:
@@ -111,8 +111,8 @@ def compare(
     from optimize.cache import Cache
     from optimize.executors import made
 
-    problem, chosen = inverse(case, size or "default", variant)
-    base = request.nested(chosen.search, request.below("search", request.assignments(changes or ())))
+    problem, usual = inverse(case, size or "default", variant)
+    base = request.nested(usual, request.below("search", request.assignments(changes or ())))
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
     writable(place)
