@@ -6,9 +6,9 @@ decides which way and how far they are magnetised (soft_magnet.py). Particles co
 over the channel, and are caught or pass by. The wire that fibres are cut from is limited, so that many
 short ones compete with few long ones.
 
-What B16 found for one cylinder, a search must find by itself: magnetised across (section 6.4.2), and short,
-as short ones have more capture volume for their own (6.4.1). As there, the flow is uniform: that fibres
-turn it aside is left out.
+What B16 found for one cylinder, a search must find by itself: transverse, which is that its axis lies across
+the field and not along it (section 6.4.2), and short, as short ones have more capture volume for their own
+(6.4.1). As there, the flow is uniform: that fibres turn it aside is left out.
 """
 
 from __future__ import annotations

@@ -1,18 +1,12 @@
-"""The case capture: its scene, its statistics, its figures, and the filter that a search designs."""
+"""The case capture: its scene, its statistics and its figures."""
 
 import numpy as np
 import pytest
 
-from cases import capture, capture_curves, capture_design, capture_pictures, capture_statistics
-from cases.capture_design import HEIGHT, WIDTH, WIRE, Filter
+from cases import capture, capture_curves, capture_pictures, capture_statistics
 from cases.case import Check
 from cases.statistics import Claim, Mean
-from optimize.cache import Cache
-from optimize.evaluator import Evaluator
-from optimize.search import search
-from optimize.settings import Settings
 from tisim import Recording, run
-from tisim.errors import InputError
 from tisim.frames import frames
 
 
@@ -97,48 +91,6 @@ def test_interval_of_a_mean_over_angles_knows_that_starts_are_shared():
     settings = [{"angle": angle, "number": 20, "duration": 10.0} for angle in (45.0, 50.0)]
     one, other = (capture_statistics.fractions(group) for group in capture_statistics.results(settings, 40))
     assert np.corrcoef(one, other)[0, 1] > 0.4
-
-
-@pytest.mark.parametrize("number", [1, 5, 12])
-def test_fibres_of_a_filter_lie_in_the_channel_and_apart(number):
-    made = Filter(aspect=5 / 3, number=float(number), spacing=1.2)
-    places = np.array(made.places())
-    assert len(places) == number
-    assert np.abs(places[:, 0]).max() <= (WIDTH - capture.DIAMETER) / 2 + 1e-12
-    assert np.abs(places[:, 2]).max() <= (HEIGHT - made.length) / 2 + 1e-12
-    assert places[:, 1].min() == 0.0
-    for k in range(number):
-        gap = np.abs(places - places[k]) - [capture.DIAMETER, capture.DIAMETER, made.length]
-        assert all((gap[j] > -1e-12).any() for j in range(number) if j != k)
-
-
-def test_wire_is_limited():
-    assert len(Filter(aspect=20.0, number=1.4).places()) == 1
-    with pytest.raises(InputError, match=f"wire must be at most {WIRE:g} m"):
-        Filter(aspect=20.0, number=1.6).places()
-
-
-def test_every_string_of_the_search_has_a_fibre():
-    """Also those on the bounds, to which methods clip."""
-    genome = capture_design.problem("fraction").genome
-    for end in (0.0, 1.0):
-        number = genome.decode([end] * len(genome))["number"]
-        assert 1 <= len(Filter(number=number).places()) <= 12
-    with pytest.raises(InputError, match="number of fibres must be at least 1; received 0"):
-        Filter(number=0.5).scene(0)
-
-
-@pytest.mark.slow
-def test_search_finds_transverse_and_short(tmp_path):
-    """B16's conclusions, found by a search that knows nothing of them."""
-    evaluator = Evaluator()
-    with Cache(tmp_path / "search.h5") as cache:
-        problem = capture_design.problem("fraction")
-        outcome = search(problem, evaluator, cache, Settings(**capture.SEARCH))
-    evaluator.close()
-    design = problem.genome.decode(outcome.best)
-    assert design["field_angle"] > 60.0
-    assert design["aspect"] < 6.0
 
 
 @pytest.mark.slow
