@@ -145,12 +145,36 @@ def test_picture_shows_the_fibres_and_what_they_caught():
     assert [line.get_label() for line in side.lines] == ["passed by", "caught", "where it was caught"]
 
 
-def captured(designs, starts):
+def captured(variant, designs, starts):
     """Fractions from starts that no search has used, the same of all designs. Shape (designs, starts)."""
-    problem = capture_design.problem("fraction")
+    problem = capture_design.problem(variant)
     seeds = [start_seed(FRESH, k) for k in range(starts)]
     results = run([problem.scene(design, seed) for design in designs for seed in seeds])
     return np.reshape([capture_design.captured(result) for result in results], (len(designs), starts))
+
+
+@pytest.mark.long
+def test_hard_magnets_are_best_magnetised_across_in_a_weak_field():
+    """A strong one holds the moments of particles where fibres then repel them in places."""
+    across = {**FIBRES, "flux": 0.07, "spacing": 3.9, "magnetisation_angle": 90.0}
+    along, strong = {**across, "magnetisation_angle": 0.0}, {**across, "flux": 0.8}
+    best, *worse = captured("hard", (across, along, strong), 24)
+    for name, other in zip(("magnetised along", "in a strong field"), worse, strict=True):
+        assert Claim(name, Mean.of(best - other), least=0.03).ok
+
+
+@pytest.mark.long
+def test_what_is_in_the_way_is_all_that_is_caught_of_a_fast_flow():
+    """The part of the channel's cross-section that fibres cover, none behind another."""
+    half = {**FIBRES, "number": 4.0, "speed": 1e-2, "radius": 208.0}
+    whole = {**half, "number": 8.0}
+    for design in (half, whole):
+        covered = round(design["number"]) * design["aspect"] * DIAMETER**2 / (WIDTH * HEIGHT)
+        found = captured("throughput", (design,), 40)[0]
+        assert Claim("fast", Mean.of(found), least=covered - 0.02, most=covered + 0.03).ok
+    assert covered == pytest.approx(1 / 6)
+    slow = captured("throughput", ({**whole, "speed": 1e-3},), 8)[0]
+    assert Claim("slow", Mean.of(slow), least=covered + 0.05).ok
 
 
 @pytest.mark.slow
@@ -167,7 +191,7 @@ def test_search_finds_transverse_and_short(tmp_path, seed):
     assert found["aspect"] < 6.0
     across, along = ({**found, "field_angle": angle} for angle in (90.0, 0.0))
     one_long = {**found, "aspect": 20.0, "number": 1.0}
-    best, turned, *worse = captured((found, across, along, one_long), 60)
+    best, turned, *worse = captured("fraction", (found, across, along, one_long), 60)
     assert Claim("right across the field is as good", Mean.of(turned - best), least=-0.03).ok
     for name, other in zip(("along the field", "all wire in one fibre"), worse, strict=True):
         assert Claim(name, Mean.of(best - other), least=0.03).ok
