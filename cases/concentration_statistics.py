@@ -112,24 +112,24 @@ def of_capture(repeats: int) -> Iterator[Claim]:
 
     Start k lies alike in all settings, so they are compared start by start.
     """
-    durations = {DILUTE: LATE, DENSE: CAPTURE["duration"], DENSEST: CAPTURE["duration"]}
+    keys = [(angle, c) for angle in ANGLES for c in (DILUTE, DENSE)] + [(90.0, DENSEST)]
     settings = [
-        {"angle": angle, "concentration": c, **CAPTURE, "duration": end}
-        for angle in ANGLES for c, end in durations.items()
-    ]  # fmt: skip
-    found = [firsts(group) for group in results(settings, repeats)]
-    dilute, dense, densest = (found[k :: len(durations)] for k in range(len(durations)))
+        {"angle": angle, "concentration": c, **CAPTURE, **({"duration": LATE} if c == DILUTE else {})}
+        for angle, c in keys
+    ]
+    found = dict(zip(keys, map(firsts, results(settings, repeats)), strict=True))
+    along, across = found[0.0, DENSE], found[90.0, DENSE]
     name = "75 nm, 0.5 g/mL, longitudinal: first capture, s (B16 0.1 to 0.25)"
-    yield Claim(name, Mean.of(dense[0]), least=EARLY)
-    yield Claim("transverse over longitudinal (B16: almost 2)", Mean.of(dense[1] / dense[0]), least=1.5)
-    by = "first capture at {:g} g/mL, sooner by, s, than"
-    others = zip(ANGLES.values(), dilute, alone(repeats), dense, densest, strict=True)
-    for name, late, lone, soon, soonest in others:
-        than = f"{name}: {by.format(DENSE)}"
-        yield Claim(f"{than} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
-        yield Claim(f"{than} of particles that feel nothing of each other", Mean.of(lone - soon), least=0.0)
-        than = f"{name}: {by.format(DENSEST)}"
-        yield Claim(f"{than} at {DENSE:g} g/mL", Mean.of(soon - soonest), least=0.0)
+    yield Claim(name, Mean.of(along), least=EARLY)
+    yield Claim("transverse over longitudinal (B16: almost 2)", Mean.of(across / along), least=1.5)
+    by = f"first capture at {DENSE:g} g/mL, sooner by, s, than"
+    for (angle, name), lone in zip(ANGLES.items(), alone(repeats), strict=True):
+        late, soon = found[angle, DILUTE], found[angle, DENSE]
+        yield Claim(f"{name}: {by} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
+        than = f"{name}: {by} of particles that feel nothing of each other"
+        yield Claim(than, Mean.of(lone - soon), least=0.0)
+    name = f"transverse: first capture at {DENSEST:g} g/mL, sooner by, s, than at {DENSE:g} g/mL"
+    yield Claim(name, Mean.of(across - found[90.0, DENSEST]), least=0.0)
 
 
 def alone(repeats: int) -> list[np.ndarray]:
