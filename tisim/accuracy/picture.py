@@ -81,7 +81,8 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
             "error of the reference", (0.99, own), (0, -3), xycoords=("axes fraction", "data"),
             textcoords="offset points", ha="right", va="top", fontsize=8,
         )  # fmt: skip
-    axis.set_ylim(low, min(high, 30.0))
+    # Room for a ring on the topmost.
+    axis.set_ylim(low, min(1.2 * high, 30.0))
     axis.set_title(study.quantities[k].name, fontsize=10.5)
     left, right = axis.get_xlim()
     narrow = right < 300 * left
