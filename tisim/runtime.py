@@ -8,6 +8,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
+from tisim import kernel_cache
 from tisim._taichi import BACKEND, ti
 from tisim.errors import InputError, must
 
@@ -72,6 +73,7 @@ def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runt
     wanted = Runtime(device, precision, threads or cores())
     if wanted == _current:
         return wanted
+    kernel_cache.unlock()
     try:
         # Taichi announces the device on standard output, where results go.
         with contextlib.redirect_stdout(io.StringIO()):
