@@ -20,8 +20,8 @@ import h5py
 import numpy as np
 
 from optimize.record import Record, canonical
-from optimize.seal import intact, sealed
 from tisim.errors import InputError, must
+from tisim.seal import intact, sealed
 
 FORMAT = "tisim evaluations 1"
 ROWS = "evaluations"

@@ -10,14 +10,14 @@ import json
 import zlib
 from collections.abc import Iterable
 
-from optimize.journal import MAGIC, frame, scan
-from optimize.record import canonical
+from tisim.framed import MAGIC, frame, scan
 
 
 def sealed(image: bytes, data: Iterable[tuple[int, int]]) -> bytes:
     """The file image with its seal; data : (offset, size) in bytes of the raw data, which is left out."""
     spans = sorted(data)
-    return image + frame(canonical({"size": len(image), "data": spans, "crc": _structure(image, spans)}))
+    seal = {"size": len(image), "data": spans, "crc": _structure(image, spans)}
+    return image + frame(json.dumps(seal).encode())
 
 
 def intact(content: bytes) -> bool:
