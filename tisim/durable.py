@@ -4,53 +4,91 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from tisim.errors import InputError, RunError
+from tisim.regular import opened
 
 try:
     import fcntl
 except ImportError:
     fcntl = None  # type: ignore[assignment]
 
+PATIENCE = 60.0
+"""s, longer than any process at work holds a lock; one that is stopped holds it for good."""
+
 
 @contextlib.contextmanager
 def locked(path: Path, *, exclusive: bool) -> Iterator[int]:
     """Hold the advisory lock of a lock file, among processes and threads; a killed holder lets go of it.
 
-    Gives a handle of the file. A lock file stays behind on purpose: removing it would let two processes lock
-    two different files.
+    Gives a handle of the file; of its folder, to one that only reads where no lock file is and none can be
+    made. A lock file stays behind on purpose: removing it would let two processes lock two different files.
+    InputError where it cannot be had, RunError when another process holds it for longer than PATIENCE.
     """
     if fcntl is None:
         raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    handle = opened(path, os.O_RDWR | os.O_CREAT) if exclusive else _for_reading(path)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH)
+        _wait(handle, path, fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH)
         yield handle
     finally:
         os.close(handle)
+
+
+def _for_reading(path: Path) -> int:
+    """A handle to lock: of the lock file, which may be another user's."""
+    try:
+        return opened(path, os.O_RDONLY)
+    except FileNotFoundError:
+        pass
+    try:
+        return opened(path, os.O_RDONLY | os.O_CREAT)
+    except InputError as refused:
+        try:
+            return os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError:
+            raise refused from None
+
+
+def _wait(handle: int, path: Path, kind: int) -> None:
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > until:
+                raise RunError(f"{path} has been locked by another process for {PATIENCE:g} s") from None
+            time.sleep(0.002)
+        except OSError as error:
+            raise InputError(f"{path} must be where files can be locked; received {error.strerror}") from None
 
 
 def append_at(path: Path, end: int, data: bytes) -> int:
     """Cut the file at byte end, write data there and flush it to the disk; return the new end.
 
     If the disk is full, the file is cut at end again and RunError raised: what was there before is whole.
+    InputError when something that is no file is in its place.
     """
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
-        if os.fstat(handle).st_size > end:
-            os.ftruncate(handle, end)
+        handle = opened(path, os.O_RDWR | os.O_CREAT)
         try:
-            _write_all(handle, data, end)
-            os.fsync(handle)
-        except OSError as error:
-            os.ftruncate(handle, end)
-            raise _full(path, error) from error
-    finally:
-        os.close(handle)
-    if end == 0:
-        _sync_folder(path)
+            if os.fstat(handle).st_size > end:
+                os.ftruncate(handle, end)
+            try:
+                _write_all(handle, data, end)
+                os.fsync(handle)
+            except OSError:
+                os.ftruncate(handle, end)
+                raise
+        finally:
+            os.close(handle)
+        if end == 0:
+            _sync_folder(path)
+    except OSError as error:
+        raise _full(path, error) from error
     return end + len(data)
 
 
@@ -58,7 +96,8 @@ def replace_file(path: Path, data: bytes) -> None:
     """Put data in the place of path so that path is, at every instant, the old file or a new one, whole.
 
     Writers of one path take turns: one name serves for the unfinished file, and a killed writer's is reused.
-    RunError if the disk is full; path is then the old file.
+    RunError if the disk is full; path is then the old file. InputError when something that is no file has the
+    unfinished one's name; a link in the place of path is replaced itself, not what it points to.
     """
     unfinished = path.with_name(path.name + ".new")
     try:
@@ -68,14 +107,14 @@ def replace_file(path: Path, data: bytes) -> None:
                 if _names(unfinished, handle):
                     _finish(handle, unfinished, path, data)
                     break
+        _sync_folder(path)
     except OSError as error:
         raise _full(path, error) from error
-    _sync_folder(path)
 
 
 def _names(path: Path, handle: int) -> bool:
     try:
-        return os.path.samestat(path.stat(), os.fstat(handle))
+        return os.path.samestat(path.lstat(), os.fstat(handle))
     except FileNotFoundError:
         return False
 
