@@ -85,11 +85,13 @@ def test_refuses_a_file_cut_short_damaged_or_none(simulation, saved, tmp_path):
     simulation.load([flow()])
     for size in (0, 10, len(content) // 2, len(content) - 1):
         saved.write_bytes(content[:size])
-        with pytest.raises(InputError, match="checkpoint must be a whole file"):
+        with pytest.raises(
+            InputError, match="checkpoint must be a file of tisim, whole and with its checksum"
+        ):
             restore(simulation, saved)
     at = content.index(velocity) + 100
     saved.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
-    with pytest.raises(InputError, match="checkpoint must be a whole file"):
+    with pytest.raises(InputError, match="checkpoint must be a file of tisim, whole and with its checksum"):
         restore(simulation, saved)
     with pytest.raises(InputError, match="checkpoint must be an existing file"):
         restore(simulation, tmp_path / "none.h5")

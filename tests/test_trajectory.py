@@ -17,7 +17,7 @@ import tisim
 from tests.scenes import by_id, compiled, flow, scene
 from tisim import Box, Recording, h5md
 from tisim.checkpoint import restore, save
-from tisim.errors import InputError, RunError
+from tisim.errors import InputError
 from tisim.frames import Frame, frames, worlds
 from tisim.trajectory import Trajectory, written
 
@@ -287,23 +287,6 @@ def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
             assert (frame.time, frame.step) == (expected.time, expected.step)
             for name, values in expected.arrays.items():
                 np.testing.assert_array_equal(frame.arrays[name], values)
-
-
-def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, monkeypatch):
-    still = scene([(0, 0, 0)], [(0.0, 0, 0)])
-    path = tmp_path / "t.h5"
-    arrays = {field.name: np.zeros(field.shape(1)) for field in written(still)}
-
-    def full(self):
-        raise OSError(28, "No space left on device")
-
-    with Trajectory(Recording(path, frames=2), [still]) as trajectory:
-        trajectory.write(0, Frame(0.0, 0, arrays))
-        with monkeypatch.context() as patch:
-            patch.setattr(h5py.Dataset, "flush", full)
-            with pytest.raises(RunError, match="No space left on device; frames before are intact"):
-                trajectory.write(0, Frame(1.0, 1, arrays))
-    assert [frame.time for frame in every_frame(path)] == [0.0]
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,14 @@ not in it: they are made anew, and results do not depend on when that was.
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
-from tisim import runtime
-from tisim.durable import replace_file
-from tisim.errors import InputError, must
+from tisim import runtime, seal
+from tisim.errors import must
 from tisim.simulation import Simulation
 from tisim.state import BOOKS, CLOCK
 from tisim.watch import Watch
@@ -48,13 +45,10 @@ def save(simulation: Simulation, path: str | Path) -> None:
     path is, at every instant, what it was before or the whole new file. RunError when the disk is full.
     """
     simulation.s.check()
-    image = io.BytesIO()
-    with h5py.File(image, "w") as file:
+    with seal.created(Path(path)) as file:
         file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
         for name in _columns(simulation):
-            # Checksums: damage is found on reading, not in the result.
-            file.create_dataset(name, data=simulation.s.read(name), chunks=True, fletcher32=True)
-    replace_file(Path(path), image.getvalue())
+            file[name] = simulation.s.read(name)
 
 
 def restore(simulation: Simulation, path: str | Path) -> None:
@@ -64,19 +58,11 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     another capacity; the simulation is then as it was.
     """
     simulation.s.check()
-    path = Path(path)
-    must(path.is_file(), "checkpoint", "an existing file", str(path))
-    wanted, columns = _columns(simulation), {}
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            must(file.attrs.get("format") == FORMAT, "checkpoint", "written by tisim", str(path))
-            for name, value in _identity(simulation).items():
-                _agree(name, value, file.attrs[name])
-            wall_s = float(file.attrs["wall_s"])
-            for name in wanted:
-                columns[name] = np.asarray(file[name])
-    except (OSError, KeyError) as error:
-        raise InputError(f"checkpoint must be a whole file; received {str(path)!r} ({error})") from None
+    with seal.opened(Path(path), "checkpoint", FORMAT) as file:
+        for name, value in _identity(simulation).items():
+            _agree(name, value, file.attrs[name])
+        wall_s = float(file.attrs["wall_s"])
+        columns = {name: np.asarray(file[name]) for name in _columns(simulation)}
     for name, values in columns.items():
         simulation.s.write(name, values)
     simulation.forget_lists()

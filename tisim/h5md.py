@@ -2,19 +2,25 @@
 1546, and nongnu.org/h5md).
 
 Of the specification this needs the metadata, the units module, and groups of particles whose number varies:
-entries whose id is the fill value are placeholders.
+entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``, which is for what
+programs add, has the scenes as TOML and checksums of all that frames hold: HDF5 1.10 and later check the
+structure of a file but not the data in it.
 """
 
 from __future__ import annotations
 
 import getpass
 import re
+import struct
+import zlib
 from typing import Any
 
 import h5py
 import numpy as np
 
 from tisim.domain import Domain
+from tisim.errors import must
+from tisim.particles import Arrays
 from tisim.state import Field
 
 VERSION = (1, 1)
@@ -23,6 +29,14 @@ ABSENT = -1
 ASCII = h5py.string_dtype("ascii")
 CHUNK = 1 << 16
 """Particles of a frame that are stored, and compressed, together."""
+ROWS = 1024
+"""Frames whose times and checksums are stored together."""
+SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
+
+
+def names(worlds: int) -> list[str]:
+    """The names of the groups of particles of so many worlds."""
+    return ["all"] if worlds == 1 else [f"world_{index}" for index in range(worlds)]
 
 
 def metadata(file: h5py.File, version: str) -> None:
@@ -65,8 +79,14 @@ def box(group: h5py.Group, domain: Domain) -> None:
     made.attrs.create("dimension", 3, dtype=np.int32)
     made.attrs["boundary"] = np.array([kind] * 3)
     if low is not None and high is not None:
+        # Within the header of the dataset, of which HDF5 checks the checksum.
+        compact = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        compact.set_layout(h5py.h5d.COMPACT)
         for name, values in (("edges", high - low), ("origin", low)):
-            _with_unit(made.create_dataset(name, data=values), "m")
+            space, double = h5py.h5s.create_simple(values.shape), h5py.h5t.NATIVE_DOUBLE
+            h5py.h5d.create(made.id, name.encode(), double, space, compact)
+            made[name][...] = values
+            _with_unit(made[name], "m")
 
 
 def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: Any) -> None:
@@ -74,8 +94,8 @@ def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: 
     for field in fields:
         element = group.create_group(field.name)
         if field.name == "position":
-            element.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(1024,), fillvalue=-1)
-            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(1024,))
+            element.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(ROWS,), fillvalue=-1)
+            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(ROWS,))
             _with_unit(time, "s")
         else:
             element["step"], element["time"] = group["position/step"], group["position/time"]
@@ -87,6 +107,41 @@ def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: 
             compression="gzip", compression_opts=1, shuffle=True,
         )  # fmt: skip
         _with_unit(value, field.unit)
+
+
+def scene(file: h5py.File, name: str, text: str) -> None:
+    """The scene of a group of particles, as TOML."""
+    data = text.encode()
+    numbers = np.frombuffer(data, np.uint8)
+    stored = file.create_dataset(f"{SCENES}/{name}", data=numbers, chunks=True, compression="gzip")
+    stored.attrs["crc32"] = np.uint32(zlib.crc32(data))
+
+
+def scene_text(file: h5py.File, name: str) -> str:
+    """What ``scene`` has written; InputError when it is damaged."""
+    stored = file[f"{SCENES}/{name}"]
+    text = stored[:].tobytes()
+    same = zlib.crc32(text) == stored.attrs["crc32"]
+    must(same, "file", "undamaged", "a scene whose checksum does not fit")
+    return text.decode()
+
+
+def checksums(file: h5py.File, name: str) -> h5py.Dataset:
+    """For each frame of a group of particles, two numbers: see ``clock_checksum`` and ``frame_checksum``."""
+    return file.create_dataset(f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(ROWS, 2))
+
+
+def clock_checksum(step: int, time: float) -> int:
+    """CRC-32 of a frame's step and time (s)."""
+    return zlib.crc32(struct.pack("<qd", step, time))
+
+
+def frame_checksum(clock: int, arrays: Arrays) -> int:
+    """CRC-32 of a frame's clock, of which the checksum is given, and its arrays as stored, by name."""
+    crc = clock
+    for name in sorted(arrays):
+        crc = zlib.crc32(arrays[name].tobytes(), crc)
+    return crc
 
 
 def _with_unit(dataset: h5py.Dataset, text: str) -> None:

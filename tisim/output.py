@@ -3,7 +3,7 @@
 result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
 one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts, ``measures``
 what effects keep of the world; the attributes say how the run ended and under which settings, and hold the
-scene as TOML.
+scene as TOML. A checksum of the whole file stands behind its end (see seal.py).
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ import h5py
 import numpy as np
 
 import tisim
-from tisim import picture, runtime
+from tisim import picture, runtime, seal
 from tisim.durable import replace_file
 from tisim.errors import InputError, must
+from tisim.frames import RESULT
 from tisim.particles import Arrays
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.state import resolve_fields
-
-FORMAT = "tisim run 1"
 
 
 @dataclass(frozen=True)
@@ -93,16 +92,15 @@ def write(result: Result, folder: Folder) -> list[Path]:
         picture.cloud(result).savefig(image, dpi=150, format="png")
         image.seek(0)
         replace_file(paths["cloud.png"], image.read())
-    replace_file(folder.result, _image(result))
+    _write_result(result, folder.result)
     folder.checkpoint.unlink(missing_ok=True)
     return [folder.result, *paths.values()]
 
 
-def _image(result: Result) -> bytes:
-    """The bytes of result.h5, built in memory: a full disk is met by an ordinary write."""
-    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+def _write_result(result: Result, path: Path) -> None:
+    with seal.created(path) as file:
         file.attrs.update({
-            "format": FORMAT, "scene": result.scene.to_toml(), "ok": result.status.ok,
+            "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,
             "reason": result.status.reason, "time": result.time, "wall_s": result.wall_s,
             "settings": json.dumps(result.settings), "versions": json.dumps(versions()),
         })  # fmt: skip
@@ -111,8 +109,6 @@ def _image(result: Result) -> bytes:
             _write_arrays(file.create_group(name), arrays, units)
         file.create_group("work").attrs.update(result.work)
         file.create_group("measures").attrs.update(result.measures)
-        file.flush()
-        return bytes(file.id.get_file_image())
 
 
 def _units(scene: Scene) -> dict[str, str]:

@@ -1,37 +1,79 @@
-"""A checksum of an HDF5 file's structure, behind its end, where HDF5 does not look.
+"""Checksums of HDF5 files that are written whole: behind their end, where HDF5 does not look.
 
-Rows and tables have checksums of their own. This one covers all the rest, because the HDF5 library, given
-a damaged structure, may read wrong data or never return: it must not be given one.
+The HDF5 library, given a damaged structure, may read wrong data or never return: it must not be given one.
+The seal covers the file, or all of it but data that has checksums of its own.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import os
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 
+import h5py
+
+from tisim import regular
+from tisim.durable import replace_file
+from tisim.errors import InputError, must
 from tisim.framed import MAGIC, frame, scan
 
 
-def sealed(image: bytes, data: Iterable[tuple[int, int]]) -> bytes:
-    """The file image with its seal; data : (offset, size) in bytes of the raw data, which is left out."""
+@contextlib.contextmanager
+def created(path: Path) -> Iterator[h5py.File]:
+    """A new HDF5 file in memory; at the end of the ``with`` it is sealed and put in the place of path.
+
+    RunError when it cannot be written; path is then what it was.
+    """
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        yield file
+    replace_file(path, sealed(image.getvalue()))
+
+
+@contextlib.contextmanager
+def opened(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> Iterator[h5py.File]:
+    """A file that ``created`` has left. InputError unless it is there, whole and of this kind.
+
+    kind : its attribute ``format``. what, rule : what it is called in messages, and what it must be.
+    """
+    content = regular.content(Path(os.path.realpath(path)))
+    if content is None:
+        raise InputError(f"{what} must be an existing file; received {str(path)!r}")
+    image = unsealed(content)
+    if image is None:
+        raise InputError(f"{what} must be {rule}, whole and with its checksum; received {str(path)!r}")
+    with h5py.File(io.BytesIO(image), "r") as found:
+        must(found.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
+        yield found
+
+
+def sealed(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
+    """The file image with its seal; data : (offset, size) in bytes of data that the seal leaves out."""
     spans = sorted(data)
-    seal = {"size": len(image), "data": spans, "crc": _structure(image, spans)}
+    seal = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
     return image + frame(json.dumps(seal).encode())
+
+
+def unsealed(content: bytes) -> bytes | None:
+    """The file image without its seal; None when it has none, or is not what was sealed."""
+    start = max(content.rfind(MAGIC), 0)
+    payloads = scan(content[start:]).payloads
+    if not payloads:
+        return None
+    seal, image = json.loads(payloads[0]), content[:start]
+    return image if len(image) == seal["size"] and _checksum(image, seal["data"]) == seal["crc"] else None
 
 
 def intact(content: bytes) -> bool:
     """Whether the structure is what was written. True without a seal (another program wrote the file)."""
-    start = content.rfind(MAGIC)
-    found = scan(content[start:]).payloads if start >= 0 else []
-    if not found:
-        return True
-    seal = json.loads(found[0])
-    image = content[:start]
-    return len(image) == seal["size"] and _structure(image, seal["data"]) == seal["crc"]
+    return MAGIC not in content or unsealed(content) is not None
 
 
-def _structure(image: bytes, spans: Iterable[Iterable[int]]) -> int:
+def _checksum(image: bytes, spans: Iterable[Iterable[int]]) -> int:
     crc = at = 0
     for offset, size in spans:
         crc, at = zlib.crc32(image[at:offset], crc), offset + size

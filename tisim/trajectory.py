@@ -4,20 +4,21 @@ A frame is the state at the end of the first step at or after each wanted time; 
 without a trajectory. The file has a group of particles for each scene: ``all``, or ``world_0`` and so on.
 Particles are in the order of their ids; a frame with fewer particles than another is filled up (see h5md.py).
 
-The file is written in HDF5's single-writer/multiple-reader mode, in which it can be read at every instant,
-also while the run goes on and after it was killed: ``step`` grows last, so what it counts is whole. A killed
-run leaves the mark of an open file, which ``frames.frames`` and h5py with ``swmr=True`` read through;
-``h5clear -s`` or ``tisim export --format h5md`` take it away for readers that do not.
+The file can be read at every instant, by any reader, also while the run goes on and after it was killed (see
+growing.py): ``step`` grows last, so what it counts is whole. It is made under another name, with room for
+frames and none in it, and then put in its place.
 """
 
 from __future__ import annotations
 
+import errno
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
@@ -25,12 +26,17 @@ import numpy as np
 import tisim
 from tisim import h5md
 from tisim.composition import needed_fields
+from tisim.durable import replace_file
 from tisim.errors import InputError, RunError, must
 from tisim.frames import Frame, frames
+from tisim.growing import Growing
 from tisim.scene import Scene
 from tisim.simulation import Simulation
 from tisim.state import RUNNING, Field, resolve_fields
 
+LIBRARY = ("v110", "v110")
+"""The versions of HDF5 that can read the file; earlier ones have no checksums of its structure."""
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 EARLY = 1e-9
 """Part of an interval by which a frame may come early, so that rounding of times costs no further step."""
 
@@ -65,23 +71,33 @@ class Trajectory:
     """
 
     def __init__(self, recording: Recording, scenes: Sequence[Scene], real: str = "f64") -> None:
-        """Make the file, in place of any before. real : "f64" or "f32". InputError when it cannot be made."""
+        """Make the file, in place of any before. real : "f64" or "f32".
+
+        InputError when it cannot be made, RunError when the disk is full.
+        """
         self.recording, self.scenes, self.path = recording, list(scenes), Path(recording.path)
         self.fields = [written(scene) for scene in scenes]
-        try:
-            self.file = h5py.File(self.path, "w", libver="latest", locking="best-effort")
-        except OSError as error:
-            raise InputError(
-                f"trajectory must be a file that can be written; received {str(self.path)!r} ({error})"
-            ) from None
-        h5md.metadata(self.file, tisim.__version__)
-        self.groups = [self.file.create_group(f"particles/{name}") for name in names(len(scenes))]
-        for scene, fields, group in zip(self.scenes, self.fields, self.groups, strict=True):
-            h5md.box(group, scene.domain)
-            h5md.elements(group, fields, scene.capacity(), np.float64 if real == "f64" else np.float32)
-            group.attrs["scene"] = scene.to_toml()
+        _put(self.path, self._empty(np.float64 if real == "f64" else np.float32))
+        self.disk = Growing(self.path)
+        self.file = h5py.File(self.disk, "r+", libver=LIBRARY)
         # From here on nothing can be added but rows.
         self.file.swmr_mode = True
+        self.groups = [self.file[f"particles/{name}"] for name in h5md.names(len(scenes))]
+        self.checksums = [self.file[f"{h5md.CHECKSUMS}/{name}"] for name in h5md.names(len(scenes))]
+
+    def _empty(self, real: Any) -> bytes:
+        """The file without frames."""
+        image = io.BytesIO()
+        with h5py.File(image, "w", libver=LIBRARY) as file:
+            h5md.metadata(file, tisim.__version__)
+            names = h5md.names(len(self.scenes))
+            for name, scene, fields in zip(names, self.scenes, self.fields, strict=True):
+                group = file.create_group(f"particles/{name}")
+                h5md.box(group, scene.domain)
+                h5md.elements(group, fields, scene.capacity(), real)
+                h5md.scene(file, name, scene.to_toml())
+                h5md.checksums(file, name)
+        return image.getvalue()
 
     @classmethod
     def going_on(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
@@ -91,11 +107,16 @@ class Trajectory:
             return cls(recording, [scene], real)
         unfinished = path.with_name(path.name + ".new")
         made = cls(replace(recording, path=unfinished), [scene], real)
-        with frames(path) as before:
-            for frame in before:
-                if frame.time <= time:
-                    made.write(0, frame)
-        unfinished.replace(path)
+        try:
+            with frames(path) as before:
+                for frame in before:
+                    if frame.time <= time:
+                        made.write(0, frame)
+            unfinished.replace(path)
+        except BaseException:
+            made._finish()
+            unfinished.unlink(missing_ok=True)
+            raise
         made.path = path
         return made
 
@@ -104,24 +125,41 @@ class Trajectory:
         group, n = self.groups[index], len(frame.arrays["id"])
         order = np.argsort(frame.arrays["id"], kind="stable")
         row = group["position/step"].shape[0]
-        try:
-            for field in self.fields[index]:
-                value = group[field.name]["value"]
-                value.resize((row + 1, max(n, value.shape[1]), *value.shape[2:]))
-                value[row, :n] = frame.arrays[field.name][order]
-                value.flush()
-            # The step comes last: it says that the row is whole.
-            for name, entry in (("time", frame.time), ("step", frame.step)):
-                column = group["position"][name]
-                column.resize((row + 1,))
-                column[row] = entry
-                column.flush()
-        except OSError as error:
-            raise RunError(f"{self.path} could not be written: {error}; frames before are intact") from error
+        arrays = {}
+        for field in self.fields[index]:
+            value = group[field.name]["value"]
+            arrays[field.name] = frame.arrays[field.name][order].astype(value.dtype)
+            value.resize((row + 1, max(n, value.shape[1]), *value.shape[2:]))
+            value[row, :n] = arrays[field.name]
+            self._flush(value)
+        clock = h5md.clock_checksum(frame.step, frame.time)
+        # The step comes last: it says that the row is whole.
+        for column, entry in (
+            (self.checksums[index], (clock, h5md.frame_checksum(clock, arrays))),
+            (group["position/time"], frame.time),
+            (group["position/step"], frame.step),
+        ):
+            column.resize(row + 1, axis=0)
+            column[row] = entry
+            self._flush(column)
+
+    def _flush(self, dataset: h5py.Dataset) -> None:
+        dataset.flush()
+        self._check()
+
+    def _check(self) -> None:
+        if self.disk.failure is not None:
+            why = self.disk.failure.strerror or self.disk.failure
+            raise RunError(f"{self.path} could not be written: {why}; frames before are intact")
+
+    def _finish(self) -> None:
+        self.file.close()
+        self.disk.close()
 
     def close(self) -> None:
-        """Finish the file."""
-        self.file.close()
+        """Finish the file; RunError when not all could be written."""
+        self._finish()
+        self._check()
 
     def __enter__(self) -> Self:
         return self
@@ -129,7 +167,9 @@ class Trajectory:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        self._finish()
+        if value is None:
+            self._check()
 
     def record(self, simulation: Simulation, indices: Sequence[int]) -> Recorder:
         """Write frames of a loaded simulation, whose worlds are the scenes of these indices, as it runs."""
@@ -207,9 +247,15 @@ def recorded(
         simulation.look = None
 
 
-def names(scenes: int) -> list[str]:
-    """Of the groups of particles of so many scenes."""
-    return ["all"] if scenes == 1 else [f"world_{index}" for index in range(scenes)]
+def _put(path: Path, image: bytes) -> None:
+    try:
+        replace_file(path, image)
+    except RunError as error:
+        cause = error.__cause__
+        if isinstance(cause, OSError) and cause.errno in NO_ROOM:
+            raise
+        rule = "a file that can be written"
+        raise InputError(f"trajectory must be {rule}; received {str(path)!r} ({cause})") from None
 
 
 def written(scene: Scene) -> tuple[Field, ...]:

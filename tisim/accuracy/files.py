@@ -19,13 +19,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim import runtime
+from tisim import runtime, seal
 from tisim.accuracy.quantity import Estimate
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
 from tisim.accuracy.study import Study
 from tisim.durable import replace_file
-from tisim.errors import InputError, must
+from tisim.errors import must
 from tisim.output import versions, writable
 
 FORMAT = "tisim cost 1"
@@ -38,7 +38,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     """Write cost.csv and cost.h5, in place of any before; returns their paths. RunError on a full disk."""
     writable(folder)
     replace_file(folder / CSV, table(study).encode())
-    replace_file(folder / HDF5, _image(study))
+    _write_rows(study, folder / HDF5)
     return [folder / CSV, folder / HDF5]
 
 
@@ -57,9 +57,8 @@ def table(study: Study) -> str:
     return text.getvalue()
 
 
-def _image(study: Study) -> bytes:
-    """The bytes of cost.h5."""
-    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+def _write_rows(study: Study, path: Path) -> None:
+    with seal.created(path) as file:
         file.attrs.update({
             "format": FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
             "settings": json.dumps(_settings(study)), "versions": json.dumps(versions()),
@@ -81,8 +80,6 @@ def _image(study: Study) -> bytes:
         for quantity, truth in zip(study.quantities, study.truths, strict=False):
             value = truths.create_dataset(quantity.name, data=truth.estimate.value)
             value.attrs.update({"uncertainty": truth.estimate.uncertainty, "source": truth.source})
-        file.flush()
-        return bytes(file.id.get_file_image())
 
 
 def _settings(study: Study) -> dict[str, Any]:
@@ -105,16 +102,12 @@ def resume(study: Study, folder: Path) -> None:
     path = folder / HDF5
     if not path.exists():
         return
-    try:
-        with h5py.File(path) as file:
-            must(file.attrs.get("format") == FORMAT, "output folder", "one of 'tisim cost'", str(folder))
-            same = json.loads(file.attrs["identity"]) == study.identity()
-            rule = "without the study of another scene, version, machine or depth (or give --overwrite)"
-            must(same, "output folder", rule, str(folder))
-            study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
-            study.complete = file.attrs["complete"] == json.dumps(study.asked())
-    except (OSError, KeyError) as fault:
-        raise InputError(f"{HDF5} must be a whole HDF5 file; received {str(path)!r} ({fault})") from None
+    with seal.opened(path, f"output folder's {HDF5}", FORMAT) as file:
+        same = json.loads(file.attrs["identity"]) == study.identity()
+        rule = "without the study of another scene, version, machine or depth (or give --overwrite)"
+        must(same, "output folder", rule, str(folder))
+        study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
+        study.complete = file.attrs["complete"] == json.dumps(study.asked())
 
 
 def _rows(group: Any) -> list[Row]:
