@@ -20,8 +20,10 @@ from optimize.cache import Cache
 from optimize.record import canonical
 from optimize.settings import FORMAT, search_name
 from optimize.stored import searches
+from tisim import claim
 from tisim.durable import locked
 from tisim.errors import InputError, must
+from tisim.regular import status
 
 FILE = "search.h5"
 BESIDE = (
@@ -34,17 +36,20 @@ BESIDE = (
     "best_cloud.png",
     "best_run.csv",
 )
+LEFT = claim.Leavings((FILE, f"{FILE}.journal", f"{FILE}.lock", *BESIDE), main=(FILE, f"{FILE}.journal"))
+HOW = "--fresh --overwrite"
+"""The options that let a search replace what is there."""
 
 
 def clear(folder: Path, overwrite: bool) -> None:
     """Make way for a new search; InputError when there is one already and it is not to be overwritten."""
-    file = folder / FILE
-    begun = file.exists() or file.with_name(FILE + ".journal").exists()
+    claim.check(folder, LEFT.names, overwrite, LEFT, HOW)
+    begun = any(status(folder / name) is not None for name in LEFT.main)
     must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
     # The lock file stays: without it two processes could lock two different files.
     if begun:
-        with locked(folder / (FILE + ".lock"), exclusive=True):
-            for name in (FILE, FILE + ".journal", *BESIDE):
+        with locked(folder / f"{FILE}.lock", exclusive=True):
+            for name in (*LEFT.main, *BESIDE):
                 (folder / name).unlink(missing_ok=True)
 
 

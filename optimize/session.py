@@ -10,16 +10,16 @@ from rich.console import Console
 from optimize import report
 from optimize.cache import Cache
 from optimize.display import Display
-from optimize.folder import FILE, check
+from optimize.folder import FILE, HOW, LEFT, check
 from optimize.individual import Individual
 from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
 from optimize.runs import Evaluator, start_seed
 from optimize.search import search
 from optimize.settings import Settings, identity
+from tisim.claim import take
 from tisim.durable import replace_file
 from tisim.interrupt import Interrupt
-from tisim.output import writable
 
 
 def session(
@@ -30,13 +30,15 @@ def session(
     say: Console,
     bar: Console,
     stopping: Callable[[], None],
+    overwrite: bool = False,
 ) -> Outcome:
     """Search, or go on with the search in the folder, and write all that is listed in optimize.folder.
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
-    search cleanly (Outcome.interrupted). InputError when the folder is another search's or cannot be written.
+    search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.
+    InputError when the folder is another search's, has such files, or cannot be written.
     """
-    writable(folder)
+    take(folder, LEFT.names, overwrite, LEFT, HOW)
     with Cache(folder / FILE) as cache:
         check(folder, cache, identity(problem, settings, evaluator.settings))
         outcome = _shown(problem, settings, evaluator, cache, bar, stopping)

@@ -9,8 +9,9 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tisim import Scene
+from tisim.claim import writable
 from tisim.errors import InputError, RunError
-from tisim.output import Folder, writable, write
+from tisim.output import Folder, write
 from tisim.picture import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]

@@ -100,7 +100,7 @@ def run(
         simulation.load([scene])
     if resume:
         checkpoint.restore(simulation, place.checkpoint)
-    output.writable(place.path)
+    place.take(overwrite, resume)
     with recorded(recording, place.trajectory, simulation, resume):
         done = _advance(simulation, name, place.checkpoint)
     if not done:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tisim import request, runtime
+from tisim import claim, request, runtime
 from tisim.errors import RunError, must
 from tisim.interrupt import Interrupt
 from tisim.options import Changes, Device, Out, Overwrite, Seed, Size, Target, Threads
@@ -62,7 +62,6 @@ def cost(
     """
     from tisim.accuracy import Study, files, listing
     from tisim.accuracy.picture import save
-    from tisim.output import writable
 
     must(error is None or error > 0, "--error", "greater than 0", error)
     runtime.start(device, "f64", threads)
@@ -79,9 +78,10 @@ def cost(
     )
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
+    claim.check(place, files.LEFT.names, overwrite, files.LEFT)
     if not overwrite:
         files.resume(study, place)
-    writable(place)
+    claim.take(place, files.LEFT.names, overwrite, files.LEFT)
     done = _measure(study, place)
     if study.truths and study.rows:
         out().print(listing.table(study))

@@ -9,12 +9,11 @@ from typing import Annotated
 
 import typer
 
-from tisim import request
+from tisim import claim, request
 from tisim.durable import replace_file
 from tisim.errors import RunError, must
 from tisim.interrupt import Interrupt
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads
-from tisim.output import writable
 from tisim.terminal import err, out, stopping
 
 Executor = Annotated[
@@ -78,7 +77,7 @@ def optimize(
     with closing(made(executor, device, precision, threads)) as evaluator:
         if fresh:
             clear(place, overwrite)
-        outcome = session(problem, settings, evaluator, place, out(), err(), stopping)
+        outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
     if outcome.interrupted:
         err().print(f"stopped; {place / FILE} has all that is done. To go on, give the same command again.")
         raise typer.Exit(130)
@@ -100,6 +99,7 @@ def compare(
     folder: Out = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
     changes: SearchChanges = None,
+    overwrite: Overwrite = False,
     device: Device = "cpu",
     precision: Precision = "f64",
     threads: Threads = 0,
@@ -115,11 +115,11 @@ def compare(
     base = request.nested(usual, request.below("search", request.assignments(changes or ())))
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
-    writable(place)
+    claim.take(place, comparison.LEFT.names, overwrite, comparison.LEFT)
     found = []
     with (
         closing(made(executor, device, precision, threads)) as evaluator,
-        Cache(place / "compare.h5") as store,
+        Cache(place / comparison.FILE) as store,
         Interrupt(stopping) as ctrl_c,
     ):
         for one in comparison.compare(
@@ -137,8 +137,8 @@ def compare(
             line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
             err().print(line, highlight=False, markup=False)
     out().print(comparison.table(problem, found))
-    replace_file(place / "compare.csv", comparison.as_csv(problem, found))
-    out().print(f"written  {place / 'compare.csv'}", highlight=False, markup=False)
+    replace_file(place / comparison.CSV, comparison.as_csv(problem, found))
+    out().print(f"written  {place / comparison.CSV}", highlight=False, markup=False)
 
 
 def cache(

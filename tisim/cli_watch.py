@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tisim import runtime
+from tisim import claim, runtime
 from tisim.errors import InputError
-from tisim.options import CaseName, Device, Out, Precision, Size, Threads
+from tisim.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads
 from tisim.terminal import err, progress_bar
 
 if TYPE_CHECKING:
@@ -29,12 +29,11 @@ Into = Annotated[
 ]
 
 
-def plot(file: File, world: World = 0, folder: Into = None) -> None:
+def plot(file: File, world: World = 0, folder: Into = None, overwrite: Overwrite = False) -> None:
     """Draw the cloud, energy, centre of gravity and number of particles in time, and what its case shows."""
     from cases.case import every
-    from tisim import plots
+    from tisim import output, plots
     from tisim.frames import frames
-    from tisim.output import writable
 
     file = _file(file)
     place = folder or file.parent
@@ -43,19 +42,18 @@ def plot(file: File, world: World = 0, folder: Into = None) -> None:
         case = every().get(found.scene.name)
         if case and case.pictures:
             pictures |= case.pictures(found)
-    writable(place)
+    claim.take(place, pictures, overwrite, output.LEFT)
     for name, figure in pictures.items():
         print(_saved(figure, place / name))
 
 
 def figures(
     case: CaseName, size: Size = None, folder: Out = None,
-    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
+    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
 ) -> None:  # fmt: skip
     """Make the figures of a case that take many runs, and the numbers in them."""
     from cases.case import find
     from tisim.durable import replace_file
-    from tisim.output import writable
 
     found = find(case)
     chosen = size or "default"
@@ -64,9 +62,11 @@ def figures(
         raise InputError(f"case must be one with figures; received {case!r}")
     runtime.start(device, precision, threads)
     place = folder or Path("out") / f"{case}-figures"
-    writable(place)
+    claim.check_all(place, overwrite)
+    claim.writable(place)
     with _bar("running") as progress:
         made = found.figures(chosen, progress)
+    claim.take(place, made, overwrite)
     for name, what in made.items():
         if isinstance(what, str):
             replace_file(place / name, what.encode())
@@ -82,18 +82,18 @@ def movie(
     ] = None,
     rate: Annotated[int, typer.Option(help="Frames a second.")] = 20,
     world: World = 0,
+    overwrite: Overwrite = False,
 ) -> None:
     """Draw a trajectory as a moving picture."""
     from tisim.frames import frames
-    from tisim.movie import check
+    from tisim.movie import check, while_drawn
     from tisim.movie import movie as draw
-    from tisim.output import writable
 
     file = _file(file)
     path = to or file.with_suffix(".gif")
     with frames(file, world) as found:
         check(found, path, rate)
-        writable(path.parent)
+        claim.take(path.parent, (path.name, while_drawn(path)), overwrite)
         with _bar("drawing") as progress:
             draw(found, path, rate, progress)
     print(path)
@@ -103,16 +103,16 @@ def export(
     file: File,
     kind: Annotated[str, typer.Option("--format", help="vtk (ParaView), xyz (OVITO, ASE) or h5md.")] = "vtk",
     folder: Into = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write the frames of a run for other programs; h5md also mends the file of a killed run."""
-    from tisim.export import check
+    from tisim.export import check, names
     from tisim.export import export as write
-    from tisim.output import writable
 
     file = _file(file)
     check(file, kind)
     place = folder or file.parent
-    writable(place)
+    claim.take(place, names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
     print(made)

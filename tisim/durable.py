@@ -99,17 +99,22 @@ def replace_file(path: Path, data: bytes) -> None:
     RunError if the disk is full; path is then the old file. InputError when something that is no file has the
     unfinished one's name; a link in the place of path is replaced itself, not what it points to.
     """
-    unfinished = path.with_name(path.name + ".new")
+    new = path.with_name(unfinished(path.name))
     try:
         while True:
-            with locked(unfinished, exclusive=True) as handle:
+            with locked(new, exclusive=True) as handle:
                 # Whoever had it before may have put it in its place; then that is the file locked here.
-                if _names(unfinished, handle):
-                    _finish(handle, unfinished, path, data)
+                if _names(new, handle):
+                    _finish(handle, new, path, data)
                     break
         _sync_folder(path)
     except OSError as error:
         raise _full(path, error) from error
+
+
+def unfinished(name: str) -> str:
+    """What a file of this name is called while it is written."""
+    return f"{name}.new"
 
 
 def _names(path: Path, handle: int) -> bool:
@@ -119,15 +124,15 @@ def _names(path: Path, handle: int) -> bool:
         return False
 
 
-def _finish(handle: int, unfinished: Path, path: Path, data: bytes) -> None:
+def _finish(handle: int, new: Path, path: Path, data: bytes) -> None:
     """Make data all that is in the file, on the disk, and put it in its place; take it away if that fails."""
     try:
         os.ftruncate(handle, 0)
         _write_all(handle, data, 0)
         os.fsync(handle)
-        unfinished.replace(path)
+        new.replace(path)
     except OSError:
-        unfinished.unlink(missing_ok=True)
+        new.unlink(missing_ok=True)
         raise
 
 

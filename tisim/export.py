@@ -35,7 +35,7 @@ def export(
         return _h5md(file, folder / f"{file.stem}_copy.h5")
     number, made = worlds(file), []
     for world in range(number):
-        name = file.stem if number == 1 else f"{file.stem}_{world}"
+        name = _name(file, world, number)
         with frames(file, world) as found:
             steps = _told(found, progress, world, number)
             made.append(_vtk(steps, folder, name) if kind == "vtk" else _xyz(found, steps, folder, name))
@@ -50,6 +50,19 @@ def check(file: Path, kind: str) -> None:
         must(sound, "file", "a trajectory.h5 for format h5md", str(file))
 
 
+def names(file: Path, kind: str) -> list[str]:
+    """The names of all files that ``export`` makes."""
+    if kind == "h5md":
+        return [f"{file.stem}_copy.h5"]
+    made, number = [], worlds(file)
+    for world in range(number):
+        name = _name(file, world, number)
+        with frames(file, world) as found:
+            parts = [_part(name, k) for k in range(len(found))]
+        made += [f"{name}.pvd", *parts] if kind == "vtk" else [f"{name}.xyz"]
+    return made
+
+
 def _told(found: Frames, progress: Callable[[float], None], world: int, number: int) -> Iterator[Frame]:
     for k, frame in enumerate(found):
         yield frame
@@ -60,11 +73,19 @@ def _vtk(steps: Iterator[Frame], folder: Path, name: str) -> Path:
     collection = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     listed = ElementTree.SubElement(collection, "Collection")
     for k, frame in enumerate(steps):
-        part = f"{name}_{k:05d}.vtu"
+        part = _part(name, k)
         replace_file(folder / part, _vtu(frame.arrays))
         ElementTree.SubElement(listed, "DataSet", timestep=repr(frame.time), part="0", file=part)
     replace_file(folder / f"{name}.pvd", _xml(collection))
     return folder / f"{name}.pvd"
+
+
+def _name(file: Path, world: int, worlds: int) -> str:
+    return file.stem if worlds == 1 else f"{file.stem}_{world}"
+
+
+def _part(name: str, k: int) -> str:
+    return f"{name}_{k:05d}.vtu"
 
 
 def _vtu(arrays: Arrays) -> bytes:

@@ -38,7 +38,7 @@ def movie(
     if coloured is not None:
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         picture.scale(figure, None, coloured, side)
-    unfinished = path.with_name(f"{path.stem}.new{path.suffix}")
+    unfinished = path.with_name(while_drawn(path))
     with writer.saving(figure, str(unfinished), DPI):
         for k, frame in enumerate(found):
             axis.clear()
@@ -47,6 +47,11 @@ def movie(
             writer.grab_frame()
             progress((k + 1) / len(found))
     unfinished.replace(path)
+
+
+def while_drawn(path: Path) -> str:
+    """What the file is called while it is not whole; its end says what it is to those who write it."""
+    return f"{path.stem}.new{path.suffix}"
 
 
 def check(found: Frames, path: Path, rate: int) -> AbstractMovieWriter:

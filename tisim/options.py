@@ -23,7 +23,9 @@ Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' 
 Device = Annotated[str, typer.Option(help="cpu or cuda.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run has left.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace what an earlier run has left, and files of other origin.")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from where Ctrl-C stopped the same run.")]
 Frames = Annotated[
     int | None,

@@ -18,14 +18,19 @@ import h5py
 import numpy as np
 
 import tisim
-from tisim import picture, runtime, seal
+from tisim import claim, picture, runtime, seal
 from tisim.durable import replace_file
-from tisim.errors import InputError, must
+from tisim.errors import must
 from tisim.frames import RESULT
 from tisim.particles import Arrays
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.state import resolve_fields
+
+LEFT = claim.Leavings(
+    ("result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5"),
+    main=("result.h5", "checkpoint.h5", "trajectory.h5"),
+)
 
 
 @dataclass(frozen=True)
@@ -56,18 +61,11 @@ class Folder:
             must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
             rule = "without an interrupted run (or give --resume or --overwrite)"
             must(not begun and not self.trajectory.exists(), what, rule, str(self.path))
+        claim.check(self.path, LEFT.names, overwrite or resume, LEFT)
 
-
-def writable(folder: Path) -> None:
-    """Make a folder and see that files can be made in it; InputError otherwise."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"output folder must be writable; received {str(folder)!r} ({error.strerror})"
-        ) from None
+    def take(self, overwrite: bool = False, resume: bool = False) -> None:
+        """Make the folder and mark it as one of tisim's; InputError as of check, and where that cannot be."""
+        claim.take(self.path, LEFT.names, overwrite or resume, LEFT)
 
 
 def versions() -> dict[str, str]:

@@ -19,7 +19,6 @@ _REFUSED = {
     errno.EISDIR: "a folder",
     errno.ENXIO: "a socket or device",
     errno.ENODEV: "a device",
-    errno.ENOTDIR: "a name below a file",
     errno.EACCES: "one without permission",
     errno.EPERM: "one without permission",
     errno.EROFS: "one on a read-only file system",
@@ -52,7 +51,7 @@ def status(path: Path) -> os.stat_result | None:
     """What the system knows of the file of this name, None where there is none; InputError as of opened."""
     try:
         kind = path.lstat()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         raise _refusal(path, error) or error from None
@@ -70,7 +69,7 @@ def content(path: Path, most: int = -1) -> bytes | None:
     try:
         with open(opened(path, os.O_RDONLY), "rb") as file:
             return file.read(most)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         raise _refused(path, str(error.strerror or error)) from error

@@ -18,6 +18,7 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
         "scene.toml",
         "versions.json",
         "cloud.png",
+        ".tisim",
     }
     written = Scene.from_toml(folder / "scene.toml")
     assert (written.seed, written.particles.density) == (7, 2e3)
@@ -27,6 +28,34 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
         2, "output folder must be without a finished run (or give --overwrite); received 'out/flow'"
     )  # fmt: skip
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+OTHERS = "output folder must be without files that tisim has not written and would replace"
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "message"),
+    [
+        ("run", "scene.toml", OTHERS),
+        ("run", "result.h5.new", OTHERS),
+        ("run", "result.h5", "output folder must be without a finished run (or give --overwrite)"),
+        ("cost", "cost.csv", OTHERS),
+    ],
+)
+def test_files_of_the_user_are_not_replaced(tisim, toml, tmp_path, command, name, message):
+    users = tmp_path / "mine" / name
+    users.parent.mkdir()
+    users.write_text("the user's own")
+    code, out, err = tisim(command, toml, "--out", "mine")
+    assert (code, out) == (2, "")
+    assert message in err
+    assert [(path.name, path.read_text()) for path in users.parent.iterdir()] == [(name, "the user's own")]
+    users.rename(tmp_path / "elsewhere")
+    users.symlink_to(tmp_path / "elsewhere")
+    code, out, err = tisim(command, toml, "--out", "mine", "--overwrite")
+    assert (code, out) == (2, "")
+    assert f"mine/{name} must be a regular file of its own that may be opened; received a symbolic" in err
+    assert (tmp_path / "elsewhere").read_text() == "the user's own"
 
 
 @pytest.mark.long
@@ -39,7 +68,7 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
         code, _, err = tisim("run", toml, "--out", "cut")
     assert code == 130
     assert "same command with --resume" in " ".join(err.split())
-    assert [path.name for path in (tmp_path / "cut").iterdir()] == ["checkpoint.h5"]
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [".tisim", "checkpoint.h5"]
     code, _, err = tisim("run", toml, "--out", "cut")
     assert code == 2
     assert "--resume" in err
@@ -54,7 +83,7 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
 def test_second_ctrl_c_stops_at_once(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
     press_ctrl_c(monkeypatch, after=1, times=2)
     assert tisim("run", toml)[0] == 130
-    assert list((tmp_path / "out" / "flow").iterdir()) == []
+    assert [path.name for path in (tmp_path / "out" / "flow").iterdir()] == [".tisim"]
 
 
 BEYOND_RANGE = [

@@ -26,12 +26,31 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
         0, 0.334, 0.667, 1,
     ]  # fmt: skip
     assert tisim("plot", folder, "--out", "p")[0] == 0
-    assert {path.name for path in (tmp_path / "p").iterdir()} == {"cloud.png", "courses.png"}
+    assert {path.name for path in (tmp_path / "p").iterdir()} == {".tisim", "cloud.png", "courses.png"}
     assert tisim("movie", folder, "--to", "m/flow.gif", "--rate", 5)[0] == 0
     assert (tmp_path / "m/flow.gif").read_bytes()[:4] == b"GIF8"
     code, out, _ = tisim("export", folder, "--format", "vtk", "--out", "v")
     assert (code, out.strip()) == (0, "v/trajectory.pvd")
     assert len(list((tmp_path / "v").glob("*.vtu"))) == 4
+    for command, name in (
+        (("plot", folder, "--out", "u"), "courses.png"),
+        (("movie", folder, "--to", "u/flow.gif"), "flow.gif"),
+        (("export", folder, "--format", "vtk", "--out", "u"), "trajectory_00003.vtu"),
+        (("export", folder, "--format", "xyz", "--out", "u"), "trajectory.xyz.new"),
+        (("export", folder, "--format", "h5md", "--out", "u"), "trajectory_copy.h5"),
+    ):
+        users = tmp_path / "u" / name
+        users.parent.mkdir(exist_ok=True)
+        users.write_text("the user's own")
+        code, _, err = tisim(*command)
+        assert code == 2
+        assert "files that tisim has not written and would replace (or give --overwrite)" in err
+        assert f"received 'u' with {name}" in err
+        assert [(path.name, path.read_text()) for path in users.parent.iterdir()] == [
+            (name, "the user's own")
+        ]
+        users.unlink()
+    assert tisim("plot", folder)[0] == 0, "the run's own cloud.png"
     (folder / "trajectory.h5").unlink()
     code, out, _ = tisim("export", folder, "--format", "xyz")
     assert (code, out.strip()) == (0, str(folder / "result.xyz"))
@@ -91,11 +110,18 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": toy})
     assert tisim("run", toml, "--frames", 3)[0] == 0
     assert tisim("plot", "out/flow", "--out", "p")[0] == 0
-    assert {path.name for path in (tmp_path / "p").iterdir()} == {"cloud.png", "courses.png", "own.png"}
+    drawn = {path.name for path in (tmp_path / "p").iterdir()}
+    assert drawn == {".tisim", "cloud.png", "courses.png", "own.png"}
     assert seen == [4]
     code, out, _ = tisim("figures", "toy", "--size", "small")
     assert (code, out.split()) == (0, ["out/toy-figures/many.png", "out/toy-figures/many.csv"])
     assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\nsmall\n"
+    (tmp_path / "out/toy-figures/notes.txt").write_text("the user's own")
+    code, _, err = tisim("figures", "toy")
+    assert code == 2
+    assert "(or give --overwrite); received 'out/toy-figures' with notes.txt" in err
+    assert tisim("figures", "toy", "--overwrite")[0] == 0
+    assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\ndefault\n"
     code, _, err = tisim("figures", "toy", "--size", "huge")
     assert code == 2
     assert "size must be one of default, small; received 'huge'" in err

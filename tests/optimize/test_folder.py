@@ -9,6 +9,8 @@ from fake_runs import FakeEvaluator, fake_problem
 from cases import case as catalogue
 from cases.case import Case, Size
 from optimize.cache import Cache
+from optimize.folder import LEFT
+from tisim.claim import MARKER
 from tisim.cli import main
 
 BOWL = Case(
@@ -62,6 +64,50 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
     assert optimize("--seed", 1)[0] == 2
+
+
+@pytest.mark.parametrize("name", ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.toml"])
+def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
+    users = tmp_path / "s" / name
+    users.parent.mkdir()
+    users.write_text("the user's own")
+    code, err = optimize()
+    assert (code, err.strip()) == (
+        2,
+        "output folder must be without files that tisim has not written and would replace "
+        f"(or give --fresh --overwrite); received 's' with {name}",
+    )
+    assert contents(users.parent) == {name: b"the user's own"}
+    assert optimize("--fresh", "--overwrite")[0] == 0
+    assert contents(users.parent).get(name) != b"the user's own"
+    assert optimize()[0] == 0
+
+
+@pytest.mark.parametrize("name", ["best.csv", "best.csv.new", *LEFT.names[:3]])
+@pytest.mark.parametrize("way", [(), ("--fresh",), ("--fresh", "--overwrite")])
+def test_planted_links_are_refused_and_not_followed(optimize, tmp_path, name, way):
+    victim, folder = tmp_path / "victim", tmp_path / "s"
+    folder.mkdir()
+    victim.write_text("the user's own")
+    (folder / name).symlink_to(victim)
+    code, err = optimize(*way)
+    assert code == 2
+    assert f"s/{name} must be a regular file of its own that may be opened; received a symbolic link" in err
+    assert victim.read_text() == "the user's own"
+    assert [path.name for path in folder.iterdir()] == [name]
+
+
+def test_a_folder_of_before_markers_goes_on_and_unrelated_files_do_not_matter(optimize, tmp_path):
+    folder = tmp_path / "s"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("the user's own")
+    assert optimize()[0] == 0
+    (folder / MARKER).unlink()
+    first = contents(folder)
+    assert optimize("--generations", 2)[0] == 0
+    assert contents(folder)["best.csv"] != first["best.csv"]
+    assert contents(folder)["notes.txt"] == b"the user's own"
+    assert "notes.txt" not in (folder / MARKER).read_text().splitlines()
 
 
 def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path):

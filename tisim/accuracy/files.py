@@ -24,12 +24,14 @@ from tisim.accuracy.quantity import Estimate
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
 from tisim.accuracy.study import Study
+from tisim.claim import Leavings, writable
 from tisim.durable import replace_file
 from tisim.errors import must
-from tisim.output import versions, writable
+from tisim.output import versions
 
 FORMAT = "tisim cost 1"
 CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
+LEFT = Leavings((CSV, HDF5, PICTURE), main=(HDF5,))
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float}
 
