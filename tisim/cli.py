@@ -101,8 +101,12 @@ def run(
     if resume:
         checkpoint.restore(simulation, place.checkpoint)
     place.take(overwrite, resume)
-    with recorded(recording, place.trajectory, simulation, resume):
-        done = _advance(simulation, name, place.checkpoint)
+    try:
+        with recorded(recording, place.trajectory, simulation, resume):
+            done = _advance(simulation, name, place.checkpoint)
+        paths = output.write(simulation.results()[0], place) if done else []
+    except RunError as error:
+        raise RunError(f"{error}. {_rescued(simulation, place.checkpoint)}") from error
     if not done:
         checkpoint.save(simulation, place.checkpoint)
         err().print(
@@ -111,7 +115,7 @@ def run(
         )
         raise typer.Exit(130)
     result = simulation.results()[0]
-    paths = [*output.write(result, place), *((place.trajectory,) if recording else ())]
+    paths += [place.trajectory] if recording else []
     out().print(_summary(result, simulation.setup_s, paths))
     if not result.status.ok:
         raise RunError(f"run failed {result.status.reason}")
@@ -143,6 +147,17 @@ def _advance(simulation: Simulation, name: str, path: Path) -> bool:
                 raise
             return False
     return True
+
+
+def _rescued(simulation: Simulation, path: Path) -> str:
+    """What there is to go on from, once something could not be written: a checkpoint, where it finds room."""
+    from tisim import checkpoint
+
+    try:
+        checkpoint.save(simulation, path)
+    except RunError:
+        return "No checkpoint could be written either" + "; that of before is intact." * path.exists()
+    return f"{path} is written. To go on, make room and give the same command with --resume."
 
 
 def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:

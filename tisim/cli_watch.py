@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,6 +43,9 @@ def plot(file: File, world: World = 0, folder: Into = None, overwrite: Overwrite
         case = every().get(found.scene.name)
         if case and case.pictures:
             pictures |= case.pictures(found)
+        for figure in pictures.values():
+            plots.mark_missing(figure, found)
+        _tell(found.missing)
     claim.take(place, pictures, overwrite, output.LEFT)
     for name, figure in pictures.items():
         print(_saved(figure, place / name))
@@ -96,6 +100,7 @@ def movie(
         claim.take(path.parent, (path.name, while_drawn(path)), overwrite)
         with _bar("drawing") as progress:
             draw(found, path, rate, progress)
+        _tell(found.missing)
     print(path)
 
 
@@ -105,9 +110,10 @@ def export(
     folder: Into = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write the frames of a run for other programs; h5md also mends the file of a killed run."""
+    """Write the frames of a run for other programs; h5md is a copy."""
     from tisim.export import check, names
     from tisim.export import export as write
+    from tisim.frames import frames
 
     file = _file(file)
     check(file, kind)
@@ -115,7 +121,14 @@ def export(
     claim.take(place, names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
+    with frames(file) as found:
+        _tell(found.missing)
     print(made)
+
+
+def _tell(missing: str) -> None:
+    if missing:
+        print(missing, file=sys.stderr)
 
 
 def _file(path: Path) -> Path:

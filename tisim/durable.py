@@ -78,7 +78,7 @@ def append_at(path: Path, end: int, data: bytes) -> int:
             if os.fstat(handle).st_size > end:
                 os.ftruncate(handle, end)
             try:
-                _write_all(handle, data, end)
+                write_at(handle, data, end)
                 os.fsync(handle)
             except OSError:
                 os.ftruncate(handle, end)
@@ -117,6 +117,21 @@ def unfinished(name: str) -> str:
     return f"{name}.new"
 
 
+@contextlib.contextmanager
+def replacing(path: Path, new: Path) -> Iterator[None]:
+    """While this lasts, ``new`` is written; then it is put in the place of path.
+
+    RunError if the disk is full; path is then the old file, and nothing unfinished is left.
+    """
+    try:
+        yield
+        new.replace(path)
+    except OSError as error:
+        raise _full(path, error) from error
+    finally:
+        new.unlink(missing_ok=True)
+
+
 def _names(path: Path, handle: int) -> bool:
     try:
         return os.path.samestat(path.lstat(), os.fstat(handle))
@@ -128,7 +143,7 @@ def _finish(handle: int, new: Path, path: Path, data: bytes) -> None:
     """Make data all that is in the file, on the disk, and put it in its place; take it away if that fails."""
     try:
         os.ftruncate(handle, 0)
-        _write_all(handle, data, 0)
+        write_at(handle, data, 0)
         os.fsync(handle)
         new.replace(path)
     except OSError:
@@ -136,7 +151,8 @@ def _finish(handle: int, new: Path, path: Path, data: bytes) -> None:
         raise
 
 
-def _write_all(handle: int, data: bytes, offset: int) -> None:
+def write_at(handle: int, data: bytes, offset: int) -> None:
+    """Write all of data into an open file from a byte on; OSError when there is no room for it."""
     view = memoryview(data)
     while view:
         written = os.pwrite(handle, view, offset)

@@ -1,4 +1,4 @@
-"""Frames of a run for other programs: VTK (ParaView), extended XYZ (OVITO, ASE), or a clean H5MD file."""
+"""Frames of a run for other programs: VTK (ParaView), extended XYZ (OVITO, ASE), or a copy as H5MD."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tisim.durable import replace_file
-from tisim.errors import RunError, must
+from tisim.durable import replace_file, replacing, unfinished
+from tisim.errors import must
 from tisim.frames import Frame, Frames, frames, worlds
 from tisim.particles import Arrays
 from tisim.trajectory import Recording, Trajectory
@@ -27,7 +27,7 @@ def export(
     """Write all frames and worlds of a trajectory.h5 or result.h5; returns what to open.
 
     kind : "vtk", a .pvd with the times and a .vtu for each frame; "xyz", one extended XYZ file; "h5md", the
-    file again without the mark that a killed run leaves. A world of several has its number in the name.
+    file again, once all of it has been found undamaged. A world of several has its number in the name.
     progress : called with the finished fraction, 0..1. InputError for another format, or no such file.
     """
     check(file, kind)
@@ -46,6 +46,7 @@ def check(file: Path, kind: str) -> None:
     """InputError unless the file can be written in this format."""
     must(kind in FORMATS, "format", f"one of {', '.join(FORMATS)}", kind)
     with frames(file) as found:
+        must(len(found) > 0, "file", "one with a frame", f"{file}, with none yet")
         sound = kind != "h5md" or "id" in found[0].arrays
         must(sound, "file", "a trajectory.h5 for format h5md", str(file))
 
@@ -138,17 +139,13 @@ def _xyz(found: Frames, steps: Iterator[Frame], folder: Path, name: str) -> Path
         pbc = "T T T" if found.scene.domain.joined() else "F F F"
         box = f'Lattice="{lattice}" Origin="{origin}" pbc="{pbc}" '
     path = folder / f"{name}.xyz"
-    unfinished = path.with_name(path.name + ".new")
-    try:
-        with unfinished.open("w") as text:
-            for frame in steps:
-                columns, properties = _columns(frame.arrays)
-                keys = f"Properties={properties} Time={frame.time!r} Step={frame.step}"
-                text.write(f"{len(columns[0])}\n{box}{keys}\n")
-                text.writelines("X " + " ".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
-        unfinished.replace(path)
-    except OSError as error:
-        raise RunError(f"{path} could not be written: {error.strerror or error}") from error
+    new = path.with_name(unfinished(path.name))
+    with replacing(path, new), new.open("w") as text:
+        for frame in steps:
+            columns, properties = _columns(frame.arrays)
+            keys = f"Properties={properties} Time={frame.time!r} Step={frame.step}"
+            text.write(f"{len(columns[0])}\n{box}{keys}\n")
+            text.writelines("X " + " ".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
     return path
 
 
@@ -171,7 +168,8 @@ def _h5md(file: Path, out: Path) -> Path:
         with frames(file, world) as found:
             scenes.append(found.scene)
             single = found[0].arrays["position"].dtype == np.float32
-    with Trajectory(Recording(out, frames=1), scenes, "f32" if single else "f64") as copy:
+    new, real = out.with_name(unfinished(out.name)), "f32" if single else "f64"
+    with replacing(out, new), Trajectory(Recording(new, frames=1), scenes, real) as copy:
         for world in range(len(scenes)):
             with frames(file, world) as found:
                 for frame in found:

@@ -19,6 +19,8 @@ from tisim.particles import Arrays
 from tisim.scene import Scene
 from tisim.superblock import SIGNATURE, SIZE, sound
 
+ROUNDING = 1e-9
+"""Part of a duration by which the sum of its steps may fall short of it."""
 RESULT = "tisim run 1"
 """The format of a result.h5."""
 
@@ -73,6 +75,14 @@ class Frames:
                 same = h5md.clock_checksum(int(steps[k]), float(times[k])) == checksums[k, 0]
                 must(same, "file", "undamaged", f"frame {k}, the checksum of whose time does not fit")
             return steps[:whole], times, checksums
+
+    @property
+    def missing(self) -> str:
+        """What there is no frame of, in words, when the run has not reached its end; empty when it has."""
+        last, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
+        if last >= end * (1 - ROUNDING):
+            return ""
+        return f"the run has come to t = {last:.6g} s of {end:.6g} s; what follows is missing"
 
     def __len__(self) -> int:
         return len(self.times)

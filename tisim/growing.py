@@ -13,7 +13,7 @@ import io
 import os
 from pathlib import Path
 
-from tisim.durable import _write_all as write_at
+from tisim.durable import write_at
 from tisim.superblock import SIZE, superblock
 
 

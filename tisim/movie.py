@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import CalledProcessError
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
@@ -11,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tisim import picture
-from tisim.errors import InputError, must
+from tisim.durable import replacing
+from tisim.errors import InputError, RunError, must
 from tisim.frames import Frames
 from tisim.particles import Arrays
 
@@ -39,14 +41,17 @@ def movie(
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         picture.scale(figure, None, coloured, side)
     unfinished = path.with_name(while_drawn(path))
-    with writer.saving(figure, str(unfinished), DPI):
-        for k, frame in enumerate(found):
-            axis.clear()
-            picture.panel(axis, frame.arrays, square, seen, coloured)
-            figure.suptitle(picture.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
-            writer.grab_frame()
-            progress((k + 1) / len(found))
-    unfinished.replace(path)
+    try:
+        with replacing(path, unfinished), writer.saving(figure, str(unfinished), DPI):
+            for k, frame in enumerate(found):
+                axis.clear()
+                picture.panel(axis, frame.arrays, square, seen, coloured)
+                figure.suptitle(picture.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
+                figure.supxlabel(found.missing, fontsize=8, y=0.005)
+                writer.grab_frame()
+                progress((k + 1) / len(found))
+    except CalledProcessError as error:
+        raise RunError(f"{path} could not be written: {error}") from error
 
 
 def while_drawn(path: Path) -> str:

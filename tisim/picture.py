@@ -42,8 +42,12 @@ def cloud(result: Result) -> Figure:
     return start_and_end((result.start, result.state), (0.0, result.time), result.scene.domain)
 
 
-def start_and_end(states: tuple[Arrays, Arrays], times: tuple[float, float], domain: Domain) -> Figure:
+def start_and_end(
+    states: tuple[Arrays, Arrays], times: tuple[float, float], domain: Domain, last: str = "end"
+) -> Figure:
     """Two states (at times in s) side by side, seen from one side without perspective.
+
+    last : what the second is called.
 
     Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
     In open space each panel has its own scale, which its bar gives.
@@ -54,7 +58,7 @@ def start_and_end(states: tuple[Arrays, Arrays], times: tuple[float, float], dom
     seen = corners(*domain.bounds())
     both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
     views = [view(both if len(seen) else state, seen) for state in states]
-    for axis, state, square, heading, time in zip(axes, states, views, ("start", "end"), times, strict=True):
+    for axis, state, square, heading, time in zip(axes, states, views, ("start", last), times, strict=True):
         panel(axis, state, square, seen, norm)
         axis.set_title(f"{heading}, {caption(state, time)}", fontsize=10)
     if norm is not None:

@@ -47,9 +47,18 @@ def history(found: Frames) -> History:
 
 
 def clouds(found: Frames) -> Figure:
-    """First and last frame side by side."""
+    """First and last frame side by side. InputError when there is none."""
+    must(len(found) > 0, "file", "one with a frame", "one with none yet")
     first, last = found[0], found[-1]
-    return start_and_end((first.arrays, last.arrays), (first.time, last.time), found.scene.domain)
+    states, times = (first.arrays, last.arrays), (first.time, last.time)
+    return start_and_end(states, times, found.scene.domain, "last frame" if found.missing else "end")
+
+
+def mark_missing(figure: Figure, found: Frames) -> Figure:
+    """The figure, with what frames are missing below it where the run has not reached its end."""
+    if found.missing:
+        figure.supxlabel(found.missing, fontsize=10, color=COLOURS[1])
+    return figure
 
 
 def courses(found: Frames) -> Figure:

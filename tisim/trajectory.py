@@ -184,10 +184,9 @@ class Recorder:
         self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
         self.last = [_last(trajectory.groups[index]) for index in self.indices]
         self.due = np.full(simulation.worlds, np.inf)
-        times = simulation.watch.good["time"]
         for w, interval in enumerate(self.interval):
-            # A run that goes on has its frame at the time where it goes on, if one was due.
-            self.due[w] = 0.0 if self.last[w] < 0 else self._after(float(times[w]), interval)
+            # A run that goes on may owe the frame of the time where it goes on: the disk was full.
+            self.due[w] = 0.0 if self.last[w] < 0 else self._after(self.last[w], interval)
         simulation.look = self.look
         self.look()
 

@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 
 from cases import case as catalogue
 from cases.case import Case, Size
+from tests.test_growing import files_of_at_most
+from tisim import Simulation, durable, seal
 from tisim.frames import frames
 
 
@@ -76,6 +78,57 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
         assert (frame.time, frame.step) == (other.time, other.step)
         for name, values in frame.arrays.items():
             np.testing.assert_array_equal(values, other.arrays[name])
+
+
+def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
+    tisim, toml, tmp_path, monkeypatch
+):
+    """The system refuses to let files grow while the run goes on; then there is room again."""
+    folder = tmp_path / "out" / "flow"
+
+    def crowded(self, progress=None, steps=None, run=Simulation.run):
+        with files_of_at_most((folder / "trajectory.h5").stat().st_size + 30_000):
+            run(self, progress, steps)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Simulation, "run", crowded)
+        code, out, err = tisim("run", toml, "--every", "5e-5")
+    assert (code, out) == (1, "")
+    assert "trajectory.h5 could not be written: File too large; frames before are intact" in err
+    assert "checkpoint.h5 is written. To go on, make room and give the same command with --resume" in err
+    assert {path.name for path in folder.iterdir()} == {".tisim", "checkpoint.h5", "trajectory.h5"}
+    begun = every_frame(folder / "trajectory.h5")
+    assert 2 < len(begun) < 21
+
+    code, out, err = tisim("plot", folder, "--out", "p")
+    assert code == 0
+    assert f"the run has come to t = {begun[-1].time:.6g} s of 0.001 s; what follows is missing" in err
+
+    assert tisim("run", toml, "--every", "5e-5", "--resume")[0] == 0
+    found = every_frame(folder / "trajectory.h5")
+    assert [frame.step for frame in found] == list(range(0, 1001, 50))
+    for frame, other in zip(begun, found, strict=False):
+        np.testing.assert_array_equal(frame.arrays["position"], other.arrays["position"])
+    assert "missing" not in tisim("plot", folder, "--out", "p")[2]
+
+
+def test_a_full_disk_at_the_end_of_a_run_loses_nothing(tisim, toml, monkeypatch):
+    replace = durable.replace_file
+
+    def full(path, data):
+        if path.name == "result.h5":
+            with files_of_at_most(0):
+                replace(path, data)
+        replace(path, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(seal, "replace_file", full)
+        code, out, err = tisim("run", toml)
+    assert (code, out) == (1, "")
+    assert "result.h5 could not be written: File too large; everything stored before is intact. " in err
+    assert "checkpoint.h5 is written. To go on, make room" in err
+    code, out, _ = tisim("run", toml, "--resume")
+    assert (code, "1000" in out) == (0, True)
 
 
 @pytest.mark.slow
