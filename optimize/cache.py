@@ -3,7 +3,7 @@
 FILE          HDF5: one row per evaluation, and tables (settings, logbooks, reports). Whole at every instant,
               because it is only ever replaced by a complete new one.
 FILE.journal  evaluations finished since; folded into FILE at the end of a generation and when it grows large.
-FILE.lock     held by whoever reads or writes either.
+FILE.lock     held by whoever reads or writes either; says how far the journal had been written.
 
 A kill between replacing FILE and emptying the journal leaves evaluations in both: they count once, by key.
 """
@@ -17,11 +17,14 @@ from pathlib import Path
 from typing import Any
 
 from optimize import store
-from optimize.journal import Journal
+from optimize.journal import Journal, Mark
 from optimize.record import Record
 from optimize.store import Table
+from tisim.claim import writable
 from tisim.durable import locked, replace_file
 from tisim.errors import must
+from tisim.framed import Scan
+from tisim.regular import status
 
 FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file
 
@@ -30,22 +33,23 @@ class Cache:
     """The evaluations in a file, kept in memory and in step with other processes that use the same file.
 
     path : the HDF5 file; made on the first fold if there is none. Its folder is made if missing.
-    Raises InputError if path is cut short or not a cache's file: nothing is then written.
+    Raises InputError if path is cut short, damaged, not a cache's file or none that may be opened: nothing is
+    then written. Warns of single evaluations that are damaged or lost; those are run again.
     Use as a context manager, or close it, so that the journal is folded in.
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        self._journal = Journal(self.path.with_name(self.path.name + ".journal"))
-        self._lock = self.path.with_name(self.path.name + ".lock")
+        self.path, journal, self._lock = _files(path)
+        self._journal = Journal(journal)
         self._records: dict[str, Record] = {}
         self._pending: dict[str, Table] = {}
         self._version: tuple[int, ...] | None = None
-        self._end = 0
-        if self.path.exists():
+        self._end = self._frames = 0
+        if status(self.path) is not None:
             with store.opened(self.path):
                 pass  # before a lock file is left beside a file that is not ours
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        if not self.path.parent.is_dir():
+            writable(self.path.parent)
         self.refresh()
 
     def __enter__(self) -> Cache:
@@ -75,10 +79,12 @@ class Cache:
 
         RunError if the disk is full; everything stored before is then intact.
         """
-        with locked(self._lock, exclusive=True):
+        with locked(self._lock, exclusive=True) as lock:
             self._refresh()
             if record.key not in self._records:
                 self._end = self._journal.append(self._end, record.payload())
+                self._frames += 1
+                Mark(self._version, self._end, self._frames).write(lock)
                 self._records[record.key] = record
                 if self._end > FOLD_BYTES:
                     self._fold()
@@ -105,53 +111,61 @@ class Cache:
         with locked(self._lock, exclusive=False), store.opened(self.path) as file:
             return store.read_table(file, name)
 
+    def attributes(self) -> dict[str, Mapping[str, Any]]:
+        """The attributes of all tables by name, stored or waiting for the next fold."""
+        found: dict[str, Mapping[str, Any]] = {}
+        with locked(self._lock, exclusive=False):
+            if status(self.path) is not None:
+                with store.opened(self.path) as file:
+                    found = {name: store.attributes(file[name]) for name in store.tables(file)}
+        return found | {name: table.attrs for name, table in self._pending.items()}
+
     def tables(self) -> list[str]:
         """Names of all tables, stored or waiting for the next fold."""
-        with locked(self._lock, exclusive=False):
-            if not self.path.exists():
-                return sorted(self._pending)
-            with store.opened(self.path) as file:
-                return sorted({*store.tables(file), *self._pending})
+        return sorted(self.attributes())
 
-    def fold(self, *, always: bool = False) -> None:
+    def fold(self) -> None:
         """Write journal and waiting tables into the HDF5 file.
 
         RunError if the disk is full; everything stored before is then intact.
         """
         with locked(self._lock, exclusive=True):
             self._refresh()
-            if always or self._journal.size() or self._pending:
+            if self._journal.size() or self._pending:
                 self._fold()
+
+    def compact(self) -> None:
+        """Fold, and leave out what is damaged or double."""
+        with locked(self._lock, exclusive=True):
+            self._refresh()
+            self._fold(damaged=False)
 
     def close(self) -> None:
         """Fold."""
         self.fold()
 
-    def _fold(self) -> None:
-        old = self.path if self.path.exists() else None
-        replace_file(self.path, store.image(old, self.records(), self._pending))
+    def _fold(self, *, damaged: bool = True) -> None:
+        old = None if status(self.path) is None else self.path
+        replace_file(self.path, store.image(old, self.records(), self._pending, damaged))
         self._journal.clear()
-        self._pending, self._version, self._end = {}, self._file_version(), 0
-
-    def _file_version(self) -> tuple[int, ...] | None:
-        if not self.path.exists():
-            return None
-        stat = self.path.stat()
-        return stat.st_ino, stat.st_mtime_ns, stat.st_size
+        self._pending, self._version, self._end, self._frames = {}, _version(self.path), 0, 0
 
     def _refresh(self) -> None:
-        version = self._file_version()
+        version = _version(self.path)
         if version != self._version or self._journal.size() < self._end:
-            self._records, self._end, self._version = {}, 0, version
+            self._records, self._end, self._frames, self._version = {}, 0, 0, version
             if version is not None:
                 with store.opened(self.path) as file:
-                    rows, damaged = store.read_rows(file)
-                self._take(rows, damaged)
+                    self._take(*store.read_rows(file))
+        first = self._end == 0
         found = self._journal.read(self._end)
-        self._take(map(Record.parse, found.payloads), [f"journal, byte {offset}" for offset in found.damaged])
-        self._end = found.end
+        self._take(*_evaluations(found))
+        self._end, self._frames = found.end, self._frames + len(found.payloads)
+        mark = Mark.read(self._lock) if first else None
+        if mark is not None and (cut := mark.cut(version, found)):
+            warnings.warn(f"{self.path}: {cut}; what is lost will be run again", RuntimeWarning, stacklevel=4)
 
-    def _take(self, records: Any, damaged: Sequence[str]) -> None:
+    def _take(self, records: Sequence[Record], damaged: Sequence[str]) -> None:
         for record in records:
             self._records.setdefault(record.key, record)
         if damaged:
@@ -159,11 +173,36 @@ class Cache:
             warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
+def _files(path: str | Path) -> tuple[Path, Path, Path]:
+    """The HDF5 file, its journal and its lock."""
+    path = Path(path)
+    must(bool(path.name), "cache file", "a file", str(path))
+    return path, path.with_name(f"{path.name}.journal"), path.with_name(f"{path.name}.lock")
+
+
+def _version(path: Path) -> tuple[int, ...] | None:
+    """What tells one state of the HDF5 file from another; None where there is none."""
+    there = status(path)
+    return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
+
+
+def _evaluations(found: Scan) -> tuple[list[Record], list[str]]:
+    """The evaluations in a stretch of journal, and a description of each thing in it that is none."""
+    records = []
+    damaged = [f"journal, byte {offset}: not a whole record" for offset in found.damaged]
+    for number, payload in enumerate(found.payloads):
+        try:
+            records.append(Record.parse(payload))
+        except ValueError:
+            damaged.append(f"journal, frame {number}: no evaluation")
+    return records, damaged
+
+
 @dataclass(frozen=True)
 class VerifyReport:
     """What verify found. rows, journal : whole records in the HDF5 file and in the journal.
 
-    damaged : every row, table or stretch of journal that is not what was written.
+    damaged : every row, table or stretch of journal that is not what was written, or has been cut off.
     torn : bytes of an unfinished record at the journal's end (a killed writer; harmless).
     duplicates : records stored more than once (a kill during a fold; harmless).
     conflicts : keys stored with different fitnesses: the evaluation is not reproducible.
@@ -182,16 +221,16 @@ class VerifyReport:
         return not self.damaged and not self.conflicts
 
 
-def _existing(path: str | Path) -> Path:
-    path = Path(path)
-    journal = path.with_name(path.name + ".journal")
-    must(path.is_file() or journal.is_file(), "cache file", "an existing file", str(path))
-    return path
+def _existing(path: str | Path) -> tuple[Path, Path, Path]:
+    file, journal, lock = _files(path)
+    there = status(file) or status(journal)
+    must(there is not None, "cache file", "an existing file", str(path))
+    return file, journal, lock
 
 
 def existing(path: str | Path) -> Cache:
     """The cache of a file that is there already. InputError if there is no such file."""
-    return Cache(_existing(path))
+    return Cache(_existing(path)[0])
 
 
 def verify(path: str | Path) -> VerifyReport:
@@ -199,17 +238,19 @@ def verify(path: str | Path) -> VerifyReport:
 
     InputError if the file does not exist, is cut short or is not a cache's.
     """
-    path = _existing(path)
-    journal = Journal(path.with_name(path.name + ".journal"))
-    with locked(path.with_name(path.name + ".lock"), exclusive=False):
+    path, journal, lock = _existing(path)
+    with locked(lock, exclusive=False):
         rows: list[Record] = []
         damaged: list[str] = []
-        if path.exists():
+        version = _version(path)
+        if version is not None:
             with store.opened(path) as file:
                 rows, damaged = store.read_rows(file)
                 damaged += store.damaged_tables(file)
-        found = journal.read()
-    frames = [Record.parse(payload) for payload in found.payloads]
+        found, mark = Journal(journal).read(), Mark.read(lock)
+    frames, none = _evaluations(found)
+    cut = None if mark is None else mark.cut(version, found)
+    damaged += [*none, *([cut] if cut else [])]
     first: dict[str, Record] = {}
     for record in (*rows, *frames):
         first.setdefault(record.key, record)
@@ -217,7 +258,7 @@ def verify(path: str | Path) -> VerifyReport:
     return VerifyReport(
         rows=len(rows),
         journal=len(frames),
-        damaged=damaged + [f"journal, byte {offset}: not a whole record" for offset in found.damaged],
+        damaged=damaged,
         torn=found.torn,
         duplicates=len(rows) + len(frames) - len(first),
         conflicts=sorted(conflicts),
@@ -225,7 +266,7 @@ def verify(path: str | Path) -> VerifyReport:
 
 
 def compact(path: str | Path) -> int:
-    """Fold an existing cache file's journal, drop duplicates and damaged rows; return how many are kept."""
+    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept."""
     cache = existing(path)
-    cache.fold(always=True)
+    cache.compact()
     return len(cache)

@@ -12,6 +12,7 @@ best_run.csv      what that run shows beside what was wanted, where the problem 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -48,9 +49,10 @@ def clear(folder: Path, overwrite: bool) -> None:
     must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
     # The lock file stays: without it two processes could lock two different files.
     if begun:
-        with locked(folder / f"{FILE}.lock", exclusive=True):
+        with locked(folder / f"{FILE}.lock", exclusive=True) as lock:
             for name in (*LEFT.main, *BESIDE):
                 (folder / name).unlink(missing_ok=True)
+            os.ftruncate(lock, 0)
 
 
 def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:

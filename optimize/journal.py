@@ -1,13 +1,54 @@
-"""Write-ahead journal: framed, checksummed payloads appended to one file (see tisim/framed.py)."""
+"""Write-ahead journal: framed, checksummed payloads appended to one file (see tisim/framed.py).
+
+Beside it, in the lock file, stands how far it had been written: what is missing of that was cut off.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from tisim.durable import append_at
 from tisim.framed import Scan, frame, scan
+from tisim.regular import content, opened, status
 
-__all__ = ["Journal", "Scan", "frame", "scan"]
+__all__ = ["Journal", "Mark", "Scan", "frame", "scan"]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How far a journal had been written.
+
+    base : what it goes with, in numbers; None where it stands alone. end : bytes. frames : in them.
+    """
+
+    base: tuple[int, ...] | None
+    end: int
+    frames: int
+
+    def write(self, lock: int) -> None:
+        """Put it into the open lock file. Nothing that is stored hangs on it: no error where it cannot be."""
+        with contextlib.suppress(OSError):
+            os.pwrite(lock, frame(json.dumps(astuple(self)).encode()), 0)
+
+    @classmethod
+    def read(cls, lock: Path) -> Mark | None:
+        """The mark in a lock file, None where there is no whole one."""
+        try:
+            base, end, frames = json.loads(scan(content(lock) or b"").payloads[0])
+            return cls(None if base is None else tuple(base), int(end), int(frames))
+        except (IndexError, ValueError, TypeError):
+            return None
+
+    def cut(self, base: tuple[int, ...] | None, found: Scan) -> str | None:
+        """In words, what is missing in a journal that was read from its beginning; None when nothing is."""
+        if self.base != base or found.end >= self.end:
+            return None
+        lost = max(1, self.frames - len(found.payloads) - len(found.damaged))
+        return f"journal, byte {found.end}: {lost} evaluation(s) cut off, {self.end - found.end} bytes"
 
 
 class Journal:
@@ -18,13 +59,14 @@ class Journal:
 
     def size(self) -> int:
         """Bytes in the file, 0 if there is none."""
-        return self.path.stat().st_size if self.path.exists() else 0
+        there = status(self.path)
+        return 0 if there is None else there.st_size
 
     def read(self, offset: int = 0) -> Scan:
         """Frames from byte offset, which must be 0 or the end of an earlier scan."""
         if self.size() <= offset:
             return Scan([], offset, [], 0)
-        with self.path.open("rb") as file:
+        with os.fdopen(opened(self.path, os.O_RDONLY), "rb") as file:
             file.seek(offset)
             return scan(file.read(), offset)
 

@@ -7,7 +7,9 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
 
 REASON_LENGTH = 500  # HDF5 rows have one length per column; a stack trace in one row would widen them all
 
@@ -69,9 +71,27 @@ class Record:
 
     @classmethod
     def parse(cls, payload: bytes) -> Record:
-        """The record that payload() wrote. ValueError or TypeError if it is none."""
+        """The record that payload() wrote. ValueError if it is none."""
+        _Form.model_validate_json(payload)
         fields = json.loads(payload)
         if fields["fitness"] is None:
             fields["fitness"] = math.nan
         others = fields.pop("others", ())
         return cls(**fields, others=tuple(math.nan if value is None else value for value in others))
+
+
+class _Form(BaseModel):
+    """A record as its payload has it."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+    key: str
+    problem: str
+    fitness: float | None
+    ok: bool
+    reason: str
+    seed: Annotated[int, Field(ge=-(2**63), lt=2**63)]
+    design: dict[str, float]
+    work: dict[str, Any]
+    wall_s: float
+    created: float
+    others: list[float | None] = []

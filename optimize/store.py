@@ -8,6 +8,7 @@ to a row and not to the column.
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import math
 import zlib
@@ -20,11 +21,15 @@ import h5py
 import numpy as np
 
 from optimize.record import Record, canonical
+from tisim import regular
 from tisim.errors import InputError, must
+from tisim.framed import MAGIC, scan
 from tisim.seal import intact, sealed
 
 FORMAT = "tisim evaluations 1"
 ROWS = "evaluations"
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""How every HDF5 file begins."""
 
 _COLUMNS: dict[str, Any] = {
     "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
@@ -51,18 +56,21 @@ class Table:
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """The file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache."""
-    rule = "a whole HDF5 file written by a cache"
-    if path.exists():
-        must(intact(path.read_bytes()), str(path), rule, "a damaged structure")
-    try:
-        # the caller's lock guards the file; HDF5's own fails on some network file systems
-        file = h5py.File(path, "r", locking=False)
-    except OSError as error:
-        size = path.stat().st_size if path.exists() else "no"
-        raise InputError(f"{path} must be {rule}; received {size} bytes ({error})") from error
-    with file:
-        must(file.attrs.get("format") == FORMAT and ROWS in file, str(path), rule, list(file))
+    """The file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache.
+
+    HDF5 gets what is in its seal and nothing else: given a damaged structure, or another program's, it may
+    never return.
+    """
+    rule = f"{path} must be a whole HDF5 file written by a cache; received"
+    content = regular.content(path)
+    if content is None:
+        raise InputError(f"{rule} nothing")
+    inside = _unsealed(content)
+    if inside is None:
+        raise InputError(f"{rule} {len(content)} bytes that are damaged, cut short or another program's")
+    with h5py.File(io.BytesIO(inside), "r") as file:
+        if file.attrs.get("format") != FORMAT or ROWS not in file:
+            raise InputError(f"{rule} one with {', '.join(file) or 'nothing in it'}")
         try:
             yield file
         except InputError:
@@ -71,14 +79,28 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} must be undamaged; received {error}") from error
 
 
-def image(old: Path | None, records: Sequence[Record], tables: Mapping[str, Table]) -> bytes:
-    """The bytes of a new file: these records, the tables of the file old, and tables (which win)."""
+def _unsealed(content: bytes) -> bytes | None:
+    """The HDF5 file in a cache file; None when it has no whole seal, or is not what was sealed."""
+    start = max(content.rfind(MAGIC), 0)
+    whole = content.startswith(SIGNATURE) and scan(content[start:]).payloads and intact(content)
+    return content[:start] if whole else None
+
+
+def image(
+    old: Path | None, records: Sequence[Record], tables: Mapping[str, Table], damaged: bool = True
+) -> bytes:
+    """The bytes of a new file: these records, the tables of the file old, and tables (which win).
+
+    damaged : whether to take over tables whose checksum fails.
+    """
     with h5py.File("image", "w", driver="core", backing_store=False) as new:
         new.attrs["format"] = FORMAT
         if old is not None:
             with opened(old) as file:
                 for name in set(file) - {ROWS}:
                     file.copy(file[name], new, name)
+        for name in [] if damaged else _damaged(new):
+            _clear(new[name])
         for name, table in tables.items():
             _write_table(new.require_group(name), table)
         _write_rows(new.create_group(ROWS), records)
@@ -102,7 +124,7 @@ def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
         try:
             record = _record(cells)
             whole = zlib.crc32(record.payload()) == crc
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, ArithmeticError):
             whole = False
         if whole:
             records.append(record)
@@ -112,8 +134,9 @@ def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
 
 
 def read_table(file: h5py.File, name: str) -> Table:
-    """One table. InputError if there is none of that name."""
+    """One table. InputError if there is none of that name, or it is damaged."""
     must(name in tables(file), "table name", f"one of {tables(file)}", name)
+    must(name not in _damaged(file), f"table {name}", "whole ('tisim cache --compact' drops it)", "damage")
     return _read_table(file[name])
 
 
@@ -124,8 +147,20 @@ def tables(file: h5py.File) -> list[str]:
     return found
 
 
+def attributes(group: h5py.Group) -> dict[str, Any]:
+    """The attributes of a table: numbers and strings."""
+    found = {
+        name: getattr(value, "tolist", lambda value=value: value)() for name, value in group.attrs.items()
+    }
+    return {name: value for name, value in found.items() if name not in ("columns", "crc32")}
+
+
 def damaged_tables(file: h5py.File) -> list[str]:
     """A description of each table whose checksum fails."""
+    return [f"table {name}: its checksum does not fit" for name in _damaged(file)]
+
+
+def _damaged(file: h5py.File) -> list[str]:
     bad = []
     for name in tables(file):
         try:
@@ -133,12 +168,12 @@ def damaged_tables(file: h5py.File) -> list[str]:
         except (OSError, KeyError, RuntimeError, ValueError, TypeError):
             whole = False
         if not whole:
-            bad.append(f"table {name}: its checksum does not fit")
+            bad.append(name)
     return bad
 
 
 def _record(cells: Mapping[str, Any]) -> Record:
-    text = {name: bytes(cell).decode("ascii") for name, cell in cells.items() if _COLUMNS.get(name) is bytes}
+    text = {name: bytes(cell).decode() for name, cell in cells.items() if _COLUMNS.get(name) is bytes}
     return Record(
         key=text["key"],
         problem=text["problem"],
@@ -174,11 +209,16 @@ def _strings(values: Sequence[bytes]) -> np.ndarray:
     return np.array(values, dtype=h5py.string_dtype("utf-8", longest))
 
 
-def _write_table(group: h5py.Group, table: Table) -> None:
+def _clear(group: h5py.Group) -> None:
+    """Take a table away; those below it stay."""
     for name in [name for name, item in group.items() if isinstance(item, h5py.Dataset)]:
         del group[name]
     for name in list(group.attrs):
         del group.attrs[name]
+
+
+def _write_table(group: h5py.Group, table: Table) -> None:
+    _clear(group)
     for name, column in table.columns.items():
         text = any(isinstance(value, str) for value in column)
         data = _strings([str(value).encode() for value in column]) if text else np.asarray(column)
@@ -194,10 +234,7 @@ def _read_table(group: h5py.Group) -> Table:
     for name in json.loads(group.attrs["columns"]):
         values = group[_dataset(name)][...].tolist()
         columns[name] = [value.decode() if isinstance(value, bytes) else value for value in values]
-    attrs = {
-        name: getattr(value, "tolist", lambda value=value: value)() for name, value in group.attrs.items()
-    }
-    return Table(columns, {name: value for name, value in attrs.items() if name not in ("columns", "crc32")})
+    return Table(columns, attributes(group))
 
 
 def _place(dataset: h5py.Dataset) -> tuple[int, int]:

@@ -67,7 +67,7 @@ def content(path: Path, most: int = -1) -> bytes | None:
     InputError as of opened, and where it cannot be read.
     """
     try:
-        with open(opened(path, os.O_RDONLY), "rb") as file:
+        with os.fdopen(opened(path, os.O_RDONLY), "rb") as file:
             return file.read(most)
     except (FileNotFoundError, NotADirectoryError):
         return None

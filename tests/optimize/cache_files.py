@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
+
 WORKER = Path(__file__).with_name("cache_worker.py")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
@@ -16,6 +18,19 @@ def payloads(records):
 
 def journal_of(path):
     return path.with_name(path.name + ".journal")
+
+
+def lock_of(path):
+    return path.with_name(path.name + ".lock")
+
+
+def hurt(path, dataset, row):
+    """Flip the first bit of a row in the raw data of a dataset; nothing else in the file is changed."""
+    with h5py.File(path, "r") as file:
+        at = file[dataset].id.get_offset() + row * file[dataset].dtype.itemsize
+    content = bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.write_bytes(content)
 
 
 def worker(*arguments, **options):

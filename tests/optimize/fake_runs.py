@@ -101,5 +101,5 @@ class FakeCache:
     def fold(self):
         pass
 
-    def tables(self):
-        return []
+    def attributes(self):
+        return {}

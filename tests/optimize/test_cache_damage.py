@@ -1,12 +1,15 @@
+import os
+import re
+
 import h5py
-import numpy as np
 import pytest
-from cache_files import journal_of, payloads
+from cache_files import hurt, journal_of, lock_of, payloads
 from fake_runs import fake_record
 
 from optimize.cache import Cache, compact, existing, verify
 from optimize.journal import Journal, frame, scan
 from tisim.errors import InputError
+from tisim.framed import MAGIC
 
 
 def test_torn_tail_at_every_byte(path):
@@ -17,6 +20,7 @@ def test_torn_tail_at_every_byte(path):
         assert (len(found.payloads), found.end, found.torn, found.damaged) == (2, len(whole), cut, [])
     for cut in range(0, len(last), 7):
         journal_of(path).write_bytes(whole + last[:cut])
+        lock_of(path).unlink(missing_ok=True)
         assert verify(path).torn == cut
         cache = Cache(path)
         assert len(cache) == 2
@@ -68,11 +72,7 @@ def test_damaged_row_is_found_and_not_used(path, column):
         for number in range(5):
             cache.put(fake_record(number, ok=number != 2))
         cache.put_table("log", {"gen": [1, 2, 3]})
-    with h5py.File(path, "r+") as file:
-        values = file["evaluations"][column][...]
-        raw = values.view(np.uint8).reshape(len(values), -1)
-        raw[2, 0] ^= 1
-        file["evaluations"][column][...] = values
+    hurt(path, f"evaluations/{column}", 2)
     assert verify(path).damaged == ["row 2: its checksum does not fit"]
     assert verify(path).rows == 4
     with pytest.warns(RuntimeWarning, match="1 damaged"):
@@ -88,9 +88,16 @@ def test_damaged_row_is_found_and_not_used(path, column):
 def test_damaged_table_is_found(path):
     with Cache(path) as cache:
         cache.put_table("log", {"gen": [1, 2, 3]}, {"note": "a"})
-    with h5py.File(path, "r+") as file:
-        file["log/gen"][1] = 5
+        cache.put_table("log/below", {"gen": [1, 2]})
+    hurt(path, "log/gen", 1)
     assert verify(path).damaged == ["table log: its checksum does not fit"]
+    with pytest.raises(InputError, match="table log must be whole"):
+        Cache(path).table("log")
+    assert Cache(path).attributes()["log"] == {"note": "a"}
+    compact(path)
+    assert verify(path).ok
+    assert Cache(path).tables() == ["log/below"]
+    assert Cache(path).table("log/below").columns == {"gen": [1, 2]}
 
 
 def test_no_flipped_bit_anywhere_goes_unnoticed(path):
@@ -140,3 +147,134 @@ def test_missing_file_is_refused(path):
         with pytest.raises(InputError, match="cache file must be an existing file; received"):
             function(path)
     assert list(path.parent.iterdir()) == []
+
+
+def test_a_damaged_seal_does_not_open_the_door_to_a_damaged_structure(path):
+    """HDF5 may hang on one; whatever is behind its end, it gets only what is whole."""
+    with Cache(path) as cache:
+        for number in range(5):
+            cache.put(fake_record(number))
+        cache.put_table("log", {"gen": [1, 2, 3]})
+    good = path.read_bytes()
+    end = good.rfind(MAGIC)
+    for at in range(end, len(good), 3):
+        hit = bytearray(good)
+        hit[at] ^= 0x10
+        hit[at * 7919 % end] ^= 1
+        path.write_bytes(hit)
+        with pytest.raises(InputError, match=r"damaged, cut short or another program's"):
+            Cache(path)
+        with pytest.raises(InputError, match=r"damaged, cut short or another program's"):
+            verify(path)
+    path.write_bytes(good[:end])
+    with pytest.raises(InputError, match=r"damaged, cut short or another program's"):
+        Cache(path)
+
+
+NO_RECORDS = {
+    "text": b"hello", "not utf-8": b"\xff\xfe", "number": b"3", "list": b"[]", "null": b"null", "empty": b"",
+    "deep": b"[" * 100_000, "long": b"9" * 5000, "no fields": b"{}", "another's": b'{"key": "x"}',
+    "too much": fake_record(7).payload()[:-1] + b',"more":1}',
+    "seed": fake_record(7).payload().replace(b'"seed":7', b'"seed":"7"'),
+    "large seed": fake_record(7).payload().replace(b'"seed":7', b'"seed":' + b"9" * 30),
+    "design": fake_record(7).payload().replace(b'"design":{', b'"design":[{').replace(b'},"fit', b'}],"fit'),
+    "key": fake_record(7).payload().replace(b'"key":"', b'"key":1,"k":"'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("payload", NO_RECORDS.values(), ids=NO_RECORDS)
+def test_a_whole_frame_that_is_no_record_is_told_and_left_out(path, payload):
+    assert payload != fake_record(7).payload()
+    journal_of(path).write_bytes(
+        b"".join(map(frame, (fake_record(0).payload(), payload, fake_record(1).payload())))
+    )
+    report = verify(path)
+    assert (report.journal, report.damaged) == (2, ["journal, frame 1: no evaluation"])
+    with pytest.warns(RuntimeWarning, match=r"1 damaged evaluation\(s\) are ignored and will be run again"):
+        cache = Cache(path)
+    assert len(cache) == 2
+    cache.put(fake_record(7))
+    with pytest.warns(RuntimeWarning, match="1 damaged"):
+        assert compact(path) == 3
+    assert verify(path).ok
+
+
+@pytest.mark.parametrize("folded", [0, 2])
+def test_a_journal_that_was_cut_says_how_much_was_lost(path, folded):
+    cache = Cache(path)
+    for number in range(folded):
+        cache.put(fake_record(number))
+    cache.fold()
+    size = [0]
+    for number in range(folded, folded + 4):
+        cache.put(fake_record(number))
+        size.append(journal_of(path).stat().st_size)
+    assert verify(path).ok
+    whole = journal_of(path).read_bytes()
+    for end, kept in ((size[4] - 1, 3), (size[3], 3), (size[2] + 5, 2), (0, 0)):
+        journal_of(path).write_bytes(whole[:end])
+        text = f"journal, byte {size[kept]}: {4 - kept} evaluation(s) cut off, {size[4] - size[kept]} bytes"
+        assert verify(path).damaged == [text] if folded or end else True
+        with pytest.warns(RuntimeWarning, match=re.escape(text)):
+            assert len(Cache(path)) == folded + kept
+    journal_of(path).write_bytes(whole[: size[2]])
+    with pytest.warns(RuntimeWarning, match=r"2 evaluation\(s\) cut off"):
+        cache = Cache(path)
+    cache.put(fake_record(9))
+    assert verify(path).ok, "what was lost has been told"
+    assert len(Cache(path)) == folded + 3
+
+
+@pytest.mark.parametrize("mark", [b"", b"the user's own", frame(b"{}"), frame(b"[1,2,3]"), frame(b"[[1],2]")])
+def test_a_lock_file_without_a_mark_says_nothing_of_the_journal(path, mark):
+    Cache(path).put(fake_record(1))
+    lock_of(path).write_bytes(mark)
+    assert verify(path).ok
+    assert len(Cache(path)) == 1
+
+
+def test_a_folded_or_killed_writer_leaves_no_alarm(path):
+    """The mark goes with one state of the HDF5 file; one folded into another is not cut."""
+    with Cache(path) as cache:
+        for number in range(3):
+            cache.put(fake_record(number))
+    assert len(lock_of(path).read_bytes()) > 0
+    assert verify(path).ok
+    assert len(Cache(path)) == 3
+    cache = Cache(path)
+    cache.put(fake_record(5))
+    Journal(journal_of(path)).append(
+        journal_of(path).stat().st_size, fake_record(6).payload()
+    )  # killed, no mark
+    assert verify(path).ok
+    assert len(Cache(path)) == 5
+
+
+IN_PLACE = {
+    "link": lambda path: path.symlink_to("elsewhere"),
+    "fifo": os.mkfifo,
+    "folder": lambda path: path.mkdir(),
+    "device": lambda path: path.symlink_to("/dev/zero"),
+}
+
+
+@pytest.mark.parametrize("place", IN_PLACE.values(), ids=IN_PLACE)
+@pytest.mark.parametrize("name", ["cache.h5", "cache.h5.journal", "cache.h5.lock"])
+def test_what_is_no_file_is_refused_by_all(path, place, name):
+    with Cache(path) as cache:
+        cache.put(fake_record(1))
+    path.with_name(name).unlink()
+    place(path.with_name(name))
+    for function in (Cache, verify, existing, compact):
+        with pytest.raises(InputError, match=rf"{name} must be a regular file of its own"):
+            function(path)
+
+
+def test_paths_that_name_no_file(path):
+    for function in (Cache, verify, existing, compact):
+        for name in ("/", ".", ""):
+            with pytest.raises(InputError, match="cache file must be a file; received"):
+                function(name)
+    path.write_text("a file")
+    with pytest.raises(InputError, match="output folder must be writable"):
+        Cache(path / "below")
