@@ -1,0 +1,295 @@
+"""Damaged files of every kind: each is read as it was, refused in a message for people, or read in part and
+said to be; never with other numbers in it, and never without end."""
+
+from __future__ import annotations
+
+import multiprocessing
+import traceback
+import warnings
+import zlib
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.soak.counts import Counts
+
+FILES = 500
+"""Damaged files of each kind."""
+PATIENCE = 20.0
+"""Seconds after which a read counts as hung; an undamaged file takes some hundredths."""
+BLOCK = 4096
+"""bytes, the largest stretch that is damaged at once: a page of the system"""
+
+
+class Kind(NamedTuple):
+    """A kind of file: ``make`` writes one into a folder and returns its path, ``read`` returns what it holds,
+    in parts each of which is whole or missing."""
+
+    make: Callable[[Path], Path]
+    read: Callable[[Path], list[str]]
+
+
+def _grains():
+    from tests.scenes import scene
+
+    return scene([(0, 0, 0), (5e-3, 0, 0)], [(1, 0, 0), (0, 0, 0)], dt=1e-6, steps=5)
+
+
+def _still():
+    from tests.test_growing import STILL
+
+    return STILL
+
+
+def _trajectory(folder: Path) -> Path:
+    from tests.test_growing import frame
+    from tisim.trajectory import Recording, Trajectory
+
+    with Trajectory(Recording(folder / "trajectory.h5", frames=9), [_still()]) as trajectory:
+        for k in range(40):
+            trajectory.write(0, frame(k))
+    return folder / "trajectory.h5"
+
+
+def _result(folder: Path) -> Path:
+    from tests.test_growing import frame
+    from tisim import output
+    from tisim.result import Result, Status
+
+    start, end = frame(0).arrays, frame(1).arrays
+    result = Result(_still(), end, start, 1.0, {"steps": 3}, Status(True, "reached its end"), 0.1)
+    output.write(result, output.Folder(folder))
+    return folder / "result.h5"
+
+
+def _frames(path: Path) -> list[str]:
+    from tisim.frames import frames
+
+    with frames(path) as found:
+        return [found.scene.digest(), *(_digest(f.time, f.step, *sorted(f.arrays.items())) for f in found)]
+
+
+def _digest(*values: object) -> str:
+    return " ".join(
+        str(zlib.crc32(v[1].tobytes())) + v[0] if isinstance(v, tuple) else repr(v) for v in values
+    )
+
+
+_simulations: list = []
+
+
+def _simulation():
+    from tisim import Simulation
+
+    if not _simulations:
+        _simulations.append(Simulation(_grains()))
+    _simulations[0].load([_grains()])
+    return _simulations[0]
+
+
+def _checkpoint(folder: Path) -> Path:
+    from tisim.checkpoint import save
+
+    simulation = _simulation()
+    simulation.run(steps=3)
+    save(simulation, folder / "checkpoint.h5")
+    return folder / "checkpoint.h5"
+
+
+def _restored(path: Path) -> list[str]:
+    from tisim.checkpoint import restore
+
+    simulation = _simulation()
+    restore(simulation, path)
+    result = simulation.results()[0]
+    return [_digest(result.time, result.work, *sorted(result.state.items()))]
+
+
+def _study():
+    from tisim.accuracy import Study
+
+    return Study(_grains())
+
+
+def _cost(folder: Path) -> Path:
+    from tisim.accuracy import files
+    from tisim.accuracy.row import Row
+
+    study = _study()
+    for k in range(20):
+        errors = tuple((1 / (k + 3), 1 / (k + 7)) for _ in study.quantities)
+        study.rows.append(
+            Row("Verlet", f"dt={k}", "Verlet()", "--set", "f64", 1, (0.1 * k,), k, k, 0.0, errors)
+        )
+    files.write(study, folder)
+    return folder / "cost.h5"
+
+
+def _rows(path: Path) -> list[str]:
+    from tisim.accuracy import files
+
+    study = _study()
+    files.resume(study, path.parent)
+    return [repr(row) for row in study.rows]
+
+
+def _record(k: int):
+    from optimize.record import Record
+
+    return Record(f"{k:064x}", "soak", 1 / (k + 3), True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k)
+
+
+def _journal(folder: Path) -> Path:
+    from optimize.cache import Cache
+
+    cache = Cache(folder / "search.h5")
+    for k in range(20):
+        cache.put(_record(k))
+    return folder / "search.h5.journal"
+
+
+def _search(folder: Path) -> Path:
+    from optimize.cache import Cache
+
+    with Cache(folder / "search.h5") as cache:
+        for k in range(20):
+            cache.put(_record(k))
+        cache.put_table("log", {"generation": list(range(9)), "best": [1 / (k + 1) for k in range(9)]})
+    return folder / "search.h5"
+
+
+def _records(path: Path) -> list[str]:
+    from optimize.cache import existing
+
+    cache = existing(path.parent / "search.h5")
+    tables = [repr(cache.table(name)) for name in cache.tables()]
+    return [*(repr(record.payload()) for record in cache.records()), *tables]
+
+
+KINDS = {
+    "result.h5": Kind(_result, _frames),
+    "trajectory.h5": Kind(_trajectory, _frames),
+    "checkpoint.h5": Kind(_checkpoint, _restored),
+    "cost.h5": Kind(_cost, _rows),
+    "search.h5": Kind(_search, _records),
+    "journal of a search": Kind(_journal, _records),
+}
+
+
+def damaged(content: bytes, rng: np.random.Generator) -> bytes:
+    """The bytes after one mishap: bits flipped, a stretch zeroed or overwritten, cut short, two swapped."""
+    hurt, size = bytearray(content), len(content)
+    at, other = (int(x) for x in rng.integers(size, size=2))
+    length = int(min(rng.choice([1, 16, 512, BLOCK]), size - max(at, other)))
+    what = int(rng.integers(6))
+    if what == 0:
+        hurt[at] ^= 1 << int(rng.integers(8))
+    elif what == 1:
+        for place in rng.integers(size, size=3):
+            hurt[place] ^= 1 << int(rng.integers(8))
+    elif what == 2:
+        hurt[at : at + length] = bytes(length)
+    elif what == 3:
+        hurt[at : at + length] = rng.bytes(length)
+    elif what == 4:
+        del hurt[at:]
+    else:
+        one, two = bytes(hurt[at : at + length]), bytes(hurt[other : other + length])
+        hurt[at : at + length], hurt[other : other + length] = two, one
+    return bytes(hurt) if bytes(hurt) != content else damaged(content, rng)
+
+
+def verdict(kind: Kind, path: Path, whole: list[str] | None) -> tuple[str, object]:
+    """What reading a file has come to: the name of a column of Counts or "", and what was read."""
+    from tisim.errors import InputError
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            found = kind.read(path)
+        except InputError as error:
+            return ("", str(error)) if "\n" not in str(error) else ("tracebacks", str(error))
+        except BaseException:
+            return "tracebacks", traceback.format_exc()
+    if whole is None or found == whole:
+        return "", found
+    if set(found) <= set(whole) and len(set(found)) == len(found):
+        return ("" if told else "lost"), found
+    return "wrong", found
+
+
+def _reader(pipe: Connection) -> None:
+    """Makes and reads files as it is told, in a process of its own."""
+    from tisim import runtime
+
+    runtime.start(threads=1)
+    while True:
+        name, action, path, whole = pipe.recv()
+        if action == "make":
+            pipe.send(KINDS[name].make(path))
+        else:
+            pipe.send(verdict(KINDS[name], path, whole))
+
+
+class Reader:
+    """A process that reads files; another one takes its place when it hangs or crashes."""
+
+    def __init__(self) -> None:
+        self.process: multiprocessing.process.BaseProcess | None = None
+
+    def __call__(self, name: str, action: str, path: Path, whole: object = None, patience: float = PATIENCE):
+        """What the process answers; "hung" or "tracebacks", and why, when it does not."""
+        if self.process is None:
+            context = multiprocessing.get_context("spawn")
+            self.pipe, end = context.Pipe()
+            self.process = context.Process(target=_reader, args=(end,), daemon=True)
+            self.process.start()
+            end.close()
+        self.pipe.send((name, action, path, whole))
+        try:
+            if self.pipe.poll(patience):
+                return self.pipe.recv()
+            found = "hung", f"no answer within {patience:g} s"
+        except EOFError:
+            self.process.join()
+            found = "tracebacks", f"ended with exit code {self.process.exitcode}"
+        self.end()
+        return found
+
+    def end(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.join()
+            self.pipe.close()
+            self.process = None
+
+
+def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
+    """Counts of damaged files, one for each kind; what went wrong is printed above them."""
+    reader = Reader()
+    try:
+        for k, name in enumerate(KINDS):
+            yield _counted(
+                name, np.random.default_rng([seed, k]), round(FILES * share), folder / name, reader
+            )
+    finally:
+        reader.end()
+
+
+def _counted(name: str, rng: np.random.Generator, number: int, folder: Path, reader: Reader) -> Counts:
+    counts = Counts(f"damaged {name}")
+    folder.mkdir(parents=True)
+    path = reader(name, "make", folder, patience=600.0)
+    content = path.read_bytes()
+    _, whole = reader(name, "read", path, patience=600.0)
+    for _ in range(number):
+        path.write_bytes(damaged(content, rng))
+        counts.tried += 1
+        what, why = reader(name, "read", path, whole)
+        if what:
+            setattr(counts, what, getattr(counts, what) + 1)
+            print(f"{name}: {what}: {str(why)[-1500:]}", flush=True)
+    return counts
