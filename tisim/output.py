@@ -90,12 +90,13 @@ def write(result: Result, folder: Folder) -> list[Path]:
         picture.cloud(result).savefig(image, dpi=150, format="png")
         image.seek(0)
         replace_file(paths["cloud.png"], image.read())
-    _write_result(result, folder.result)
+    write_result(result, folder.result)
     folder.checkpoint.unlink(missing_ok=True)
     return [folder.result, *paths.values()]
 
 
-def _write_result(result: Result, path: Path) -> None:
+def write_result(result: Result, path: Path) -> None:
+    """Write the result.h5 of a run, in place of any before. RunError on a full disk."""
     with seal.created(path) as file:
         file.attrs.update({
             "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,

@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from tests.test_growing import files_of_at_most
-from tisim import Simulation, durable, seal
+from tests.test_growing import STILL, files_of_at_most
+from tisim import Recording, Simulation, durable, seal
 from tisim.frames import frames
+from tisim.trajectory import Trajectory
 
 
 def every_frame(path):
@@ -110,6 +111,21 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     for frame, other in zip(begun, found, strict=False):
         np.testing.assert_array_equal(frame.arrays["position"], other.arrays["position"])
     assert "missing" not in tisim("plot", folder, "--out", "p")[2]
+
+
+@pytest.mark.parametrize("command", ["plot", "movie", "export"])
+def test_damaged_trajectories_are_refused_in_a_line(tisim, tmp_path, command):
+    Trajectory(Recording(tmp_path / "trajectory.h5", frames=3), [STILL]).close()
+    code, out, err = tisim(command, "trajectory.h5")
+    assert (code, out) == (2, "")
+    assert "file must be one with" in err  # so many frames
+    content = (tmp_path / "trajectory.h5").read_bytes()
+    for hurt in (content[: len(content) // 2], content[:9] + bytes(512) + content[521:], bytes(len(content))):
+        (tmp_path / "trajectory.h5").write_bytes(hurt)
+        code, out, err = tisim(command, "trajectory.h5")
+        assert (code, out) == (2, "")
+        assert len(err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["trajectory.h5"]
 
 
 def test_a_full_disk_at_the_end_of_a_run_loses_nothing(tisim, toml, monkeypatch):

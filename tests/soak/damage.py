@@ -56,12 +56,12 @@ def _trajectory(folder: Path) -> Path:
 
 def _result(folder: Path) -> Path:
     from tests.test_growing import frame
-    from tisim import output
+    from tisim.output import write_result
     from tisim.result import Result, Status
 
     start, end = frame(0).arrays, frame(1).arrays
     result = Result(_still(), end, start, 1.0, {"steps": 3}, Status(True, "reached its end"), 0.1)
-    output.write(result, output.Folder(folder))
+    write_result(result, folder / "result.h5")
     return folder / "result.h5"
 
 
