@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import inspect
+import math
 import random
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +27,10 @@ _UNFIT = {
         "is for several objectives",
     ),
 }
+
+
+POPULATION, PARENTS = 20, 6
+"""Of Z04 section 8."""
 
 
 class Operator(Checked):
@@ -70,10 +76,12 @@ class Operator(Checked):
 
 
 class Breeding(Checked):
-    """Composition of a generation. Defaults are Z04 section 8.
+    """Composition of a generation. Defaults are Z04 section 8; of population, parents and offspring, what is
+    not given follows what is, in the proportions that Z04 has (20, 6 and 6).
 
     population : strings per generation (S). parents : the best, kept unchanged and never evaluated again (K).
-    offspring : bred strings (None: as many as parents). The rest are fresh random strings of the search box.
+    offspring : bred strings (None: as many as parents, or as there is room for, in pairs). The rest are fresh
+    random strings of the search box.
     recentre_every : generations between re-centrings of the box on the best (0: never);
     recentre_factor : its shrinking each time.
     breeding : "z04" - the parents, ranked, are mated in neighbouring pairs (1st with 2nd, 3rd with 4th, ...),
@@ -81,8 +89,8 @@ class Breeding(Checked):
     operators of deap.tools, which work in the coordinates of the search box, and keep to it.
     """
 
-    population: int = Field(20, ge=2)
-    parents: int = Field(6, ge=1)
+    population: int = Field(POPULATION, ge=2)
+    parents: int = Field(PARENTS, ge=1)
     offspring: int | None = Field(None, ge=0)
     recentre_every: int = Field(4, ge=0)
     recentre_factor: float = Field(0.5, gt=0, le=1)
@@ -101,10 +109,34 @@ class Breeding(Checked):
     @property
     def bred(self) -> int:
         """Number of offspring."""
-        return self.parents if self.offspring is None else self.offspring
+        if self.offspring is not None:
+            return self.offspring
+        return min(self.parents, self.population - self.parents) // 2 * 2
+
+    @model_validator(mode="before")
+    @classmethod
+    def _following(cls, data: dict[str, Any]) -> dict[str, Any]:
+        """What the numbers that are given make of those that are not."""
+        population, parents, offspring = (
+            int(value) if isinstance(value := data.get(name), Integral) else None
+            for name in ("population", "parents", "offspring")
+        )
+        follow: dict[str, int] = {}
+        if "parents" not in data:
+            wish = proportional(population or POPULATION)
+            if data.get("breeding", "z04") == "z04":  # each parent has one offspring at most
+                wish = max(wish, offspring or 0)
+            room = wish if population is None else population - (offspring or 0)
+            follow["parents"] = max(1, min(wish, room))
+        kept = parents or follow.get("parents", PARENTS)
+        total = kept + (kept if offspring is None else offspring)
+        if "population" not in data and total > POPULATION:
+            follow["population"] = math.ceil(total / (2 * PARENTS) * POPULATION)
+        return {**data, **follow}
 
     @model_validator(mode="after")
     def _consistent(self) -> Breeding:
+        must(self.parents < self.population, "parents", f"< population = {self.population}", self.parents)
         total = self.parents + self.bred
         must(total <= self.population, "parents + offspring", f"<= population = {self.population}", total)
         must(self.bred % 2 == 0, "number of offspring", "even (a pair has two)", self.bred)
@@ -119,6 +151,12 @@ class Breeding(Checked):
             for operator, prefix in ((self.select, "sel"), (self.mate, "cx"), (self.mutate, "mut")):
                 operator.function(prefix)
         return self
+
+
+def proportional(population: int) -> int:
+    """How many parents go with a population: the even number nearest to Z04's part of it, 6 of 20; one where
+    that is none."""
+    return 2 * round(population * PARENTS / POPULATION / 2) or 1
 
 
 class Breeder:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from optimize import methods
@@ -26,7 +26,8 @@ class Method(ABC):
        and of what it was told: to resume a search is to run it again from the start with the same cache.
 
     name : as in ``--method NAME``; several : whether it can search for several objectives at once.
-    Options : its settings, as in ``--set search.options.KEY=VALUE``.
+    Options : its settings, as in ``--set search.options.KEY=VALUE``. followers : by option, the others that
+    follow it where they are not given: a case's own values of those go with its own value of this one.
     width : mean width of the part of the unit cube that it draws from now. moved : the last ``tell`` has put
     that part elsewhere.
     """
@@ -34,6 +35,7 @@ class Method(ABC):
     name: ClassVar[str]
     several: ClassVar[bool] = False
     Options: ClassVar[type[Checked]]
+    followers: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     width: float = 1.0
     moved: bool = False
 
@@ -64,5 +66,5 @@ def every() -> dict[str, type[Method]]:
 def find(name: str) -> type[Method]:
     """A method by name; InputError naming the known ones when there is none."""
     known = every()
-    must(name in known, "method", f"one of {', '.join(known)}", name)
+    must(isinstance(name, str) and name in known, "method", f"one of {', '.join(known)}", name)
     return known[name]

@@ -57,7 +57,7 @@ def optimize(
     from optimize.executors import made
     from optimize.folder import FILE, clear
     from optimize.session import session
-    from optimize.settings import Settings, fit, proposed
+    from optimize.settings import Settings, fit, followed, proposed
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
     problem, usual = inverse(case, size or "default", variant)
@@ -71,7 +71,7 @@ def optimize(
         **request.below("search", request.assignments(changes or ())),
     }
     given = {key: value for key, value in wishes.items() if value is not None}
-    settings = Settings(**request.nested(proposed(problem, usual, method), given))
+    settings = Settings(**request.nested(followed(proposed(problem, usual, method), given), given))
     fit(problem, settings)
     place = folder or Path("out") / problem.name
     with closing(made(executor, device, precision, threads)) as evaluator:
@@ -110,9 +110,11 @@ def compare(
     from optimize import comparison
     from optimize.cache import Cache
     from optimize.executors import made
+    from optimize.settings import followed
 
     problem, usual = inverse(case, size or "default", variant)
-    base = request.nested(usual, request.below("search", request.assignments(changes or ())))
+    given = request.below("search", request.assignments(changes or ()))
+    base = request.nested(followed(usual, given), given)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
     claim.take(place, comparison.LEFT.names, overwrite, comparison.LEFT)

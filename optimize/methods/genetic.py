@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from optimize.breeding import Breeder, Breeding
 from optimize.individual import Individual
@@ -14,6 +15,9 @@ class Genetic(Method):
 
     name = "genetic"
     Options = Breeding
+    followers: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "population": ("parents", "offspring"), "parents": ("offspring",), "offspring": ("parents",),
+    }  # fmt: skip
 
     def __init__(self, genes: int, objectives: int, options: Breeding, seed: int) -> None:
         self.options, self.breeder = options, Breeder(genes, options, seed)

@@ -2,6 +2,7 @@
 
 import csv
 import tomllib
+from dataclasses import replace
 
 import pytest
 from fake_runs import FakeEvaluator, fake_problem
@@ -64,6 +65,18 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
     assert optimize("--seed", 1)[0] == 2
+
+
+def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path, monkeypatch):
+    """On a case that has more parents than this population has strings; and to compare methods, too."""
+    usual = {"options": {"population": 24, "parents": 8}}
+    monkeypatch.setattr(
+        catalogue, "every", lambda: {BOWL.name: replace(BOWL, sizes={"default": Size("", {}, usual)})}
+    )
+    code, err = optimize("--population", 8)
+    assert (code, "best f" in err) == (0, True)
+    code, err = optimize("--population", 8, "--set", "search.options.parents=8")
+    assert (code, err.strip()) == (2, "parents must be < population = 8; received 8")
 
 
 @pytest.mark.parametrize("name", ["best.csv", "convergence.png.new", "search.h5.journal", "best_scene.toml"])
