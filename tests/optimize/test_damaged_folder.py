@@ -1,4 +1,4 @@
-"""Every command in the damaged folder of a search or of a comparison says so in one line, and changes nothing."""
+"""Every command in the damaged folder of a search or a comparison says so in a line and changes nothing."""
 
 import os
 
