@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from optimize import store
+from optimize import salvage, store
 from optimize.journal import Journal, Mark
 from optimize.record import Record
 from optimize.store import Table
@@ -246,7 +246,8 @@ def verify(path: str | Path) -> VerifyReport:
         if version is not None:
             with store.opened(path) as file:
                 rows, damaged = store.read_rows(file)
-                damaged += store.damaged_tables(file)
+                bad = store.damaged_tables(file)
+                damaged += [f"table {name}: its checksum does not fit" for name in bad]
         found, mark = Journal(journal).read(), Mark.read(lock)
     frames, none = _evaluations(found)
     cut = None if mark is None else mark.cut(version, found)
@@ -266,7 +267,12 @@ def verify(path: str | Path) -> VerifyReport:
 
 
 def compact(path: str | Path) -> int:
-    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept."""
-    cache = existing(path)
+    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept.
+
+    A file that is damaged as a whole is kept as FILE.damaged; FILE then has what could be read of it.
+    """
+    file, _, lock = _existing(path)
+    salvage.mend(file, lock)
+    cache = Cache(file)
     cache.compact()
     return len(cache)

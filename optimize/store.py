@@ -65,9 +65,12 @@ def opened(path: Path) -> Iterator[h5py.File]:
     content = regular.content(path)
     if content is None:
         raise InputError(f"{rule} nothing")
-    inside = _unsealed(content)
+    inside = unsealed(content)
     if inside is None:
-        raise InputError(f"{rule} {len(content)} bytes that are damaged, cut short or another program's")
+        raise InputError(
+            f"{rule} {len(content)} bytes that are damaged, cut short or another program's "
+            "('tisim cache --compact' keeps what can be read)"
+        )
     with h5py.File(io.BytesIO(inside), "r") as file:
         if file.attrs.get("format") != FORMAT or ROWS not in file:
             raise InputError(f"{rule} one with {', '.join(file) or 'nothing in it'}")
@@ -79,7 +82,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} must be undamaged; received {error}") from error
 
 
-def _unsealed(content: bytes) -> bytes | None:
+def unsealed(content: bytes) -> bytes | None:
     """The HDF5 file in a cache file; None when it has no whole seal, or is not what was sealed."""
     start = max(content.rfind(MAGIC), 0)
     whole = content.startswith(SIGNATURE) and scan(content[start:]).payloads and intact(content)
@@ -99,7 +102,7 @@ def image(
             with opened(old) as file:
                 for name in set(file) - {ROWS}:
                     file.copy(file[name], new, name)
-        for name in [] if damaged else _damaged(new):
+        for name in [] if damaged else damaged_tables(new):
             _clear(new[name])
         for name, table in tables.items():
             _write_table(new.require_group(name), table)
@@ -136,7 +139,12 @@ def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
 def read_table(file: h5py.File, name: str) -> Table:
     """One table. InputError if there is none of that name, or it is damaged."""
     must(name in tables(file), "table name", f"one of {tables(file)}", name)
-    must(name not in _damaged(file), f"table {name}", "whole ('tisim cache --compact' drops it)", "damage")
+    must(
+        name not in damaged_tables(file),
+        f"table {name}",
+        "whole ('tisim cache --compact' drops it)",
+        "damage",
+    )
     return _read_table(file[name])
 
 
@@ -156,11 +164,7 @@ def attributes(group: h5py.Group) -> dict[str, Any]:
 
 
 def damaged_tables(file: h5py.File) -> list[str]:
-    """A description of each table whose checksum fails."""
-    return [f"table {name}: its checksum does not fit" for name in _damaged(file)]
-
-
-def _damaged(file: h5py.File) -> list[str]:
+    """Names of the tables whose checksum fails."""
     bad = []
     for name in tables(file):
         try:

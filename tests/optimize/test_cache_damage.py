@@ -278,3 +278,52 @@ def test_paths_that_name_no_file(path):
     path.write_text("a file")
     with pytest.raises(InputError, match="output folder must be writable"):
         Cache(path / "below")
+
+
+SPOILT = {
+    "a flipped bit in the seal": lambda content: content[:-20] + bytes([content[-20] ^ 1]) + content[-19:],
+    "without the seal": lambda content: content[: content.rfind(MAGIC)],
+    "garbage after it": lambda content: content + MAGIC + b"garbage",
+}
+
+
+@pytest.mark.parametrize("spoil", SPOILT.values(), ids=SPOILT)
+def test_compact_keeps_what_can_be_read_of_a_damaged_file(path, spoil):
+    with Cache(path) as cache:
+        for number in range(5):
+            cache.put(fake_record(number))
+        cache.put_table("log", {"gen": [1, 2, 3]}, {"note": "a"})
+        cache.put_table("lost", {"gen": [1, 2, 3]})
+    cache.put(fake_record(8))
+    hurt(path, "evaluations/fitness", 2)
+    hurt(path, "lost/gen", 1)
+    path.write_bytes(spoil(path.read_bytes()))
+    damaged = path.read_bytes()
+    assert compact(path) == 5
+    assert path.with_name("cache.h5.damaged").read_bytes() == damaged
+    assert verify(path).ok
+    cache = Cache(path)
+    assert payloads(cache.records()) == payloads(fake_record(n) for n in (0, 1, 3, 4, 8))
+    assert cache.tables() == ["log"]
+    assert cache.table("log").attrs == {"note": "a"}
+    path.write_bytes(damaged)
+    with pytest.raises(
+        InputError, match=r"place for the damaged file must be free; received .*cache\.h5\.damaged"
+    ):
+        compact(path)
+    assert path.read_bytes() == damaged
+
+
+def test_reading_what_is_damaged_ends_in_any_case(path, monkeypatch):
+    """As when HDF5 never returns; and the file is then as it was."""
+    with Cache(path) as cache:
+        cache.put(fake_record(1))
+    before = SPOILT["without the seal"](path.read_bytes())
+    path.write_bytes(before)
+    with monkeypatch.context() as patch:
+        patch.setattr("optimize.salvage.LIMIT", 1e-3)
+        with pytest.raises(InputError, match=r"cache\.h5 must be a whole HDF5 file written by a cache"):
+            compact(path)
+    assert path.read_bytes() == before
+    assert not path.with_name("cache.h5.damaged").exists()
+    assert compact(path) == 1
