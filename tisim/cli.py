@@ -15,7 +15,7 @@ from rich.text import Text
 
 from tisim import __version__, cli_cost, cli_search, cli_watch, request, runtime
 from tisim.errors import InputError, RunError
-from tisim.interrupt import Interrupt
+from tisim.interrupt import Interrupt, exit_code, handled, stop
 from tisim.options import (
     CaseName,
     Changes,
@@ -50,18 +50,25 @@ app = typer.Typer(
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Exit codes: 0 done; 1 a run or check failed; 2 wrong input, nothing was run; 130 stopped by Ctrl-C."""
-    try:
-        app(arguments, prog_name="tisim")
-    except InputError as error:
-        print(error, file=sys.stderr)
-        sys.exit(2)
-    except RunError as error:
-        print(error, file=sys.stderr)
-        sys.exit(1)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    sys.exit(0)
+    """Exit codes: 0 done; 1 a run or check failed; 2 wrong input, nothing was run; 130, 143, 129 stopped by
+    Ctrl-C, SIGTERM, SIGHUP.
+    """
+    code: int | str | None = 0
+    with handled(stop):
+        try:
+            app(arguments, prog_name="tisim")
+        except InputError as error:
+            print(error, file=sys.stderr)
+            code = 2
+        except RunError as error:
+            print(error, file=sys.stderr)
+            code = 1
+        except SystemExit as ended:
+            # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
+            code = exit_code() if ended.code == 130 else ended.code
+        except KeyboardInterrupt:
+            code = exit_code()
+    sys.exit(code)
 
 
 def _print_version(wanted: bool) -> None:

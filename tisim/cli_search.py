@@ -124,20 +124,19 @@ def compare(
         Cache(place / comparison.FILE) as store,
         Interrupt(stopping) as ctrl_c,
     ):
-        for one in comparison.compare(
-            problem,
-            base,
-            names,
-            evaluations,
-            repeats,
-            fresh_starts,
-            evaluator,
-            store,
+        searches = comparison.compare(
+            problem, base, names, evaluations, repeats, fresh_starts, evaluator, store,
             lambda _: ctrl_c.check(),
-        ):
-            found.append(one)
-            line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
-            err().print(line, highlight=False, markup=False)
+        )  # fmt: skip
+        try:
+            for one in searches:
+                found.append(one)
+                line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
+                err().print(line, highlight=False, markup=False)
+        except KeyboardInterrupt:
+            done = f"stopped; {place / 'compare.h5'} has all that is done."
+            err().print(f"{done} To go on, give the same command again.")
+            raise
     out().print(comparison.table(problem, found))
     replace_file(place / comparison.CSV, comparison.as_csv(problem, found))
     out().print(f"written  {place / comparison.CSV}", highlight=False, markup=False)

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import concurrent.futures as cf
+import logging
+import time
+import warnings
 from collections.abc import Sequence
 
-from optimize.executors import worker
-from optimize.executors.worker import Wanted
+from optimize.executors import handshake, worker
+from optimize.executors.worker import Answer, Wanted
 from tisim.errors import InputError, RunError, must
-from tisim.result import Result
 from tisim.scene import Scene
 
 CONNECT_S = 10.0
 """Time that a scheduler has to answer, seconds."""
+SILENCE_S = 60.0
+"""Time without any worker after which the search gives up, seconds: a cluster may start others."""
+LOOK_S = 1.0
+"""Time between looks at whether there are workers, seconds."""
 
 
 class DaskCluster:
@@ -20,7 +26,8 @@ class DaskCluster:
 
     Every worker must have this package, the same compiler and Python. Taichi gets as many threads as the
     worker was given (``dask worker --nthreads``). A unit of work whose worker is lost is given to another one
-    by the scheduler, a few times at most. InputError when there is no scheduler, or it has no workers.
+    by the scheduler, a few times at most. InputError when there is no scheduler, it has no workers, or one of
+    them is of another program.
     """
 
     def __init__(self, address: str) -> None:
@@ -35,35 +42,73 @@ class DaskCluster:
             raise InputError(
                 f"executor must be the address of a running Dask scheduler; received {address!r} ({failure})"
             ) from None
-        if not self.workers:
+        # A scheduler that is lost is told below; the client would tell it too, with all of its stack.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        try:
+            must(self.workers > 0, "Dask cluster", "one with workers", address)
+            for where, theirs in self._client.run(handshake.program, on_error="return").items():
+                who = f"worker {where} of the Dask cluster"
+                if isinstance(theirs, dict):
+                    handshake.agree(handshake.program(), theirs, who)
+                elif not isinstance(theirs, OSError):  # or it has just gone
+                    raise handshake.stranger(theirs, who)
+        except InputError:
             self._client.close()
-            must(False, "Dask cluster", "one with workers", address)
+            raise
         self._executor = self._client.get_executor(pure=False)
+        self._looked = self._answered = time.monotonic()
+        self._told = False
 
     @property
     def workers(self) -> int:
-        return len(self._client.nthreads())
+        """How many there are; 0 also when the scheduler does not answer."""
+        try:
+            return len(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S))
+        except (OSError, TimeoutError):
+            return 0
 
-    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[list[Result]]:
+    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
+        self._answered = time.monotonic()
         return self._executor.submit(_run, scenes, wanted)
 
-    def outcome(self, future: cf.Future[list[Result]]) -> list[Result]:
+    def outcome(self, future: cf.Future[Answer]) -> Answer:
         from distributed import KilledWorker
 
         try:
-            return future.result()
-        except KilledWorker as killed:
-            raise RunError(f"worker of the Dask cluster was lost again and again ({killed})") from killed
-        except cf.CancelledError as cancelled:
-            raise RunError("Dask scheduler was lost; what had finished is in the cache") from cancelled
+            answer = future.exception() or future.result()
+        except cf.CancelledError:
+            raise RunError("Dask scheduler was lost; what had finished is kept") from None
+        if isinstance(answer, (KilledWorker, OSError)):
+            raise RunError(f"workers of the Dask cluster were lost again and again ({answer})") from answer
+        if isinstance(answer, Answer):
+            return answer
+        # It could not read what it was sent, or is of a version that does not know of answers.
+        raise handshake.stranger(answer, "worker of the Dask cluster")
 
-    def stop(self, at_once: bool) -> None:
+    def look(self) -> None:
+        """Say so when there is no worker; RunError when there has been none for SILENCE_S."""
+        now = time.monotonic()
+        if now - self._looked < LOOK_S:
+            return
+        self._looked = now
+        if self.workers:
+            self._answered, self._told = now, False
+        elif now - self._answered > SILENCE_S:
+            raise RunError(
+                f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; what had finished is kept"
+            )
+        elif not self._told:
+            self._told = True
+            waiting = f"no worker of the Dask cluster answers; waiting for {SILENCE_S:g} s"
+            warnings.warn(waiting, RuntimeWarning, stacklevel=2)
+
+    def stop(self) -> None:
         """Cancel what is waiting; what a worker is at, it finishes for nothing."""
         self._executor.shutdown(wait=False)
         self._client.close()
 
 
-def _run(scenes: Sequence[Scene], wanted: Wanted) -> list[Result]:
+def _run(scenes: Sequence[Scene], wanted: Wanted) -> Answer:
     from distributed import get_worker
 
     return worker.run(scenes, wanted, get_worker().state.nthreads)

@@ -8,66 +8,104 @@ import multiprocessing
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import resource_tracker
 
 from optimize.executors import worker
 from optimize.executors.remote import Lost
-from optimize.executors.worker import Wanted
+from optimize.executors.worker import Answer, Wanted
 from tisim import runtime
-from tisim.result import Result
+from tisim.errors import RunError
 from tisim.scene import Scene
+
+LEAVE_S = 10.0
+"""Time that a worker without work has to end by itself, seconds."""
 
 
 class Processes:
-    """So many processes, started (spawned: a fork would not survive Taichi) with the first work."""
+    """So many processes, started (spawned: a fork would not survive Taichi) as there is work for them.
+
+    Each has a connection of its own, and a thread here that waits for its answer: one that dies is noticed at
+    once, and takes with it the unit of work that it was at and nothing else. (Those of concurrent.futures
+    share queues and their locks, and one that is killed may leave them locked, or a message cut short.)
+    """
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-        self._pool: cf.ProcessPoolExecutor | None = None
-        self._broken = False
-        self._children: set[multiprocessing.process.BaseProcess] = set()
+        self._threads = cf.ThreadPoolExecutor(workers)
+        self._crew: set[_Worker] = set()
+        self._idle: list[_Worker] = []
+        self._changing = threading.Lock()
+        self._stopped = False
 
-    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[list[Result]]:
-        if self._pool is None or self._broken:
-            self.stop(at_once=True)
-            context = multiprocessing.get_context("spawn")
-            self._pool, self._broken = cf.ProcessPoolExecutor(self.workers, context), False
-        share = max(1, runtime.cores() // self.workers)
-        before = set(multiprocessing.active_children())
-        with _children_deaf_to_ctrl_c():
-            future = self._pool.submit(worker.run, scenes, wanted, share)
-        self._children |= set(multiprocessing.active_children()) - before
-        return future
+    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
+        return self._threads.submit(self._ask, scenes, wanted)
 
-    def outcome(self, future: cf.Future[list[Result]]) -> list[Result]:
+    def outcome(self, future: cf.Future[Answer]) -> Answer:
+        return future.result()
+
+    def look(self) -> None:
+        """A worker that has ended is noticed by the thread that waits for it."""
+
+    def stop(self) -> None:
+        """Let the idle ones end in order, and kill those at work."""
+        with self._changing:
+            self._stopped = True
+            for busy in self._crew.difference(self._idle):
+                busy.process.kill()
+        self._threads.shutdown(wait=True, cancel_futures=True)
+        for one in self._crew:
+            one.connection.close()
+        for one in self._crew:
+            one.process.join(LEAVE_S)
+            one.process.kill()
+            one.process.join()
+
+    def _ask(self, scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+        with self._changing:
+            if self._stopped:
+                raise Lost("workers have been stopped")
+            asked = self._idle.pop() if self._idle else _Worker(max(1, runtime.cores() // self.workers))
+            self._crew.add(asked)
         try:
-            return future.result()
-        except BrokenProcessPool as broken:
-            self._broken = True
-            raise Lost(str(broken)) from broken
+            answer = asked.answer(scenes, wanted)
+        except (EOFError, OSError):
+            asked.process.join()
+            self._crew.remove(asked)
+            raise Lost(f"a worker process has ended with exit code {asked.process.exitcode}") from None
+        self._idle.append(asked)
+        return answer
 
-    def stop(self, at_once: bool) -> None:
-        if self._pool is None:
-            return
-        if at_once:
-            for child in self._children:
-                child.terminate()
-        self._pool.shutdown(wait=True, cancel_futures=True)
-        self._pool = None
-        self._children.clear()
+
+class _Worker:
+    """A process that serves at the other end of a connection."""
+
+    def __init__(self, share: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, end = context.Pipe()
+        self.process = context.Process(target=worker.serve, args=(end, share), daemon=True)
+        with _children_deaf_to_ctrl_c():
+            try:
+                self.process.start()
+            except OSError as failure:
+                raise RunError(f"worker process could not be started: {failure}") from failure
+        end.close()  # or it would not be closed when the process ends
+
+    def answer(self, scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+        """EOFError or OSError when the process ends before it has answered."""
+        self.connection.send((scenes, wanted))
+        answer: Answer = self.connection.recv()
+        return answer
 
 
 @contextlib.contextmanager
 def _children_deaf_to_ctrl_c() -> Iterator[None]:
     """A Ctrl-C reaches all processes of the terminal; this one decides what becomes of its workers.
 
-    What a process ignores, the processes that it starts ignore from their first instruction on.
+    Signals that a thread blocks, the processes that it starts block from their first instruction on.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource_tracker.ensure_running()  # begun by the first start otherwise, which unblocks the signal again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

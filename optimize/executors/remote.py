@@ -6,7 +6,8 @@ import concurrent.futures as cf
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
-from optimize.executors.worker import Wanted
+from optimize.executors import handshake
+from optimize.executors.worker import Answer, Wanted
 from tisim.errors import RunError
 from tisim.result import Result
 from tisim.scene import Scene
@@ -17,11 +18,11 @@ of worlds is the faster per world the larger it is."""
 LOOK_S = 0.1
 """Time between looks at progress while nothing comes, seconds."""
 TRIES = 3
-"""Times that workers may be lost in a row, nothing finished in between, before the search gives up."""
+"""Workers that a unit of work may cost before the search gives up."""
 
 
 class Lost(Exception):
-    """Workers are gone: this unit of work will not come back, nor any other that has not finished."""
+    """The worker is gone: this unit of work will not come back."""
 
 
 class Pool(Protocol):
@@ -30,18 +31,22 @@ class Pool(Protocol):
     @property
     def workers(self) -> int: ...
 
-    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[list[Result]]:
+    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
         """Have a worker run optimize.executors.worker.run on them."""
         ...
 
-    def outcome(self, future: cf.Future[list[Result]]) -> list[Result]:
-        """Of a finished future; its error as it was raised. Lost when its worker is gone and it must be sent
-        again, RunError when that would be no use.
+    def outcome(self, future: cf.Future[Answer]) -> Answer:
+        """The answer of a finished future. Lost when its worker is gone and it must be sent again, RunError
+        when that would be no use.
         """
         ...
 
-    def stop(self, at_once: bool) -> None:
-        """Let the workers go; at_once: whatever they are doing."""
+    def look(self) -> None:
+        """Called every LOOK_S while an answer is waited for; RunError when none is to be hoped for."""
+        ...
+
+    def stop(self) -> None:
+        """Let the workers go, whatever they are doing."""
         ...
 
 
@@ -55,41 +60,53 @@ class Remote:
     def __init__(self, pool: Pool, wanted: Wanted) -> None:
         self.pool, self.wanted = pool, wanted
         self.settings: dict[str, Any] = dict(wanted.settings)
-        self._waiting: dict[cf.Future[list[Result]], list[int]] = {}
 
     def evaluate(
         self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None
     ) -> Iterator[tuple[int, Result]]:
-        """Yield (index into scenes, Result) as units of work end."""
-        self._waiting = {}
-        done, lost = 0, 0
-        to_send = units(scenes, self.pool.workers)
-        while to_send or self._waiting:
-            for unit in to_send:
-                self._waiting[self.pool.submit([scenes[k] for k in unit], self.wanted)] = unit
-            to_send = []
-            finished, _ = cf.wait(self._waiting, LOOK_S, cf.FIRST_COMPLETED)
-            while finished:
-                future = finished.pop()
-                unit = self._waiting.pop(future)
+        """Yield (index into scenes, Result) as units of work end.
+
+        RunError when workers are lost again and again, InputError when one is of another program.
+        """
+        waiting: dict[cf.Future[Answer], tuple[list[int], int]] = {}
+
+        def send(unit: list[int], lost: int) -> None:
+            waiting[self.pool.submit([scenes[k] for k in unit], self.wanted)] = unit, lost
+
+        for unit in units(scenes, self.pool.workers):
+            send(unit, 0)
+        done = 0
+        while waiting:
+            finished, _ = cf.wait(waiting, LOOK_S, cf.FIRST_COMPLETED)
+            for future in finished:
+                unit, lost = waiting.pop(future)
                 try:
-                    results = self.pool.outcome(future)
+                    results = self._results(self.pool.outcome(future))
                 except Lost as gone:
-                    lost += not to_send
-                    if lost >= TRIES:
-                        rule = f"workers were lost {lost} times in a row, with nothing finished"
-                        raise RunError(f"{rule} ({gone})") from gone
-                    to_send.append(unit)
-                    finished = set(self._waiting)  # what else they had is lost with them, or has finished
+                    if lost + 1 == TRIES:
+                        raise RunError(
+                            f"{gone}; it was the worker number {TRIES} to be lost with the same work. "
+                            "What had finished is kept"
+                        ) from gone
+                    send(unit, lost + 1)
                     continue
-                done, lost = done + len(unit), 0
+                done += len(unit)
                 yield from zip(unit, results, strict=True)
+            self.pool.look()
             if progress is not None:
                 progress(done / len(scenes))
 
+    def _results(self, answer: Answer) -> list[Result]:
+        """What a worker has found. Its error if it failed, InputError if it is of another program."""
+        ours = handshake.program() if answer.error else self.wanted.made_by
+        handshake.agree(ours, answer.made_by, answer.worker)
+        if answer.error:
+            raise answer.error
+        return answer.results
+
     def close(self) -> None:
         """Let the workers go; what they are still at is given up."""
-        self.pool.stop(at_once=bool(self._waiting))
+        self.pool.stop()
 
 
 def units(scenes: Sequence[Scene], workers: int) -> list[list[int]]:

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+import concurrent.futures as cf
+import os
+import pickle
+import platform
+import traceback
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 
 from optimize.evaluator import Evaluator
+from optimize.executors import handshake
 from tisim import runtime
-from tisim.errors import InputError
+from tisim.errors import InputError, RunError
 from tisim.result import Result
 from tisim.scene import Scene
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """How a worker is to run: see tisim.runtime; threads 0 for its share of the cores.
-
-    backend : the kernel compiler of the searching process. Another one would give other last bits, and the
-    cache would take them for the same.
-    """
+    """How a worker is to run: see tisim.runtime; threads 0 for its share of the cores."""
 
     device: str = "cpu"
     precision: str = "f64"
     threads: int = 0
-    backend: str = runtime.backend()
 
     def __post_init__(self) -> None:
         runtime.Runtime(self.device, self.precision, self.threads)
@@ -32,28 +33,93 @@ class Wanted:
     @property
     def settings(self) -> dict[str, str]:
         """As of the in-process evaluator: what a cached result depends on."""
-        return {"precision": self.precision, "device": self.device, "backend": self.backend}
+        return {"precision": self.precision, "device": self.device, "backend": runtime.backend()}
+
+    @property
+    def made_by(self) -> dict[str, str]:
+        """What an answer must say of itself, or its last bits may be others, and the cache would take them
+        for the same.
+        """
+        return {**handshake.program(), "precision": self.precision, "device": self.device}
 
 
-_taichi = ThreadPoolExecutor(1)
+@dataclass(frozen=True)
+class Answer:
+    """The results of the scenes, in order, or the error instead; what they were made by, and where."""
+
+    made_by: dict[str, str]
+    results: list[Result]
+    error: BaseException | None = None
+    worker: str = field(default_factory=lambda: f"worker (process {os.getpid()} of {platform.node()})")
+
+
+_taichi = cf.ThreadPoolExecutor(1)
 """Taichi belongs to the thread that has started it; whoever calls, all of it happens in this one."""
 _evaluator: list[Evaluator] = []
 
 
-def run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> list[Result]:
-    """The results of scenes, in order, from a worker whose share of the cores that is.
+def run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
+    """The answer of a worker whose share of the cores that is."""
+    return _answered(_taichi.submit(_run, scenes, wanted, share))
 
-    InputError when this machine has another compiler or lacks the device; what else goes wrong as in-process.
+
+def serve(connection: Connection, share: int) -> None:
+    """Answer pickled (scenes, wanted) until the other end is closed: the whole life of a worker process.
+
+    This thread does nothing but listen. When the searching process is gone, however it went, the system
+    closes its end, and what is being run for it ends here and now.
     """
-    return _taichi.submit(_run, scenes, wanted, share).result()
+    sent: cf.Future[None] | None = None
+    while True:
+        try:
+            question = connection.recv_bytes()
+        except (EOFError, OSError):
+            break
+        made = _taichi.submit(_run_pickled, question, share)
+        sent = _taichi.submit(_send, connection, made)
+        sent.add_done_callback(_end_unless_sent)
+    if sent is not None and not sent.done():
+        os._exit(1)
 
 
-def _run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> list[Result]:
-    if wanted.backend != runtime.backend():
-        raise InputError(f"compiler of a worker must be {wanted.backend}; received {runtime.backend()!r}")
+def _run_pickled(question: bytes, share: int) -> Answer:
+    scenes, wanted = pickle.loads(question)
+    return _run(scenes, wanted, share)
+
+
+def _run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
     before = runtime.generation()
     runtime.start(wanted.device, wanted.precision, wanted.threads or share)
     if not _evaluator or runtime.generation() != before:
         _evaluator[:] = [Evaluator()]
     results = dict(_evaluator[0].evaluate(scenes))
-    return [results[index] for index in range(len(scenes))]
+    made_by = {**handshake.program(), **runtime.current().settings}
+    return Answer(made_by, [results[index] for index in range(len(scenes))])
+
+
+def _answered(made: cf.Future[Answer]) -> Answer:
+    error = made.exception()
+    return Answer(handshake.program(), [], _portable(error)) if error else made.result()
+
+
+def _send(connection: Connection, made: cf.Future[Answer]) -> None:
+    connection.send(_answered(made))
+
+
+def _end_unless_sent(sent: cf.Future[None]) -> None:
+    """Who waits for the answer would wait for ever; that a process has ended is noticed."""
+    if sent.exception():
+        os._exit(1)
+
+
+def _portable(error: BaseException) -> BaseException:
+    """The error as it can be sent; one that is not for people with where in the worker it was raised."""
+    if isinstance(error, (InputError, RunError)):
+        return error
+    told = "".join(traceback.format_exception(error))
+    try:
+        error = pickle.loads(pickle.dumps(error))
+    except (pickle.PickleError, TypeError, AttributeError):
+        error = RuntimeError(repr(error))
+    error.add_note(f"in a worker:\n{told}")
+    return error

@@ -4,6 +4,7 @@ import os
 import resource
 import signal
 import sys
+import time
 from pathlib import Path
 
 from fake_runs import FakeEvaluator, fake_problem, fake_record
@@ -89,6 +90,26 @@ def search(path):
     print("done", flush=True)
 
 
+class Asleep:
+    """A scene that a worker reads for an hour."""
+
+    def __reduce__(self):
+        return time.sleep, (3600.0,)
+
+
+def asleep():
+    """Two worker processes that are busy, and a parent that waits for them."""
+    from optimize.executors.processes import Processes
+    from optimize.executors.worker import Wanted
+
+    pool = Processes(2)
+    given = [pool.submit([Asleep()], Wanted()) for _ in range(2)]
+    while len(pool._crew) < 2:
+        time.sleep(0.01)
+    print("2 at work", flush=True)
+    given[0].result()
+
+
 def tisim(*arguments):
     """The command, naming each evaluation on standard output as soon as it counts as finished."""
     from drift_case import CASE
@@ -110,5 +131,5 @@ def tisim(*arguments):
 
 
 if __name__ == "__main__":
-    known = {"write": write, "stepwise": stepwise, "limited": limited, "search": search, "tisim": tisim}
-    known[sys.argv[1]](*sys.argv[2:])
+    known = (write, stepwise, limited, search, asleep, tisim)
+    {function.__name__: function for function in known}[sys.argv[1]](*sys.argv[2:])

@@ -2,14 +2,19 @@
 
 import concurrent.futures as cf
 import contextlib
+import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
+import light_worker
 import numpy as np
 import pytest
 from cache_files import worker
@@ -18,15 +23,17 @@ from drift_case import problem, scene
 from optimize import executors
 from optimize.cache import Cache, verify
 from optimize.evaluator import Evaluator
-from optimize.executors import remote
-from optimize.executors.remote import Remote, units
-from optimize.executors.worker import Wanted, run
+from optimize.executors import dask_cluster, handshake
+from optimize.executors.processes import Processes
+from optimize.executors.remote import Lost, Remote, units
+from optimize.executors.worker import Answer, Wanted
 from optimize.search import search
 from optimize.settings import Settings
-from tisim import Cloud, runtime
+from tisim import Cloud, __version__, runtime
 from tisim.effects.impact import Impact
 from tisim.errors import InputError, RunError
 
+ROOT = Path(__file__).parents[2]
 SCENES = [scene({"speed": 3.0 + k, "rise": 5.0}, seed=k) for k in range(9)]
 LONG = [s.model_copy(update={"duration": 150.0}) for s in SCENES]
 """The same for 150,000 steps: seconds rather than milliseconds."""
@@ -51,7 +58,8 @@ def away(request):
         pids = lambda: list(evaluator.pool._client.run(os.getpid).values())  # noqa: E731
     else:
         evaluator = executors.made("processes:2")
-        pids = lambda: [child.pid for child in evaluator.pool._children if child.is_alive()]  # noqa: E731
+        crew = evaluator.pool._crew
+        pids = lambda: [one.process.pid for one in crew if one.process.is_alive()]  # noqa: E731
     with closing(evaluator):
         yield evaluator, pids
 
@@ -136,12 +144,24 @@ def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     assert (report.ok, report.duplicates) == (True, 0)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("away", ["processes"], indirect=True)
+def test_worker_killed_while_it_has_nothing_to_do(away, here):
+    evaluator, pids = away
+    dict(evaluator.evaluate(SCENES))
+    for pid in pids():
+        os.kill(pid, signal.SIGKILL)
+    while pids():
+        time.sleep(0.01)
+    same(dict(evaluator.evaluate([*SCENES, CROWDED])), here[0])
+
+
 @pytest.mark.long
-def test_stopped_it_leaves_no_process(monkeypatch):
+def test_stopped_it_leaves_no_process():
     evaluator = executors.made("processes:2")
     with closing(evaluator):
         dict(evaluator.evaluate(SCENES))
-        children = list(evaluator.pool._children)
+        children = [one.process for one in evaluator.pool._crew]
 
         def ctrl_c(fraction):
             raise KeyboardInterrupt
@@ -153,29 +173,107 @@ def test_stopped_it_leaves_no_process(monkeypatch):
     assert not any(child.is_alive() for child in children)
 
 
+@pytest.fixture
+def light(monkeypatch):
+    """Processes that do what they are told and compile nothing; see light_worker.py."""
+    monkeypatch.setattr("optimize.executors.worker.serve", light_worker.serve)
+    with closing(Remote(Processes(2), Wanted())) as evaluator:
+        yield evaluator.pool
+
+
+def test_process_that_ends_takes_only_its_own_work_with_it(light):
+    doomed, other = light.submit("end", None), light.submit("echo", None)
+    with pytest.raises(Lost, match="worker process has ended with exit code 3"):
+        light.outcome(doomed)
+    assert light.outcome(other) == "echo"
+    assert light.outcome(light.submit("echo", None)) == "echo"
+    cut = light.submit("answer in part", None)
+    with pytest.raises(Lost, match="ended with exit code 4"):
+        light.outcome(cut)
+    assert [light.outcome(f) for f in [light.submit("echo", None) for _ in range(4)]] == ["echo"] * 4
+
+
+def test_process_that_is_killed_with_nothing_to_do_is_noticed_by_the_next(light):
+    os.kill(light.outcome(light.submit("pid", None)), signal.SIGKILL)
+    (killed,) = light._crew
+    killed.process.join()
+    with pytest.raises(Lost, match="ended with exit code -9"):
+        light.outcome(light.submit("echo", None))
+    assert light.outcome(light.submit("echo", None)) == "echo"
+
+
+def test_ctrl_c_is_for_the_searching_process(light):
+    first = light.submit("pid", None)
+    os.kill(light.outcome(first), signal.SIGINT)
+    assert light.outcome(light.submit("echo", None)) == "echo"
+
+
+def test_process_that_cannot_be_started_is_a_message(light, monkeypatch):
+    def none_left(process):
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("multiprocessing.process.BaseProcess.start", none_left)
+    with pytest.raises(RunError, match=r"worker process could not be started: .*temporarily unavailable"):
+        light.outcome(light.submit("echo", None))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("away", ["processes"], indirect=True)
+def test_error_of_the_program_in_a_worker_is_raised_here(away):
+    """It says where in the worker it was; the worker goes on."""
+    evaluator, pids = away
+    dict(evaluator.evaluate(SCENES))
+    before = pids()
+    with pytest.raises(ValueError, match="invalid literal for int") as raised:
+        evaluator._results(evaluator.pool.outcome(evaluator.pool.submit([Unreadable()], Wanted())))
+    assert "in _run_pickled" in raised.value.__notes__[0]
+    dict(evaluator.evaluate(SCENES))
+    assert pids() == before
+
+
+class Unreadable:
+    """A scene that a worker cannot unpickle."""
+
+    def __reduce__(self):
+        return int, ("x",)
+
+
+@pytest.mark.long
+def test_workers_end_with_the_searching_process_whatever_they_are_at():
+    """Killed itself, it can tell them nothing."""
+    with worker("asleep", start_new_session=True) as process:
+        assert process.stdout.readline() == "2 at work\n"
+        assert len(alive(process.pid)) >= 3
+        process.kill()
+    await_end(process.pid)
+
+
 class Doomed:
     """Workers that die of everything."""
 
     workers = 2
 
     def __init__(self):
-        self.sent = 0
+        self.sent = []
 
     def submit(self, scenes, wanted):
-        self.sent += 1
+        self.sent.append(tuple(scene.seed for scene in scenes))
         future = cf.Future()
         future.set_result([])
         return future
 
     def outcome(self, future):
-        raise remote.Lost("killed")
+        raise Lost("killed")
+
+    def look(self):
+        pass
 
 
 def test_workers_that_die_of_everything_end_the_search():
     doomed = Doomed()
-    with pytest.raises(RunError, match=r"lost 3 times in a row, with nothing finished \(killed\)"):
+    with pytest.raises(RunError, match=r"killed; it was the worker number 3 to be lost with the same work"):
         list(Remote(doomed, Wanted()).evaluate(SCENES))
-    assert doomed.sent == 3 * len(units(SCENES, 2))
+    assert max(doomed.sent.count(unit) for unit in doomed.sent) == 3
 
 
 def test_units_of_work():
@@ -218,9 +316,152 @@ def test_dask_is_optional(monkeypatch):
         executors.made("dask://127.0.0.1:9")
 
 
-def test_worker_with_another_compiler_is_refused():
-    with pytest.raises(InputError, match=r"compiler of a worker must be other 1\.0\.0; received"):
-        run(SCENES, Wanted(backend="other 1.0.0"), 1)
+class Other:
+    """Workers that answer as they are told to."""
+
+    workers = 1
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def submit(self, scenes, wanted):
+        future = cf.Future()
+        future.set_result(self.answer)
+        return future
+
+    def outcome(self, future):
+        return future.result()
+
+    def look(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("tisim", "0.0.9"),
+        ("physics", "0"),
+        ("code", "0123456789ab"),
+        ("backend", "other 1.0.0"),
+        ("NumPy", "2.0.0"),
+        ("Python", "3.10"),
+        ("machine", "other"),
+        ("precision", "f32"),
+        ("device", "cuda"),
+    ],
+)
+def test_worker_of_another_program_is_refused(name, value):
+    """Its last bits may be others, and the cache would take them for the same."""
+    wanted = Wanted()
+    made_by = {**wanted.made_by, name: value}
+    message = f"of {name} {re.escape(wanted.made_by[name])}, as the search is; received '{name} {value}'"
+    with pytest.raises(InputError, match=message):
+        list(Remote(Other(Answer(made_by, [])), wanted).evaluate(SCENES[:1]))
+
+
+def test_one_edited_source_file_makes_another_program(tmp_path, monkeypatch):
+    for name in ("tisim", "optimize", "cases"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    ours = handshake.source.__wrapped__()
+
+    def found(name):
+        return SimpleNamespace(submodule_search_locations=[str(tmp_path / name)])
+
+    monkeypatch.setattr(handshake, "find_spec", found)
+    assert handshake.source.__wrapped__() == ours
+    with (tmp_path / "tisim" / "effects" / "drag.py").open("a") as file:
+        file.write("\n")
+    assert handshake.source.__wrapped__() != ours
+
+
+def elsewhere(address, folder):
+    """A Dask worker that finds its packages in a folder."""
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address]
+    options = ["--no-nanny", "--no-dashboard", "--nthreads", "1", "--local-directory", str(folder)]
+    return subprocess.Popen(
+        [*command, *options], env={**os.environ, "PYTHONPATH": str(folder)}, cwd=folder,
+        stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def join(cluster, tmp_path):
+    """Adds a worker of other packages to the cluster."""
+    joined = []
+
+    def start():
+        before = len(cluster.scheduler_info["workers"])
+        joined.append(elsewhere(cluster.scheduler_address, tmp_path))
+        while len(cluster.scheduler_info["workers"]) == before:
+            assert joined[-1].poll() is None
+            time.sleep(0.05)
+
+    yield start
+    for process in joined:
+        process.kill()
+        process.wait()
+    while len(cluster.scheduler_info["workers"]) > 2:
+        time.sleep(0.05)
+
+
+def without(folder, *gone):
+    """Packages as of another version: without some modules, and with another number."""
+    for name in ("tisim", "optimize", "cases"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", *gone))
+    text = folder / "tisim" / "__init__.py"
+    text.write_text(text.read_text().replace(f'"{__version__}"', '"0.0.9"'))
+
+
+def connected(cluster):
+    return executors.made(f"dask://{cluster.scheduler_address.removeprefix('tcp://')}")
+
+
+@pytest.mark.long
+def test_dask_worker_of_another_version_is_refused_before_anything_runs(cluster, join, tmp_path):
+    without(tmp_path)
+    join()
+    message = (
+        rf"^worker tcp://\S+ of the Dask cluster must be of tisim {__version__}, code \w+, as the search is; "
+    )
+    with pytest.raises(InputError, match=message + r"received 'tisim 0\.0\.9, code \w+'$"):
+        connected(cluster)
+
+
+@pytest.mark.slow
+def test_dask_worker_that_does_not_know_its_version_is_refused(cluster, join, tmp_path):
+    without(tmp_path, "handshake.py")
+    join()
+    message = (
+        rf"must be one that knows what the search is made of \(tisim {__version__}, .*; received .*handshake"
+    )
+    with pytest.raises(InputError, match=message):
+        connected(cluster)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gone", ["nothing", "handshake.py"])
+def test_dask_worker_of_another_version_that_comes_later_is_refused(cluster, join, tmp_path, gone):
+    without(tmp_path, gone)
+    with closing(connected(cluster)) as evaluator:
+        join()
+        many = [s.model_copy(update={"seed": k}) for k, s in enumerate(SCENES * 20)]
+        with pytest.raises(InputError, match=r"tisim 0\.0\.9|one that knows what the search is made of"):
+            list(evaluator.evaluate(many))
+
+
+@pytest.mark.long
+def test_dask_without_workers_says_so_and_gives_up(cluster, monkeypatch):
+    """Simulated here; the next test kills real ones."""
+    monkeypatch.setattr(dask_cluster, "SILENCE_S", 0.5)
+    monkeypatch.setattr(dask_cluster, "LOOK_S", 0.0)
+    with closing(connected(cluster)) as evaluator:
+        dict(evaluator.evaluate(SCENES))
+        monkeypatch.setattr(dask_cluster.DaskCluster, "workers", 0)
+        with (
+            pytest.warns(RuntimeWarning, match=r"no worker of the Dask cluster answers; waiting for 0\.5 s"),
+            pytest.raises(RunError, match=r"no worker of the Dask cluster has answered for 0\.5 s"),
+        ):
+            list(evaluator.evaluate([s.model_copy(update={"duration": 1e5}) for s in SCENES]))
 
 
 def alive(group):
@@ -234,9 +475,26 @@ def alive(group):
     return found
 
 
+def await_end(group):
+    """Wait until no process of a group is left; those at work finish the kernel that they are at."""
+    ends = time.monotonic() + 600
+    while left := alive(group):
+        assert time.monotonic() < ends, left
+        time.sleep(0.02)
+
+
 @pytest.mark.slow
-def test_ctrl_c_of_the_terminal_stops_the_command_and_all_its_workers(tmp_path):
-    """SIGINT to the whole group, as a terminal sends it."""
+@pytest.mark.parametrize(
+    ("number", "all_of_them", "code"),
+    [
+        (signal.SIGINT, True, 130),  # as a terminal sends it
+        (signal.SIGHUP, True, 129),
+        (signal.SIGTERM, False, 143),
+        (signal.SIGTERM, True, 143),
+        (signal.SIGKILL, False, -9),
+    ],
+)
+def test_whatever_stops_the_command_stops_all_its_workers(tmp_path, number, all_of_them, code):
     command = ("optimize", "drift", "--generations", "5000")
     folder = tmp_path / "s"
     with worker(
@@ -246,13 +504,49 @@ def test_ctrl_c_of_the_terminal_stops_the_command_and_all_its_workers(tmp_path):
         for line in process.stderr:
             if line.startswith("generation   1"):
                 break
-        os.killpg(process.pid, signal.SIGINT)
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "To go on, give the same command again" in " ".join(err.split())
+        (os.killpg if all_of_them else os.kill)(process.pid, number)
+        _, err = process.communicate()
+    assert process.returncode == code
+    assert number == signal.SIGKILL or "To go on, give the same command again" in " ".join(err.split())
     assert "Traceback" not in err
-    ends = time.monotonic() + 10
-    while (left := alive(process.pid)) and time.monotonic() < ends:
-        time.sleep(0.1)  # Python's resource tracker goes when its parent has
-    assert not left
+    await_end(process.pid)
     assert verify(folder / "search.h5").ok
+
+
+@pytest.fixture
+def grid(tmp_path):
+    """A Dask scheduler and one worker that nobody starts again: the processes, and the address."""
+    file = tmp_path / "scheduler.json"
+    options = ["--no-dashboard", "--scheduler-file", str(file)]
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", *options]
+    scheduler = subprocess.Popen([*command, "--host", "127.0.0.1", "--port", "0"], stderr=subprocess.DEVNULL)
+    while not (file.exists() and file.read_text().endswith("}")):
+        assert scheduler.poll() is None
+        time.sleep(0.05)
+    address = json.loads(file.read_text())["address"]
+    one = elsewhere(address, tmp_path)
+    yield scheduler, one, f"dask://{address.removeprefix('tcp://')}"
+    for process in (scheduler, one):
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("who", ["scheduler", "worker"])
+def test_dask_that_is_lost_ends_the_search_with_a_message(grid, tmp_path, who):
+    (tmp_path / "sitecustomize.py").write_text(f"import sys; sys.path += {sys.path!r}")
+    scheduler, one, name = grid
+    command = ("optimize", "drift", "--generations", "5000", "--executor", name, "--out", tmp_path / "s")
+    with worker("tisim", *command, stderr=subprocess.PIPE) as process:
+        for line in process.stderr:
+            if line.startswith("generation   1"):
+                break
+        (scheduler if who == "scheduler" else one).kill()
+        _, err = process.communicate()
+    assert process.returncode == 1, err
+    assert "Traceback" not in err
+    last = (
+        "Dask scheduler was lost" if who == "scheduler" else "no worker of the Dask cluster has answered for"
+    )
+    assert last in err.splitlines()[-1]
+    assert verify(tmp_path / "s" / "search.h5").ok

@@ -1,0 +1,19 @@
+"""A worker process for tests of what becomes of processes: it compiles nothing."""
+
+import os
+import struct
+
+
+def serve(connection, share):
+    """Echo what is asked, end, or end in the middle of an answer."""
+    while True:
+        try:
+            asked, _ = connection.recv()
+        except EOFError:
+            return
+        if asked == "end":
+            os._exit(3)
+        if asked == "answer in part":
+            os.write(connection.fileno(), struct.pack("!i", 1000) + b"too short")
+            os._exit(4)
+        connection.send(os.getpid() if asked == "pid" else asked)
