@@ -42,8 +42,9 @@ class DaskCluster:
             raise InputError(
                 f"executor must be the address of a running Dask scheduler; received {address!r} ({failure})"
             ) from None
-        # A scheduler that is lost is told below; the client would tell it too, with all of its stack.
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        # A scheduler that is lost is told below; Dask would tell it too, with all of its stacks.
+        for logger in ("distributed", "distributed.client"):
+            logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
             must(self.workers > 0, "Dask cluster", "one with workers", address)
             for where, theirs in self._client.run(handshake.program, on_error="return").items():
@@ -68,6 +69,7 @@ class DaskCluster:
             return 0
 
     def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
+        self._check()
         self._answered = time.monotonic()
         return self._executor.submit(_run, scenes, wanted)
 
@@ -77,7 +79,7 @@ class DaskCluster:
         try:
             answer = future.exception() or future.result()
         except cf.CancelledError:
-            raise RunError("Dask scheduler was lost; what had finished is kept") from None
+            raise _scheduler_lost() from None
         if isinstance(answer, (KilledWorker, OSError)):
             raise RunError(f"workers of the Dask cluster were lost again and again ({answer})") from answer
         if isinstance(answer, Answer):
@@ -86,7 +88,8 @@ class DaskCluster:
         raise handshake.stranger(answer, "worker of the Dask cluster")
 
     def look(self) -> None:
-        """Say so when there is no worker; RunError when there has been none for SILENCE_S."""
+        """Say so when there is no worker; RunError without one for SILENCE_S, or without a scheduler."""
+        self._check()
         now = time.monotonic()
         if now - self._looked < LOOK_S:
             return
@@ -102,10 +105,18 @@ class DaskCluster:
             waiting = f"no worker of the Dask cluster answers; waiting for {SILENCE_S:g} s"
             warnings.warn(waiting, RuntimeWarning, stacklevel=2)
 
+    def _check(self) -> None:
+        if self._client.status != "running":
+            raise _scheduler_lost()
+
     def stop(self) -> None:
         """Cancel what is waiting; what a worker is at, it finishes for nothing."""
         self._executor.shutdown(wait=False)
         self._client.close()
+
+
+def _scheduler_lost() -> RunError:
+    return RunError("Dask scheduler was lost; what had finished is kept")
 
 
 def _run(scenes: Sequence[Scene], wanted: Wanted) -> Answer:

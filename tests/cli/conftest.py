@@ -49,18 +49,20 @@ def impacts(tmp_path, toml):
 
 @pytest.fixture
 def press_ctrl_c():
-    """Press Ctrl-C when progress is looked at for the ``after``-th time."""
+    """Press Ctrl-C, or send another signal, when progress is looked at for the ``after``-th time."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored in the background
 
-    def press(monkeypatch, after, times=1):
+    def press(monkeypatch, after, times=1, number=signal.SIGINT):
         looked = []
 
         def check(self, original=Interrupt.check):
             looked.append(1)
             if len(looked) == after:
                 for _ in range(times):
-                    os.kill(os.getpid(), signal.SIGINT)
+                    os.kill(os.getpid(), number)
             original(self)
 
         monkeypatch.setattr(Interrupt, "check", check)
 
-    return press
+    yield press
+    signal.signal(signal.SIGINT, before)

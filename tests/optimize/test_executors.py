@@ -439,14 +439,32 @@ def test_dask_worker_that_does_not_know_its_version_is_refused(cluster, join, tm
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gone", ["nothing", "handshake.py"])
-def test_dask_worker_of_another_version_that_comes_later_is_refused(cluster, join, tmp_path, gone):
-    without(tmp_path, gone)
+def test_dask_worker_of_another_version_that_comes_later_is_refused(cluster, join, tmp_path):
+    without(tmp_path)
     with closing(connected(cluster)) as evaluator:
         join()
         many = [s.model_copy(update={"seed": k}) for k, s in enumerate(SCENES * 20)]
-        with pytest.raises(InputError, match=r"tisim 0\.0\.9|one that knows what the search is made of"):
+        with pytest.raises(InputError, match=r"received 'tisim 0\.0\.9, code \w+'"):
             list(evaluator.evaluate(many))
+
+
+def test_dask_futures_that_hold_no_answer_are_messages():
+    distributed = pytest.importorskip("distributed")
+    for sent, error, message in (
+        ([], InputError, r"one that knows what the search is made of \(tisim .*\); received \[\]"),
+        (AttributeError("Wanted"), InputError, r"received AttributeError\('Wanted'\)"),
+        (
+            distributed.KilledWorker("run", SimpleNamespace(address="tcp://a"), 4),
+            RunError,
+            "were lost again and again",
+        ),
+        (OSError("closed"), RunError, r"were lost again and again \(closed\)"),
+        (cf.CancelledError(), RunError, "Dask scheduler was lost"),
+    ):
+        future = cf.Future()
+        (future.set_exception if isinstance(sent, BaseException) else future.set_result)(sent)
+        with pytest.raises(error, match=message):
+            dask_cluster.DaskCluster.outcome(None, future)
 
 
 @pytest.mark.long

@@ -1,0 +1,111 @@
+"""What asks a command to stop: Ctrl-C, SIGTERM, SIGHUP; and a terminal that is closed."""
+
+import contextlib
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import termios
+
+import pytest
+
+from tests.optimize.drift_case import CASE
+from tisim import Scene, interrupt, runtime
+from tisim.interrupt import Interrupt
+
+ASKED = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+
+
+@pytest.fixture(autouse=True)
+def heard():
+    """Signals are heard here, also where the tests run in the background or under nohup."""
+    before = {number: signal.signal(number, signal.default_int_handler) for number, _ in ASKED}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize(("number", "code"), ASKED)
+def test_signal_is_told_at_once_and_raised_at_a_good_moment(number, code):
+    told = []
+    with Interrupt(lambda: told.append(1)) as asked:
+        asked.check()
+        os.kill(os.getpid(), number)
+        assert told == [1]
+        with pytest.raises(KeyboardInterrupt):
+            asked.check()
+    assert (asked.forced, interrupt.exit_code()) == (False, code)
+    assert signal.getsignal(number) is signal.default_int_handler
+
+
+def test_only_ctrl_c_forces():
+    """Whoever ends a session may send SIGTERM and SIGHUP, and each of them to a process and to its group."""
+    with Interrupt(lambda: None) as asked:
+        for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGHUP):
+            os.kill(os.getpid(), number)
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert asked.forced
+    assert interrupt.exit_code() == 130
+
+
+@pytest.mark.parametrize(("number", "code"), ASKED)
+def test_signal_that_is_ignored_stays_so(number, code):
+    """As SIGHUP under nohup."""
+    signal.signal(number, signal.SIG_IGN)
+    with interrupt.handled(interrupt.stop), Interrupt(lambda: None) as asked:
+        os.kill(os.getpid(), number)
+        asked.check()
+    assert not asked.noted
+    assert signal.getsignal(number) is signal.SIG_IGN
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("number", "code"), ASKED[1:])
+def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c, number, code):
+    press_ctrl_c(monkeypatch, after=2, times=3, number=number)
+    ended, _, err = tisim("run", toml, "--out", "cut")
+    assert ended == code
+    assert "same command with --resume" in " ".join(err.split())
+    assert [path.name for path in (tmp_path / "cut").iterdir()] == ["checkpoint.h5"]
+
+
+@pytest.mark.long
+def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c):
+    monkeypatch.setattr("cases.case.every", lambda: {CASE.name: CASE})
+    press_ctrl_c(monkeypatch, after=9, number=signal.SIGTERM)
+    code, _, err = tisim("compare", "drift", "--methods", "random", "--out", "c")
+    assert code == 143
+    assert "compare.h5 has all that is done. To go on, give the same command" in " ".join(err.split())
+    assert (tmp_path / "c" / "compare.h5").exists()
+
+
+@pytest.mark.parametrize(("number", "code"), ASKED)
+def test_commands_that_keep_nothing_end_as_well(tisim, monkeypatch, number, code):
+    monkeypatch.setattr(runtime, "start", lambda *settings: os.kill(os.getpid(), number))
+    assert tisim("check", "vibration") == (code, "", "")
+
+
+@pytest.mark.slow
+def test_run_whose_terminal_is_closed_saves_a_checkpoint(toml, tmp_path):
+    """All that it prints then fails."""
+    scene = Scene.from_toml(tmp_path / toml).model_copy(update={"duration": 1e3})
+    (tmp_path / toml).write_text(scene.to_toml())
+    ours, theirs = os.openpty()
+    command = "from tisim.cli import main; main()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", command, "run", toml, "--out", "cut"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )  # fmt: skip
+    os.close(theirs)
+    shown = b""
+    while b"left" not in shown:
+        with contextlib.suppress(OSError):
+            shown += os.read(ours, 1000)
+        assert process.poll() is None, shown
+    os.close(ours)
+    assert process.wait() == 129
+    assert (tmp_path / "cut" / "checkpoint.h5").exists()

@@ -1,0 +1,194 @@
+"""Searches that are killed at random moments, begun again until they end, and held against one left alone."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from optimize.cache import Cache, existing, verify
+from tests.soak.counts import Counts
+
+WORKER = Path(__file__).parents[1] / "optimize" / "cache_worker.py"
+SEARCH = ("optimize", "drift", "--generations", "8", "--seed", "3")
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
+KILLS = 5
+"""Of each kind, at full share."""
+HUNG_S = 600.0
+"""A process that has not ended by then never will, seconds."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Which signal goes to whom: the searching process alone, all of its group, or one of its workers."""
+
+    number: signal.Signals
+    whom: str = "search"
+    executor: str = "batch"
+
+    @property
+    def name(self) -> str:
+        """A row of the table."""
+        whom = {"search": "search", "all": "search and workers", "worker": "a worker"}[self.whom]
+        return f"{self.number.name} to {whom} ({self.executor})"
+
+
+KINDS = (
+    *(Kind(number) for number in SIGNALS),
+    *(Kind(number, "search", "processes:2") for number in (signal.SIGKILL, signal.SIGTERM)),
+    *(Kind(number, "all", "processes:2") for number in SIGNALS),
+    *(Kind(number, "worker", "processes:2") for number in (signal.SIGKILL, signal.SIGTERM)),
+)
+
+
+def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
+    """Counts of every kind of kill."""
+    for number in SIGNALS[1:]:
+        if signal.getsignal(number) is signal.SIG_IGN:  # as in the background; searches would inherit it
+            signal.signal(number, lambda *_: None)
+    alone = _Search(folder / "alone", "batch")
+    assert alone.wait() == 0, alone.said()
+    expected = found(folder / "alone")
+    for kind in KINDS:
+        rng = random.Random(f"{seed} {kind.name}")
+        yield killed(kind, max(1, round(share * KILLS)), expected, rng, folder / kind.name.replace(" ", "-"))
+
+
+def killed(kind: Kind, kills: int, expected: dict, rng: random.Random, folder: Path) -> Counts:
+    """Kill so often; whenever a search has ended in spite of it, compare it and begin another one."""
+    counts = Counts(kind.name)
+    round_, told = 0, set()
+    while True:
+        place = folder / str(round_)
+        search = _Search(place, kind.executor)
+        shot = counts.tried < kills and shoot(search, kind, rng)
+        code = search.wait()
+        counts.tried += shot
+        counts.hung += search.hung
+        stopped = {0, 128 + kind.number, -kind.number} if shot and kind.whom != "worker" else {0}
+        counts.tracebacks += not search.hung and ("Traceback" in search.said() or code not in stopped)
+        told |= search.stored
+        counts.lost += len(told - keys(place))
+        if code == 0:
+            counts.wrong += found(place) != expected
+            counts.doubled += verify(place / "search.h5").duplicates
+            if counts.tried == kills:
+                return counts
+            round_, told = round_ + 1, set()
+        elif search.hung or code not in stopped:
+            return counts  # it would only fail again
+
+
+def shoot(search: _Search, kind: Kind, rng: random.Random) -> bool:
+    """Wait for a random number of evaluations and a little more, and send the signal; False if it had ended.
+
+    A part of the shots comes before there is anything: while Python starts, files are read, kernels compiled.
+    """
+    early = (
+        kind.number != signal.SIGINT and rng.random() < 0.2
+    )  # Python itself starts with a stack for Ctrl-C
+    if early:
+        time.sleep(rng.uniform(0.0, 3.0))
+    elif not search.follow(rng.randint(1, 60)):
+        return False
+    time.sleep(rng.uniform(0.0, 0.03))
+    if kind.whom == "all":
+        os.killpg(search.process.pid, kind.number)
+    elif kind.whom == "search":
+        search.process.send_signal(kind.number)
+    else:
+        workers = [pid for pid, command in living(search.process.pid) if "spawn_main" in command]
+        if not workers:
+            return False
+        os.kill(rng.choice(workers), kind.number)
+    return True
+
+
+class _Search:
+    """A search in a process group of its own. stored : keys of the evaluations that it has acknowledged."""
+
+    def __init__(self, folder: Path, executor: str) -> None:
+        self.hung, self.stored = False, set[str]()
+        self._errors = folder.with_name(folder.name + ".stderr")
+        self._errors.parent.mkdir(parents=True, exist_ok=True)
+        command = [
+            sys.executable,
+            str(WORKER),
+            "tisim",
+            *SEARCH,
+            "--executor",
+            executor,
+            "--out",
+            str(folder),
+        ]
+        with self._errors.open("w") as errors:
+            self.process = subprocess.Popen(
+                command, env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True,
+            )  # fmt: skip
+        self._dog = threading.Timer(HUNG_S, self._end)
+        self._dog.start()
+
+    def follow(self, evaluations: int | None = None) -> bool:
+        """Read on until so many more have been stored, or no process is left to tell; whether there were."""
+        left = evaluations
+        while left is None or left > 0:
+            line = self.process.stdout.readline()
+            if not line.endswith("\n"):
+                return False
+            if line.startswith("stored "):
+                self.stored.add(line.split()[1])
+                left = None if left is None else left - 1
+        return True
+
+    def wait(self) -> int:
+        """The exit code, when no process of the group is left."""
+        self.follow()
+        code = self.process.wait()
+        while living(self.process.pid):
+            time.sleep(0.02)
+        self._dog.cancel()
+        return code
+
+    def said(self) -> str:
+        """What it has written to its standard error."""
+        return self._errors.read_text()
+
+    def _end(self) -> None:
+        self.hung = True
+        for pid, _ in living(self.process.pid):
+            os.kill(pid, signal.SIGKILL)
+
+
+def living(group: int) -> list[tuple[int, str]]:
+    """Ids and command lines of the processes of a group that have not ended."""
+    table = subprocess.run(
+        ["ps", "-eo", "pid=,pgid=,stat=,args="], capture_output=True, text=True, check=True
+    )
+    rows = (line.split(maxsplit=3) for line in table.stdout.splitlines())
+    return [(int(row[0]), row[3]) for row in rows if int(row[1]) == group and not row[2].startswith("Z")]
+
+
+def keys(folder: Path) -> set[str]:
+    """Of the evaluations in the file of a search, if there is one yet."""
+    file = folder / "search.h5"
+    if not (file.exists() or file.with_name("search.h5.journal").exists()):
+        return set()
+    return {record.key for record in existing(file).records()}
+
+
+def found(folder: Path) -> dict:
+    """All that a search has found."""
+    cache = Cache(folder / "search.h5")
+    return {
+        "records": {record.key: (record.values, record.seed, record.design) for record in cache.records()},
+        "tables": {name: repr(cache.table(name).columns) for name in cache.tables()},
+        "best": (folder / "best.csv").read_bytes(),
+    }
