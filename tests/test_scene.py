@@ -38,7 +38,7 @@ SCENES = {
     "one by one": lambda: scene(
         np.random.default_rng(1).normal(size=(3, 3)),
         np.full((3, 3), 1 / 3),
-        radius=[0.1, 1 / 7, 1e-300],
+        radius=[0.1, 1 / 7, 1e-90],
         mass=0.1,
     ),
     "bare": lambda: Scene(particles=Cloud(number=1, radius=1, density=1), duration=1),

@@ -131,16 +131,18 @@ class Table:
     def write(self, rows: Sequence[Sequence[Spec]]) -> None:
         """Set the parameters of each world from its parts, in the order they were bound.
 
-        InputError for one that the precision cannot hold.
+        InputError for one that the precision cannot hold, or that kernels would flush to zero.
         """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):
             table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.kind())]
-        with np.errstate(over="ignore"):
-            held = table.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
-        for world, slot in np.argwhere(~np.isfinite(held)):
+        real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
+        with np.errstate(over="ignore", under="ignore"):
+            held = table.astype(real)
+        flushed = (table != 0) & (np.abs(held) < np.finfo(real).tiny)
+        for world, slot in np.argwhere(~np.isfinite(held) | flushed):
             names = [name for part in rows[world] for name, _ in _entries(part, part.kind())]
-            must(False, names[slot], "within the range of f32", float(table[world, slot]))
+            must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
         self.field.from_numpy(held)
 
     def destroy(self) -> None:

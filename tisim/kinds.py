@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib
 import json
 import pkgutil
+import re
+import tomllib
 from collections.abc import Mapping
 from types import ModuleType
 from typing import Any, TypeVar, get_args
 
-from tisim.errors import must
+from tisim.errors import InputError, must, named, shown
 from tisim.spec import Spec
 
 Part = TypeVar("Part", bound=Spec)
@@ -21,10 +23,17 @@ def load(package: ModuleType) -> None:
         importlib.import_module(f"{package.__name__}.{module.name}")
 
 
+def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
+    """A copy of a table whose keys are text; InputError naming ``where`` for anything else."""
+    must(isinstance(data, Mapping), where, what, data)
+    for key in data:
+        must(isinstance(key, str), f"a key of {where}", "text", key)
+    return dict(data)
+
+
 def from_dict(base: type[Part], data: Any, where: str) -> Part:
     """The part that ``data["kind"]`` names; its other keys are its parameters."""
-    must(isinstance(data, Mapping), where, "a table", data)
-    values = dict(data)
+    values = table(data, where)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
     listed = dict(kind.lists())
@@ -33,6 +42,9 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
         inner = None if name in listed else _part(info.annotation)
         if name in values and inner is not None:
             values[name] = from_dict(inner, values[name], f"{where}.{name}")
+    for name in listed.keys() & values.keys():
+        if isinstance(values[name], list | tuple):
+            values[name] = [table(row, f"{where}.{name}.{k}") for k, row in enumerate(values[name])]
     return kind(**values)
 
 
@@ -55,13 +67,13 @@ def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:
     return {"kind": part.kind(), **values} if named else values
 
 
-def toml(table: Mapping[str, Any], path: str = "") -> str:
+def toml(data: Mapping[str, Any], path: str = "") -> str:
     """TOML text of nested tables of numbers, text, flags and lists."""
-    tables = {key for key, value in table.items() if isinstance(value, Mapping) or _tables(value)}
-    lines = [f"{key} = {inline(value)}" for key, value in table.items() if key not in tables]
+    tables = {key for key, value in data.items() if isinstance(value, Mapping) or _tables(value)}
+    lines = [f"{_key(key)} = {inline(value)}" for key, value in data.items() if key not in tables]
     text = "\n".join(lines) + "\n" if lines else ""
-    for key, value in table.items():
-        name = f"{path}.{key}" if path else key
+    for key, value in data.items():
+        name = f"{path}.{_key(key)}" if path else _key(key)
         if isinstance(value, Mapping):
             text += f"\n[{name}]\n{toml(value, name).lstrip()}"
         elif key in tables:
@@ -77,7 +89,24 @@ def _tables(value: Any) -> bool:
 def inline(value: Any) -> str:
     """A value as TOML on one line."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {inline(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{_key(key)} = {inline(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(inline(item) for item in value) + "]"
-    return json.dumps(value)
+    # TOML has the strings of JSON, but no pairs of surrogates, and DEL must be escaped too.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    """A key of a table: in quotes unless all of it is letters of ASCII, digits, - and _."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else inline(name)
+
+
+def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
+    """The table that TOML text holds; InputError naming ``what`` and ``source`` where it is not TOML."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{what} must be less deeply nested; received {shown(source)}") from None
+    except ValueError as fault:
+        # Not of the format, or a number of more digits than Python reads.
+        raise InputError(f"{what} must be TOML; received {shown(source)} ({named(str(fault))})") from None

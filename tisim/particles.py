@@ -9,10 +9,11 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from tisim.domain import Domain
-from tisim.errors import InputError, must
+from tisim.errors import InputError, must, shown
 from tisim.packing.placement import Placement, RandomInDomain
 from tisim.pulses import Pulse
-from tisim.spec import Spec, Vector, parameter
+from tisim.ranges import LEAST, MOST, PARTICLES, check_memory, limits
+from tisim.spec import Spec, Text, Vector, parameter
 
 Arrays = dict[str, np.ndarray]
 """Particle quantities by field name: shape (n,) or (n, 3), SI."""
@@ -32,8 +33,11 @@ class Start(Spec):
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
 
 
-def _array(value: Any) -> tuple[Any, ...]:
-    return tuple(tuple(row) if np.ndim(row) else row for row in np.asarray(value, dtype=float).tolist())
+def _listed(value: Any) -> Any:
+    """An array, or one number, as rows of plain numbers; anything else as it is."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    return (value,) if isinstance(value, float | int) else value
 
 
 class Particles(Start):
@@ -50,18 +54,21 @@ class Particles(Start):
     radius: tuple[float, ...] = parameter("m")
     mass: tuple[float, ...] | None = parameter("kg", None)
     density: float | None = parameter("kg/m^3", None, gt=0)
-    quantities: Mapping[str, Any] = Field(default_factory=dict)
+    quantities: Mapping[Text, Any] = Field(default_factory=dict)
 
     @field_validator("position", "velocity", "radius", "mass", mode="before")
     @classmethod
     def _from_array(cls, value: Any) -> Any:
-        return _array(np.atleast_1d(value)) if isinstance(value, np.ndarray | float | int) else value
+        return _listed(value)
 
     def _column(self, name: str, value: Any, n: int) -> np.ndarray:
         try:
-            column = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"particles.{name} must be numbers; received {value!r}") from None
+            column = np.asarray(value)
+        except (ValueError, RecursionError):
+            raise InputError(f"particles.{name} must be numbers; received {shown(value)}") from None
+        # Neither text nor whole numbers of more than 64 bits.
+        must(column.dtype.kind in "biuf", f"particles.{name}", "numbers", value)
+        column = column.astype(float)
         if column.ndim == 0 or column.shape == (1,):
             column = np.full(n, float(column.reshape(-1)[0]))
         must(len(column) == n, f"particles.{name}", f"one value or {n} of them", column.shape)
@@ -94,12 +101,15 @@ class Particles(Start):
         }
         given = "both" if self.mass is not None else "neither"
         must((self.mass is None) != (self.density is None), "particles", "given mass or density", given)
-        volume = 4 / 3 * np.pi * arrays["radius"] ** 3
-        arrays["mass"] = (
-            volume * self.density if self.density is not None else self._column("mass", self.mass, n)
-        )
-        for name in ("radius", "mass"):
-            must(bool((arrays[name] > 0).all()), f"particles.{name}", "greater than 0", arrays[name].min())
+        farthest = float(np.abs(arrays["position"]).max())
+        must(farthest <= MOST, "particles.position", f"at most {MOST:g} m from the origin", farthest)
+        _check_sizes("radius", "m", arrays["radius"])
+        if self.density is not None:
+            with np.errstate(over="ignore"):
+                arrays["mass"] = 4 / 3 * np.pi * arrays["radius"] ** 3 * self.density
+        else:
+            arrays["mass"] = self._column("mass", self.mass, n)
+        _check_sizes("mass", "kg", arrays["mass"])
         for name, value in self.quantities.items():
             must(
                 name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value
@@ -113,6 +123,15 @@ class Particles(Start):
 
 def _worst(column: np.ndarray) -> float:
     return float(column[~np.isfinite(column)].flat[0]) if not np.isfinite(column).all() else 0.0
+
+
+def _check_sizes(name: str, unit: str, column: np.ndarray) -> None:
+    """InputError unless all are above 0 and within the limits of their unit."""
+    least, most = limits(unit)
+    must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min()))
+    outside = column[(column < least) | (column > most)]
+    worst = float(outside[0]) if len(outside) else 0.0
+    must(not len(outside), f"particles.{name}", f"from {least:g} to {most:g} {unit}", worst)
 
 
 class Cloud(Start):
@@ -129,7 +148,7 @@ class Cloud(Start):
     parameters.
     """
 
-    number: int | None = Field(None, gt=0, le=10**8)
+    number: int | None = Field(None, gt=0, le=PARTICLES)
     radius: float = parameter("m", gt=0)
     density: float = parameter("kg/m^3", gt=0)
     placement: Placement = RandomInDomain()
@@ -138,7 +157,7 @@ class Cloud(Start):
     pulse: Pulse | None = None
     temperature: float = parameter("K", 300.0, gt=0)
     specific_charge: float | None = parameter("C/kg", None)
-    quantities: Mapping[str, float | Vector] = Field(default_factory=dict)
+    quantities: Mapping[Text, float | Vector] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -150,30 +169,32 @@ class Cloud(Start):
         own |= {"charge"} if self.specific_charge is not None else set()
         for name, value in self.quantities.items():
             must(name not in own, f"cloud.quantities.{name}", "given beside quantities, and once", value)
+        mass, rule = self._mass(), f"from {LEAST:g} to {MOST:g} kg"
+        must(LEAST <= mass <= MOST, "mass of a particle of the cloud", rule, mass)
         return self
 
     def count(self) -> int:
         """Number of spheres."""
         return self.placement.sites() or self.number or 0
 
-    @model_validator(mode="after")
-    def _weighs(self) -> Self:
-        with np.errstate(over="ignore"):
-            mass = float(self.density * 4 / 3 * np.pi * np.float64(self.radius) ** 3)
-        must(0 < mass < np.inf, "mass of a particle of the cloud", "greater than 0 and finite", mass)
-        return self
+    def _mass(self) -> float:
+        """Mass of each sphere, kg."""
+        return self.density * 4 / 3 * np.pi * self.radius**3
 
     def masses(self) -> np.ndarray:
-        return np.full(self.count(), self.density * 4 / 3 * np.pi * self.radius**3)
+        # All in one place of memory, as the number may be large and a scene is checked before it is run.
+        return np.broadcast_to(self._mass(), self.count())
 
+    @np.errstate(over="ignore", invalid="ignore")
     def arrays(self, domain: Domain, seed: int) -> Arrays:
         n = self.count()
+        check_memory(f"a cloud of {n} particles", n)
         draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
         arrays = {
             "position": self.placement.centres(n, self.radius, domain, seed),
             "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
             "radius": np.full(n, self.radius),
-            "mass": self.masses(),
+            "mass": np.full(n, self._mass()),
             "temperature": np.full(n, self.temperature),
             **{name: np.repeat([value], n, axis=0).astype(float) for name, value in self.quantities.items()},
         }
@@ -181,6 +202,8 @@ class Cloud(Start):
             arrays["charge"] = arrays["mass"] * self.specific_charge
         if self.pulse is not None:
             arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
+        for name, values in arrays.items():
+            must(bool(np.isfinite(values).all()), f"{name} of the cloud", "finite", _worst(values))
         return arrays
 
     def structure(self) -> tuple[Any, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tisim.errors import InputError, must
+from tisim.errors import InputError, must, named, shown
 from tisim.scene import Scene
 
 
@@ -24,7 +24,7 @@ def scene(
     """
     if target.endswith(".toml"):
         must(size is None, "--size", "given for a case only", size)
-        name, made = Path(target).stem, _from_file(Path(target))
+        name, made = Path(target).stem, Scene.from_toml(target)
         if seed is not None:
             made = made.replace({"seed": seed})
     else:
@@ -38,25 +38,25 @@ def scene(
     return name, made.without(*absent).replace(assignments(changes))
 
 
-def _from_file(path: Path) -> Scene:
-    must(not path.is_dir(), "scene file", "a file", str(path))
-    try:
-        return Scene.from_toml(path)
-    except OSError as error:
-        raise InputError(f"scene file must be readable; received {str(path)!r} ({error.strerror})") from None
-
-
 def assignments(changes: Sequence[str]) -> dict[str, Any]:
     """``key=value`` texts as a mapping. A value is read as TOML; what is not TOML is text."""
     found = {}
     for change in changes:
         key, equals, text = change.partition("=")
         must(bool(key.strip() and equals), "--set", "key=value", change)
-        try:
-            found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            found[key.strip()] = text.strip()
+        found[key.strip()] = _value(key, text)
     return found
+
+
+def _value(key: str, text: str) -> Any:
+    """What stands right of the equals sign: a TOML value, else text."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+    except (RecursionError, ValueError):
+        # Nested too deeply to be read, or a number of thousands of digits.
+        raise InputError(f"{named(key)} must be a value that can be read; received {shown(text)}") from None
 
 
 def below(table: str, changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -70,11 +70,14 @@ def nested(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
     """Settings with dotted keys changed; tables on the way are made where they are missing."""
     result = dict(settings)
     for dotted, value in changes.items():
-        first, _, rest = dotted.partition(".")
-        if rest:
-            inside = result.get(first, {})
-            must(isinstance(inside, Mapping), dotted, "a setting", rest)
-            result[first] = nested(inside, {rest: value})
-        else:
-            result[first] = value
+        *path, last = dotted.split(".")
+        place = result
+        for step in path:
+            inside = place.get(step, {})
+            must(isinstance(inside, Mapping), dotted, "a setting", last)
+            # A copy, as the settings given stay as they are.
+            inner = dict(inside)
+            place[step] = inner
+            place = inner
+        place[last] = value
     return result

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -14,9 +13,9 @@ from pydantic import Field, field_validator, model_validator
 from tisim import effects, kinds, operators, sources, steppers
 from tisim.domain import Box, Domain, Open
 from tisim.effect import Effect, Source
-from tisim.errors import InputError, must
+from tisim.errors import InputError, must, shown
 from tisim.particles import Start
-from tisim.spec import Spec
+from tisim.spec import Spec, Text
 from tisim.steppers.stepper import Stepper
 from tisim.steppers.verlet import Verlet
 
@@ -38,7 +37,7 @@ class Scene(Spec):
     Raises InputError ("X must be Y; received Z") when made from anything that cannot be run.
     """
 
-    name: str = "scene"
+    name: Text = "scene"
     particles: Start
     effects: tuple[Effect, ...] = ()
     domain: Domain = Open()
@@ -119,42 +118,49 @@ class Scene(Spec):
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Scene:
         """A scene from plain data; InputError names the key that is wrong."""
-        rest = dict(data)
+        rest = kinds.table(data, "scene")
         must("particles" in rest, "scene.particles", "given", "nothing")
         made: dict[str, Any] = {"particles": kinds.from_dict(Start, rest.pop("particles"), "particles")}
         if "domain" in rest:
             made["domain"] = kinds.from_dict(Domain, rest.pop("domain"), "domain")
         if "stepper" in rest:
             made["stepper"] = cls._stepper(rest.pop("stepper"))
-        listed = rest.pop("effects", {})
-        must(isinstance(listed, Mapping), "scene.effects", "a table of effects", listed)
+        listed = kinds.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
         kinds.load(effects)
         kinds.load(operators)
         kinds.load(sources)
-        for kind, values in listed.items():
-            must(isinstance(values, Mapping), f"effects.{kind}", "a table", values)
+        tables = {kind: kinds.table(values, f"effects.{kind}") for kind, values in listed.items()}
         made["effects"] = tuple(
             kinds.from_dict(Effect, {"kind": kind, **values}, f"effects.{kind}")
-            for kind, values in listed.items()
+            for kind, values in tables.items()
         )
         return cls(**made, **rest)
 
     @staticmethod
     def _stepper(data: Any) -> Stepper:
         kinds.load(steppers)
-        must(isinstance(data, Mapping), "stepper", "a table", data)
-        return kinds.from_dict(Stepper, {"kind": Verlet.kind(), **data}, "stepper")
+        return kinds.from_dict(Stepper, {"kind": Verlet.kind(), **kinds.table(data, "stepper")}, "stepper")
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Scene:
         """A scene from a TOML file; InputError when it is not one."""
+        file, what = Path(path), "scene file"
+        text = None
         try:
-            with Path(path).open("rb") as file:
-                return cls.from_dict(tomllib.load(file))
+            # Neither a folder nor a pipe, which may never end.
+            if file.is_file() or not file.exists():
+                text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise InputError(f"scene file must exist; received {str(path)!r}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
-            raise InputError(f"scene file must be TOML; received {str(path)!r} ({fault})") from None
+            raise InputError(f"{what} must exist; received {shown(str(path))}") from None
+        except OSError as error:
+            received = f"{shown(str(path))} ({error.strerror})"
+            raise InputError(f"{what} must be readable; received {received}") from None
+        except ValueError as fault:
+            # Bytes that are no text, or a name with a NUL.
+            raise InputError(f"{what} must be TOML; received {shown(str(path))} ({fault})") from None
+        if text is None:
+            raise InputError(f"{what} must be a file; received {shown(str(path))}")
+        return cls.from_dict(kinds.read_toml(text, what, str(path)))
 
     def to_toml(self) -> str:
         """The scene as TOML text; ``from_toml`` gives it back."""
@@ -185,7 +191,8 @@ class Scene(Spec):
 
 def _step(place: Any, step: str, key: str) -> Any:
     """The key or number by which a place in plain data is entered; InputError naming the whole ``key``."""
-    listed = isinstance(place, list) and step.isdecimal() and int(step) < len(place)
+    # Of few digits: Python does not read numbers of some thousand.
+    listed = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
     must(listed or (isinstance(place, dict) and step in place), key, "a setting of this scene", step)
     return int(step) if listed else step
 

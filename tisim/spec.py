@@ -6,20 +6,33 @@ A ``Spec`` is a frozen pydantic model. Its name in a file is its class name in s
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Self, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 from tisim._taichi import DEVICE_FUNCTION
-from tisim.errors import InputError, must
+from tisim.errors import InputError, must, named, shown
 from tisim.knob import Knob
+from tisim.ranges import WHOLE, check_magnitude
 
 Vector = tuple[float, float, float]
 """Three Cartesian components."""
+
+
+def _encodable(text: str) -> str:
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise PydanticCustomError("surrogate", "text that UTF-8 can hold")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_encodable)]
+"""Text that a file can hold: without halves of surrogate pairs."""
 ROWS = 32
 """Rows that there is room for in every list."""
 
@@ -29,7 +42,8 @@ class Checked(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    def __init__(self, **data: Any) -> None:
+    # ``self`` by position alone: a file can have a key of that name.
+    def __init__(self, /, **data: Any) -> None:
         try:
             super().__init__(**data)
         except ValidationError as invalid:
@@ -46,11 +60,23 @@ class Spec(Checked):
 
     model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
 
+    @model_validator(mode="after")
+    def _in_range(self) -> Self:
+        """Refuse magnitudes with which the arithmetic does not hold (see ranges.py)."""
+        varying = {name for name, _, _ in self.parameters()}
+        for name, info in type(self).model_fields.items():
+            value, where = getattr(self, name), f"{self.kind()}.{name}"
+            if name in varying and value is not None:
+                check_magnitude(where, unit_of(info), value)
+            elif info.annotation in (int, int | None, int | float) and not _bounded(info):
+                must(value is None or abs(value) < WHOLE, where, f"less than {WHOLE}", value)
+        return self
+
     @classmethod
-    def named(cls, kind: str, where: str) -> type[Self]:
+    def named(cls, kind: Any, where: str) -> type[Self]:
         """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
         known = cls.known()
-        must(kind in known, where, f"one of {', '.join(sorted(known))}", kind)
+        must(isinstance(kind, str) and kind in known, where, f"one of {', '.join(sorted(known))}", kind)
         return known[kind]
 
     @classmethod
@@ -128,6 +154,11 @@ def parameter(unit: str, default: Any = ..., **rules: Any) -> Any:
     return Field(default, json_schema_extra={"unit": unit}, **rules)
 
 
+def _bounded(info: FieldInfo) -> bool:
+    """Whether the rules of a number say how large it may be."""
+    return any(hasattr(rule, "le") or hasattr(rule, "lt") for rule in info.metadata)
+
+
 def room(rows: int) -> int:
     """Rows that a world's table has room for, so that scenes with lists of like lengths run as one batch."""
     return max(ROWS, 1 << (rows - 1).bit_length())
@@ -155,6 +186,7 @@ _RULES = {
     "bool_type": "true or false",
     "string_type": "text",
     "missing": "given",
+    "extra_forbidden": "a known key",
     "literal_error": "{expected}",
     "tuple_type": "a list",
     "too_short": "a list of {min_length}",
@@ -162,25 +194,38 @@ _RULES = {
 }
 
 
+FAULTS = 10
+"""Faults that a message lists, a line for each."""
+_CHOICE = re.compile(r"int|float|tuple\[.*\]")
+"""What pydantic adds to the place of a fault, for each type that would have done."""
+
+
 def explain_invalid(invalid: ValidationError, where: str) -> str:
     """One line per fault of a pydantic report: "X must be Y; received Z"."""
-    lines = []
-    for fault in invalid.errors():
-        name = ".".join([where, *(str(part) for part in fault["loc"])])
+    lines: dict[str, list[str]] = {}
+    received: dict[str, str] = {}
+    for fault in invalid.errors(include_url=False):
+        loc = tuple(itertools.takewhile(lambda part: not _is_choice(part), fault["loc"]))
+        name = named(".".join([where, *map(str, loc)]))
         context: Mapping[str, Any] = fault.get("ctx", {})
         if isinstance(context.get("error"), InputError):
-            lines += _named_within(name, fault["loc"], str(context["error"]))
-            continue
-        if fault["type"] == "extra_forbidden":
-            lines.append(f"{name} must be a known key; received {fault['input']!r}")
-            continue
-        if fault["type"] == "missing":
-            lines.append(f"{name} must be given; received nothing")
+            for line in _named_within(name, loc, str(context["error"])):
+                lines.setdefault(line, [])
             continue
         known = _RULES.get(fault["type"])
         rule = known.format(**context) if known else fault["msg"].removeprefix("Input should be ")
-        lines.append(f"{name} must be {rule}; received {fault['input']!r}")
-    return "\n".join(lines)
+        lines.setdefault(name, []).append(rule)
+        received.setdefault(name, "nothing" if fault["type"] == "missing" else shown(fault["input"]))
+    text = [
+        f"{name} must be {' or '.join(dict.fromkeys(rules))}; received {received[name]}" if rules else name
+        for name, rules in lines.items()
+    ]
+    rest = f" (and {len(text) - FAULTS} faults more)" if len(text) > FAULTS else ""
+    return "\n".join(text[:FAULTS]) + rest
+
+
+def _is_choice(part: int | str) -> bool:
+    return isinstance(part, str) and _CHOICE.fullmatch(part) is not None
 
 
 def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:

@@ -36,6 +36,12 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             _check(f, start[f.name], n)
+    # Where rounding is coarser than a particle, it is not known what it touches.
+    farthest = np.abs(start["position"]).max(axis=1)
+    coarse = np.spacing(farthest.astype(_real())) > start["radius"]
+    worst = float(farthest[coarse][0]) if coarse.any() else 0.0
+    rule = f"so near the origin that {runtime.current().precision} rounds it by less than a radius"
+    must(not coarse.any(), "particles.position", rule, worst)
 
 
 def _check(f: Field, values: np.ndarray, n: int) -> None:
@@ -43,10 +49,13 @@ def _check(f: Field, values: np.ndarray, n: int) -> None:
     held: np.ndarray
     with np.errstate(over="ignore"):
         held = values.astype(_real())
-    lost = ~np.isfinite(held)
-    if f.name in ("mass", "radius"):
-        # No mass is what marks a particle as gone.
-        lost |= held == 0
+    lost, least = ~np.isfinite(held), float(np.finfo(_real()).tiny)
+    if f.name == "mass":
+        # Kernels flush smaller numbers to zero, and no mass is what marks a particle as gone.
+        lost |= held < least
+    if f.name == "radius":
+        # Volumes are its cube.
+        lost |= (held < least ** (1 / 3)) | (held > float(np.finfo(_real()).max) ** (1 / 3))
     if lost.any():
         rule = f"within the range of {runtime.current().precision}"
         must(False, f"particles.{f.name}", rule, float(values[lost][0]))

@@ -5,8 +5,9 @@ import pytest
 
 import tisim
 from tests.scenes import flow
-from tisim import Box, Cloud, Particles, Scene, Simulation
+from tisim import Box, Cloud, Lattice, Particles, RandomAroundCylinder, Scene, Simulation
 from tisim.effects.impact import Impact
+from tisim.effects.mie import Mie
 from tisim.errors import InputError
 from tisim.operators.cooling import Cooling
 from tisim.operators.fragmentation import Fragmentation
@@ -30,9 +31,53 @@ BAD = {
     "absolute zero": (lambda: Cloud(**CLOUD, temperature=0), "cloud.temperature must be greater than 0"),
     "no mass at all": (
         lambda: Cloud(**{**CLOUD, "radius": 1e-120}),
-        "mass of a particle of the cloud must be",
+        "cloud.radius must be 0, or of a magnitude of 1e-100 to 1e+100 m; received 1e-120",
     ),
-    "mass beyond numbers": (lambda: Cloud(**{**CLOUD, "radius": 1e200}), "mass of a particle of the cloud"),
+    "radius beyond volumes": (lambda: Cloud(**{**CLOUD, "radius": 1e200}), "cloud.radius must be 0, or of"),
+    "mass beyond numbers": (
+        lambda: Cloud(**{**CLOUD, "density": 1e300}),
+        "mass of a particle of the cloud must be from 1e-100 to 1e+100 kg; received",
+    ),
+    "mass of 1e-320": (lambda: particles(mass=1e-320), "particles.mass must be from 1e-100 to 1e+100 kg"),
+    "mass of 1e308": (lambda: particles(mass=1e308), "particles.mass must be from 1e-100 to 1e+100 kg"),
+    "a radius of 1e-300": (lambda: particles(radius=1e-300), "particles.radius must be from 1e-100 to 1e+1"),
+    "a place at 1e300": (
+        lambda: particles(position=[[1e300, 0, 0]]),
+        "particles.position must be at most 1e+100 m from the origin; received 1e+300",
+    ),
+    "whole number without end": (
+        lambda: particles(quantities={"temperature": [10**400]}),
+        "particles.temperature must be numbers; received [a whole number of about 401 digits]",
+    ),
+    "text for a quantity": (
+        lambda: particles(quantities={"temperature": "300"}),
+        "particles.temperature must be numbers; received '300'",
+    ),
+    "half a surrogate pair": (
+        lambda: Scene(particles=Cloud(**CLOUD), duration=1, name="\ud800"),
+        "scene.name must be text that UTF-8 can hold; received '\\ud800'",
+    ),
+    "more sites than a start can have": (
+        lambda: Lattice(shape=(10**4,) * 3, spacing=1.0),
+        "lattice.shape must be of at most 1e+08 sites together; received (10000, 10000, 10000)",
+    ),
+    "thickness beyond areas": (
+        lambda: RandomAroundCylinder(radius=1, length=1, thickness=3e296),
+        "random_around_cylinder.thickness must be 0, or of a magnitude of 1e-100 to 1e+100 m",
+    ),
+    "axis beyond squares": (
+        lambda: RandomAroundCylinder(radius=1, length=1, thickness=1, axis=(1e200, 0, 0)),
+        "random_around_cylinder.axis must be a direction",
+    ),
+    "a subnormal parameter": (
+        lambda: Impact(hardness=1e-320),
+        "impact.hardness must be 0, or of a magnitude of 2.225e-308 to 1.798e+308 Pa; received 1e-320",
+    ),
+    "more iterations than can be counted": (
+        lambda: Impact(hardness=1, max_iterations=2**31),
+        "impact.max_iterations must be less than 2147483648",
+    ),
+    "an exponent without end": (lambda: Mie(epsilon=1, n=1e300), "mie.n must be less than 2147483648"),
     "unknown key": (lambda: Cloud(**CLOUD, colour="red"), "cloud.colour must be a known key; received 'red'"),
     "unit in text": (
         lambda: Cloud(**{**CLOUD, "radius": "1 mm"}),
@@ -74,7 +119,7 @@ BAD = {
     ),
     "box inside out": (lambda: Box(low=(0, 0, 0), high=(1, 1, 0)), "box.high must be above box.low in every"),
     "box infinite": (lambda: Box(low=(0, 0, 0), high=(1, 1, INF)), "box.high.2 must be a finite number"),
-    "box beyond numbers": (lambda: Box(low=(0, 0, 0), high=(1e200,) * 3), "volume of the box must be"),
+    "box beyond numbers": (lambda: Box(low=(0, 0, 0), high=(1e200,) * 3), "box.high must be 0, or of"),
     "step zero": (lambda: FixedStep(dt=0), "fixed_step.dt must be greater than 0"),
     "limits crossed": (
         lambda: ApproachTime(shortest=1e-2),

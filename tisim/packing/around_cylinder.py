@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from tisim.domain import Domain
 from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
+from tisim.ranges import check_direction, check_resolved
 from tisim.spec import Vector, parameter
 
 ROUNDS = 200
@@ -37,7 +38,7 @@ class RandomAroundCylinder(Placement):
     @field_validator("axis", mode="after")
     @classmethod
     def _direction(cls, axis: Vector) -> Vector:
-        must(0 < float(np.linalg.norm(axis)) < np.inf, "random_around_cylinder.axis", "a direction", axis)
+        check_direction("random_around_cylinder.axis", axis)
         return axis
 
     def volume(self) -> float:
@@ -50,6 +51,10 @@ class RandomAroundCylinder(Placement):
         rule = f"above a diameter, {2 * radius:g} m"
         must(self.thickness > 2 * radius, "thickness", rule, self.thickness)
         must(self.part != "side" or self.length > 2 * radius, "length", rule, self.length)
+        farthest = np.abs(self.centre) + self.radius + self.length / 2 + self.thickness
+        check_resolved("places around the cylinder", farthest, radius)
+        fraction = number * 4 / 3 * np.pi * radius**3 / self.volume()
+        must(fraction <= 1, "volume fraction", "at most 1", float(f"{fraction:.4g}"))
         generator = np.random.default_rng([seed, 0x6C61796572])
         found = np.empty((0, 3))
         for _ in range(ROUNDS):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Self
 
 import numpy as np
@@ -11,6 +12,7 @@ from tisim.domain import Domain
 from tisim.errors import InputError, must
 from tisim.packing import region
 from tisim.packing.sequential import place
+from tisim.ranges import PARTICLES, check_resolved
 from tisim.spec import Spec, Vector, parameter
 
 
@@ -84,6 +86,8 @@ class Lattice(Placement):
     @model_validator(mode="after")
     def _sound(self) -> Self:
         must(min(self.shape) > 0, "lattice.shape", "at least 1 in each direction", self.shape)
+        rule = f"of at most {PARTICLES:.0e} sites together"
+        must(self.sites() <= PARTICLES, "lattice.shape", rule, self.shape)
         given = "both" if self.size is not None else "neither"
         must((self.spacing is None) != (self.size is None), "lattice", "given spacing or size", given)
         for n, length in zip(self.shape, self.size or (), strict=False):
@@ -92,7 +96,7 @@ class Lattice(Placement):
         return self
 
     def sites(self) -> int:
-        return int(np.prod(self.shape))
+        return math.prod(self.shape)
 
     def steps(self) -> np.ndarray:
         """Distance of neighbours along each axis, m, shape (3,)."""
@@ -105,5 +109,7 @@ class Lattice(Placement):
         # Touching is allowed, to rounding.
         rule = f"at least a diameter, {2 * radius:g} m, apart"
         must(bool(closest >= 2 * radius * (1 - 1e-12)), "lattice sites", rule, float(closest))
+        half = (np.asarray(self.shape) - 1) / 2 * self.steps()
+        check_resolved("lattice sites", np.abs(self.centre) + half, radius)
         index = np.indices(self.shape).reshape(3, -1).T
         return np.asarray(self.centre) + (index - (np.asarray(self.shape) - 1) / 2) * self.steps()

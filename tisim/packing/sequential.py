@@ -12,6 +12,7 @@ from tisim._taichi import ti
 from tisim.errors import InputError, must
 from tisim.packing.region import Region, box
 from tisim.packing.voids import fill
+from tisim.ranges import check_resolved
 
 STREAM = 0x52534100
 SATURATION = 0.3841
@@ -19,13 +20,14 @@ SATURATION = 0.3841
 PATIENCE = 5_000
 """Failures in a row after which places are no longer tried everywhere, only where there is room."""
 CELLS = 64
-PER_CELL = 8
+"""Cells along an axis, at most."""
 
 
 @ti.kernel
 def _add(
     centres: ti.types.ndarray(),  # type: ignore[valid-type]
-    cells: ti.types.ndarray(),  # type: ignore[valid-type]
+    heads: ti.types.ndarray(),  # type: ignore[valid-type]
+    follow: ti.types.ndarray(),  # type: ignore[valid-type]
     spheres: ti.i32,
     radius: ti.f64,
     seed: ti.u64,
@@ -42,7 +44,11 @@ def _add(
     periodic: ti.i32,
     ball: ti.i32,
 ) -> ti.i32:
-    """Place the spheres; returns how many found room. ``cells[c, 0]`` counts the members that follow it."""
+    """Place the spheres; returns how many found room.
+
+    ``heads`` has the last member of each cell, and ``follow`` the one before each sphere in its cell; -1
+    where there is none.
+    """
     placed = 0
     ti.loop_config(serialize=True)
     for _once in range(1):
@@ -71,8 +77,8 @@ def _add(
                             c = (c + dims) % dims
                         if free and c.min() >= 0 and (c < dims).all():
                             at = (c[0] * dims[1] + c[1]) * dims[2] + c[2]
-                            for m in range(cells[at, 0]):
-                                j = cells[at, m + 1]
+                            j = heads[at]
+                            while j >= 0:
                                 gap = ti.Vector([
                                     x[0] - centres[j, 0], x[1] - centres[j, 1], x[2] - centres[j, 2]
                                 ])  # fmt: skip
@@ -80,10 +86,11 @@ def _add(
                                     gap -= side * ti.round(gap / side)
                                 if gap.norm_sqr() < 4.0 * radius * radius:
                                     free = False
+                                j = follow[j]
                     if free:
                         at = (cell[0] * dims[1] + cell[1]) * dims[2] + cell[2]
-                        cells[at, cells[at, 0] + 1] = i
-                        cells[at, 0] += 1
+                        follow[i] = heads[at]
+                        heads[at] = i
                         for k in ti.static(range(3)):
                             centres[i, k] = x[k]
             if free:
@@ -111,6 +118,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     the volume fraction reached, when no further sphere fits.
     """
     runtime.current()
+    check_resolved("places of the packing", np.stack([region.low, region.high]), radius)
     sphere = 4 / 3 * np.pi * radius**3
     # Refused at once where no choice of places would do: a few spheres can exceed the limit of many.
     most = (SATURATION + count**-0.5) * region.covered(radius) / region.volume
@@ -133,13 +141,12 @@ def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndar
     """The first centres, found by trying places in all of the region."""
     # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
     dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, CELLS).astype(int)
-    wide = np.prod(np.minimum(region.side / dims / (2.0 * radius), 1e6))
-    members = min(count, int(np.ceil(wide)) * PER_CELL)
-    cells = np.zeros((int(np.prod(dims)), 1 + members), dtype=np.int32)
-    centres = np.zeros((count, 3))
+    heads = np.full(int(np.prod(dims)), -1, dtype=np.int32)
+    centres, follow = np.zeros((count, 3)), np.full(count, -1, dtype=np.int32)
     placed = _add(
         centres,
-        cells,
+        heads,
+        follow,
         count,
         radius,
         seed,

@@ -12,6 +12,7 @@ from scipy.constants import mu_0
 from tisim._taichi import ti
 from tisim.effect import Effect, parameter
 from tisim.errors import InputError, must
+from tisim.ranges import check_direction
 from tisim.sources import cylinder_field
 from tisim.sources.cylinder_end import ClosedEnds
 from tisim.sources.cylinder_table import TabulatedEnds, table
@@ -33,8 +34,8 @@ class Cylinder(Body):
     @field_validator("axis", mode="after")
     @classmethod
     def _unit(cls, axis: Vector) -> Vector:
+        check_direction("cylinder.axis", axis)
         size = float(np.linalg.norm(axis))
-        must(0 < size < np.inf, "cylinder.axis", "a direction", axis)
         # One that is of unit length to rounding stays as it is: files give back the same bits.
         return axis if abs(size - 1) < 1e-15 else (axis[0] / size, axis[1] / size, axis[2] / size)
 

@@ -1,0 +1,158 @@
+"""Values that nobody means, and valid scenes with something of theirs put in the wrong place."""
+
+from __future__ import annotations
+
+import copy
+import datetime
+from functools import cache
+from random import Random
+from typing import Any
+
+from tests.scenes import flow, scene
+from tests.test_packing_placement import BALL, VIBRATION
+from tisim import Blast, Cloud, RandomAroundCylinder, RandomInBox, kinds, steppers
+from tisim.effect import Effect
+from tisim.explain import known_effects
+from tisim.sources.uniform import MagneticField
+from tisim.spec import Spec
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.stepper import Stepper
+
+
+def nested(levels: int) -> list[Any]:
+    """A list in a list, so many times."""
+    inner: list[Any] = []
+    for _ in range(levels):
+        inner = [inner]
+    return inner
+
+
+def tables(levels: int) -> dict[str, Any]:
+    """A table in a table, so many times."""
+    inner: dict[str, Any] = {}
+    for _ in range(levels):
+        inner = {"a": inner}
+    return inner
+
+
+NUMBERS = (
+    0, -0.0, 1, -1, 3, 0.5, 2.5, 1e-9, 2.3e-308, 1e-200, 1e-100, 1e-30, 1e15, 1e17, 3e38, 1e39, 1e100, 1e155,
+    3e296, 1.7e308, float("inf"), -float("inf"), float("nan"), 2**31, 2**53 + 1, 2**63, -(2**63), 10**400,
+    -(10**5000),
+)  # fmt: skip
+TEXTS = (
+    "", " ", "x", "nan", "1e999", "sphere", "self", "kind", "größer", "日本", "😀", "a\x00b", "a\nb", "\x7f",
+    "\ud800", 'a"b\\', "[table]", "a.b", "../x", "x" * 100_000, "9" * 5000,
+)  # fmt: skip
+OTHERS = (
+    None, True, False, (), [], {}, [[]], [None], [1], [1, 2], [1, 2, 3], [1, 2, 3, 4], [1, "2", 3], [0.0] * 3,
+    [[0, 0, 0]], [[0, 0, 0]] * 2, [[1, 2], [3]], {"kind": "verlet"}, {"kind": []}, {"self": 1}, {"": 1},
+    {"a": {"b": 1}}, datetime.date(2004, 1, 1), datetime.time(1), b"bytes", 1j, {3}, {3: 4}, object(),
+)  # fmt: skip
+DEEP = (100, 500, 2000, 20_000)
+
+
+def value(random: Random) -> Any:
+    """Something hostile."""
+    choice = random.randrange(10)
+    if choice < 4:
+        return random.choice(NUMBERS)
+    if choice < 6:
+        return random.choice(TEXTS)
+    if choice < 9:
+        return copy.deepcopy(random.choice(OTHERS))
+    return random.choice((nested, tables))(random.choice(DEEP))
+
+
+def _places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every place in plain data but the whole of it; the first few of long lists, and none very deep."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    found = []
+    for key, inner in list(items)[: 8 if len(path) < 8 else 0]:
+        found += [(*path, key), *_places(inner, (*path, key))]
+    return found
+
+
+def _mutate(data: dict[str, Any], random: Random) -> None:
+    """Change one thing: a value, a key, or that it is there."""
+    *path, last = random.choice(_places(data))
+    place: Any = data
+    for step in path:
+        place = place[step]
+    kind = random.randrange(8)
+    if kind < 4:
+        place[last] = value(random)
+    elif kind == 4:
+        del place[last]
+    elif isinstance(place, list):
+        place.extend([copy.copy(place[last])] * random.choice((1, 2, 40)))
+    elif kind == 5:
+        place[random.choice((*TEXTS, 3, None, (1, 2)))] = place.pop(last)
+    elif kind == 6:
+        place[random.choice(TEXTS)] = copy.copy(place[last])
+    else:
+        place[random.choice(list(place))] = place[last]
+
+
+def mutated(random: Random) -> dict[str, Any]:
+    """The plain data of a scene that was valid, with one to three things in it changed."""
+    data = copy.deepcopy(random.choice(valid()))
+    for _ in range(random.choice((1, 1, 1, 2, 3))):
+        if data:
+            _mutate(data, random)
+    return data
+
+
+@cache
+def valid() -> tuple[dict[str, Any], ...]:
+    """Plain data of scenes: those of all cases, every stepper and control, every start, every effect by
+    itself where it needs no other."""
+    from cases.case import every
+
+    base = scene([[0, 0, 0], [1, 0, 0]], [[0, 0, 0]] * 2, quantities={"temperature": 300.0})
+    found = [flow(grains=3).to_dict(), base.to_dict()]
+    found += [case.scene(size, 1).to_dict() for case in every().values() for size in list(case.sizes)[:2]]
+    box = {"kind": "box", "low": [-1.0] * 3, "high": [1.0] * 3}
+    cylinder = RandomAroundCylinder(radius=0.5, length=3.0, thickness=0.4)
+    starts = (
+        Cloud(**BALL, specific_charge=10.0, pulse=Blast(energy=1e4)),
+        Cloud(**VIBRATION, quantities={"charge": 1.0, "spin": (0.0, 0.0, 3.0)}),
+        Cloud(number=9, radius=0.02, density=1.0, placement=cylinder),
+        Cloud(number=5, radius=0.1, density=1.0, placement=RandomInBox(low=(0, 0, 0), high=(1, 1, 1))),
+        Cloud(number=5, radius=0.1, density=1.0),
+    )
+    for start in starts:
+        found.append({**base.to_dict(), "domain": box, "particles": kinds.to_dict(start)})
+    controls = {"brownian": DriftLimit(longest=1e-9), "boris": FixedStep(dt=1e-9)}
+    for name, kind in _known(Stepper).items():
+        needed = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
+        control = {"control": controls[name]} if name in controls else {}
+        found.append({**base.to_dict(), "stepper": kinds.to_dict(kind(**needed, **control))})
+    return (*found, *({**base.to_dict(), "effects": _with_needed(kind)} for kind in known_effects()))
+
+
+def _with_needed(kind: type[Effect]) -> dict[str, Any]:
+    """Plain data of an effect, after those that it needs."""
+    partners: dict[str, Any] = {}
+    for contract in kind.requires:
+        partners |= _with_needed(next(known for known in known_effects() if issubclass(known, contract)))
+    if kind.feels:
+        partners |= _with_needed(MagneticField)
+    rows = {name: [_required(row)] for name, row in kind.lists()}
+    return {**partners, kind.kind(): kinds.to_dict(kind(**_required(kind), **rows), named=False)}
+
+
+def _required(kind: type[Spec]) -> dict[str, Any]:
+    """A value that will do for each parameter that must be given."""
+    fit = {"cutoff": 4.0}
+    return {
+        name: fit.get(name, 0.5) if size == 1 else (0.0, 0.0, 0.5)
+        for name, info, size in kind.parameters()
+        if info.is_required()
+    }
+
+
+def _known(contract: type[Stepper]) -> dict[str, type[Stepper]]:
+    kinds.load(steppers)
+    return {name: kind for name, kind in contract.known().items() if kind.__module__.startswith("tisim.")}
