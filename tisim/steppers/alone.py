@@ -43,9 +43,10 @@ class Stretch(Phase):
 
 @ti.func
 def beginning(s, control: ti.template(), w, window):  # type: ignore[valid-type]
-    """When a window begins; none does after the end. s, f64."""
+    """When a window begins; none does after the end, and the first of all at 0. s, f64."""
     length = ti.cast(control.longest(w), ti.f64)
-    return ti.select((window + LITTLE) * length >= s.end[w], s.end[w], window * length)
+    over = window > 0.0 and (window + LITTLE) * length >= s.end[w]
+    return ti.select(over, s.end[w], window * length)
 
 
 class Alone(PerParticle):

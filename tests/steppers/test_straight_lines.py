@@ -1,0 +1,133 @@
+"""Particles on which nothing acts, for any time from 1e-15 to 1e3 of the longest step: straight lines."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, scene, simulate
+from tisim import Particles, Scene, runtime
+from tisim.effects.near_field import NearField
+from tisim.frames import frames
+from tisim.sources.flow import UniformFlow
+from tisim.steppers.boris import Boris
+from tisim.steppers.brownian import Brownian
+from tisim.steppers.collocation import Collocation
+from tisim.steppers.controller import ApproachTime, FixedStep
+from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.implicit_control import ErrorControl, IterationControl
+from tisim.steppers.stage_control import StageControl
+from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.verlet import Verlet
+from tisim.trajectory import Recording, Trajectory
+
+PARTICLES = 9
+"""One more than go together on a CPU."""
+NOTHING = NearField(alpha1=0.0, alpha2=0.0)
+"""A force between pairs, for which they take common steps."""
+FREE = {
+    "verlet, fixed": lambda longest: Verlet(control=FixedStep(dt=longest)),
+    "verlet, approach": lambda longest: Verlet(
+        control=ApproachTime(shortest=1e-3 * longest, longest=longest)
+    ),
+    "boris": lambda longest: Boris(control=FixedStep(dt=longest)),
+    "trapezoid, iteration": lambda longest: Trapezoid(control=IterationControl(**limits(longest))),
+    "trapezoid, error": lambda longest: Trapezoid(control=ErrorControl(**limits(longest))),
+    "collocation": lambda longest: Collocation(control=StageControl(**limits(longest))),
+}
+QUICK = ["verlet, fixed", "trapezoid, iteration", "brownian"]
+ALL = [
+    (name, together, schedule)
+    for name in (*FREE, "brownian")
+    for together in (False, True)
+    for schedule in ("world", "particle")
+]
+CASES = [
+    case if case[0] in QUICK and case[1:] == (False, "world") else pytest.param(*case, marks=pytest.mark.slow)
+    for case in ALL
+]
+DECADES = 10.0 ** np.arange(-15, 4)
+NEAR = np.array([1.0, 1 - 1e-12, 1 + 1e-12, 1 - 1e-7, 1 + 1e-7, 1 + 3e-6])
+"""A little less or more than whole steps, too."""
+RATIOS = np.unique(np.concatenate([DECADES, NEAR, 3 * NEAR, 1e-6 * NEAR, DECADES * np.pi / 2]))
+LONGEST = np.array([2.5e-4, 1e3])
+"""s; a small one and a generous one."""
+
+
+def limits(longest):
+    return {"first": 0.04 * longest, "longest": longest, "shortest": 1e-9 * longest}
+
+
+def straight(name, together, longest, ratio):
+    """Particles side by side, at velocities across the line they stand on, which are those of a flow for
+    colloids."""
+    place, velocity = np.zeros((PARTICLES, 3)), np.zeros((PARTICLES, 3))
+    place[:, 0] = 10.0 * np.arange(PARTICLES)
+    velocity[:, 1:] = [1e6, -3.0] if name == "brownian" else np.random.default_rng(1).normal(size=(9, 2))
+    effects, duration = (NOTHING,) if together else (), ratio * longest
+    if name != "brownian":
+        return scene(place, velocity, effects, stepper=FREE[name](longest), duration=duration)
+    control = DriftLimit(longest=longest, shortest=1e-8 * longest)
+    return Scene(
+        particles=Particles(position=place, velocity=velocity, radius=1e-3, density=1.0),
+        effects=(*effects, UniformFlow(velocity=tuple(velocity[0]))),
+        stepper=Brownian(temperature=0.0, viscosity=1.0, control=control),
+        duration=duration,
+    )
+
+
+def on_line(arrays, start, time):
+    """Whether particles are where they get in so much time (s)."""
+    rounding = np.finfo(runtime.current().precision.replace("f", "float")).eps
+    order = np.argsort(arrays["id"])
+    gone = arrays["position"][order][:, 1:]
+    np.testing.assert_allclose(gone, start["velocity"][:, 1:] * time, rtol=1e4 * rounding)
+
+
+@pytest.mark.parametrize(("name", "together", "schedule"), CASES)
+def test_straight_lines(name, together, schedule):
+    """For any duration: at least one step, the time asked for to the last bit, the place to rounding."""
+    scenes = [straight(name, together, longest, ratio) for longest in LONGEST for ratio in RATIOS]
+    for result in simulate(scenes, worlds=len(scenes), capacity=PARTICLES, schedule=schedule):
+        assert result.status.ok, result.status.reason
+        assert result.time == result.scene.duration
+        assert result.work["steps"] > 0
+        assert result.work["particle_steps"] >= PARTICLES
+        on_line(result.state, result.start, result.time)
+
+
+def test_a_moment_of_the_default_stepper():
+    """A picosecond at 1e6 m/s, with limits as they come."""
+    (result,) = simulate([scene([[0.0] * 3], [[1e6, 0, 0]], stepper=Trapezoid(), duration=1e-12)])
+    assert result.state["position"][0, 0] == 1e-6
+    assert result.work["particle_steps"] == 1
+
+
+@pytest.mark.parametrize("name", ["trapezoid, iteration", "brownian"])
+def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
+    """They meet at multiples of the longest step. Frames a little before or after one: each shows particles
+    where they were, none comes too early, and the end is the same to the last bit."""
+    ratios = np.array([1e-9, 1e-6, 0.3, 1.0, 1 + 1e-7, 7.0, 7 - 1e-7])
+    scenes = [straight(name, False, LONGEST[0], ratio) for ratio in ratios]
+    alone = simulate(scenes, worlds=len(RATIOS) * len(LONGEST), capacity=PARTICLES, schedule="world")
+    simulation = compiled(scenes[0], len(RATIOS) * len(LONGEST), PARTICLES, "world")
+    for every in LONGEST[0] * np.array([1e-3, 1 - 1e-7, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-7, 2.5]):
+        path = tmp_path / f"{every}.h5"
+        simulation.load(scenes)
+        with Trajectory(Recording(path, every=every), scenes, runtime.current().precision) as trajectory:
+            trajectory.record(simulation, range(len(scenes)))
+            simulation.run()
+        for w, (result, other) in enumerate(zip(simulation.results(), alone, strict=True)):
+            np.testing.assert_array_equal(result.state["position"], other.state["position"])
+            with frames(path, w) as seen:
+                times = []
+                for frame in seen:
+                    times.append(frame.time)
+                    on_line(frame.arrays, result.start, frame.time)
+            assert times[0] == 0.0
+            assert times[-1] == result.time
+            # One for each time that was asked for, at the next meeting or at the end.
+            meetings = np.append(
+                np.arange(np.ceil(result.time / LONGEST[0] - 1e-6)) * LONGEST[0], result.time
+            )
+            asked = np.arange(np.floor(result.time / every) + 1) * every
+            due = np.searchsorted(meetings, asked * (1 - 1e-8))
+            assert set(meetings[np.minimum(due, len(meetings) - 1)]) <= set(times)
