@@ -141,7 +141,8 @@ def _advance(simulation: Simulation, name: str, path: Path) -> bool:
 
         def progress(fraction: float) -> None:
             nonlocal saved
-            bar.update(task, completed=fraction)
+            ahead = f"{name}, {simulation.ahead():.3g} steps ahead"
+            bar.update(task, completed=fraction, description=ahead)
             ctrl_c.check()
             if time.monotonic() - saved > CHECKPOINT_SECONDS:
                 checkpoint.save(simulation, path)

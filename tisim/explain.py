@@ -49,14 +49,16 @@ class Memory:
 class Explanation:
     """A scene, as one world of it is compiled.
 
-    particles, capacity : at the start, and room for. memory : every allocation, fields first. phases : of a
-    step, in order; those with * are repeated until nothing waits. absent_effects : known, and left out.
+    particles, capacity : at the start, and room for. steps : that a run takes at least. memory : every
+    allocation, fields first. phases : of a step, in order; those with * are repeated until nothing waits.
+    absent_effects : known, and left out.
     absent_fields : (field, effects that would need it), not allocated.
     """
 
     name: str
     particles: int
     capacity: int
+    steps: float
     schedule: str
     precision: str
     effects: tuple[Part, ...]
@@ -89,6 +91,7 @@ def explain(scene: Scene) -> Explanation:
         name=scene.name,
         particles=len(scene.particles.masses()),
         capacity=capacity,
+        steps=scene.stepper.fewest(scene.effects, scene.duration),
         schedule=schedule,
         precision=precision,
         effects=tuple(_part(effect) for effect in scene.acting()),
@@ -190,7 +193,8 @@ def render(found: Explanation) -> RenderableType:
     head = Text.assemble(
         (found.name, "bold"),
         f": {found.particles} particles, room for {found.capacity}; {found.precision}; "
-        f"schedule '{found.schedule}'; {_bytes(found.bytes)} per world",
+        f"schedule '{found.schedule}'; {_bytes(found.bytes)} per world; "
+        f"at least {found.steps:.3g} steps",
     )
     what = _table("It has", "effect", "parameters", "what it is", "source")
     for part in (*found.effects, *found.others):

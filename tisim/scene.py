@@ -79,6 +79,7 @@ class Scene(Spec):
                 ", ".join(other.kind() for other in present),
             )
         self.stepper.suits(self.effects, self.domain)
+        self.stepper.fewest(self.effects, self.duration)
         self.capacity()
         return self
 

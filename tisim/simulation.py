@@ -177,6 +177,16 @@ class Simulation:
         ended = self.s.read("status")[:n] != RUNNING
         return float(np.where(ended, 1.0, self.s.read("time")[:n] / self.s.read("end")[:n]).mean())
 
+    def ahead(self) -> float:
+        """Steps before the world that has most of them, if they go on as long as its last one; those that it
+        takes at least where there was none."""
+        n = len(self.scenes)
+        running = self.s.read("status")[:n] == RUNNING
+        left, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
+        fewest = [scene.stepper.fewest(scene.effects, scene.duration) for scene in self.scenes]
+        steps = np.where(dt > 0, left / np.where(dt > 0, dt, 1.0), fewest)
+        return float(np.where(running, np.ceil(steps), 0.0).max())
+
     def ended(self) -> list[int]:
         """The loaded worlds that run no more, for good or ill."""
         status = self.s.read("status")[: len(self.scenes)]

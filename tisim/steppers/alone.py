@@ -67,7 +67,7 @@ class Alone(PerParticle):
         s = self.s
         self.registers.load(w, i)
         begin, passed = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        steps, tries, iterations, going = 0, 0, 0, 1
+        steps, tries, iterations, going = ti.i64(0), ti.i64(0), ti.i64(0), 1
         aim = self.control.aim(w)
         for k in range(ti.cast(s.stretch_windows[w], ti.i32)):
             if going > 0:
@@ -94,12 +94,12 @@ class Alone(PerParticle):
         iterations."""
         s = self.own
         elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        steps, tries, iterations, verdict = 0, 0, 0, ACCEPTED
+        steps, tries, iterations, verdict = ti.i64(0), ti.i64(0), ti.i64(0), ACCEPTED
         while elapsed < length and verdict != HOPELESS:
             self.solve.keep(w, i)
             verdict = TRIED
             while verdict == TRIED:
-                wanted = self.control.step(w, s.own_dt[w, i])
+                wanted = self.control.step(s, w, s.own_dt[w, i])
                 last = wanted * (1.0 + LITTLE) >= length - elapsed
                 dt = ti.select(last, length - elapsed, wanted)
                 verdict, k = self.attempt(w, i, begin + elapsed, dt, aim)
@@ -156,7 +156,7 @@ class Alone(PerParticle):
                     verdict = ACCEPTED
                 else:
                     wanted = ti.min(wanted, SHORTER * dt)
-                    verdict = ti.select(self.control.hopeless(w, dt), HOPELESS, TRIED)
+                    verdict = ti.select(self.control.hopeless(s, w, dt), HOPELESS, TRIED)
                     solve.give_up(w, i)
                 s.own_dt[w, i] = ti.cast(wanted, s.real)
         return verdict, k - 1

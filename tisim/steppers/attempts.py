@@ -60,7 +60,7 @@ class Attempt(Repeat):
 @ti.func
 def length(s, control: ti.template(), w):  # type: ignore[valid-type]
     """Of the next attempt (s, f64); the last step ends exactly on time."""
-    dt = control.step(w, s.next_dt[w])
+    dt = control.step(s, w, s.next_dt[w])
     left = s.end[w] - s.time_before[w]
     # A remainder as small as rounding leaves is not worth a step of its own.
     if dt * (1.0 + 1e-6) >= left:

@@ -79,6 +79,10 @@ class Brownian(Stepper):
         alone = all(single(effect) or _one_by_one(effect) for effect in effects)
         return alone and self.hydrodynamics == "none"
 
+    def countable(self, effects: Sequence[Effect]) -> float:
+        # Where each takes its own, the noise of a step is numbered by 32 bits of its window.
+        return 2**32 if self.independent(effects) else super().countable(effects)
+
     def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
         if self.hydrodynamics == "none":
             return ()

@@ -220,7 +220,7 @@ class Judge(Phase):
         else:
             # A step that was not accepted would fail again in the same way if it were as long.
             factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
-            if self.control.hopeless(w, s.dt[w]):
+            if self.control.hopeless(s, w, s.dt[w]):
                 s.verdict[w] = HOPELESS
                 accuse(s, w)
         s.next_dt[w] = s.dt[w] * factor

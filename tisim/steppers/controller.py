@@ -13,6 +13,16 @@ from tisim.spec import Spec, parameter
 
 TOUCH = 1.0 + 1e-6
 """Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
+LEAST = 1e-30
+"""The shortest step that may be asked for, s: light goes 3e-22 m in it, and single precision holds it."""
+MOST_STEPS = 2.0**53
+"""Steps that a run may take: with more, one is shorter than what the time at the end is rounded to."""
+
+
+@ti.func
+def told(s, w, shortest):
+    """The shortest step (s, f64), where this one is asked for, that the time at the end still tells."""
+    return ti.max(ti.cast(shortest, ti.f64), s.end[w] / MOST_STEPS)
 
 
 class StepControl(Spec):
@@ -34,6 +44,10 @@ class StepControl(Spec):
     def note(self, s, w, i, soonest):
         """Note for a particle the least time that its pairs allow. s, f64."""
 
+    def fewest(self, duration: float) -> float:
+        """The number of steps that a run of this duration (s) takes at least."""
+        return 1.0
+
 
 class Controller(StepControl):
     """Control of explicit steppers: ``next`` decides before the step is made."""
@@ -49,9 +63,12 @@ class Controller(StepControl):
 class FixedStep(Controller):
     """Steps of one length; the last one is cut to end on time."""
 
-    dt: float = parameter("s", gt=0)
+    dt: float = parameter("s", ge=LEAST)
 
     knobs = (Knob(dt=2),)
+
+    def fewest(self, duration: float) -> float:
+        return duration / self.dt
 
     @ti.func
     def next(self, s, w, horizon):
@@ -65,8 +82,8 @@ class ApproachTime(Controller):
     is not always the first to be met. Limits of Z04 section 8: 1e-6 s and 1e-3 s.
     """
 
-    shortest: float = parameter("s", 1e-6, gt=0)
-    longest: float = parameter("s", 1e-3, gt=0)
+    shortest: float = parameter("s", 1e-6, ge=LEAST)
+    longest: float = parameter("s", 1e-3, ge=LEAST)
     watches_pairs: ClassVar[bool] = True
 
     knobs = (Knob(shortest=1, longest=1), Knob(shortest=1, converges=False), Knob(longest=1, converges=False))
@@ -75,6 +92,9 @@ class ApproachTime(Controller):
     def _ordered(self) -> Self:
         must(self.longest >= self.shortest, "approach_time.longest", "at least shortest", self.longest)
         return self
+
+    def fewest(self, duration: float) -> float:
+        return duration / self.longest
 
     @ti.func
     def pair(self, s, w, i, j, separation):
@@ -101,4 +121,4 @@ class ApproachTime(Controller):
         if horizon > 0.0:
             # Pairs not seen are farther apart than this, and close no faster than twice the fastest.
             dt = ti.min(dt, ti.cast(horizon, ti.f64) / (2.0 * s.fastest[w] + 1e-300))
-        return ti.max(ti.cast(self.shortest(w), ti.f64), ti.min(dt, ti.cast(self.longest(w), ti.f64)))
+        return ti.max(told(s, w, self.shortest(w)), ti.min(dt, ti.cast(self.longest(w), ti.f64)))

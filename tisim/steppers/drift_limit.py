@@ -11,7 +11,7 @@ from tisim.errors import must
 from tisim.knob import Knob
 from tisim.spec import parameter
 from tisim.state import NOT_FINITE, STEEP
-from tisim.steppers.controller import Controller
+from tisim.steppers.controller import LEAST, Controller
 
 MOST = 1e9
 """Steps of one longest step at most: a particle by itself numbers them with 32 bits."""
@@ -38,8 +38,8 @@ class DriftLimit(Controller):
     that asks for less stops its world, with time and particle.
     """
 
-    longest: float = parameter("s", gt=0)
-    shortest: float = parameter("s", 1e-12, gt=0)
+    longest: float = parameter("s", ge=LEAST)
+    shortest: float = parameter("s", 1e-12, ge=LEAST)
     drift: float = parameter("", 0.05, gt=0)
 
     keeps: ClassVar = ("steepest",)
@@ -51,6 +51,9 @@ class DriftLimit(Controller):
         allowed = f"at least longest/{MOST:.0e}"
         must(self.shortest * MOST >= self.longest, "drift_limit.shortest", allowed, self.shortest)
         return self
+
+    def fewest(self, duration: float) -> float:
+        return duration / self.longest
 
     @ti.func
     def rate(self, s, w, i, velocity):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from tisim._taichi import ti
 from tisim.errors import must
 from tisim.knob import Knob
 from tisim.spec import parameter
-from tisim.steppers.controller import StepControl
+from tisim.steppers.controller import LEAST, StepControl, told
 
 
 class ImplicitControl(StepControl):
@@ -21,9 +22,9 @@ class ImplicitControl(StepControl):
     """
 
     contract: ClassVar[bool] = True
-    first: float = parameter("s", 1e-5, gt=0)
-    longest: float = parameter("s", 2.5e-4, gt=0)
-    shortest: float = parameter("s", 1e-12, gt=0)
+    first: float = parameter("s", 1e-5, ge=LEAST)
+    longest: float = parameter("s", 2.5e-4, ge=LEAST)
+    shortest: float = parameter("s", 1e-12, ge=LEAST)
     most: float = parameter("", 4.0, ge=1)
     least: float = parameter("", 0.1, gt=0, lt=1)
 
@@ -34,18 +35,27 @@ class ImplicitControl(StepControl):
         must(self.shortest <= self.first, f"{name}.first", "at least shortest", self.first)
         return self
 
-    @ti.func
-    def step(self, w, wanted):
-        """The step (s, f64) where this one was wanted; 0 for the first of all."""
-        shortest, longest = ti.cast(self.shortest(w), ti.f64), ti.cast(self.longest(w), ti.f64)
-        return ti.max(
-            shortest, ti.min(ti.select(wanted > 0.0, wanted, ti.cast(self.first(w), ti.f64)), longest)
-        )
+    def fewest(self, duration: float) -> float:
+        first = min(self.first, self.longest)
+        growing = duration / first
+        if self.most > 1:
+            # first (1 + most + ... + most^(n - 1)) = duration.
+            growing = np.logaddexp(0, np.log(duration) - np.log(first) + np.log(self.most - 1)) / np.log(
+                self.most
+            )
+        return max(duration / self.longest, float(growing))
 
     @ti.func
-    def hopeless(self, w, dt):
+    def step(self, s, w, wanted):
+        """The step (s, f64) where this one was wanted; 0 for the first of all."""
+        longest = ti.cast(self.longest(w), ti.f64)
+        step = ti.min(ti.select(wanted > 0.0, wanted, ti.cast(self.first(w), ti.f64)), longest)
+        return ti.max(told(s, w, self.shortest(w)), step)
+
+    @ti.func
+    def hopeless(self, s, w, dt):
         """Whether a step of this length (s) that has failed must not be made shorter."""
-        return dt <= ti.cast(self.shortest(w), ti.f64) * (1.0 + 1e-9)
+        return dt <= told(s, w, self.shortest(w)) * (1.0 + 1e-9)
 
     @ti.func
     def limited(self, w, wanted, reached):

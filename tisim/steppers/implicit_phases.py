@@ -103,7 +103,7 @@ class Judge(Phase):
         if solved or k >= self.control.iterations or not (change < ti.math.inf):
             if solved and self.control.accepts(w, error):
                 s.verdict[w] = ACCEPTED
-            elif self.control.hopeless(w, s.dt[w]):
+            elif self.control.hopeless(s, w, s.dt[w]):
                 s.verdict[w] = HOPELESS
                 accuse(s, w)
             factor = self.control.factor(w, self.control.aim(w), change, k, error)

@@ -7,6 +7,7 @@ from pydantic import Field
 from tisim._taichi import ti
 from tisim.knob import Knob
 from tisim.spec import parameter
+from tisim.steppers.controller import LEAST
 from tisim.steppers.implicit_control import ImplicitControl
 
 CONTRACTION = 0.25
@@ -32,8 +33,8 @@ class StageControl(ImplicitControl):
     sweeps: int = Field(10, ge=2)
     safety: float = parameter("", 0.85, gt=0, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
-    first: float = parameter("s", 1e-6, gt=0)
-    longest: float = parameter("s", 1.0, gt=0)
+    first: float = parameter("s", 1e-6, ge=LEAST)
+    longest: float = parameter("s", 1.0, ge=LEAST)
 
     knobs = (Knob(error=1),)
 

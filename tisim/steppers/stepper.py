@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from tisim.domain import Domain
 from tisim.effect import Effect, Force, Mutual, Settled, Source
+from tisim.errors import must
 from tisim.program import Item
 from tisim.spec import Spec
 from tisim.state import Field, State
-from tisim.steppers.controller import StepControl
+from tisim.steppers.controller import MOST_STEPS, StepControl
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,18 @@ class Stepper(Spec):
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
         """InputError when it cannot step a scene of these; by default it can."""
+
+    def countable(self, effects: Sequence[Effect]) -> float:
+        """The number of steps that it can count in a scene of these."""
+        return MOST_STEPS
+
+    def fewest(self, effects: Sequence[Effect], duration: float) -> float:
+        """The number of steps that a run of this duration (s) takes at least; InputError where it is more
+        than can be counted."""
+        steps, most = min(self.control.fewest(duration), sys.float_info.max), self.countable(effects)
+        rule = f"reached in at most {most:.3g} steps, but takes at least {steps:.3g} of {self.control.kind()}"
+        must(steps <= most, "scene.duration", rule, duration)
+        return max(1.0, steps)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
         """Whether it may take each particle by itself: by default, when they feel nothing of each other and
