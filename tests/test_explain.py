@@ -26,6 +26,7 @@ def test_whole_flow_leaves_nothing_out():
     names = {part.name for part in found.effects}
     assert {part.name for part in found.absent_effects} == {k.kind() for k in known_effects()} - names
     assert (found.particles, found.capacity) == (60, 60)
+    assert found.steps == pytest.approx(flow.duration / flow.stepper.control.longest)
 
 
 def test_absent_effects_and_fields():

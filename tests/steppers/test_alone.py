@@ -53,6 +53,20 @@ def test_who_gets_stuck_first_is_named_with_the_time_and_the_force(chunks):
     assert np.isfinite(stuck.state["position"]).all()
 
 
+def test_a_step_that_time_does_not_tell_is_not_taken():
+    """On the cliff, which needs steps of 3e-7 s, when the time at the end is rounded to 1e-6 s: it stops and
+    says so, where steps of 1e-20 s would never get there."""
+    control = IterationControl(first=1e-20, longest=1e-3, shortest=1e-25)
+    stepper, start = Trapezoid(control=control), ([[0.0, 0, 0]], [[1.0, 0, 0]])
+    made = scene(*start, (Cliff(place=0.0),), mass=1.0, stepper=stepper, duration=1e10)
+    simulation = compiled(made, worlds=2, capacity=3)
+    simulation.load([made])
+    simulation.run(steps=1)
+    (result,) = simulation.results()
+    assert "cannot be solved even at the shortest step, by effects.cliff" in result.status.reason
+    assert result.time == 0.0
+
+
 @pytest.mark.slow
 def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bits(tmp_path):
     """A step of the world is a window; in one launch, in small ones, and from a checkpoint: the same bits."""

@@ -50,6 +50,7 @@ NEAR = np.array([1.0, 1 - 1e-12, 1 + 1e-12, 1 - 1e-7, 1 + 1e-7, 1 + 3e-6])
 RATIOS = np.unique(np.concatenate([DECADES, NEAR, 3 * NEAR, 1e-6 * NEAR, DECADES * np.pi / 2]))
 LONGEST = np.array([2.5e-4, 1e3])
 """s; a small one and a generous one."""
+WORLDS = len(RATIOS) * len(LONGEST)
 
 
 def limits(longest):
@@ -86,7 +87,7 @@ def on_line(arrays, start, time):
 def test_straight_lines(name, together, schedule):
     """For any duration: at least one step, the time asked for to the last bit, the place to rounding."""
     scenes = [straight(name, together, longest, ratio) for longest in LONGEST for ratio in RATIOS]
-    for result in simulate(scenes, worlds=len(scenes), capacity=PARTICLES, schedule=schedule):
+    for result in simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule=schedule):
         assert result.status.ok, result.status.reason
         assert result.time == result.scene.duration
         assert result.work["steps"] > 0
@@ -94,11 +95,40 @@ def test_straight_lines(name, together, schedule):
         on_line(result.state, result.start, result.time)
 
 
+def short(scenes):
+    """Results of scenes without effects, in a simulation that is compiled already."""
+    return simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule="world")
+
+
 def test_a_moment_of_the_default_stepper():
     """A picosecond at 1e6 m/s, with limits as they come."""
-    (result,) = simulate([scene([[0.0] * 3], [[1e6, 0, 0]], stepper=Trapezoid(), duration=1e-12)])
+    (result,) = short([scene([[0.0] * 3], [[1e6, 0, 0]], stepper=Trapezoid(), duration=1e-12)])
     assert result.state["position"][0, 0] == 1e-6
     assert result.work["particle_steps"] == 1
+
+
+def test_growth_of_steps_is_counted():
+    """Steps that double from 1 s need ten for 1023 s, and a little more if they may be 100 s at most."""
+    control = IterationControl(first=1.0, longest=2e3, most=2.0)
+    assert control.fewest(1023.0) == pytest.approx(10.0)
+    (result,) = short([scene([[0.0] * 3], [[1.0] * 3], stepper=Trapezoid(control=control), duration=1023.0)])
+    assert result.work["particle_steps"] == 10
+    assert IterationControl(first=1.0, longest=100.0, most=2.0).fewest(1023.0) == pytest.approx(10.23)
+
+
+def test_steps_ahead():
+    """As many as are left at the length of the last one, in the world that has most."""
+    made = [
+        scene([[0.0] * 3], [[1.0] * 3], stepper=FREE["verlet, fixed"](dt), duration=1.0)
+        for dt in (1e-2, 1e-3)
+    ]
+    simulation = compiled(made[0], WORLDS, PARTICLES, "world")
+    simulation.load(made)
+    assert simulation.ahead() == pytest.approx(1000, abs=1)
+    simulation.run(steps=40)
+    assert simulation.ahead() == pytest.approx(960, abs=1)
+    simulation.run()
+    assert simulation.ahead() == 0
 
 
 @pytest.mark.parametrize("name", ["trapezoid, iteration", "brownian"])
@@ -107,8 +137,8 @@ def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
     where they were, none comes too early, and the end is the same to the last bit."""
     ratios = np.array([1e-9, 1e-6, 0.3, 1.0, 1 + 1e-7, 7.0, 7 - 1e-7])
     scenes = [straight(name, False, LONGEST[0], ratio) for ratio in ratios]
-    alone = simulate(scenes, worlds=len(RATIOS) * len(LONGEST), capacity=PARTICLES, schedule="world")
-    simulation = compiled(scenes[0], len(RATIOS) * len(LONGEST), PARTICLES, "world")
+    alone = simulate(scenes, worlds=WORLDS, capacity=PARTICLES, schedule="world")
+    simulation = compiled(scenes[0], WORLDS, PARTICLES, "world")
     for every in LONGEST[0] * np.array([1e-3, 1 - 1e-7, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-7, 2.5]):
         path = tmp_path / f"{every}.h5"
         simulation.load(scenes)

@@ -11,6 +11,7 @@ from tisim.state import STUCK
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.kept import kept
 from tisim.steppers.registers import Registers
+from tisim.steppers.span import went
 
 LAUNCH = 2**20
 """Windows of a launch at most, of all particles together, where more than WINDOWS of them."""
@@ -112,6 +113,8 @@ class Alone(PerParticle):
                     carry = (total - elapsed) - step
                     elapsed = ti.select(last, length, total)
                     steps += 1
+                    if ti.static(self.control.at_end):
+                        went(s, w, i, self.solve.gone(w, i, ti.cast(dt, s.real)))
                     # That a step has been cut short says nothing about the next one.
                     s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, wanted, 0.0), s.real))
         return elapsed, steps, tries, iterations
@@ -141,7 +144,7 @@ class Alone(PerParticle):
                 # Nothing moves where nothing changes: 0/0 is no error.
                 change = change / ti.select(change > 0.0, moved, 1.0)
                 error = solve.error(w, i, step)
-                error = error / ti.select(error > 0.0, self.control.scale(s, w, i, moved), 1.0)
+                error = error / ti.select(error > 0.0, self.control.scale(s, w, i, moved, step), 1.0)
             ratio, off = ti.cast(change, ti.f64), ti.cast(error, ti.f64)
             solved = self.control.solved(w, ratio)
             # Not below infinity: also true of NaN.

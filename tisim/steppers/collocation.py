@@ -14,6 +14,7 @@ from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
 from tisim.steppers.collocation_phases import Conclude, Forget, Judge, Place, Predict, Sweep, Take, Try
 from tisim.steppers.kept import CHANGE, kept
 from tisim.steppers.phases import Arrive, Listen, Operate
+from tisim.steppers.span import Went, spans
 from tisim.steppers.stage_control import StageControl
 from tisim.steppers.stages import Stages
 from tisim.steppers.stepper import Parts, Stepper
@@ -59,7 +60,13 @@ class Collocation(Stepper):
         return work["force_evaluations"]
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        return (FORCE, *kept(turning), CHANGE, *Stages.fields(self.stages, turning))
+        return (
+            FORCE,
+            *kept(turning),
+            CHANGE,
+            *spans(self.control.at_end),
+            *Stages.fields(self.stages, turning),
+        )
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, stages, sums = parts.s, Stages(parts, self.stages), BlockSums(parts.s, 3)
@@ -72,4 +79,6 @@ class Collocation(Stepper):
         attempt = (Try(parts, stages), Predict(stages), sweep, Conclude(stages), GiveUp(stages), *listen)
         operate = (Operate(parts), *listen) if parts.operators else ()
         begin = (Forget(s), Begin(s), Keep(stages))
-        return (*begin, Attempt(s, (*attempt, Decide(parts))), *parts.remember, *operate, Arrive(s))
+        note = (Went(stages),) if self.control.at_end else ()
+        step = (Attempt(s, (*attempt, Decide(parts))), *note, *parts.remember, *operate, Arrive(s))
+        return (*begin, *step)

@@ -123,7 +123,7 @@ class Take(PerBlock):
             error = dt * dt * self.estimate(s.stage_acceleration, w, i)
             if ti.static(stages.turning):
                 error += dt * dt * s.radius[w, i] * self.estimate(s.stage_turning, w, i)
-            scale = self.control.scale(s, w, i, stages.displacement(w, i, stage, dt).norm())
+            scale = self.control.scale(s, w, i, stages.displacement(w, i, stage, dt).norm(), dt)
         return ti.cast(ti.Vector([dt * dt * change, error, scale]), ti.f64)
 
     @ti.func
@@ -140,11 +140,17 @@ class Take(PerBlock):
 
     @ti.func
     def estimate(self, rate: ti.template(), w, i):  # type: ignore[valid-type]
-        """|sum_j d_j rate_j|."""
-        total = ti.Vector.zero(self.s.real, 3)
+        """The error over dt^2: |sum_j d_j rate_j|, which bounds it, or what that says of its leading term."""
+        total, largest = ti.Vector.zero(self.s.real, 3), ti.cast(0.0, self.s.real)
         for j in range(self.stages.number):
-            total += ti.cast(self.stages.estimate[j], self.s.real) * self.stages.at(rate, w, i, j)
-        return total.norm()
+            here = self.stages.at(rate, w, i, j)
+            total += ti.cast(self.stages.estimate[j], self.s.real) * here
+            largest = ti.max(largest, here.norm())
+        error = total.norm()
+        if ti.static(self.control.at_end):
+            factor, power = ti.static(self.stages.leading)
+            error = largest * ti.pow(factor * error / ti.select(largest > 0.0, largest, 1.0), power)
+        return error
 
 
 class Judge(Phase):
@@ -152,8 +158,7 @@ class Judge(Phase):
 
     def __init__(self, parts, sums, stages) -> None:
         self.s, self.control, self.sums, self.stages = parts.s, parts.control, sums, stages
-        # Of the error, which falls as dt^(s + 1), over the displacement, which falls as dt.
-        self.order = stages.number
+        self.order = parts.control.order(stages.number)
 
     @ti.func
     def run(self, w, _k):

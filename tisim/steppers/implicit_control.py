@@ -12,6 +12,7 @@ from tisim.errors import must
 from tisim.knob import Knob
 from tisim.spec import parameter
 from tisim.steppers.controller import LEAST, StepControl, told
+from tisim.steppers.span import Per, compared
 
 
 class ImplicitControl(StepControl):
@@ -27,6 +28,11 @@ class ImplicitControl(StepControl):
     shortest: float = parameter("s", 1e-12, ge=LEAST)
     most: float = parameter("", 4.0, ge=1)
     least: float = parameter("", 0.1, gt=0, lt=1)
+
+    @property
+    def at_end(self) -> bool:
+        """Whether it aims at the error at the end of the run."""
+        return False
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -104,8 +110,8 @@ class IterationControl(ImplicitControl):
         return True
 
     @ti.func
-    def scale(self, s, w, i, moved):
-        """What the error of a particle that has moved so far is compared with. m."""
+    def scale(self, s, w, i, moved, dt):
+        """What the error of a particle that has moved so far in a step of dt (s) is compared with. m."""
         return moved
 
     @ti.func
@@ -142,12 +148,17 @@ class ErrorControl(IterationControl):
     error: float = parameter("", 1e-4, gt=0)
     safety: float = parameter("", 0.8, gt=0, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
+    per: Per = "step"
 
     knobs = (Knob(error=1, tolerance=1),)
 
+    @property
+    def at_end(self) -> bool:
+        return self.per == "run"
+
     @ti.func
-    def scale(self, s, w, i, moved):
-        return moved + self.resolution(w) * s.radius[w, i]
+    def scale(self, s, w, i, moved, dt):
+        return compared(self, s, w, i, moved, dt)
 
     @ti.func
     def accepts(self, w, error):

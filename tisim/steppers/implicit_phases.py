@@ -73,7 +73,7 @@ class Correct(PerBlock):
             note_stride(s, w, ti.cast(step, ti.f64))
         s.iterate_change[w, i] = change
         moved = solve.displacement(w, i, v, dt).norm()
-        error, scale = solve.error(w, i, dt), self.control.scale(s, w, i, moved)
+        error, scale = solve.error(w, i, dt), self.control.scale(s, w, i, moved, dt)
         return ti.cast(ti.Vector([change, moved, error, scale]), ti.f64)
 
 

@@ -9,6 +9,7 @@ With two stages this is the trapezoidal rule.
 from __future__ import annotations
 
 from itertools import pairwise
+from math import factorial
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -44,7 +45,25 @@ def highest(stages: int) -> np.ndarray:
     prod_(k<s-1) (c - c_k); in position at the end by at most the integral of (1 - c) |prod|.
     """
     c = nodes(stages)
+    return bound(c) * np.array([1.0 / np.prod(here - np.delete(c, j)) for j, here in enumerate(c)])
+
+
+def bound(c: np.ndarray) -> float:
+    """The integral of (1 - x) |prod_(k<s-1) (x - c_k)| from 0 to 1."""
     rest = Polynomial.fromroots(c[:-1]) * Polynomial([1.0, -1.0])
     # |rest| has no sign changes between nodes.
-    most = sum(abs(rest.integ()(b) - rest.integ()(a)) for a, b in pairwise(c))
-    return most * np.array([1.0 / np.prod(here - np.delete(c, j)) for j, here in enumerate(c)])
+    return float(sum(abs(rest.integ()(b) - rest.integ()(a)) for a, b in pairwise(c)))
+
+
+def leading(stages: int) -> tuple[float, float]:
+    """l and p of the leading term of the error, in position dt^2 a (l e)^p, where e is the estimate by
+    ``highest`` over dt^2 a, and a the largest acceleration.
+
+    The method multiplies a motion of rate k by the (s - 1, s - 1) approximant of Pade to exp(k dt), which is
+    off by c (k dt)^(2s - 1), c = ((s - 1)!)^2/((2s - 2)! (2s - 1)!) (Hairer and Wanner, section IV.3); in
+    position, by a/k^2 times that. The estimate tells the derivative of order s - 1: e = m (k dt)^(s - 1)/
+    (s - 1)! with m = ``bound``.
+    """
+    n = stages - 1
+    pade, power = factorial(n) ** 2 / (factorial(2 * n) * factorial(2 * n + 1)), (2 * n - 1) / n
+    return float(factorial(n) / bound(nodes(stages)) * pade ** (1 / power)), power

@@ -45,6 +45,11 @@ class Solve(Kept):
         return dt * (self.phi(w) * v + (1.0 - self.phi(w)) * self.s.velocity_before[w, i])
 
     @ti.func
+    def gone(self, w, i, dt):
+        """The displacement in a step that has been accepted. m."""
+        return self.displacement(w, i, self.s.velocity[w, i], dt)
+
+    @ti.func
     def jacobian(self, w, i, t):
         """J, the derivative of the force by velocity where effects give it, at the present v. N s/m."""
         return summed_jacobian(self.linear, self.s, w, i, t)

@@ -9,6 +9,7 @@ from tisim.knob import Knob
 from tisim.spec import parameter
 from tisim.steppers.controller import LEAST
 from tisim.steppers.implicit_control import ImplicitControl
+from tisim.steppers.span import Per, compared
 
 CONTRACTION = 0.25
 """What a sweep is to multiply the error by, at most, where convergence limits the step."""
@@ -33,15 +34,24 @@ class StageControl(ImplicitControl):
     sweeps: int = Field(10, ge=2)
     safety: float = parameter("", 0.85, gt=0, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
+    per: Per = "step"
     first: float = parameter("s", 1e-6, ge=LEAST)
     longest: float = parameter("s", 1.0, ge=LEAST)
 
     knobs = (Knob(error=1),)
 
+    @property
+    def at_end(self) -> bool:
+        return self.per == "run"
+
+    def order(self, stages: int) -> int:
+        """The power of dt with which an estimate of error falls, over what it is compared with."""
+        return 2 * stages - 2 if self.at_end else stages
+
     @ti.func
-    def scale(self, s, w, i, moved):
-        """What the error of a particle that has moved so far is compared with. m."""
-        return moved + self.resolution(w) * s.radius[w, i]
+    def scale(self, s, w, i, moved, dt):
+        """What the error of a particle that has moved so far in a step of dt (s) is compared with. m."""
+        return compared(self, s, w, i, moved, dt)
 
     @ti.func
     def solved(self, w, left):

@@ -5,7 +5,7 @@ import numpy as np
 from tisim._taichi import ti
 from tisim.state import Field
 from tisim.steppers.kept import Kept
-from tisim.steppers.lobatto import highest, integrals, nodes
+from tisim.steppers.lobatto import highest, integrals, leading, nodes
 from tisim.steppers.solve import solved, summed_jacobian, with_jacobian
 
 
@@ -20,7 +20,7 @@ class Stages(Kept):
 
     def __init__(self, parts, number: int) -> None:
         super().__init__(parts)
-        s, self.number = self.s, number
+        s, self.number, self.leading = self.s, number, leading(number)
         self.linear = with_jacobian(parts.singles)
         rates = [(s.stage_acceleration, s.last_acceleration)]
         if self.turning:
@@ -110,6 +110,11 @@ class Stages(Kept):
         s = self.s
         moved = dt * ti.cast(self.c[stage], s.real) * s.velocity_before[w, i]
         return moved + dt * dt * self.sum(self.places, stage, s.stage_acceleration, w, i)
+
+    @ti.func
+    def gone(self, w, i, dt):
+        """The displacement in a step that has been accepted. m."""
+        return self.displacement(w, i, self.number - 1, dt)
 
     @ti.func
     def spin(self, w, i, stage, dt):

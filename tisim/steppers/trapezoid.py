@@ -17,6 +17,7 @@ from tisim.steppers.implicit_phases import Correct, Iteration, Judge, Predict, T
 from tisim.steppers.kept import CHANGE, kept
 from tisim.steppers.phases import Arrive, Listen, Operate
 from tisim.steppers.solve import Solve
+from tisim.steppers.span import Went, spans
 from tisim.steppers.stepper import Parts, Stepper
 
 OWN = (Field("own_dt", "s", 1, "keep", scratch=True), Field("own_time", "s", 1, "keep", scratch=True))
@@ -70,9 +71,10 @@ class Trapezoid(Stepper):
 
     def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         if independent:
-            return (FORCE, *OWN)
+            return (FORCE, *OWN, *spans(self.control.at_end))
         accelerated = self.acceleration == "anderson"
-        return (FORCE, *kept(turning), CHANGE, *(memory_of_iterates(turning) if accelerated else ()))
+        more = (*spans(self.control.at_end), *(memory_of_iterates(turning) if accelerated else ()))
+        return (FORCE, *kept(turning), CHANGE, *more)
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, solve = parts.s, Solve(parts, self.phi)
@@ -87,4 +89,5 @@ class Trapezoid(Stepper):
         iteration = Iteration(s, (*forces, Correct(parts, sums, solve), *listen, Judge(parts, sums)))
         attempt = (Try(parts), Predict(solve), *listen, iteration, GiveUp(solve), *listen, Decide(parts))
         operate = (Operate(parts), *listen) if parts.operators else ()
-        return (Begin(s), Keep(solve), Attempt(s, attempt), *parts.remember, *operate, Arrive(s))
+        note = (Went(solve),) if self.control.at_end else ()
+        return (Begin(s), Keep(solve), Attempt(s, attempt), *note, *parts.remember, *operate, Arrive(s))

@@ -1,0 +1,71 @@
+"""How far from the right end runs are for the error that was asked for, by each control that asks for one.
+
+    python tests/benchmarks/calibration.py [--figure docs/steppers_calibration.png]
+
+The scenes are those of tests/steppers/calibrated.py. For each scene and control: the least and the largest of
+the error at the end over the error asked for, over 1e-2 to 1e-6 for the trapezoid, to 1e-10 for collocation;
+and the figure, where each line is a scene.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numpy as np
+from matplotlib import colormaps
+
+from tests.steppers.calibrated import CHAOTIC, CONTROLS, KNOWN, ratios
+from tests.steppers.test_calibration import BAND
+from tisim import runtime
+from tisim.figure import empty, plain
+
+Found = dict[str, dict[str, np.ndarray]]
+
+
+def table(found: Found) -> None:
+    """Least and largest ratio of each scene, a column for each control."""
+    print("| scene | " + " | ".join(found) + " |")
+    print("|---" * (1 + len(found)) + "|")
+    for scene in KNOWN:
+        cells = [f"{values[scene].min():.1g} .. {values[scene].max():.1g}" for values in found.values()]
+        print(f"| {scene} | " + " | ".join(cells) + " |")
+
+
+def draw(found: Found, path: Path) -> None:
+    """A panel for each control; the band that is stated for those that aim at the end."""
+    figure = empty(11.0, 7.6)
+    panels = figure.subplots(2, 2, sharey=True).ravel()
+    colours = colormaps["tab20"].colors
+    for panel, (control, ratio) in zip(panels, found.items(), strict=True):
+        asked = CONTROLS[control][1]
+        for colour, (scene, values) in zip(colours, ratio.items(), strict=False):
+            line = {"color": "black", "ls": "--"} if scene == CHAOTIC else {"color": colour}
+            panel.loglog(asked, values, marker="o", ms=3, lw=1.2, label=scene, **line)
+        if "run" in control:
+            panel.axhspan(*BAND, color="0.9", zorder=0)
+        panel.axhline(1.0, color="0.4", lw=0.8)
+        panel.invert_xaxis()
+        panel.set_title(control, fontsize=10, loc="left")
+        panel.set_xlabel("error asked for")
+        plain(panel)
+    for panel in panels[::2]:
+        panel.set_ylabel("error at the end / error asked for")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper", fontsize=8, frameon=False)
+    figure.savefig(path, dpi=100)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
+    parser.add_argument("--figure", type=Path, default=Path("docs/steppers_calibration.png"))
+    asked = parser.parse_args()
+    runtime.start(device="cpu", precision="f64")
+    found = {control: ratios(*settings) for control, settings in CONTROLS.items()}
+    table(found)
+    draw(found, asked.figure)
+
+
+if __name__ == "__main__":
+    main()

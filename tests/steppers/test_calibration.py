@@ -1,0 +1,135 @@
+"""How far from the right end a run is for the error asked for: bands over scenes whose end is known."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, simulate
+from tests.steppers.calibrated import (
+    CHAOTIC,
+    CONTROLS,
+    KNOWN,
+    SINGLE,
+    Single,
+    collocation,
+    orbit,
+    ratios,
+    trapezoid,
+)
+from tests.steppers.charged import order
+from tisim import Box, Scene
+from tisim.checkpoint import restore, save
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.lobatto import leading
+from tisim.steppers.trapezoid import Trapezoid
+
+ASKED = 10.0 ** -np.arange(2, 6)
+FORGETS = "drag in a flow"
+"""Its errors die out within the run."""
+BAND = 1 / 20, 20.0
+"""Of the error at the end over that asked for, where a motion neither forgets errors nor multiplies them."""
+
+
+def within(found, least=BAND[0], most=BAND[1]):
+    for name, values in found.items():
+        assert (values > (0.0 if name == FORGETS else least)).all(), f"{name}: {values}"
+        assert (values < most).all(), f"{name}: {values}"
+
+
+def test_the_error_at_the_end_of_a_particle_alone_is_that_asked_for():
+    """By the trapezoidal rule: within a factor of 4 for each motion that is linear, whatever is asked for."""
+    found = ratios(trapezoid("run"), ASKED, SINGLE)
+    within(found, 0.25, 4.0)
+    assert list(found) == list(SINGLE)
+
+
+def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path):
+    """How far a particle has been from its start is its own, and kept."""
+    made = [known.scene(trapezoid("run")(ASKED[0])) for known in SINGLE.values()]
+    worlds = len(SINGLE) * len(ASKED)
+    together = simulate(made, worlds=worlds, capacity=1)
+    simulation = compiled(made[0], worlds, 1)
+    for scene, result in zip(made[::3], together[::3], strict=True):
+        (alone,) = simulate([scene], worlds=worlds, capacity=1)
+        assert alone.work == result.work
+        np.testing.assert_array_equal(alone.state["position"], result.state["position"])
+    # Windows of a tenth of a second, to stop at.
+    control = ErrorControl(error=1e-3, tolerance=1e-5, per="run", first=1e-4, longest=0.1)
+    stops = made[0].model_copy(update={"stepper": Trapezoid(control=control)})
+    simulation.load([stops])
+    simulation.run()
+    (whole,) = simulation.results()
+    simulation.load([stops])
+    simulation.run(steps=7)
+    save(simulation, tmp_path / "c.h5")
+    simulation.load([stops])
+    restore(simulation, tmp_path / "c.h5")
+    simulation.run()
+    (rest,) = simulation.results()
+    assert rest.work == whole.work
+    np.testing.assert_array_equal(rest.state["position"], whole.state["position"])
+
+
+def test_what_the_estimate_says_of_the_leading_term():
+    """With two stages that is the trapezoidal rule's own: (k dt)^3/12 of the amplitude."""
+    factor, power = leading(2)
+    # An estimate of a/6 k dt by two stages, over a.
+    assert (factor * 0.3 / 6) ** power == pytest.approx(0.3 / 12)
+    assert [leading(s)[1] for s in (2, 3, 5)] == [1.0, 1.5, 1.75]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in CONTROLS if "run" in name])
+def test_the_error_at_the_end_is_that_asked_for(name):
+    """Within a factor of 20 for every decade; the chaotic motion multiplies errors, by some 50."""
+    make, asked = CONTROLS[name]
+    found = ratios(make, asked)
+    within({scene: values for scene, values in found.items() if scene != CHAOTIC})
+    assert (found[CHAOTIC] < 100).all(), found[CHAOTIC]
+
+
+@pytest.mark.slow
+def test_an_error_of_steps_says_less_of_the_end():
+    """Of the same motions: what is asked of steps is missed at the end by a factor of 100 and more, either
+    way, and by one that depends on what is asked for."""
+    for name, (make, asked) in CONTROLS.items():
+        if "run" not in name:
+            values = np.concatenate(
+                [v for scene, v in ratios(make, asked).items() if scene not in (CHAOTIC, FORGETS)]
+            )
+            assert max(values.max(), 1 / values.min()) > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("make", "asked", "expected"), [(trapezoid, ASKED, 2.0), (collocation, 10.0 ** -np.arange(4, 11), 8.0)]
+)
+def test_order_is_kept(make, asked, expected):
+    """The error falls with the number of steps as that of equal ones does."""
+    known = Single(30.25, (1.0, 0.0), spring=(2 * np.pi) ** 2)
+    results = simulate([known.scene(make("run")(e)) for e in asked], worlds=len(asked), capacity=1)
+    errors = [known.end.error(result) for result in results]
+    steps = [result.work["particle_steps"] for result in results]
+    assert order(steps, errors) == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [trapezoid("run"), collocation("run")])
+def test_the_size_of_a_motion_is_that_of_open_space_in_a_box(make):
+    """Two bodies that go round each other through the faces of a box take the steps they take without."""
+    free = orbit(0.5, 1.3).scene(make(1e-4))
+    results = []
+    for shift in (0.0, 4.0):
+        data = free.to_dict()
+        data["particles"]["position"] = (np.array(data["particles"]["position"]) + shift).tolist()
+        boxed = Scene.from_dict(data).model_copy(update={"domain": Box(low=(-4.0,) * 3, high=(4.0,) * 3)})
+        results += simulate([boxed], capacity=5)
+    inside, across = results
+    assert inside.status.ok
+    assert across.status.ok
+    assert across.work["steps"] == pytest.approx(inside.work["steps"], abs=2)
+    moved = across.state["position"] - inside.state["position"] - 4.0
+    np.testing.assert_allclose((moved + 4.0) % 8.0 - 4.0, 0.0, atol=1e-6)
+
+
+def test_known_scenes_are_as_many_as_are_told():
+    assert len(KNOWN) == 15
