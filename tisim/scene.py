@@ -19,7 +19,7 @@ from tisim.spec import Spec, Text
 from tisim.steppers.stepper import Stepper
 from tisim.steppers.verlet import Verlet
 
-PHYSICS_VERSION = 1
+PHYSICS_VERSION = 2
 """Raised whenever a change of code changes the result of a scene; part of its digest."""
 
 __all__ = ["Box", "Open", "Scene"]

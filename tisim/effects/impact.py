@@ -22,6 +22,12 @@ is met. x >= 1 means that the pair bonds.
 Kinetic energies lost are those in the frame of the pair's centre of mass. The paper writes each particle's
 own 1/2 m v^2 (5.1, 6.10), whose split between the two depends on who is watching and can cool a grain below
 absolute zero; the sum, which is what heat and energy books need, is the same.
+
+A pair at rest relative to each other is in contact, not colliding. So what bonds leaves with one velocity, to
+the last bit, and an approach is one only above what rounding makes of rest. With u the unit roundoff, each
+velocity is known to u of itself, their difference is rounded once, and a product of three components thrice
+(N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, Eq. 3.5): together that is
+5 u (|v_i| + |v_j|) . |r_ij|, by components. Closer than the rounding of its own way no such pair comes.
 """
 
 from __future__ import annotations
@@ -74,6 +80,9 @@ class ImpactLaw(Effect):
         """Join two grains that have bonded and have not broken."""
 
 
+ROUNDOFF = {ti.f64: 2.0**-53, ti.f32: 2.0**-24}
+"""u: a number is known to this part of itself."""
+
 HOOKS = ("hardness_factor", "limit", "supply", "temperature", "fracture", "bond")
 
 
@@ -119,8 +128,10 @@ class Impact(PairEvent):
         reach = s.radius[w, i] + s.radius[w, j]
         due = ti.cast(-1.0, s.real)
         if closing > 0.0 and separation.norm_sqr() <= reach * reach:
-            distance = separation.norm()
-            due = (reach - distance) * distance / closing
+            speeds = ti.abs(s.velocity[w, i]) + ti.abs(s.velocity[w, j])
+            if closing > 5.0 * ROUNDOFF[s.real] * speeds.dot(ti.abs(separation)):
+                distance = separation.norm()
+                due = (reach - distance) * distance / closing
         return due
 
     @ti.func
@@ -219,6 +230,9 @@ class Impact(PairEvent):
             impulse += self.tangential(w, reduced, v_n, v_t, x) * slip / v_t
         s.velocity[w, i] -= impulse / m_i
         s.velocity[w, j] += impulse / m_j
+        if x >= 1.0:
+            common = s.velocity[w, i] + m_j / (m_i + m_j) * (s.velocity[w, j] - s.velocity[w, i])
+            s.velocity[w, i], s.velocity[w, j] = common, common
         ti.atomic_add(s.impacts[w], 1)
 
         lost = self.lost(w, reduced, v_n, v_t, x)
