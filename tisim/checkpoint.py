@@ -15,16 +15,9 @@ import numpy as np
 from tisim import runtime, seal
 from tisim.errors import must
 from tisim.simulation import Simulation
-from tisim.state import BOOKS, CLOCK
 from tisim.watch import Watch
 
 FORMAT = "tisim checkpoint 1"
-
-
-def _columns(simulation: Simulation) -> tuple[str, ...]:
-    """All of the state that decides how a simulation goes on."""
-    s = simulation.s
-    return (*(field.name for field in s.fields), *CLOCK, *BOOKS, *s.counters, *s.keeps, "frame", "seed")
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:
@@ -47,8 +40,8 @@ def save(simulation: Simulation, path: str | Path) -> None:
     simulation.s.check()
     with seal.created(Path(path)) as file:
         file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
-        for name in _columns(simulation):
-            file[name] = simulation.s.read(name)
+        for name, values in simulation.s.image().items():
+            file[name] = values
 
 
 def restore(simulation: Simulation, path: str | Path) -> None:
@@ -58,16 +51,15 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     another capacity; the simulation is then as it was.
     """
     simulation.s.check()
+    wanted = simulation.s.columns()
     with seal.opened(Path(path), "checkpoint", FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])
         wall_s = float(file.attrs["wall_s"])
-        columns = {name: np.asarray(file[name]) for name in _columns(simulation)}
-    for name, values in columns.items():
-        simulation.s.write(name, values)
-    simulation.forget_lists()
+        columns = {name: np.asarray(file[name]) for name in wanted}
+    simulation.put(columns)
     simulation.wall_s = wall_s
-    simulation.watch = Watch(simulation.s, simulation.scenes, simulation.made.inquest)
+    simulation.watch = Watch(simulation, columns)
 
 
 def _agree(name: str, value: Any, received: Any) -> None:

@@ -20,8 +20,8 @@ class Status:
 class Result:
     """A world read back.
 
-    state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, the
-        last good state. start : the same at the start.
+    state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, that
+        of the last good step. start : the same at the start.
     time : s. work : counts (steps, particle_steps, and what the effects count). measures : quantities of the
         world that its effects keep, at the end. wall_s : wall seconds of
         the batch that this world was part of, per world; set-up and compilation are not in it.

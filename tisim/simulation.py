@@ -96,20 +96,30 @@ class Simulation:
         starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
         for scene, start in zip(scenes, starts, strict=True):
             check_start(self.s.fields, scene, start)
-        for f in self.s.fields:
-            self.s.write(f.name, laid_out(f, starts, self.worlds, self.s.capacity))
-        counts = np.array([len(start["mass"]) for start in starts] + [0] * (self.worlds - len(starts)))
-        self._reset(scenes, starts, counts)
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
-        self.forget_lists()
         self.look: Callable[[], None] | None = None
         self.s.hold.fill(np.inf)
-        if self.first.items:
-            self.first.advance(1)
-        self.watch = Watch(self.s, self.scenes, self.made.inquest)
+        self.begin()
+        self.watch = Watch(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.watch.look()
+
+    def begin(self) -> None:
+        """Put every world at its start, with all that its first step takes."""
+        for f in self.s.fields:
+            self.s.write(f.name, laid_out(f, self.starts, self.worlds, self.s.capacity))
+        counts = [len(start["mass"]) for start in self.starts]
+        self._reset(self.scenes, self.starts, np.array(counts + [0] * (self.worlds - len(counts))))
+        self.forget_lists()
+        if self.first.items:
+            self.first.advance(1)
+
+    def put(self, image: dict[str, np.ndarray]) -> None:
+        """Put all worlds where they were when ``s.image()`` was made of them."""
+        for name, values in image.items():
+            self.s.write(name, values)
+        self.forget_lists()
 
     def forget_lists(self) -> None:
         """Pair lists are made anew before they are used again."""

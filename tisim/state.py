@@ -185,6 +185,15 @@ class State:
         """A field as an array of its full shape."""
         return np.asarray(getattr(self, name).to_numpy())
 
+    def columns(self) -> tuple[str, ...]:
+        """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
+        fields = (field.name for field in self.fields)
+        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.keeps, "frame", "seed")
+
+    def image(self) -> dict[str, np.ndarray]:
+        """A copy of the columns of all worlds, by name."""
+        return {name: self.read(name) for name in self.columns()}
+
     def destroy(self) -> None:
         """Give the memory back."""
         # Taichi must have seen fields that no kernel has used before they go, or it stumbles over them later.

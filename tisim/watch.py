@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tisim.inquest import Inquest
+from tisim.replay import Image, Replay
 from tisim.result import Status
-from tisim.scene import Scene
 from tisim.state import (
     ASKED,
     CROWDED,
@@ -19,8 +20,10 @@ from tisim.state import (
     STEEP,
     STUCK,
     UNSETTLED,
-    State,
 )
+
+if TYPE_CHECKING:
+    from tisim.simulation import Simulation
 
 REASONS = {
     RUNNING: "running",
@@ -39,45 +42,70 @@ REASONS = {
 class Watch:
     """The last good state of a loaded batch, and what has gone wrong in it.
 
-    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds.
+    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look; those
+        of the last good step, where a world has failed.
     faults : world -> (time found, s; what is wrong).
     """
 
-    def __init__(self, s: State, scenes: list[Scene], inquest: Inquest) -> None:
-        self.s, self.scenes, self.inquest = s, scenes, inquest
+    def __init__(self, simulation: Simulation, image: Image | None = None) -> None:
+        """``image`` : where the simulation has been put, when that is not its start."""
+        self.simulation, self.s = simulation, simulation.s
+        self.replay = Replay(simulation, image)
         self.good = self._snapshot()
         self.faults: dict[int, tuple[float, str]] = {}
 
-    def _snapshot(self) -> dict[str, np.ndarray]:
+    def _snapshot(self) -> Image:
         return {name: self.s.read(name) for name in (*(f.name for f in self.s.told), "time", "count")}
 
     def look(self) -> None:
-        """Stop worlds in which something is not finite; keep the others' state as the last good one."""
-        now, status = self._snapshot(), self.s.read("status")
-        worlds = len(status)
-        live = np.arange(self.s.capacity) < now["count"][:, None]
-        found: dict[int, str] = {}
-        for f in self.s.told:
-            bad = live & ~np.isfinite(now[f.name].reshape(worlds, self.s.capacity, -1)).all(axis=2)
-            for w in map(int, np.flatnonzero(bad.any(axis=1))):
-                found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
-        if (self.s.read("blame") == ASKED).any():
-            self.inquest.hold()
-        for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
-            found[w] = self._fault(w, int(status[w]))
+        """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
+        now = self._snapshot()
+        found = self._found(now)
         fresh = [w for w in found if w not in self.faults]
-        for w in fresh:
-            self.faults[w] = float(now["time"][w]), found[w]
-        sound = np.array([w not in found for w in range(worlds)])
         for name, values in now.items():
+            sound = [w for w in range(len(values)) if w not in found]
             self.good[name][sound] = values[sound]
         if fresh:
-            # So that a checkpoint holds it too, and not what has failed.
-            for name, values in now.items():
-                values[fresh] = self.good[name][fresh]
-                self.s.write(name, values)
-            status[~sound & (status == RUNNING)] = NOT_FINITE
-            self.s.write("status", status)
+            self._stop(fresh, now, found)
+        else:
+            self.replay.keep()
+
+    def _stop(self, fresh: list[int], now: Image, found: dict[int, str]) -> None:
+        """Put worlds that have failed where they were last good; so a checkpoint holds that too."""
+        live = self.s.image()
+        for w in fresh:
+            good, then = self.good, now
+            # In a start that has failed nothing has been done yet.
+            if live["steps"][w] > 0:
+                good = self.replay.last_good(w, self._sound)
+                then = self._snapshot()
+                found = self._found(then)
+            self.faults[w] = float(then["time"][w]), found[w]
+            status = self.s.read("status")[w]
+            for name, values in good.items():
+                live[name][w] = values[w]
+            for name, kept in self.good.items():
+                kept[w] = good[name][w]
+            live["status"][w] = NOT_FINITE if status in (RUNNING, ENDED) else status
+        self.simulation.put(live)
+
+    def _found(self, now: Image) -> dict[int, str]:
+        """What is wrong, by world; ``now`` is a snapshot of how they are."""
+        if (self.s.read("blame") == ASKED).any():
+            self.simulation.made.inquest.hold()
+        found: dict[int, str] = {}
+        live = np.arange(self.s.capacity) < now["count"][:, None]
+        for f in self.s.told:
+            bad = live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
+            for w in map(int, np.flatnonzero(bad.any(axis=1))):
+                found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
+        status = self.s.read("status")
+        for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
+            found[w] = self._fault(w, int(status[w]))
+        return found
+
+    def _sound(self, w: int) -> bool:
+        return w not in self._found(self._snapshot())
 
     def status(self, w: int, code: int) -> Status:
         """How a world whose status field holds ``code`` has ended, or that it runs."""
@@ -89,7 +117,7 @@ class Watch:
     def _fault(self, w: int, code: int) -> str:
         """What the kernels have recorded of a failure: reason, effect and particle."""
         blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
-        effects = self.scenes[w].effects
+        effects = self.simulation.scenes[w].effects
         by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
         reason = REASONS[code]
         if code == UNSETTLED:
