@@ -34,7 +34,7 @@ def cylinder(scene: Scene) -> Cylinder:
 
 def outline(axis: Axes, body: Cylinder) -> None:
     """A cylinder whose axis lies in the xz plane, as seen along y. In um."""
-    along = np.array([body.axis[0], body.axis[2]])
+    along = np.array(body.direction)[[0, 2]]
     across = np.array([-along[1], along[0]])
     a, b = 0.5 * body.length * along / MICRO, body.radius * across / MICRO
     corners = np.array([a + b, a - b, -a - b, -a + b])
@@ -157,7 +157,7 @@ def capture_volume(scene: Scene) -> float:
     From the middles of cells, SPACE along each side of a box that reaches BEYOND the cylinder.
     """
     body = cylinder(scene)
-    half = 0.5 * body.length * np.abs(body.axis) + BEYOND
+    half = 0.5 * body.length * np.abs(body.direction) + BEYOND
     lines = [h * ((2 * np.arange(SPACE) + 1) / SPACE - 1) for h in half]
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
     part = float((pull(scene, points) >= LEAST_FORCE).mean())
@@ -166,7 +166,7 @@ def capture_volume(scene: Scene) -> float:
 
 def attraction(force: np.ndarray, points: np.ndarray, body: Cylinder) -> np.ndarray:
     """Component of a force (N) towards the nearest point of a cylinder at the origin; 0 inside it."""
-    axis = np.asarray(body.axis)
+    axis = np.asarray(body.direction)
     z = points @ axis
     radial = points - z[..., None] * axis
     rho = np.linalg.norm(radial, axis=-1)

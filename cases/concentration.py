@@ -114,7 +114,7 @@ def scene(
     body = capture.fibre(capture.axis(angle), ASPECT)
     radius = nanometres * 1e-9
     half = side(number, radius, concentration) / 2
-    axis = np.asarray(body.axis)
+    axis = np.asarray(body.direction)
     # Above the rim where it is nearest to the direction of the field.
     outward = np.array([axis[2], 0.0, -axis[0]])
     centre = (body.length / 2 + distance + half) * axis + body.radius * outward

@@ -31,7 +31,7 @@ def test_samples_have_the_concentration_and_lie_above_the_rim(angle, concentrati
     made = scene(angle=angle, concentration=concentration, number=500)
     state = made.particles.arrays(made.domain, 0)
     body = made.effects[1].cylinders[0]
-    along = state["position"] @ np.asarray(body.axis)
+    along = state["position"] @ np.asarray(body.direction)
     d = side(500, 75e-9, concentration)
     assert state["mass"].sum() / d**3 == pytest.approx(1e3 * concentration)
     low, high = state["position"].min(axis=0), state["position"].max(axis=0)
@@ -39,7 +39,7 @@ def test_samples_have_the_concentration_and_lie_above_the_rim(angle, concentrati
     assert (high - low > 0.9 * d).all()
     assert along.min() >= body.length / 2 + DISTANCE
     assert along.min() < body.length / 2 + DISTANCE + 0.1 * d
-    across = (low + high) / 2 - (low + high) / 2 @ np.asarray(body.axis) * np.asarray(body.axis)
+    across = (low + high) / 2 - (low + high) / 2 @ np.asarray(body.direction) * np.asarray(body.direction)
     assert np.linalg.norm(across) == pytest.approx(body.radius, abs=0.1 * d)
 
 

@@ -44,8 +44,8 @@ def distance(body, r):
     d = r - body.centre
     if isinstance(body, Sphere):
         return np.linalg.norm(d, axis=1) - body.radius
-    z = d @ np.array(body.axis)
-    side = np.linalg.norm(d - z[:, None] * np.array(body.axis), axis=1) - body.radius
+    z = d @ np.array(body.direction)
+    side = np.linalg.norm(d - z[:, None] * np.array(body.direction), axis=1) - body.radius
     end = np.abs(z) - body.length / 2
     return np.hypot(np.maximum(side, 0), np.maximum(end, 0)) + np.minimum(np.maximum(side, end), 0)
 

@@ -41,19 +41,59 @@ def flux_density(point, radius, half, m):
 
 def field_and_gradient(point, radius, half, m):
     """B, and its gradient by differences with so many digits that they are exact."""
+    return anywhere(point, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius, 2 * half, m)
+
+
+def anywhere(point, centre, axis, radius, length, magnetisation):
+    """The same of a cylinder in any direction: of these very numbers, none of which is rounded on the way."""
     with mp.workdps(100):
+        turn, place = seen_from(point, centre, axis)
         # Beside the axis and the surface, where the formulas are 0/0, by less than any digit asked for.
-        place = [mp.mpf(float(v)) + mp.mpf(10) ** -20 * (i + 1) for i, v in enumerate(point)]
-        arguments = mp.mpf(float(radius)), mp.mpf(float(half)), [mp.mpf(float(v)) for v in m]
-        step = mp.mpf(10) ** -25
-        b = flux_density(place, *arguments)
-        slope = np.zeros((3, 3))
+        place += radius * mp.matrix([mp.mpf(10) ** -20 * (i + 1) for i in range(3)])
+        radius, half = mp.mpf(float(radius)), mp.mpf(float(length)) / 2
+        arguments = radius, half, list(turn * exactly(magnetisation))
+        step = radius * mp.mpf(10) ** -25
+        b = mp.matrix(flux_density(place, *arguments))
+        slope = mp.matrix(3, 3)
         for k in range(3):
-            ahead = list(place)
+            ahead = place.copy()
             ahead[k] += step
-            beyond = flux_density(ahead, *arguments)
-            slope[:, k] = [float((v - u) / step) for u, v in zip(b, beyond, strict=True)]
-        return np.array([float(v) for v in b]), slope
+            slope[:, k] = (mp.matrix(flux_density(ahead, *arguments)) - b) / step
+        back = turn.T
+        return as_floats(back * b)[:, 0], as_floats(back * slope * turn)
+
+
+def from_rim(point, centre, axis, radius, length):
+    """How far beyond the side of a cylinder a point is, and beyond its ends; negative before them. m."""
+    with mp.workdps(100):
+        x, y, z = seen_from(point, centre, axis)[1]
+        return float(mp.sqrt(x * x + y * y) - mp.mpf(radius)), float(abs(z) - mp.mpf(length) / 2)
+
+
+def seen_from(point, centre, axis):
+    """The matrix that turns a cylinder's axis to the last one, and the point in its coordinates."""
+    turn = frame(exactly(axis))
+    return turn, turn * (exactly(point) - exactly(centre))
+
+
+def exactly(numbers):
+    return mp.matrix([mp.mpf(float(v)) for v in numbers])
+
+
+def frame(axis):
+    """Rows: unit vectors of axes of which the last is along the given one."""
+    size = mp.norm(axis)
+    c = [v / size for v in axis]
+    least = min(range(3), key=lambda i: abs(c[i]))
+    a = [(1 if i == least else 0) - c[least] * c[i] for i in range(3)]
+    size = mp.norm(mp.matrix(a))
+    a = [v / size for v in a]
+    b = [c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]]
+    return mp.matrix([a, b, c])
+
+
+def as_floats(m):
+    return np.array(m.tolist(), dtype=float)
 
 
 def by_quadrature(point, radius, half, m):

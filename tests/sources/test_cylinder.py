@@ -7,8 +7,9 @@ from scipy.constants import mu_0
 from scipy.spatial.transform import Rotation
 
 from tests.sources.fields import WORLDS, fields, relative, steepness
-from tests.sources.published import by_quadrature, field_and_gradient
+from tests.sources.published import anywhere, by_quadrature, field_and_gradient, from_rim
 from tisim.sources.cylinder import Cylinder, MagneticCylinders
+from tisim.sources.cylinder_frame import split_magnetisation
 
 M = (0.3e6, -0.5e6, 0.8e6)
 
@@ -62,6 +63,81 @@ def test_field_and_gradient_at_the_hard_places(halves, rng):
         known = 1e-12 + 4 * 2.3e-16 / np.hypot(rho - 1, z - half)
         assert (relative(b[w], field) / known).max() < 1
         assert (np.linalg.norm(slope[w] - gradient, axis=(1, 2)) / size / known).max() < 1
+
+
+def inclined(ratio, towards, rng):
+    """One of this length, in radii, that lies anywhere in any direction; towards : how it is magnetised."""
+    # Neither its direction nor what is parallel to it has digits to spare.
+    axis = rng.normal(size=3)
+    across = np.cross(axis, rng.normal(size=3))
+    m = {
+        "along": 3e5 * axis,
+        "nearly along": 3e5 * axis + 10.0 ** rng.uniform(-16, -3) * across,
+        "across": 3e5 * across,
+        "anywhere": 3e5 * (axis + across),
+    }[towards]
+    radius = 10.0 ** rng.uniform(-4, 1)
+    return {
+        "centre": radius * rng.normal(size=3) * 10.0 ** rng.uniform(-1, 2),
+        "axis": axis, "radius": radius, "length": ratio * radius, "magnetisation": m,
+    }  # fmt: skip
+
+
+def about(body, n, rng):
+    """Points beside its side, within it, about its rim, and farther away."""
+    radius, half, up = body["radius"], 0.5 * body["length"], body["axis"] / np.linalg.norm(body["axis"])
+    kind = np.arange(n) % 4
+    small, turn = 10.0 ** rng.uniform(-8, -1, n), rng.uniform(0, 2 * np.pi, n)
+    rho = np.choose(kind, [1 + 10.0 ** rng.uniform(-12, 1, n), rng.uniform(0, 1, n), 1 + small * np.cos(turn),
+                           10.0 ** rng.uniform(0, 4, n)])  # fmt: skip
+    z = np.where(kind == 2, half + radius * small * np.sin(turn), half * rng.uniform(-1.2, 1.2, n))
+    across = np.cross(up, rng.normal(size=(n, 3)))
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    return body["centre"] + z[:, None] * up + radius * rho[:, None] * across
+
+
+def errors_of_inclined(ratios, n, rng):
+    """Of field and gradient, as parts of what the docstring allows; a row for each point, for long bodies of
+    every way to be magnetised."""
+    found = []
+    for towards in ("along", "nearly along", "across", "anywhere"):
+        bodies = [inclined(ratio, towards, rng) for ratio in ratios]
+        places = np.array([about(body, n, rng) for body in bodies])
+        b, slope = fields([MagneticCylinders(cylinders=[Cylinder(**body)]) for body in bodies], places)
+        for w, body in enumerate(bodies):
+            radius = body["radius"]
+            for k, point in enumerate(places[w]):
+                field, gradient = anywhere(point, **body)
+                side, end = from_rim(point, body["centre"], body["axis"], radius, body["length"])
+                size = np.linalg.norm(gradient) + np.linalg.norm(field) / np.hypot(abs(side) + radius, end)
+                allowed = 1e-12 + 1e-15 * radius / np.hypot(side, end)
+                off = np.linalg.norm(b[w, k] - field) / np.linalg.norm(field)
+                found.append([off / allowed, np.linalg.norm(slope[w, k] - gradient) / size / allowed])
+    return np.array(found)
+
+
+def test_long_cylinders_in_any_direction(rng):
+    """Beside one that is magnetised along its axis the field is 1e-7 of what it would be across."""
+    assert errors_of_inclined((1.0, 30.0, 300.0, 2000.0), 3, rng).max() < 1
+
+
+@pytest.mark.slow
+def test_many_cylinders_in_any_direction(rng):
+    for _ in range(4):
+        ratios = 10.0 ** rng.uniform(-1, np.log10(2000), WORLDS)
+        assert errors_of_inclined(ratios, 12, rng).max() < 1
+
+
+def test_what_is_parallel_stays_parallel_and_files_keep_what_was_written():
+    """A direction is not rounded before it is used."""
+    body = Cylinder(axis=(1, 2, 3), radius=1, length=2, magnetisation=(1e5, 2e5, 3e5))
+    assert body.axis == (1, 2, 3)
+    assert np.linalg.norm(body.direction) == pytest.approx(1, abs=3e-16)
+    across, along = split_magnetisation(body.axis, body.magnetisation)
+    assert across == (0, 0, 0)
+    assert along == np.sqrt(14) * 1e5
+    for axis in ((1e-200, 0, 0), (3e307, 4e307, 0), (5e-324, 5e-324, 0)):
+        assert np.linalg.norm(Cylinder(axis=axis, radius=1, length=2).direction) == pytest.approx(1)
 
 
 def test_the_published_formulas_are_right():
@@ -130,8 +206,8 @@ def test_against_an_independent_library(rng):
             assert np.median(apart) < 1e-12
         for c in world.cylinders:
             d = points[w] - c.centre
-            z = d @ np.array(c.axis)
-            rho = np.linalg.norm(d - z[:, None] * np.array(c.axis), axis=1)
+            z = d @ np.array(c.direction)
+            rho = np.linalg.norm(d - z[:, None] * np.array(c.direction), axis=1)
             inside += ((rho < c.radius) & (np.abs(z) < c.length / 2)).sum()
     assert inside > 300
 

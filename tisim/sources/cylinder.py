@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Self
 
 import numpy as np
 from pydantic import Field as Option
 from pydantic import field_validator, model_validator
+from pydantic.fields import FieldInfo
 from scipy.constants import mu_0
 
 from tisim._taichi import ti
@@ -15,6 +17,7 @@ from tisim.errors import InputError, must
 from tisim.ranges import check_direction
 from tisim.sources import cylinder_field
 from tisim.sources.cylinder_end import ClosedEnds
+from tisim.sources.cylinder_frame import place, split_direction, split_magnetisation
 from tisim.sources.cylinder_table import TabulatedEnds, table
 from tisim.sources.magnets import Body, Magnets
 from tisim.spec import Vector
@@ -23,8 +26,7 @@ from tisim.spec import Vector
 class Cylinder(Body):
     """A cylinder, magnetised uniformly and in any direction, or not at all.
 
-    centre; axis : of any length but 0, made a unit vector; radius; length : from end to end;
-    magnetisation : M.
+    centre; axis : of any length but 0; radius; length : from end to end; magnetisation : M.
     """
 
     axis: Vector = parameter("", (0.0, 0.0, 1.0))
@@ -33,34 +35,42 @@ class Cylinder(Body):
 
     @field_validator("axis", mode="after")
     @classmethod
-    def _unit(cls, axis: Vector) -> Vector:
+    def _direction(cls, axis: Vector) -> Vector:
         check_direction("cylinder.axis", axis)
-        size = float(np.linalg.norm(axis))
-        # One that is of unit length to rounding stays as it is: files give back the same bits.
-        return axis if abs(size - 1) < 1e-15 else (axis[0] / size, axis[1] / size, axis[2] / size)
+        return axis
+
+    @property
+    def direction(self) -> Vector:
+        """The unit vector along the axis."""
+        (a, b, c), (u, v, w) = split_direction(self.axis)
+        return a + u, b + v, c + w
+
+    @classmethod
+    def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
+        """What it is given, and what kernels read in place of axis and magnetisation."""
+        yield from super().parameters()
+        for name, size in (("lead", 3), ("rest", 3), ("across", 3), ("along", 1)):
+            yield name, FieldInfo(annotation=Vector if size == 3 else float), size
+
+    def values(self) -> list[float]:
+        given = np.hstack([getattr(self, name) for name, _, _ in super().parameters()]).tolist()
+        lead, rest = split_direction(self.axis)
+        across, along = split_magnetisation(self.axis, self.magnetisation)
+        return [*given, *lead, *rest, *across, along]
 
     @ti.func
     def place(self, w, k, r):
-        """Where r lies: distance from the axis of cylinder k, unit vector from it, and place along it."""
-        d = r - self.centre(w, k)
-        axis = self.axis(w, k)
-        z = d.dot(axis)
-        across = d - z * axis
-        rho = across.norm()
-        return rho, across / ti.select(rho > 0.0, rho, 1.0), z
-
-    @ti.func
-    def magnetised(self, w, k):
-        """The magnetisation across the axis, and its component along it."""
-        m, axis = self.magnetisation(w, k), self.axis(w, k)
-        along = m.dot(axis)
-        return m - along * axis, along
+        """Where r lies: distance from the axis of cylinder k, unit vector from it, place along it from the
+        centre, and distance beyond the nearer end, negative before it."""
+        rho, outward, foot, z = place(r, self.centre(w, k), self.lead(w, k), self.rest(w, k))
+        side = ti.select(foot + z < 0.0, -1.0, 1.0)
+        return rho, outward, foot + z, (side * foot - 0.5 * self.length(w, k)) + side * z
 
     @ti.func
     def nearest(self, w, k, r):
-        rho, outward, z = self.place(w, k, r)
-        side, end = rho - self.radius(w, k), ti.abs(z) - 0.5 * self.length(w, k)
-        upward = ti.select(z < 0.0, -1.0, 1.0) * self.axis(w, k)
+        rho, outward, z, end = self.place(w, k, r)
+        side = rho - self.radius(w, k)
+        upward = ti.select(z < 0.0, -1.0, 1.0) * self.unit(w, k)
         # Inside, the nearer of side and end; on the axis there is no way to the side.
         sideways = side >= end and rho > 0.0
         distance, normal = ti.select(sideways, side, end), ti.select(sideways, outward, upward)
@@ -70,30 +80,35 @@ class Cylinder(Body):
         return distance, normal
 
     @ti.func
-    def shape(self, w, k, rho, z):
+    def unit(self, w, k):
+        """The unit vector along the axis."""
+        return self.lead(w, k) + self.rest(w, k)
+
+    @ti.func
+    def shape(self, w, k, rho, z, end):
         """The six functions of ``cylinder_field``."""
-        return cylinder_field.shape(rho, z, self.radius(w, k), 0.5 * self.length(w, k), self.ends)
+        return cylinder_field.shape(rho, z, end, self.radius(w, k), 0.5 * self.length(w, k), self.ends)
 
     @ti.func
     def flux_density(self, w, k, r):
-        rho, outward, z = self.place(w, k, r)
-        return self.density(w, k, self.shape(w, k, rho, z), rho, outward, z)
+        rho, outward, z, end = self.place(w, k, r)
+        return self.density(w, k, self.shape(w, k, rho, z, end), rho, outward, end)
 
     @ti.func
     def flux(self, w, k, r):
-        rho, outward, z = self.place(w, k, r)
-        six = self.shape(w, k, rho, z)
-        m_across, m_along = self.magnetised(w, k)
-        slope = cylinder_field.gradient(six, rho, outward, self.axis(w, k), m_across, m_along)
-        return self.density(w, k, six, rho, outward, z), mu_0 * slope
+        rho, outward, z, end = self.place(w, k, r)
+        six = self.shape(w, k, rho, z, end)
+        slope = cylinder_field.gradient(
+            six, rho, outward, self.unit(w, k), self.across(w, k), self.along(w, k)
+        )
+        return self.density(w, k, six, rho, outward, end), mu_0 * slope
 
     @ti.func
-    def density(self, w, k, six, rho, outward, z):
+    def density(self, w, k, six, rho, outward, end):
         """B = mu_0 (H + M), M inside only."""
-        m_across, m_along = self.magnetised(w, k)
-        across, along = cylinder_field.field(six, rho, outward, m_across, m_along)
-        b = across + along * self.axis(w, k)
-        if rho < self.radius(w, k) and ti.abs(z) < 0.5 * self.length(w, k):
+        across, along = cylinder_field.field(six, rho, outward, self.across(w, k), self.along(w, k))
+        b = across + along * self.unit(w, k)
+        if rho < self.radius(w, k) and end < 0.0:
             b += self.magnetisation(w, k)
         return mu_0 * b
 
@@ -105,9 +120,11 @@ class MagneticCylinders(Magnets):
     table_digits : with these many digits field and gradient are read from a table, made when a scene is
         compiled, where its error is measured; cylinders must then be at least as long as their radius.
     Without it they are closed forms in complete elliptic integrals, with series about the axis and far away.
-    In f64, for lengths of 1/10 to 2000 radii, their errors are below 1e-12, and 1e-15 R/d more at a distance
-    d from the rim, as places are known to rounding only: that of B relative to |B|, that of its gradient to
-    |grad B| + |B|/l, l the distance to the rim with R added across, as it passes through 0 in the middle.
+    In f64, for lengths of 1/10 to 2000 radii in any direction, their errors are below 1e-12, and 1e-15 R/d
+    more at a distance d from the rim, as places are known to rounding only: that of B relative to |B|, that
+    of its gradient to |grad B| + |B|/l, l the distance to the rim with R added across, as it passes through 0
+    in the middle. That is of the numbers as they are given: what their own rounding puts across the axis of
+    a long cylinder that is magnetised along it is of the order of 1e-16 (length/R)^2 of the field beside it.
     Where the field has no value - on the surface, where it jumps, and at the rims, where it grows as a
     logarithm - it is finite.
     Source: B16 Eqs (5.1), (5.3), (5.21).

@@ -12,22 +12,22 @@ from tisim.sources.cylinder_far import far_away
 
 
 @ti.func
-def shape(rho, z, radius, half, ends: ti.template()):  # type: ignore[valid-type]
-    """The six functions, as a vector. Lengths in one unit. ends : closed or tabulated."""
+def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+    """The six functions, as a vector. Lengths in one unit. end : |z| - half, which the caller knows without
+    cancellation. ends : closed or tabulated."""
     six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
     if rho * rho + z * z > ends.far * (radius * radius + half * half):
         six = far_away(rho, z, radius, half, ends.small)
     else:
-        six = close_by(rho, z, radius, half, ends)
+        six = close_by(rho, z, end, radius, half, ends)
     return six
 
 
 @ti.func
-def close_by(rho, z, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+def close_by(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
     """The difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
-    side, height = ti.select(z < 0.0, -1.0, 1.0), ti.abs(z)
-    between = height < half
-    pair = ends.both(rho, ti.Vector([height + half, ti.abs(height - half)]), radius)
+    side, between = ti.select(z < 0.0, -1.0, 1.0), end < 0.0
+    pair = ends.both(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
     odd = ti.select(between, 1.0, -1.0)
     six = ti.Vector(
         [
