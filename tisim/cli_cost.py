@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tisim import claim, request, runtime
-from tisim.errors import RunError, must
+from tisim.errors import must
 from tisim.interrupt import Interrupt
 from tisim.options import Changes, Device, Out, Overwrite, Seed, Size, Target, Threads
 from tisim.terminal import err, out, progress_bar, stopping
@@ -49,7 +49,7 @@ def cost(
         bool, typer.Option("--quick", help="A look: stop a decade above what the scene asks for, time once.")
     ] = False,
     budget: Annotated[
-        float, typer.Option(metavar="MINUTES", help="Leave out what would take longer.")
+        float, typer.Option(metavar="MINUTES", help="Leave out what would run longer; compiling is free.")
     ] = math.inf,
     single: Annotated[bool, typer.Option("--f32/--no-f32", help="Also run in single precision.")] = True,
     device: Device = "cpu",
@@ -92,12 +92,6 @@ def cost(
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)
-        if row is None:
-            least = min((row.at_most(which) for row in study.rows), default=math.inf)
-            raise RunError(
-                f"no setting that was measured has an error of at most {error:g}; the least is {least:.1e}. "
-                f"{'More --starts go' if study.random else '--finer goes'} further"
-            )
         words = f"{target} --size {size}" if size else target
         print(f"cheapest with an error of at most {error:g}:\n{listing.recipe(row, words, which)}")
 

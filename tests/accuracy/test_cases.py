@@ -36,7 +36,7 @@ def test_the_array_follows_its_closed_form():
     (result,) = simulate([scene], capacity=8)
     for quantity in (positions, centre):
         truth = closed_form(quantity, result)
-        error, off = estimate(quantity, [result]).error(truth.estimate)
+        error, off = estimate(quantity, [result]).error(truth.estimate, truth.size)
         assert error < 1e-5
         assert off == 0.0
     assert truth.estimate.value[2] == 0.0

@@ -1,5 +1,6 @@
 """How a study finds what to turn: from what the parts of a scene say of themselves."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import pytest
@@ -9,14 +10,15 @@ from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
 from tisim.accuracy import Quantity, Study
 from tisim.accuracy.methods import exchanged, finest, methods, parts
+from tisim.accuracy.picture import picture
 from tisim.accuracy.reference import attempts, compared
-from tisim.accuracy.row import Row, cheapest, decades
+from tisim.accuracy.row import Row, decades, tied
 from tisim.accuracy.words import expression, options
 from tisim.effects.moment import InducedMoment
 from tisim.effects.mutual_moment import MutualInducedMoment
 from tisim.effects.near_field import NearField, TruncatedNearField
 from tisim.effects.tether import Tether
-from tisim.errors import InputError
+from tisim.errors import InputError, RunError
 from tisim.knob import Knob
 from tisim.sources.uniform import MagneticField
 from tisim.spec import parameter
@@ -202,15 +204,88 @@ def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatc
     assert own(1.0, 1.01, 1.2, 1.21) == pytest.approx(0.2)
 
 
-def row(name, seconds, error, off):
-    return Row(name, "", "", "", "f64", 1, seconds=(seconds,), errors=((error, off),))
+def row(name, seconds, error, off=0.0, sums=1.0):
+    seconds = seconds if isinstance(seconds, tuple) else (seconds,)
+    return Row(name, "", "", "", "f64", 1, seconds=seconds, sums=sums, errors=((error, off),))
 
 
 def test_what_an_error_may_be_off_by_counts_in_the_choice():
     rows = [row("sure", 2.0, 5e-4, 1e-5), row("unsure", 1.0, 9e-4, 5e-4), row("slow", 3.0, 1e-6, 0.0)]
-    assert cheapest(rows, 1e-3).method == "sure"
-    assert cheapest(rows, 2e-3).method == "unsure"
-    assert cheapest(rows, 1e-7) is None
-    chosen = {error: best.method for error, best in decades(rows).items()}
+    assert [r.method for r in tied(rows, 1e-3)] == ["sure"]
+    assert [r.method for r in tied(rows, 2e-3)] == ["unsure"]
+    assert tied(rows, 1e-7) == []
+    chosen = {error: best.method for error, (best,) in decades(rows).items()}
     assert chosen == {1e-2: "unsure", 1e-3: "sure", 1e-4: "slow", 1e-5: "slow", 1e-6: "slow"}
     assert [r.trusted() for r in rows] == [True, False, True]
+
+
+def test_what_timings_do_not_tell_apart_is_decided_by_work():
+    """2 ms of noise, the clock, and a timing taken once are no reason to prefer one."""
+    spread = [
+        row("a", (0.010, 0.012, 0.013), 1e-5, sums=20.0),
+        row("b", (0.009, 0.011, 0.012), 1e-5, sums=90.0),
+    ]
+    clock = [row("a", (2e-4, 2e-4), 1e-5, sums=20.0), row("b", (1e-4, 1e-4), 1e-5, sums=90.0)]
+    once = [row("a", 1.1, 1e-5, sums=20.0), row("b", 1.0, 1e-5, sums=90.0)]
+    for rows in (spread, clock, once):
+        assert [r.method for r in tied(rows, 1e-4)] == ["a", "b"]
+        assert decades(rows)[1e-5] == rows
+    apart = [row("a", (0.020, 0.021, 0.022), 1e-5, sums=20.0), spread[1]]
+    assert [r.method for r in tied(apart, 1e-4)] == ["b"]
+    # Starts are work too.
+    more = replace(spread[0], starts=8)
+    assert [r.method for r in tied([more, spread[1]], 1e-4)] == ["b", "a"]
+
+
+def test_a_law_that_changes_nothing_is_not_chosen():
+    law = row("all pairs", 2.0, 1e-5)
+    for error, same in ((1e-5 + 1e-15, True), (1e-5 + 1e-10, False)):
+        cut = row("cut-off", 1.0, error)
+        assert cut.same_errors(law) == same
+        chosen = tied([law, replace(cut, same=cut.same_errors(law))], 1e-4)
+        assert [r.method for r in chosen] == ["all pairs" if same else "cut-off"]
+    assert not law.same_errors(law)
+    assert not law.same_errors(Row("failed", "", "", "", "f64", 1, failed="not finite"))
+
+
+def pictured(*rows):
+    """Labels of the legend, and the limits of the errors, of a study that has found this."""
+    made = Study(oscillator(), (KNOWN,))
+    made.rows = list(rows)
+    figure = picture(made)
+    (legend,) = figure.legends
+    return [" ".join(text.get_text().split()) for text in legend.get_texts()], figure.axes[0].get_ylim()
+
+
+def test_what_has_failed_is_in_the_legend():
+    failed = Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")
+    labels, _ = pictured(
+        row("good", 1.0, 1e-3), failed, row("at times", 1.0, 1e-2), replace(failed, method="at times")
+    )
+    assert labels[:3] == [
+        "good",
+        "never; failed: a quantity is not finite",
+        "at times; 1 of 2 failed: a quantity is not finite",
+    ]
+    assert labels[3] == "cheapest for a power of ten of the error"
+
+
+def test_a_picture_of_large_errors_is_not_blank():
+    _, (low, high) = pictured(row("far off", 1.0, 1e5), row("farther", 2.0, 1e6))
+    assert low < 1e5 < high
+
+
+def test_nothing_found_is_told_in_words():
+    made = Study(oscillator(), (KNOWN,))
+    made.rows = [row("good", 1.0, 1e-3, 1e-4)]
+    with pytest.raises(RunError) as told:
+        made.cheapest(1e-4)
+    assert str(told.value) == (
+        "error of known must be at least 1.1e-03, the least that was reached (good, ; finer settings go further); "
+        "received 0.0001"
+    )
+    made.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
+    with pytest.raises(
+        RunError, match=r"a setting that was measured; there is none: a quantity is not finite"
+    ):
+        made.cheapest(1.0)

@@ -73,7 +73,7 @@ def test_a_random_reference_is_no_better_than_its_starts(drifts):
     apart = estimate(unknown, half).value - truth.estimate.value
     assert bias == pytest.approx(np.linalg.norm(apart))
     assert bias > 0
-    error, off = estimate(unknown, drifts[:STARTS]).error(truth.estimate)
+    error, off = estimate(unknown, drifts[:STARTS]).error(truth.estimate, truth.size)
     assert error < TRUSTED * off
 
 

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from tisim.batches import Progress
 from tisim.errors import RunError
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.simulation import Simulation
+
+Look = Callable[[Result], None]
+LOOKS = 128
+"""Looks at a run on its way."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,25 @@ class Timed:
         return steps / starts, sums / starts, rejections / starts
 
 
+def watched(simulation: Simulation, look: Look) -> None:
+    """Let the first world wait ``LOOKS`` times on its way, and look at its state there."""
+    every = simulation.scenes[0].duration / LOOKS
+    due = 0.0
+
+    def arrived() -> None:
+        nonlocal due
+        (result,) = simulation.results([0])
+        if result.time >= due:
+            look(result)
+            due = (np.floor(result.time / every) + 1.0) * every
+            hold = simulation.s.read("hold")
+            hold[0] = due
+            simulation.s.write("hold", hold)
+
+    simulation.look = arrived
+    arrived()
+
+
 class Bench:
     """Compiled simulations, one for each structure and number of worlds: idle worlds would be timed too."""
 
@@ -49,10 +75,20 @@ class Bench:
             self.made[key] = Simulation(scene, worlds)
         return self.made[key]
 
-    def run(self, scenes: Sequence[Scene], progress: Progress | None = None) -> Timed:
-        """RunError, with the reason, when one of them fails."""
+    def run(
+        self, scenes: Sequence[Scene], progress: Progress | None = None, look: Look | None = None
+    ) -> Timed:
+        """RunError, with the reason, when one of them fails.
+
+        progress : called about four times a second, first when all is compiled and the run begins. look :
+        given the first scene's state about ``LOOKS`` times, evenly in its simulated time.
+        """
         simulation = self.ready(scenes[0], len(scenes))
         simulation.load(scenes)
+        if progress:
+            progress(0.0)
+        if look:
+            watched(simulation, look)
         simulation.run(progress)
         results = simulation.results()
         for result in results:
@@ -73,12 +109,18 @@ class OutOfTime(Exception):
 
 
 class Limit:
-    """Progress that stops a run after so many seconds with OutOfTime."""
+    """Progress that stops a run with OutOfTime, so many seconds after it has first been called."""
 
     def __init__(self, seconds: float, then: Progress) -> None:
-        self.end, self.then = time.monotonic() + seconds, then
+        self.seconds, self.then, self.began = seconds, then, math.inf
 
     def __call__(self, fraction: float) -> None:
-        if fraction < 1.0 and time.monotonic() > self.end:
+        self.began = min(self.began, time.monotonic())
+        if fraction < 1.0 and self.spent > self.seconds:
             raise OutOfTime
         self.then(fraction)
+
+    @property
+    def spent(self) -> float:
+        """Seconds since the first call; 0 before."""
+        return max(0.0, time.monotonic() - self.began)

@@ -7,7 +7,6 @@ next and repeats in turns, so that a machine that drifts, a budget that ends and
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -16,12 +15,13 @@ import numpy as np
 
 from tisim import runtime
 from tisim.accuracy import reference
-from tisim.accuracy.bench import Bench, Limit, OutOfTime, Timed
+from tisim.accuracy.bench import Bench, Limit, Look, OutOfTime, Timed
 from tisim.accuracy.methods import Method, Setting, ensembles, methods
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.row import Row
 from tisim.accuracy.words import expression, options, pasted
 from tisim.errors import InputError, RunError, must
+from tisim.result import Result
 from tisim.scene import Scene
 
 if TYPE_CHECKING:
@@ -40,14 +40,21 @@ class Run:
 
     def __init__(self, study: Study, progress: Progress, finished: Callable[[], object]) -> None:
         self.study, self.progress, self.finished = study, progress, finished
-        self.bench, self.began = Bench(), time.monotonic()
+        self.bench, self.spent = Bench(), 0.0
         self.done, self.planned, self.what = 0.0, 1.0, "the scene as it is"
 
     def all(self) -> None:
         study = self.study
         where = runtime.current()
         runtime.start(where.device, "f64", where.threads)
-        base = self._run([study.scene], 0.0)
+        largest = [0.0 for _ in study.quantities]
+
+        def look(result: Result) -> None:
+            for k, q in enumerate(study.quantities):
+                largest[k] = max(largest[k], q.size(result))
+
+        returns = any(q.returns for q in study.quantities)
+        base = self._run([study.scene], 0.0, look=look if returns else None)
         found = self._methods(base)
         self.base = base.seconds
         must(bool(found), "scene", "one that has something to turn", study.scene.stepper.kind())
@@ -57,13 +64,15 @@ class Run:
             [(m, k) for m in found if k < len(m.settings) and (m.name, m.settings[k].words) not in known]
             for k in range(rounds)
         ]
-        self._truths(base, found, sum(self._cost(m, k) for items in plan for m, k in items))
+        rest = sum(self._cost(m, k) for items in plan for m, k in items)
+        self._truths(base, largest, found, rest)
         for precision in study.precisions:
             if runtime.current().precision != precision:
                 self.bench.close()
                 runtime.start(where.device, precision, where.threads)
             for items in plan:
                 self._round([(m, k) for m, k in items if m.settings[k].precision == precision])
+        self._compare_laws(found)
         known = {row.key for row in study.rows}
         study.complete = all((m.name, setting.words) in known for m in found for setting in m.settings)
         self.bench.close()
@@ -85,8 +94,9 @@ class Run:
                 return repeats * row.median * weights[k] / guesses[row.setting]
         return repeats * self.base * method.settings[k].starts * (weights[k] if method.knob else 1.0)
 
-    def _truths(self, base: Timed, found: Sequence[Method], rest: float) -> None:
-        """The true values, where they are not known yet; ``rest``: seconds planned for all that follows."""
+    def _truths(self, base: Timed, largest: Sequence[float], found: Sequence[Method], rest: float) -> None:
+        """The true values, where they are not known yet. largest : of each quantity on the way. rest :
+        seconds planned for all that follows."""
         study, self.planned = self.study, rest
         if study.truths:
             return
@@ -97,18 +107,22 @@ class Run:
             costs = [n * self.base * 10.0 ** (-a.decades / a.method.base.stepper.order) for a in made]
             self.planned += sum(costs)
             if sum(costs) > self._left():
-                raise RunError(f"the reference takes about {sum(costs):.0f} s, which is more than the budget")
+                reason = (
+                    f"the reference takes about {sum(costs):.2g} s of running, more than the budget has left"
+                )
+                raise RunError(f"{reason}, {max(self._left(), 0.0):.2g} s")
             for attempt, cost in zip(made, costs, strict=True):
                 self.what = f"{'reference' if attempt is made[0] else 'its check'}: {attempt.name}"
-                runs.append(self._run(self._starts(attempt.scene, n, OTHERS), cost).results)
-        truths = []
-        for q in study.quantities:
-            if q.exact is None:
-                truths.append(reference.compared(q, runs, made))
-            else:
-                truths.append(reference.closed_form(q, base.results[0]))
-            must(bool(np.any(truths[-1].estimate.value)), q.name, "other than zero at the end", 0.0)
-        study.truths = tuple(truths)
+                try:
+                    runs.append(self._run(self._starts(attempt.scene, n, OTHERS), cost).results)
+                except RunError as error:
+                    raise RunError(f"the {self.what}: {error}") from None
+        study.truths = tuple(
+            reference.compared(q, runs, made, most)
+            if q.exact is None
+            else reference.closed_form(q, base.results[0], most)
+            for q, most in zip(study.quantities, largest, strict=True)
+        )
         self.finished()
 
     def _starts(self, scene: Scene, n: int, first: int = 0) -> list[Scene]:
@@ -143,10 +157,23 @@ class Run:
                 if runs[at] or at in failed:
                     self._row(method, k, runs[at], failed.get(at, ""))
 
-    def _left(self) -> float:
-        return self.study.budget - (time.monotonic() - self.began)
+    def _compare_laws(self, found: Sequence[Method]) -> None:
+        """Cheaper laws that make the same errors as the law they stand for are no laws of their own."""
+        rows = {row.key: row for row in self.study.rows}
+        stands_for = {(m.name, s.words): m.exact for m in found for s in m.settings if m.exact}
+        self.study.rows[:] = [
+            replace(row, same=row.same_errors(rows.get(stands_for.get(row.key, row.key), row)))
+            for row in self.study.rows
+        ]
+        self.finished()
 
-    def _run(self, scenes: Sequence[Scene], cost: float, limit: float = math.inf) -> Timed:
+    def _left(self) -> float:
+        """Seconds of the budget, which compiling takes nothing of."""
+        return self.study.budget - self.spent
+
+    def _run(
+        self, scenes: Sequence[Scene], cost: float, limit: float = math.inf, look: Look | None = None
+    ) -> Timed:
         """Run and time; ``cost`` is what was planned for it, s; OutOfTime after ``limit`` (s)."""
         begun = self.done
         if limit <= 0.0:
@@ -156,7 +183,11 @@ class Run:
             self.progress(min((begun + cost * fraction) / self.planned, 1.0), self.what)
 
         watch(0.0)
-        timed = self.bench.run(scenes, Limit(limit, watch))
+        clock = Limit(limit, watch)
+        try:
+            timed = self.bench.run(scenes, clock, look)
+        finally:
+            self.spent += clock.spent
         self.done = begun + cost
         return timed
 
@@ -170,7 +201,7 @@ class Run:
         if not failed:
             steps, sums, rejections = runs[0].work
             errors = tuple(
-                estimate(q, runs[0].results).error(truth.estimate)
+                estimate(q, runs[0].results).error(truth.estimate, truth.size)
                 for q, truth in zip(study.quantities, study.truths, strict=True)
             )
             row = replace(

@@ -2,8 +2,9 @@
 
 cost.h5: group ``rows`` has one array per column, in the order of cost.csv, with ``errors`` and
 ``uncertainties`` of shape (rows, quantities) and ``seconds`` (rows, repeats), NaN where there was none; group
-``truths`` has the true value of each quantity, with its own uncertainty and where it is from. The attributes
-hold the scene as TOML, the settings and the versions, as in a run's result.h5.
+``truths`` has the true value of each quantity, with its own uncertainty, where it is from, and the size that
+errors are relative to. The attributes hold the scene as TOML, the settings and the versions, as in a run's
+result.h5.
 """
 
 from __future__ import annotations
@@ -29,11 +30,11 @@ from tisim.durable import replace_file
 from tisim.errors import must
 from tisim.output import versions
 
-FORMAT = "tisim cost 1"
+FORMAT = "tisim cost 2"
 CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
 LEFT = Leavings((CSV, HDF5, PICTURE), main=(HDF5,))
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
-_NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float}
+_NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
 
 def write(study: Study, folder: Path) -> list[Path]:
@@ -81,7 +82,10 @@ def _write_rows(study: Study, path: Path) -> None:
         truths = file.create_group("truths")
         for quantity, truth in zip(study.quantities, study.truths, strict=False):
             value = truths.create_dataset(quantity.name, data=truth.estimate.value)
-            value.attrs.update({"uncertainty": truth.estimate.uncertainty, "source": truth.source})
+            value.attrs.update({
+                "uncertainty": truth.estimate.uncertainty, "source": truth.source, "size": truth.size,
+                "errors are relative to": quantity.relative_to,
+            })  # fmt: skip
 
 
 def _settings(study: Study) -> dict[str, Any]:
@@ -131,6 +135,7 @@ def _truths(group: Any, study: Study) -> tuple[Truth, ...]:
         Truth(
             Estimate(group[q.name][()], float(group[q.name].attrs["uncertainty"])),
             str(group[q.name].attrs["source"]),
+            float(group[q.name].attrs["size"]),
         )
         for q in study.quantities
     )

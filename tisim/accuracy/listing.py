@@ -11,11 +11,14 @@ from tisim.accuracy.study import Study
 
 
 def table(study: Study) -> RenderableType:
-    """Every setting by method, with its median time, work and errors; for what error it is the cheapest."""
+    """Every setting by method, with its median time, work and errors; for what error it is the cheapest, in
+    brackets where timings do not tell it from the one that is chosen."""
     names = [quantity.name for quantity in study.quantities]
     heads = ["", "seconds", "spread", "steps", "forces", "rejected", *names, "best for"]
-    best = study.decades()
-    cells = {row.key: _cells(row, best) for row in study.rows}
+    best: dict[tuple[str, str], str] = {}
+    for error, (chosen, *others) in study.decades().items():
+        best |= {row.key: f"({error:.0e})" for row in others} | {chosen.key: f"{error:.0e}"}
+    cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows}
     columns = zip(heads, *(line for line in cells.values() if len(line) == len(heads)), strict=True)
     widths = [max(map(len, column)) for column in columns]
     blocks: list[RenderableType] = [_grid([heads], widths, "bold")]
@@ -33,16 +36,15 @@ def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
     return grid
 
 
-def _cells(row: Row, best: dict[float, Row]) -> list[str]:
+def _cells(row: Row, best: str) -> list[str]:
     if row.failed:
         return [f"  {row.setting}: {row.failed}"]
-    least = min((error for error, chosen in best.items() if chosen is row), default=None)
     errors = [
         f"{row.errors[k][0]:.1e}" if row.trusted(k) else f"< {row.at_most(k):.0e}"
         for k in range(len(row.errors))
     ]
     work = [f"{value:.0f}" for value in (row.steps, row.sums, row.rejections)]
-    note = f"{least:.0e}" if least is not None else ""
+    note = "no change" if row.same else best
     return [f"  {row.setting}", f"{row.median:.3g}", f"{row.spread:.1g}", *work, *errors, note]
 
 
@@ -51,7 +53,14 @@ def sources(study: Study) -> list[str]:
     lines = []
     for quantity, truth in zip(study.quantities, study.truths, strict=False):
         own = f"; its own error at most {truth.error:.1e}" if truth.error else ""
-        lines.append(f"error of {quantity.name}: against {truth.source}{own}")
+        relative = f"relative to {quantity.relative_to}"
+        lines.append(f"error of {quantity.name}: {relative}, against {truth.source}{own}")
+    if any(len(rows) > 1 for rows in study.decades().values()):
+        lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
+    if not study.complete:
+        lines.append("not complete: the budget, or Ctrl-C, came before the other settings")
+    if any(row.same for row in study.rows):
+        lines.append("no change: the same as of the law that it stands for, but for rounding")
     return lines
 
 

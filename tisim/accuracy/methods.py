@@ -30,7 +30,8 @@ class Method:
     """A line in the picture: settings of one kind, the cheapest first.
 
     weights : guesses of how their times go. knob : the one that is turned, of the part at ``path``; None for
-    a list of laws or of numbers of starts.
+    a list of laws or of numbers of starts. exact : method and setting that such laws differ from in the law
+    only; None for all else.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Method:
     base: Scene
     path: str = ""
     knob: Knob | None = None
+    exact: tuple[str, str] | None = None
 
     @property
     def converges(self) -> bool:
@@ -118,8 +120,9 @@ def methods(
         laws = effect.approximations(extent)
         if laws:
             # As accurate otherwise as anything here, so that what is seen is the error of the law.
-            accurate = found[0].settings[-1].scene if found else scene
-            found.append(_laws(accurate, effect.kind(), laws, starts))
+            accurate = found[0].settings[-1] if found else Setting(scene, "")
+            exact = (found[0].name, accurate.words) if found else None
+            found.append(_laws(accurate.scene, effect.kind(), laws, starts, exact))
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in _within("stepper", stepper):
@@ -170,7 +173,9 @@ def _turning(
     return Method(name, tuple(settings), tuple(weights), scene, path, knob)
 
 
-def _laws(scene: Scene, kind: str, laws: Sequence[Spec], starts: int) -> Method:
+def _laws(
+    scene: Scene, kind: str, laws: Sequence[Spec], starts: int, exact: tuple[str, str] | None
+) -> Method:
     own = next(effect for effect in scene.effects if effect.kind() == kind)
     settings = []
     for law in laws:
@@ -182,7 +187,7 @@ def _laws(scene: Scene, kind: str, laws: Sequence[Spec], starts: int) -> Method:
         words = ", ".join(differ) or type(law).__name__
         settings.append(Setting(exchanged(scene, f"effects.{kind}", law), words, starts=starts))
     name = type(laws[0]).__name__
-    return Method(name, tuple(settings), (1.0,) * len(laws), scene)
+    return Method(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
 
 
 def _title(scene: Scene, path: str) -> str:

@@ -35,8 +35,8 @@ def picture(study: Study) -> Figure:
     """A panel for each quantity: wall seconds across, error up, both logarithmic.
 
     An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
-    larger. Rings are the cheapest setting for each power of ten of the error. Below the shaded edge, the
-    error of the reference itself, nothing can be told.
+    larger. Rings are the cheapest setting for each power of ten of the error, dotted ones others that timings
+    do not tell from it. Below the shaded edge, the error of the reference itself, nothing can be told.
     """
     wide = len(study.quantities)
     lines = list(dict.fromkeys(row.method for row in study.rows))
@@ -56,34 +56,35 @@ def picture(study: Study) -> Figure:
 
 def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     for at, method in enumerate(lines):
-        rows = [row for row in study.line(method) if row.errors and row.at_most(k) > 0]
+        rows = [row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same]
         colour, marker = COLOURS[at % len(COLOURS)], MARKERS[at % len(MARKERS)]
         style = "-" if all(row.precision == "f64" for row in rows) else "--"
         times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
         axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
-        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=fill(method, WIDTH))
+        label = fill(_label(study, method), WIDTH)
+        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=label)
         for row in rows:
             _mark(axis, row, k, colour, marker)
-    chosen = decades(study.rows, k)
-    best = {id(row): row for row in chosen.values()}.values()
-    axis.scatter(
-        [row.median for row in best], [row.at_most(k) for row in best], s=130, facecolors="none",
-        edgecolors="black", linewidths=1.1, zorder=4, label="cheapest for a power of ten of the error",
-    )  # fmt: skip
+    found = list(decades(study.rows, k).values())
+    best = {row.key: row for row, *_ in found}
+    others = {row.key: row for _, *rows in found for row in rows if row.key not in best}
+    _ring(axis, list(best.values()), k, "-", "cheapest for a power of ten of the error")
+    _ring(axis, list(others.values()), k, ":", "as cheap, as far as timings tell, with more work")
     axis.set_xscale("log")
     axis.set_yscale("log")
     low, high = axis.get_ylim()
     own = study.truths[k].error if k < len(study.truths) else 0.0
     if own > 0:
-        low = min(low, own / 2)
+        low = min(low, own / 4)
         axis.axhspan(low, own, color="0.9", zorder=0)
         axis.annotate(
             "error of the reference", (0.99, own), (0, -3), xycoords=("axes fraction", "data"),
             textcoords="offset points", ha="right", va="top", fontsize=8,
         )  # fmt: skip
-    # Room for a ring on the topmost.
-    axis.set_ylim(low, min(1.2 * high, 30.0))
-    axis.set_title(study.quantities[k].name, fontsize=10.5)
+    # Room for a ring on the topmost; what is far off where others are not is left out.
+    axis.set_ylim(low, min(1.2 * high, max(30.0, 30.0 * low)))
+    quantity = study.quantities[k]
+    axis.set_title(f"{quantity.name}, relative to {quantity.relative_to}", fontsize=10.5)
     left, right = axis.get_xlim()
     narrow = right < 300 * left
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
@@ -91,6 +92,24 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel(f"wall time{' of all starts' if study.random else ''}")
     plain(axis)
+
+
+def _label(study: Study, method: str) -> str:
+    """A method, and how many of its settings have failed and why."""
+    rows = study.line(method)
+    failed = [row.failed for row in rows if row.failed]
+    if not failed:
+        return method
+    many = "" if len(failed) == len(rows) else f"{len(failed)} of {len(rows)} "
+    return f"{method}; {many}failed: {failed[0]}"
+
+
+def _ring(axis: Axes, rows: list[Row], k: int, style: str, label: str) -> None:
+    if rows:
+        axis.scatter(
+            [row.median for row in rows], [row.at_most(k) for row in rows], s=130, facecolors="none",
+            edgecolors="black", linewidths=1.1, linestyles=style, zorder=4, label=label,
+        )  # fmt: skip
 
 
 def _mark(axis: Axes, row: Row, k: int, colour: str, marker: str) -> None:

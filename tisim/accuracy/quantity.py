@@ -18,17 +18,29 @@ Value = Callable[[Result], "np.ndarray | float"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a result; its error is |measured - true| / |true|, with the root of the sum of squares.
+    """A quantity of a result; its error is |measured - true| / size, with the root of the sum of squares.
 
     value : of a result, any shape; zero means that nothing has happened, as for a displacement.
     exact : the true value in closed form, of the scene of a result; None where there is none.
     random : whether it is the mean over random starts that counts. Then ``exact`` is of that mean.
+    returns : whether it may come back to zero, as the displacement on a closed path does. Then size is the
+        largest |value| on the way, of the scene as it is; else it is |true|, at the end.
     """
 
     name: str
     value: Value
     exact: Value | None = None
     random: bool = False
+    returns: bool = False
+
+    def size(self, result: Result) -> float:
+        """|value| of a result, in its own unit."""
+        return float(np.linalg.norm(np.ravel(np.asarray(self.value(result)))))
+
+    @property
+    def relative_to(self) -> str:
+        """What its errors are relative to, for people."""
+        return "its largest on the way" if self.returns else "its true value"
 
 
 @dataclass(frozen=True)
@@ -38,9 +50,8 @@ class Estimate:
     value: np.ndarray
     uncertainty: float = 0.0
 
-    def error(self, truth: Estimate) -> tuple[float, float]:
-        """Relative distance from the truth, and how far that may be off."""
-        size = float(np.linalg.norm(truth.value))
+    def error(self, truth: Estimate, size: float) -> tuple[float, float]:
+        """Distance from the truth relative to ``size``, and how far that may be off."""
         off = float(np.linalg.norm(self.value - truth.value))
         return off / size, float(np.hypot(self.uncertainty, truth.uncertainty)) / size
 
@@ -92,7 +103,8 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
         # Where opposite faces are joined a place jumps; a velocity does not.
         jumps = scene.domain.joined()
-        return (Quantity("velocity", velocity) if jumps else Quantity("displacement", displacement),)
+        name, value = ("velocity", velocity) if jumps else ("displacement", displacement)
+        return (Quantity(name, value, returns=True),)
     starts = [scene.particles.arrays(scene.domain, scene.seed + k) for k in (0, 1)]
     differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))
     rule = "given for a scene with impacts or operators whose start is not random"

@@ -27,15 +27,17 @@ TIGHTER = 2.0
 
 @dataclass(frozen=True)
 class Truth:
-    """Of a quantity; ``source`` says where it is from."""
+    """The true value of a quantity; ``source`` says where it is from. size : what errors are relative to, in
+    the unit of the quantity."""
 
     estimate: Estimate
     source: str
+    size: float
 
     @property
     def error(self) -> float:
         """Bound of its own relative error."""
-        return self.estimate.uncertainty / float(np.linalg.norm(self.estimate.value))
+        return self.estimate.uncertainty / self.size
 
 
 @dataclass(frozen=True)
@@ -72,14 +74,18 @@ def attempts(methods: Sequence[Method], level: float) -> list[Attempt]:
     return [Attempt(m, level) for m in (best, *others[:1]) for level in (tight, tight + 1)]
 
 
-def closed_form(quantity: Quantity, result: Result) -> Truth:
-    """For the scene of a result."""
+def closed_form(quantity: Quantity, result: Result, largest: float = 0.0) -> Truth:
+    """The truth for the scene of a result. largest : |value| on the way."""
     assert quantity.exact is not None
-    return Truth(Estimate(np.ravel(np.asarray(quantity.exact(result)))), "its closed form")
+    return _truth(
+        quantity, Estimate(np.ravel(np.asarray(quantity.exact(result)))), "its closed form", largest
+    )
 
 
-def compared(quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequence[Attempt]) -> Truth:
-    """The truth from the runs of a reference and its checks."""
+def compared(
+    quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequence[Attempt], largest: float = 0.0
+) -> Truth:
+    """The truth from the runs of a reference and its checks. largest : |value| on the way."""
     best, short, *other = (estimate(quantity, results) for results in runs)
     off = _distance(best, short)
     if other:
@@ -88,7 +94,17 @@ def compared(quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequenc
     source = f"{made[0].name} at {made[0].decades:+g} decades of error, checked by itself"
     source += "".join(f" and by {attempt.name}" for attempt in made[2:3])
     # What the stepper does to every start, and what so few starts leave open.
-    return Truth(Estimate(best.value, off + best.uncertainty), source)
+    return _truth(quantity, Estimate(best.value, off + best.uncertainty), source, largest)
+
+
+def _truth(quantity: Quantity, found: Estimate, source: str, largest: float) -> Truth:
+    """InputError where there is nothing that an error could be relative to."""
+    size = float(np.linalg.norm(found.value))
+    if quantity.returns:
+        size = max(size, largest)
+    when = "at some time" if quantity.returns else "at the end"
+    must(size > 0, quantity.name, f"other than zero {when}", size)
+    return Truth(found, source, size)
 
 
 def _distance(one: Estimate, other: Estimate) -> float:

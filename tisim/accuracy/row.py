@@ -1,4 +1,8 @@
-"""A measured setting, and the choice among them."""
+"""A measured setting, and the choice among them.
+
+Timings that overlap are not told apart: among settings that take the least time as far as can be seen, the
+one with the fewest sums of forces is chosen, which no machine changes.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,11 @@ import numpy as np
 
 TRUSTED = 3.0
 """An error is known when it is at least so many times what it may be off by."""
+ONCE, ALWAYS, CLOCK = 0.15, 0.05, 1e-3
+"""Seconds are never known better than to these parts of themselves, if taken once and if more often; nor than
+to so many s."""
+ALIKE = 1e-11
+"""Difference of two errors that rounding makes: laws that are no further apart have done the same."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +30,8 @@ class Row:
     seconds : wall seconds of each repeat. steps, sums, rejections : steps, sums of forces and rejected steps
     of a particle, the mean over particles and starts.
     errors : for each quantity the error, and how far that may be off; both relative.
-    failed : why there is no result, or nothing.
+    failed : why there is no result, or nothing. same : whether it is a law that makes no difference here to
+    the one it stands for.
     """
 
     method: str
@@ -36,6 +46,7 @@ class Row:
     rejections: float = math.nan
     errors: tuple[tuple[float, float], ...] = ()
     failed: str = ""
+    same: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -52,6 +63,18 @@ class Row:
         """Longest less shortest of the wall seconds."""
         return max(self.seconds) - min(self.seconds) if self.seconds else math.nan
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Least and most wall seconds that it may take: those measured, or as well as a clock tells."""
+        known = max(CLOCK, (ALWAYS if len(self.seconds) > 1 else ONCE) * self.median)
+        return min(*self.seconds, self.median - known), max(*self.seconds, self.median + known)
+
+    def same_errors(self, other: Row) -> bool:
+        """Whether another row has the same errors, but for rounding."""
+        if other is self or not (self.errors and other.errors):
+            return False
+        return all(abs(a[0] - b[0]) <= ALIKE for a, b in zip(self.errors, other.errors, strict=True))
+
     def at_most(self, quantity: int = 0) -> float:
         """The error and what it may be off by; infinite when the run has failed."""
         return sum(self.errors[quantity]) if self.errors else math.inf
@@ -61,21 +84,27 @@ class Row:
         return bool(self.errors) and self.errors[quantity][0] >= TRUSTED * self.errors[quantity][1]
 
 
-def cheapest(rows: Iterable[Row], error: float, quantity: int = 0) -> Row | None:
-    """The row that takes least time among those whose error is at most this; None where there is none."""
-    good = [row for row in rows if row.at_most(quantity) <= error]
-    return min(good, key=lambda row: row.median, default=None)
+def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
+    """The rows that take least time, as far as timings tell, among those whose error is at most this; the one
+    to choose first, that is of the least work."""
+    good = [row for row in rows if row.at_most(quantity) <= error and not row.same]
+    if not good:
+        return []
+    _, latest = min((row.interval for row in good), key=lambda interval: interval[1])
+    return sorted(
+        (row for row in good if row.interval[0] <= latest),
+        key=lambda row: (row.sums * row.starts, row.median),
+    )
 
 
-def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, Row]:
-    """The cheapest for each power of ten of the error, down to the least that was met; the largest first."""
+def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
+    """``tied`` for each power of ten of the error, down to the least that was met; the largest first."""
     reached = [row.at_most(quantity) for row in rows if 0 < row.at_most(quantity) < math.inf]
     if not reached:
         return {}
     highest, lowest = math.ceil(math.log10(max(reached))), math.ceil(math.log10(min(reached)))
     found = {}
     for power in range(min(highest, 0), lowest - 1, -1):
-        row = cheapest(rows, 10.0**power, quantity)
-        if row is not None:
-            found[10.0**power] = row
+        if best := tied(rows, 10.0**power, quantity):
+            found[10.0**power] = best
     return found

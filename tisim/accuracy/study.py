@@ -12,8 +12,8 @@ from tisim import runtime
 from tisim.accuracy.driver import Progress, Run
 from tisim.accuracy.quantity import Quantity, usual
 from tisim.accuracy.reference import Truth
-from tisim.accuracy.row import Row, cheapest, decades
-from tisim.errors import must
+from tisim.accuracy.row import Row, decades, tied
+from tisim.errors import RunError, must
 from tisim.scene import Scene
 
 if TYPE_CHECKING:
@@ -25,8 +25,9 @@ class Study:
 
     quantities : what errors are of; by default ``quantity.usual``. coarser, finer : decades of error on
     either side of what the scene asks for. repeats : of each timing. precisions : "f64" and others to try.
-    starts : numbers of random starts, for quantities that are random. budget : wall seconds; what would not
-    fit is left out. rows, truths : what is known so far, in order; a truth for each quantity.
+    starts : numbers of random starts, for quantities that are random. budget : wall seconds of running, of
+    which compiling takes nothing; what would not fit is left out. rows, truths : what is known so far, in
+    order; a truth for each quantity.
     complete : nothing is left to measure.
 
     To measure another precision, tisim starts anew: simulations made before must not be used afterwards.
@@ -97,16 +98,31 @@ class Study:
         finally:
             runtime.start(before.device, before.precision, before.threads)
 
-    def cheapest(self, error: float, quantity: str | None = None) -> Row | None:
-        """The cheapest setting whose error is at most this; None where there is none."""
-        return cheapest(self.rows, error, self.index(quantity))
+    def cheapest(self, error: float, quantity: str | None = None) -> Row:
+        """The cheapest setting whose error is at most this; of those that timings do not tell apart, the one
+        of the least work. RunError, with the least error there is, where none is so accurate."""
+        k = self.index(quantity)
+        if best := tied(self.rows, error, k):
+            return best[0]
+        name = f"error of {self.quantities[k].name}"
+        done = [row for row in self.rows if row.errors]
+        if not done:
+            failed = next((f": {row.failed}" for row in self.rows if row.failed), "")
+            raise RunError(f"{name} must be of a setting that was measured; there is none{failed}")
+        least = min(done, key=lambda row: row.at_most(k))
+        finer = "more starts go further" if self.random else "finer settings go further"
+        raise RunError(
+            f"{name} must be at least {least.at_most(k):.1e}, the least that was reached ({least.method}, "
+            f"{least.setting}; {finer}); received {error:g}"
+        )
 
-    def decades(self, quantity: str | None = None) -> dict[float, Row]:
-        """The cheapest setting for each power of ten of the error."""
+    def decades(self, quantity: str | None = None) -> dict[float, list[Row]]:
+        """For each power of ten of the error the settings that take the least time, as far as timings tell;
+        the one of the least work first."""
         return decades(self.rows, self.index(quantity))
 
     def index(self, quantity: str | None) -> int:
-        """Of a quantity by its name, or of the first."""
+        """The place of a quantity among all, by its name; of the first where none is given."""
         names = [q.name for q in self.quantities]
         must(quantity is None or quantity in names, "quantity", f"one of {', '.join(names)}", quantity)
         return names.index(quantity) if quantity is not None else 0
