@@ -25,4 +25,4 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Paths can be followed as long as particles do not touch; then it is the mean over random starts."""
     if any(isinstance(effect, PairForce) for effect in scene.effects):
         return (Quantity("half-axes of the cloud", of_the_end, random=True),)
-    return (Quantity("positions", displacement),)
+    return (Quantity("positions", displacement, returns=True),)

@@ -71,6 +71,6 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
         return np.tile(exact(result), (len(result.start["mass"]), 1))
 
     return (
-        Quantity("positions", displacement, alike if alone else None),
-        Quantity("centre of gravity", centre, exact if known else None),
+        Quantity("positions", displacement, alike if alone else None, returns=True),
+        Quantity("centre of gravity", centre, exact if known else None, returns=True),
     )

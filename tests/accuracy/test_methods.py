@@ -223,7 +223,7 @@ def test_what_timings_do_not_tell_apart_is_decided_by_work():
     """2 ms of noise, the clock, and a timing taken once are no reason to prefer one."""
     spread = [
         row("a", (0.010, 0.012, 0.013), 1e-5, sums=20.0),
-        row("b", (0.009, 0.011, 0.012), 1e-5, sums=90.0),
+        row("b", (0.009, 0.01, 0.012), 1e-5, sums=90.0),
     ]
     clock = [row("a", (2e-4, 2e-4), 1e-5, sums=20.0), row("b", (1e-4, 1e-4), 1e-5, sums=90.0)]
     once = [row("a", 1.1, 1e-5, sums=20.0), row("b", 1.0, 1e-5, sums=90.0)]
@@ -281,11 +281,9 @@ def test_nothing_found_is_told_in_words():
     with pytest.raises(RunError) as told:
         made.cheapest(1e-4)
     assert str(told.value) == (
-        "error of known must be at least 1.1e-03, the least that was reached (good, ; finer settings go further); "
-        "received 0.0001"
+        "error of known must be at least 1.1e-03, the least that was reached (good, ; finer settings go "
+        "further); received 0.0001"
     )
     made.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
-    with pytest.raises(
-        RunError, match=r"a setting that was measured; there is none: a quantity is not finite"
-    ):
+    with pytest.raises(RunError, match=r"there is none: a quantity is not finite"):
         made.cheapest(1.0)
