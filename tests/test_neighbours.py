@@ -14,6 +14,7 @@ from tisim.effects.friction import Friction
 from tisim.effects.impact import Impact
 from tisim.operators.agglomeration import Agglomeration
 from tisim.steppers.verlet import Verlet
+from tisim.taichi_thread import in_taichi_thread
 
 WORLDS, CAPACITY, STEPS, DT = 18, 300, 5, 1.0
 
@@ -128,8 +129,8 @@ def test_every_near_pair_is_offered_once_by_its_larger_member(rng, domain):
     simulation.load(scenes)
     seen = Recorder.latest
     for step in range(STEPS):
-        counts = seen.to_numpy()
-        seen.fill(0)
+        counts = in_taichi_thread(seen.to_numpy)()
+        in_taichi_thread(seen.fill)(0)
         for w, (name, result) in enumerate(zip(names, simulation.results(), strict=True)):
             state, n = result.state, len(result.state["mass"])
             table = counts[w, :n, :n]
@@ -149,7 +150,7 @@ def test_every_near_pair_is_offered_once_by_its_larger_member(rng, domain):
             near = near_pairs(state["position"], state["radius"], domain, min(horizon, 10.0))
             missed = near - set(zip(owner.tolist(), other.tolist(), strict=True))
             assert not missed, f"{where}: missed {sorted(missed)[:5]}"
-        cells = simulation.made.near.dims.to_numpy()[: len(scenes)].prod(axis=1)
+        cells = in_taichi_thread(simulation.made.near.dims.to_numpy)()[: len(scenes)].prod(axis=1)
         assert (cells <= simulation.made.near.max_cells).all(), "cells beyond their memory"
         simulation.run(steps=1)
         assert (simulation.s.read("status")[: len(scenes)] == 0).all()

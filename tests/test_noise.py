@@ -6,10 +6,12 @@ from scipy import stats
 
 from tisim import noise
 from tisim._taichi import ti
+from tisim.taichi_thread import in_taichi_thread
 
 ONES = 0xFFFFFFFF
 
 
+@in_taichi_thread
 @ti.kernel
 def _philox(counters: ti.types.ndarray(), keys: ti.types.ndarray(), out: ti.types.ndarray()):
     for n in range(counters.shape[0]):
@@ -19,6 +21,7 @@ def _philox(counters: ti.types.ndarray(), keys: ti.types.ndarray(), out: ti.type
             out[n, k] = words[k]
 
 
+@in_taichi_thread
 @ti.kernel
 def _bits(where: ti.types.ndarray(), out: ti.types.ndarray()):
     """where: rows of seed, stream, particle, step, draw."""
@@ -34,6 +37,7 @@ def _bits(where: ti.types.ndarray(), out: ti.types.ndarray()):
             out[n, k] = words[k]
 
 
+@in_taichi_thread
 @ti.kernel
 def _numbers(words: ti.types.ndarray(), uniform: ti.types.ndarray(), normal: ti.types.ndarray()):
     for n in range(words.shape[0]):
@@ -44,6 +48,7 @@ def _numbers(words: ti.types.ndarray(), uniform: ti.types.ndarray(), normal: ti.
             normal[n, k] = z[k]
 
 
+@in_taichi_thread
 @ti.kernel
 def _normals(words: ti.types.ndarray(), normal: ti.types.ndarray()):
     for n in range(words.shape[0]):

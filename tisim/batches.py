@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import threading
+import weakref
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-from tisim import runtime
+from tisim import memory, runtime
 from tisim.errors import InputError, must
 from tisim.particles import Arrays
 from tisim.result import Result, Status
@@ -16,7 +19,10 @@ from tisim.trajectory import Trajectory
 SLOTS = 300_000
 """Particles of all worlds of a batch together; keeps its memory to some hundred MB."""
 KEPT = 8
-"""Compiled simulations kept for later calls, each of another structure."""
+"""Compiled simulations kept for later calls."""
+SPARE, WASTE = 4096, 8
+"""A kept simulation serves where it has room for at most so many particles, or so many times what is needed:
+all of its room is loaded and looked at."""
 
 Progress = Callable[[float], None]
 
@@ -36,7 +42,8 @@ class Batches:
     def __init__(self, limit: int = 256) -> None:
         must(limit >= 1, "batch", "at least 1", limit)
         self.limit = limit
-        self._made: dict[Any, Simulation] = {}
+        self._idle: list[Simulation] = []
+        _all.add(self)
 
     def run(
         self,
@@ -65,42 +72,98 @@ class Batches:
             groups.setdefault(scene.structure(), []).append(index)
         done = len(scenes) - len(starts)
         for members in groups.values():
-            simulation = self.simulation([scenes[k] for k in members])
-            for begin in range(0, len(members), simulation.worlds):
-                batch = members[begin : begin + simulation.worlds]
-                simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
-                if trajectory:
-                    trajectory.record(simulation, batch)
-                chunks = simulation.chunks()
-                given: set[int] = set()
-                while len(given) < len(batch):
-                    new = [w for w in simulation.ended() if w not in given]
-                    yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
-                    given.update(new)
-                    next(chunks, None)
-                    if progress:
-                        progress((done + len(batch) * simulation.fraction()) / len(scenes))
-                done += len(batch)
+            with self._simulation([scenes[k] for k in members]) as simulation:
+                for begin in range(0, len(members), simulation.worlds):
+                    batch = members[begin : begin + simulation.worlds]
+                    simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
+                    if trajectory:
+                        trajectory.record(simulation, batch)
+                    chunks = simulation.chunks()
+                    given: set[int] = set()
+                    while len(given) < len(batch):
+                        new = [w for w in simulation.ended() if w not in given]
+                        yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
+                        given.update(new)
+                        next(chunks, None)
+                        if progress:
+                            progress((done + len(batch) * simulation.fraction()) / len(scenes))
+                    done += len(batch)
 
-    def simulation(self, scenes: Sequence[Scene]) -> Simulation:
-        """A compiled simulation for scenes of one structure; made anew only when it must be larger."""
-        if self._made and next(iter(self._made.values())).s.stale:
-            self._made.clear()
-        key, capacity = scenes[0].structure(), max(scene.capacity() for scene in scenes)
+    @contextmanager
+    def _simulation(self, scenes: Sequence[Scene]) -> Iterator[Simulation]:
+        """A compiled simulation for scenes of one structure, which is nobody else's meanwhile."""
+        capacity = max(scene.capacity() for scene in scenes)
         worlds = max(1, min(len(scenes), self.limit, SLOTS // capacity))
-        old = self._made.pop(key, None)
-        if old is None or old.s.capacity < capacity or old.worlds < worlds:
-            if old is not None:
-                old.close()
-                capacity = max(capacity, old.s.capacity)
-            while len(self._made) >= KEPT:
-                self._made.pop(next(iter(self._made))).close()
-            old = Simulation(scenes[0], worlds, capacity)
-        self._made[key] = old
-        return old
+        simulation = self._kept(scenes[0].structure(), worlds, capacity)
+        if simulation is None:
+            _renew()
+            capacity = rounded(capacity)
+            worlds = max(1, min(rounded(worlds), self.limit, SLOTS // capacity))
+            simulation = Simulation(scenes[0], worlds, capacity)
+        try:
+            yield simulation
+        finally:
+            with _lock:
+                self._idle.append(simulation)
+                old, self._idle = self._idle[:-KEPT], self._idle[-KEPT:]
+            for each in old:
+                each.close()
+
+    def _kept(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
+        """The smallest kept simulation that serves, taken out of those kept; None where there is none."""
+        most = max(SPARE, WASTE * worlds * capacity)
+        with _lock:
+            self._idle = [each for each in self._idle if each.s.alive]
+            serve = [
+                each
+                for each in self._idle
+                if each.structure == structure
+                and each.worlds >= worlds
+                and each.s.capacity >= capacity
+                and each.worlds * each.s.capacity <= most
+            ]
+            if not serve:
+                return None
+            best = min(serve, key=lambda each: each.worlds * each.s.capacity)
+            self._idle.remove(best)
+            return best
 
     def close(self) -> None:
-        """Give the device memory back."""
-        for simulation in self._made.values():
-            simulation.close()
-        self._made.clear()
+        """Give the device memory back, of all that does not run."""
+        with _lock:
+            old, self._idle = self._idle, []
+        for each in old:
+            each.close()
+
+
+_lock = threading.Lock()
+"""Held while a simulation changes hands."""
+_all: weakref.WeakSet[Batches] = weakref.WeakSet()
+
+
+def rounded(number: int) -> int:
+    """The next number up whose binary digits are all 0 after the first three.
+
+    A size is compiled in: so scenes of like sizes share what is compiled, in this process and in those that
+    find it on the disk.
+    """
+    unit = 1 << max(0, number.bit_length() - 3)
+    return -(-number // unit) * unit
+
+
+def _renew() -> None:
+    """Start Taichi anew where it has grown, and nothing would be lost but simulations that are kept idle."""
+    if memory.worn():
+        _give_up()
+        memory.renew()
+
+
+def _give_up() -> None:
+    """Forget what all Batches keep idle, unless something else is in use."""
+    with _lock:
+        idle = [each for batches in _all for each in batches._idle]
+        if memory.in_use() <= {tree for each in idle for tree in each.trees}:
+            for batches in _all:
+                batches._idle = []
+            for each in idle:
+                each.close()

@@ -14,7 +14,9 @@ import numpy as np
 
 from tisim._taichi import ti
 from tisim.errors import must
+from tisim.memory import Tree
 from tisim.spec import Spec, room
+from tisim.taichi_thread import in_taichi_thread
 
 Part = TypeVar("Part", bound=Spec)
 
@@ -92,7 +94,7 @@ class Table:
         self.field = ti.field(real)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, worlds).dense(ti.j, max(1, self.slots)).place(self.field)
-        self._trees = [builder.finalize()]
+        self.trees = [Tree(builder)]
         self._next, self.array_bytes = 0, 0
 
     def bind(self, part: Part) -> Part:
@@ -113,7 +115,7 @@ class Table:
         """An array in device memory."""
         column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
         builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
-        self._trees.append(builder.finalize())
+        self.trees.append(Tree(builder))
         held = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
         column.from_numpy(held)
         self.array_bytes += held.nbytes
@@ -143,12 +145,11 @@ class Table:
         for world, slot in np.argwhere(~np.isfinite(held) | flushed):
             names = [name for part in rows[world] for name, _ in _entries(part, part.kind())]
             must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
-        self.field.from_numpy(held)
+        self._put(held)
 
-    def destroy(self) -> None:
-        """Give the memory back."""
-        for tree in self._trees:
-            tree.destroy()
+    @in_taichi_thread
+    def _put(self, held: np.ndarray) -> None:
+        self.field.from_numpy(held)
 
 
 def connect(bound: Sequence[Any]) -> None:

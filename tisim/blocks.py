@@ -1,6 +1,7 @@
 """Sums over the particles of a world: by blocks, then over the blocks, so always in the same order."""
 
 from tisim._taichi import ti
+from tisim.memory import Tree
 from tisim.program import Phase
 from tisim.state import State
 
@@ -18,16 +19,11 @@ class BlockSums:
         self.partial = ti.Vector.field(terms, ti.f64)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, s.worlds).dense(ti.j, self.blocks).place(self.partial)
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
         return 8 * self.s.worlds * self.blocks * self.terms
-
-    def destroy(self) -> None:
-        """Give the memory back."""
-        ti.sync()
-        self._tree.destroy()
 
     @ti.func
     def number(self, w):

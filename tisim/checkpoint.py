@@ -51,7 +51,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     another capacity; the simulation is then as it was.
     """
     simulation.s.check()
-    wanted = simulation.s.columns()
+    wanted = simulation.s.saved()
     with seal.opened(Path(path), "checkpoint", FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])

@@ -17,6 +17,7 @@ import numpy as np
 
 from tisim import runtime
 from tisim._taichi import BACKEND, ti
+from tisim.taichi_thread import in_taichi_thread
 
 DEPENDENCIES = ("tisim", "taichi", "quadrants", "numpy", "h5py", "deap", "pydantic", "matplotlib")
 PARTICLES = 2000
@@ -46,6 +47,7 @@ class Finding:
     note: str = ""
 
 
+@in_taichi_thread
 @ti.kernel
 def _pairs(
     x: ti.types.ndarray(),  # type: ignore[valid-type]

@@ -21,6 +21,7 @@ from __future__ import annotations
 from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import PairEvent
+from tisim.memory import Tree
 from tisim.neighbours import Neighbours
 from tisim.program import PerParticle, Phase, Repeat
 from tisim.state import CROWDED, State
@@ -45,15 +46,11 @@ class Contacts:
         builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.best)
         for column in (self.size, self.waiting):
             builder.dense(ti.i, s.worlds).place(column)
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
         return self.s.worlds * (16 * self.capacity + 8 * self.s.capacity + 8)
-
-    def destroy(self) -> None:
-        """Give the memory back."""
-        self._tree.destroy()
 
     @ti.func
     def add(self, w, i, j, due):

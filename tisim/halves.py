@@ -7,6 +7,7 @@ sorted by index. A sum over neighbours then has the same order, and the same bit
 
 from tisim._taichi import ti
 from tisim.cells import listing
+from tisim.memory import Tree
 from tisim.neighbours import Neighbours
 from tisim.program import PerParticle, Phase
 
@@ -23,7 +24,7 @@ class Halves:
         builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).dense(ti.k, near.room).place(
             self.larger
         )
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
 
     def phases(self) -> tuple[Phase, ...]:
         """Bring both halves up to date where it is due."""
@@ -33,10 +34,6 @@ class Halves:
     def bytes(self) -> int:
         """Device memory, in bytes."""
         return 4 * self.s.worlds * self.s.capacity * (1 + self.near.room)
-
-    def destroy(self) -> None:
-        """Give the memory back."""
-        self._tree.destroy()
 
     @ti.func
     def size(self, w, i):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from tisim._taichi import ti
 from tisim.forces import SumForces
 from tisim.state import ASKED
+from tisim.taichi_thread import in_taichi_thread
 
 
 @ti.data_oriented
@@ -17,9 +18,13 @@ class Inquest:
     def __init__(self, summed: SumForces) -> None:
         self.s, self.summed = summed.s, summed
 
-    @ti.kernel
-    def hold(self):
+    @in_taichi_thread
+    def hold(self) -> None:
         """Blame the effect whose force on the culprit is largest, or not finite, where it was when asked."""
+        self._hold()
+
+    @ti.kernel
+    def _hold(self):
         for w in range(self.s.worlds):
             if self.s.blame[w] == ASKED:
                 for i in range(self.s.count[w]):

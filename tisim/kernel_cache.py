@@ -1,17 +1,22 @@
 """The compiled kernels that Taichi keeps on disk for the next process.
 
-Taichi 1.7.4 and Quadrants 1.3.3 lock them by a file, for the moments in which they read or write the list
-of them. A process that is killed meanwhile leaves the file behind: no other uses the kernels again, each
-compiles its own, and warns.
+Taichi 1.7.4 and Quadrants 1.3.3 read them when they start, and write them when they stop: at the end of a
+process, not when it is killed. Meanwhile they lock them by a file. Another process waits a quarter of a
+second for it, then warns, and compiles all or keeps nothing; a process that is killed meanwhile leaves the
+file behind. Processes of tisim wait for each other here instead.
 """
 
 from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from tisim._taichi import BACKEND, ti
+from tisim.durable import locked
+from tisim.errors import InputError, RunError
 
 STALE = 60.0
 """s, longer than any process holds a lock."""
@@ -20,18 +25,32 @@ LOCKS = {
     "quadrants": ("QD_OFFLINE_CACHE_FILE_PATH", "kernel_compilation_manager/qdcache.lock"),
 }
 """The variable that names another folder, and the lock in it."""
+QUEUE = "tisim.lock"
+"""The file that processes of tisim queue at, in the same folder: the system frees it when one dies."""
 
 
 def lock() -> Path:
-    """Where the lock is, when it is held."""
+    """Where Taichi's lock is, when it is held."""
     variable, name = LOCKS[BACKEND]
     return Path(os.environ.get(variable) or ti.lang.impl.default_cfg().offline_cache_file_path) / name
 
 
 def unlock() -> None:
     """Remove a lock that has been left behind. No error where that is not allowed: kernels are compiled."""
-    try:
+    with suppress(OSError):
         if time.time() - lock().stat().st_mtime > STALE:
             lock().unlink()
-    except OSError:
-        pass
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """While this lasts, no other process of tisim reads or writes the kernels on disk.
+
+    Where the folder cannot be written, or the system has no locks, there is no waiting.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError, InputError, RunError):
+            lock().parent.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(locked(lock().with_name(QUEUE), exclusive=True))
+        unlock()
+        yield

@@ -12,7 +12,9 @@ from __future__ import annotations
 from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import PairForce
+from tisim.memory import Tree
 from tisim.state import State
+from tisim.taichi_thread import in_taichi_thread
 
 SMALL = 48
 """Worlds of at most this many particles look at all pairs."""
@@ -50,7 +52,7 @@ class Neighbours:
         builder.dense(ti.i, worlds).dense(ti.j, capacity).dense(ti.k, self.room + 1).place(self.other)
         for column in (self.dims, self.corner, self.cell, self.skin, self.gap, self.stale):
             builder.dense(ti.i, worlds).place(column)
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
@@ -58,9 +60,10 @@ class Neighbours:
         per_world = 4 * (self.max_cells + 5 + self.s.capacity * (4 + self.room))
         return self.s.worlds * (per_world + real * (10 + 4 * self.s.capacity))
 
-    def destroy(self) -> None:
-        """Give the memory back."""
-        self._tree.destroy()
+    @in_taichi_thread
+    def forget(self) -> None:
+        """Have every list made anew before it is used again."""
+        self.stale.fill(1)
 
     @ti.func
     def owns(self, w, i, j):

@@ -18,6 +18,7 @@ from typing import ClassVar
 
 from tisim._taichi import ti
 from tisim.state import RUNNING, State
+from tisim.taichi_thread import in_taichi_thread
 
 TASK = 512
 """Iterations that Taichi and Quadrants hand to a CPU thread at once, whatever block size is asked for
@@ -105,8 +106,10 @@ class Program:
         self.s, self.items, self.schedule = s, items, schedule
         self.outside = Nest()
 
+    @in_taichi_thread
     def advance(self, steps: int) -> None:
         """At most ``steps`` steps of every running world; none goes on past its ``hold``."""
+        self.s.check()
         if self.schedule == "world":
             self._advance_worlds(steps)
             return
@@ -124,6 +127,7 @@ class Program:
             else:
                 self._sweep(item, nest)
 
+    @in_taichi_thread
     def compile(self) -> None:
         """Compile what ``advance`` runs, and run nothing: no world may be running."""
         if self.schedule == "world":

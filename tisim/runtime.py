@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import io
 import os
+import threading
 from dataclasses import dataclass
 from typing import Any
 
 from tisim import kernel_cache
 from tisim._taichi import BACKEND, ti
 from tisim.errors import InputError, must
+from tisim.taichi_thread import in_taichi_thread
 
 DEVICES = ("cpu", "cuda")
 PRECISIONS = ("f64", "f32")
@@ -48,6 +51,10 @@ class Runtime:
         return {"precision": self.precision, "device": self.device}
 
 
+turn = threading.RLock()
+"""Held while scenes are run by ``tisim.run``, and while settings change: calls of several threads take turns,
+and one that is made from within another, such as from its progress, goes ahead."""
+
 _current: Runtime | None = None
 _generation = 0
 
@@ -69,14 +76,24 @@ def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runt
     Raises InputError when a setting is unknown or the device is absent. A change of settings
     invalidates every Simulation made before; those say so when used.
     """
-    global _current, _generation
     wanted = Runtime(device, precision, threads or cores())
     if wanted == _current:
         return wanted
-    kernel_cache.unlock()
+    with turn:
+        _start(wanted)
+    return wanted
+
+
+@in_taichi_thread
+def _start(wanted: Runtime) -> None:
+    global _current, _generation
+    if not _generation:
+        atexit.register(_stop)
+    # Whether it starts or not, what ran before has stopped.
+    _current, _generation = None, _generation + 1
     try:
         # Taichi announces the device on standard output, where results go.
-        with contextlib.redirect_stdout(io.StringIO()):
+        with kernel_cache.alone(), contextlib.redirect_stdout(io.StringIO()):
             ti.init(
                 arch=ti.cuda if wanted.device == "cuda" else ti.cpu,
                 default_fp=wanted.real,
@@ -89,10 +106,20 @@ def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runt
             )
     except RuntimeError as failure:
         raise InputError(
-            f"device must be present on this machine; received {device!r} ({failure})"
+            f"device must be present on this machine; received {wanted.device!r} ({failure})"
         ) from failure
-    _current, _generation = wanted, _generation + 1
-    return wanted
+    _current = wanted
+
+
+def _stop() -> None:
+    """Stop Taichi at the end of the process, which has it write down what it has compiled."""
+    with kernel_cache.alone():
+        ti.reset()
+
+
+def restart() -> None:
+    """Start Taichi anew with the same settings: whatever was compiled or stored is gone, and its memory."""
+    _start(current())
 
 
 def current() -> Runtime:

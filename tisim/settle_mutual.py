@@ -8,6 +8,7 @@ from tisim._taichi import ti
 from tisim.domain import Domain
 from tisim.effect import Mutual, Settled
 from tisim.halves import Halves
+from tisim.memory import Tree
 from tisim.pairs import PairSum
 from tisim.program import Item, PerParticle, Phase, Repeat
 from tisim.settle import Settling
@@ -35,7 +36,7 @@ class MutualSettling(Settling):
         builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.next)
         for column in (self.pending, self.sweeps, self.again, self.largest, *self.changes):
             builder.dense(ti.i, s.worlds).place(column)
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
 
     def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
         return ((StartAgain if again else Start)(self), Sweeps(self, trial))
@@ -44,11 +45,6 @@ class MutualSettling(Settling):
         """Device memory, in bytes."""
         real = 8 if self.s.real == ti.f64 else 4
         return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12)
-
-    def destroy(self) -> None:
-        """Give the memory back."""
-        ti.sync()
-        self._tree.destroy()
 
 
 class Start(PerParticle):

@@ -12,12 +12,14 @@ from tisim import runtime
 from tisim.binding import Table, connect
 from tisim.composition import Composition, declared, needed_fields
 from tisim.errors import must
+from tisim.memory import Tree, collected
 from tisim.particles import Arrays
 from tisim.program import Nest, Program
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.starts import check_start, laid_out, volume
-from tisim.state import BOOKS, CLOCK, ENDED, MOTION, NOBODY, RUNNING, State, resolve_fields
+from tisim.state import ENDED, NOBODY, RUNNING, State, resolve_fields
+from tisim.taichi_thread import in_taichi_thread
 from tisim.watch import Watch
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
@@ -30,7 +32,7 @@ class Simulation:
 
     scene : any scene of the structure; its values do not matter here.
     schedule : "world" or "particle" (see program.py), or None to choose by device and size.
-    Loading and running other scenes of the same structure compiles nothing.
+    Loading and running other scenes of the same structure compiles nothing. It is for one thread at a time.
     """
 
     def __init__(
@@ -46,6 +48,25 @@ class Simulation:
         rule = f"within the {there / 1e9:.0f} GB of this machine"
         must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
         must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
+        self.trees = self._make(scene, worlds, capacity, schedule)
+        self.scenes: list[Scene] = []
+        self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
+
+    @in_taichi_thread
+    def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
+        """Place all fields, which are returned, and compile the kernels of a step."""
+        with collected() as trees:
+            self._place(scene, worlds, capacity)
+        self.schedule = schedule or self._choose(capacity)
+        self.program = Program(self.s, self.made.step, self.schedule)
+        self.first = Program(self.s, self.made.first, self.schedule)
+        self.s.write("status", ENDED)
+        self.program.compile()
+        if self.first.items:
+            self.first.compile()
+        return trees
+
+    def _place(self, scene: Scene, worlds: int, capacity: int) -> None:
         asked = (scene.effects, scene.stepper)
         fields = resolve_fields(needed_fields(*asked))
         self.s = State(worlds, capacity, fields, declared(*asked, "counts"), declared(*asked, "keeps"))
@@ -54,15 +75,6 @@ class Simulation:
         *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
         connect(effects)
         self.made = Composition(self.s, stepper, tuple(effects), domain, control)
-        self.schedule = schedule or self._choose(capacity)
-        self.program = Program(self.s, self.made.step, self.schedule)
-        self.first = Program(self.s, self.made.first, self.schedule)
-        self.s.status.fill(ENDED)
-        self.program.compile()
-        if self.first.items:
-            self.first.compile()
-        self.scenes: list[Scene] = []
-        self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
 
     @staticmethod
     def _parts(scene: Scene) -> list[Any]:
@@ -99,7 +111,7 @@ class Simulation:
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.look: Callable[[], None] | None = None
-        self.s.hold.fill(np.inf)
+        self.s.write("hold", np.inf)
         self.begin()
         self.watch = Watch(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
@@ -107,8 +119,7 @@ class Simulation:
 
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
-        for f in self.s.fields:
-            self.s.write(f.name, laid_out(f, self.starts, self.worlds, self.s.capacity))
+        self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
         counts = [len(start["mass"]) for start in self.starts]
         self._reset(self.scenes, self.starts, np.array(counts + [0] * (self.worlds - len(counts))))
         self.forget_lists()
@@ -117,34 +128,35 @@ class Simulation:
 
     def put(self, image: dict[str, np.ndarray]) -> None:
         """Put all worlds where they were when ``s.image()`` was made of them."""
-        for name, values in image.items():
-            self.s.write(name, values)
+        self.s.fill(image)
         self.forget_lists()
 
     def forget_lists(self) -> None:
         """Pair lists are made anew before they are used again."""
         if self.made.near is not None:
-            self.made.near.stale.fill(1)
+            self.made.near.forget()
 
     def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
-        for name in (*CLOCK, *BOOKS, *self.s.counters, *self.s.keeps):
-            getattr(self.s, name).fill(0)
         empty = self.worlds - len(scenes)
-        for name in MOTION:
-            getattr(self.s, name).fill(0)
         frame = [np.average(a["velocity"], axis=0, weights=a["mass"]) for a in starts]
-        self.s.write("frame", np.array(frame + [np.zeros(3)] * empty))
-        self.s.write("seed", np.array([scene.seed for scene in scenes] + [0] * empty))
-        self.s.write("count", counts.astype(np.int32))
-        self.s.write("next_id", counts.astype(np.int32))
-        self.s.write("status", np.array([RUNNING] * len(scenes) + [ENDED] * empty, dtype=np.int32))
-        self.s.write("end", np.array([scene.duration for scene in scenes] + [0.0] * empty))
-        self.s.write(
-            "volume", np.array([volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty)
+        self.s.fill(
+            {
+                # What worlds wait for is asked of them by others, and stays.
+                **dict.fromkeys((name for name in self.s.columns if name != "hold"), 0),
+                "frame": np.array(frame + [np.zeros(3)] * empty),
+                "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
+                "count": counts,
+                "next_id": counts,
+                "status": np.array([RUNNING] * len(scenes) + [ENDED] * empty),
+                "end": np.array([scene.duration for scene in scenes] + [0.0] * empty),
+                "volume": np.array(
+                    [volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty
+                ),
+                "approach_time": np.inf,
+                "culprit": NOBODY,
+                "blame": NOBODY,
+            }
         )
-        self.s.approach_time.fill(np.inf)
-        self.s.culprit.fill(NOBODY)
-        self.s.blame.fill(NOBODY)
 
     def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:
         """Run every world to its end, or for at most ``steps`` more steps each.
@@ -204,9 +216,10 @@ class Simulation:
 
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
         """Loaded worlds read back: those asked for, or all of them, in order."""
-        tallies = {name: self.s.read(name) for name in self.s.counters}
-        kept = {name: self.s.read(name) for e in self.scenes[0].effects for name in e.keeps}
-        status, good = self.s.read("status"), self.watch.good
+        now, good = self.s.snapshot(self.s.columns), self.watch.good
+        tallies = {name: now[name] for name in self.s.counters}
+        kept = {name: now[name] for e in self.scenes[0].effects for name in e.keeps}
+        status = now["status"]
         found = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
             n = int(good["count"][w])
@@ -226,6 +239,6 @@ class Simulation:
         return found
 
     def close(self) -> None:
-        """Give the device memory back."""
-        for part in (self.s, self.table, *(part for part, _, _ in self.made.memory)):
-            part.destroy()
+        """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""
+        for tree in self.trees:
+            tree.destroy()

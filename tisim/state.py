@@ -4,7 +4,7 @@ Every field has a leading world axis. Vectors are stored as separate components 
 which the compiler can vectorise over particles.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,6 +13,8 @@ import numpy as np
 from tisim import runtime
 from tisim._taichi import ti
 from tisim.errors import RunError
+from tisim.exchange import Exchange
+from tisim.memory import Tree
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,6 @@ class State:
         self.fields, self.counters, self.keeps = fields, (*TALLIES, *counters), keeps
         self.told = tuple(field for field in fields if not field.scratch)
         self.real = runtime.current().real
-        self._generation = runtime.generation()
         builder = ti.FieldsBuilder()
         for field in fields:
             setattr(self, field.name, self._place(builder, field))
@@ -136,7 +137,9 @@ class State:
             column = ti.field(ti.f64)
             builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
             setattr(self, name, column)
-        self._tree = builder.finalize()
+        self._tree = Tree(builder)
+        self._exchanges: dict[tuple[str, ...], Exchange] = {}
+        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *keeps, "seed", "hold", "held", "until")
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -177,38 +180,62 @@ class State:
             for f in self.fields
         }
 
-    def write(self, name: str, values: np.ndarray) -> None:
-        """Set a field from an array of its full shape."""
-        getattr(self, name).from_numpy(np.ascontiguousarray(values))
+    def _exchange(self, names: tuple[str, ...]) -> Exchange:
+        self.check()
+        if names not in self._exchanges:
+            self._exchanges[names] = Exchange({name: getattr(self, name) for name in names})
+        return self._exchanges[names]
+
+    def snapshot(self, names: Iterable[str]) -> dict[str, np.ndarray]:
+        """Fields as arrays of their full shapes, by name.
+
+        A copy is compiled for each choice of particle fields, and one for all quantities of the worlds.
+        """
+        names = tuple(names)
+        particles = tuple(name for name in names if name not in self.columns)
+        found = self._exchange(particles).read() if particles else {}
+        if len(particles) < len(names):
+            found |= self._exchange(self.columns).read()
+        return {name: found[name] for name in names}
 
     def read(self, name: str) -> np.ndarray:
         """A field as an array of its full shape."""
-        return np.asarray(getattr(self, name).to_numpy())
+        return self.snapshot((name,))[name]
 
-    def columns(self) -> tuple[str, ...]:
+    def saved(self) -> tuple[str, ...]:
         """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
         fields = (field.name for field in self.fields)
         return (*fields, *CLOCK, *BOOKS, *self.counters, *self.keeps, "frame", "seed")
 
     def image(self) -> dict[str, np.ndarray]:
-        """A copy of the columns of all worlds, by name."""
-        return {name: self.read(name) for name in self.columns()}
+        """A copy of all worlds as they are, by the names that are saved."""
+        return self.snapshot(self.saved())
 
-    def destroy(self) -> None:
-        """Give the memory back."""
-        # Taichi must have seen fields that no kernel has used before they go, or it stumbles over them later.
-        ti.sync()
-        self._tree.destroy()
+    def fill(self, values: Mapping[str, Any]) -> None:
+        """Set fields, each from an array of its full shape or to one number."""
+        worlds = {name: values[name] for name in self.columns if name in values}
+        if worlds:
+            exchange = self._exchange(self.columns)
+            exchange.write(worlds if len(worlds) == len(self.columns) else {**exchange.read(), **worlds})
+        particles = tuple(name for name in values if name not in worlds)
+        if particles:
+            self._exchange(particles).write(values)
+
+    def write(self, name: str, values: Any) -> None:
+        """Set a field from an array of its full shape, or to one number."""
+        self.fill({name: values})
 
     @property
-    def stale(self) -> bool:
-        """Whether Taichi has been started anew since; the memory is then gone."""
-        return self._generation != runtime.generation()
+    def alive(self) -> bool:
+        """Whether the memory is there: neither given back, nor gone because Taichi has been started anew."""
+        return self._tree.alive
 
     def check(self) -> None:
         """RunError when the memory is gone."""
-        if self.stale:
+        if self._tree.generation != runtime.generation():
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
+        if not self.alive:
+            raise RunError("a Simulation must be used before it is closed; make another")
 
     @ti.func
     def axes(self, column: ti.template(), w):  # type: ignore[valid-type]

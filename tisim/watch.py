@@ -55,7 +55,7 @@ class Watch:
         self.faults: dict[int, tuple[float, str]] = {}
 
     def _snapshot(self) -> Image:
-        return {name: self.s.read(name) for name in (*(f.name for f in self.s.told), "time", "count")}
+        return self.s.snapshot((*(f.name for f in self.s.told), "time", "count"))
 
     def look(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""

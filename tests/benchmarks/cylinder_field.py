@@ -22,10 +22,12 @@ from tisim import runtime
 from tisim._taichi import ti
 from tisim.binding import Table, connect
 from tisim.sources.cylinder import Cylinder, MagneticCylinders
+from tisim.taichi_thread import in_taichi_thread
 
 RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 
 
+@in_taichi_thread
 @ti.kernel
 def field(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
     for i in range(r.shape[0]):
@@ -34,6 +36,7 @@ def field(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray())
             out[i, 0, a] = b[a]
 
 
+@in_taichi_thread
 @ti.kernel
 def both(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
     for i in range(r.shape[0]):

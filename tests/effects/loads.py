@@ -6,6 +6,7 @@ from tests.scenes import compiled, scene
 from tisim._taichi import ti
 from tisim.composition import needed_fields
 from tisim.state import CORE, resolve_fields
+from tisim.taichi_thread import in_taichi_thread
 
 WORLDS = 8
 """At a time: one number for all, so that each structure is compiled once."""
@@ -39,6 +40,7 @@ def loads(scenes, dt=0.0, capacity=16):
     ]
 
 
+@in_taichi_thread
 @ti.kernel
 def _jacobians(s: ti.template(), effect: ti.template(), out: ti.types.ndarray()):
     for w in range(s.worlds):

@@ -20,6 +20,7 @@ from tisim.langevin import langevin_ratio
 from tisim.sources.uniform import MagneticField
 from tisim.steppers.implicit_control import ErrorControl
 from tisim.steppers.trapezoid import Trapezoid
+from tisim.taichi_thread import in_taichi_thread
 
 N = np.array([2.0, -3.0, 6.0]) / 7
 ARGUMENTS = np.concatenate(
@@ -27,6 +28,7 @@ ARGUMENTS = np.concatenate(
 )
 
 
+@in_taichi_thread
 @ti.kernel
 def _ratios(x: ti.types.ndarray(), out: ti.types.ndarray()):
     for k in range(x.shape[0]):

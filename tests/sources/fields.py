@@ -5,11 +5,13 @@ import numpy as np
 from tisim import runtime
 from tisim._taichi import ti
 from tisim.binding import Table, connect
+from tisim.taichi_thread import in_taichi_thread
 
 WORLDS = 4
 _bound: dict = {}
 
 
+@in_taichi_thread
 @ti.kernel
 def _evaluate(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
     for w, i in ti.ndrange(r.shape[0], r.shape[1]):

@@ -99,8 +99,7 @@ class Bench:
     def close(self) -> None:
         """Give the memory back."""
         for simulation in self.made.values():
-            if not simulation.s.stale:
-                simulation.close()
+            simulation.close()
         self.made.clear()
 
 

@@ -13,6 +13,7 @@ from tisim.errors import InputError, must
 from tisim.packing.region import Region, box
 from tisim.packing.voids import fill
 from tisim.ranges import check_resolved
+from tisim.taichi_thread import in_taichi_thread
 
 STREAM = 0x52534100
 SATURATION = 0.3841
@@ -23,6 +24,7 @@ CELLS = 64
 """Cells along an axis, at most."""
 
 
+@in_taichi_thread
 @ti.kernel
 def _add(
     centres: ti.types.ndarray(),  # type: ignore[valid-type]

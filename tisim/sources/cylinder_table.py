@@ -15,6 +15,7 @@ from tisim import runtime
 from tisim._taichi import ti
 from tisim.errors import InputError
 from tisim.sources.cylinder_end import end
+from tisim.taichi_thread import in_taichi_thread
 
 NEAREST, FARTHEST = -40, 16
 """Powers of two of (d / R)^2 between which the table is."""
@@ -24,6 +25,7 @@ SAFE = 3.0
 """Field and gradient are differences between ends, in which errors weigh more: by less than that."""
 
 
+@in_taichi_thread
 @ti.kernel
 def _ends(places: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[valid-type]
     for i in range(places.shape[0]):
@@ -78,7 +80,7 @@ def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
 
 
 @cache
-def _table(digits: int, generation: int) -> tuple[np.ndarray, tuple[int, int, int]]:
+def _table(digits: int, settings: runtime.Runtime) -> tuple[np.ndarray, tuple[int, int, int]]:
     """The smallest that is accurate to so many digits, (cells, numbers in each), and its grid."""
     for grid in GRIDS:
         coefficients = _made(*grid)
@@ -89,7 +91,7 @@ def _table(digits: int, generation: int) -> tuple[np.ndarray, tuple[int, int, in
 
 def table(digits: int) -> tuple[np.ndarray, tuple[int, int, int]]:
     """The same, made once for the running settings. InputError where no table is so accurate."""
-    return _table(digits, runtime.generation())
+    return _table(digits, runtime.current())
 
 
 class TabulatedEnds:

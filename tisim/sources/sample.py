@@ -1,6 +1,7 @@
 """The field of sources at any points, as particles of a scene would feel it."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +11,8 @@ from tisim._taichi import ti
 from tisim.binding import Table, connect
 from tisim.effect import Effect, Source
 from tisim.errors import must
+from tisim.memory import collected
+from tisim.taichi_thread import in_taichi_thread
 
 
 @ti.data_oriented
@@ -48,11 +51,18 @@ def sample(
     must(places.ndim == 2 and places.shape[1] == 3, "points", "of shape (n, 3)", places.shape)
     given = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
     must(bool(given), "effects", f"with a source of {quantity}", [effect.kind() for effect in effects])
-    table = Table(given, 1, real)
-    bound = tuple(table.bind(source) for source in given)
+    out = np.zeros((len(places), 4, 3), places.dtype)
+    _sample(given, real, time, places, out)
+    return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
+
+
+@in_taichi_thread
+def _sample(given: Sequence[Source], real: Any, time: float, places: np.ndarray, out: np.ndarray) -> None:
+    with collected() as trees:
+        table = Table(given, 1, real)
+        bound = tuple(table.bind(source) for source in given)
     connect(bound)
     table.write([given])
-    out = np.zeros((len(places), 4, 3), places.dtype)
     _Sum(bound).at(time, places, out)
-    table.destroy()
-    return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
+    for tree in trees:
+        tree.destroy()

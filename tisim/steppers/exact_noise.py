@@ -6,6 +6,7 @@ D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 multip
 from tisim import runtime
 from tisim._taichi import ti
 from tisim.errors import must
+from tisim.memory import Tree
 from tisim.pairs import PairSum
 from tisim.program import PerParticle, Phase
 from tisim.state import INDEFINITE, Field
@@ -32,7 +33,7 @@ class Exact:
         self.matrix = ti.field(self.s.real)
         builder = ti.FieldsBuilder()
         builder.dense(ti.i, self.s.worlds).dense(ti.jk, (self.rows, self.rows)).place(self.matrix)
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
         # Pivots as small as rounding makes them are those of spheres in each other's place.
         self.least = 1e-12 if self.s.real == ti.f64 else 1e-5
 
@@ -43,11 +44,6 @@ class Exact:
     def bytes(self) -> int:
         """Device memory, in bytes."""
         return (8 if self.s.real == ti.f64 else 4) * self.s.worlds * self.rows**2
-
-    def destroy(self) -> None:
-        """Give the memory back."""
-        ti.sync()
-        self._tree.destroy()
 
     @ti.func
     def pushed(self, w, i):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tisim._taichi import ti
+from tisim.memory import Tree
 from tisim.state import Field
 from tisim.steppers.kept import Kept
 from tisim.steppers.lobatto import highest, integrals, leading, nodes
@@ -34,7 +35,7 @@ class Stages(Kept):
         builder.dense(ti.i, number).dense(ti.j, number).place(self.speeds, self.places)
         builder.dense(ti.i, s.worlds).dense(ti.j, number).dense(ti.k, number).place(self.predict)
         builder.dense(ti.i, s.worlds).dense(ti.j, number).place(self.shape)
-        self._tree = builder.finalize()
+        self.tree = Tree(builder)
         once = integrals(number)
         for column, values in (
             (self.c, nodes(number)),
@@ -58,11 +59,6 @@ class Stages(Kept):
         """Device memory, in bytes."""
         n = self.number
         return 8 * (2 * n + 2 * n * n + self.s.worlds * n * (n + 1))
-
-    def destroy(self) -> None:
-        """Give the memory back."""
-        ti.sync()
-        self._tree.destroy()
 
     @ti.func
     def extrapolate(self, w, ratio):

@@ -1,0 +1,75 @@
+"""Memory and time over many scenes of changing structure: what is compiled for each, and what of it remains.
+
+    python tests/benchmarks/changing_structure.py --scenes 1000
+
+Each scene has exponents of its law, and a number of particles, that few before it have had, so nearly all
+are compiled. A line for each hundred: seconds per scene, memory of the process, and so far, field trees that
+have been made and starts of Taichi.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import tisim
+from tisim import Particles, Scene, memory, runtime
+from tisim.effects.near_field import NearField
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.verlet import Verlet
+
+PAGE = 4096
+
+
+def resident() -> float:
+    """Memory of this process, MB."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE / 1e6
+
+
+def scenes(number: int, seed: int = 1) -> Iterator[Scene]:
+    """Small scenes, most of a structure of their own."""
+    draw = np.random.Generator(np.random.Philox(seed))
+    for _ in range(number):
+        n, near, far = (int(k) for k in (draw.integers(2, 40), draw.integers(1, 20), draw.integers(21, 40)))
+        yield Scene(
+            particles=Particles(
+                position=draw.uniform(size=(n, 3)), velocity=np.zeros((n, 3)), radius=0.01, mass=1.0
+            ),
+            effects=(NearField(alpha1=1e-9, beta1=near, alpha2=0.0, beta2=far),),
+            stepper=Verlet(control=FixedStep(dt=0.5)),
+            duration=1.0,
+        )
+
+
+def soak(number: int, every: int) -> Iterator[tuple[int, float, float]]:
+    """Run so many scenes; of each ``every`` of them the number so far, seconds for one, and memory in MB."""
+    began = time.perf_counter()
+    for done, scene in enumerate(scenes(number), 1):
+        assert tisim.run(scene).status.ok
+        if done % every == 0:
+            yield done, (time.perf_counter() - began) / every, resident()
+            began = time.perf_counter()
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("--scenes", type=int, default=1000)
+    asked.add_argument("--every", type=int, default=100)
+    asked.add_argument("--threads", type=int, default=2)
+    given = asked.parse_args()
+    runtime.start(threads=given.threads)
+    print(f"{runtime.backend()}\n{'scenes':>8}{'s each':>9}{'MB':>8}{'trees':>8}{'starts':>8}")
+    for done, seconds, size in soak(given.scenes, given.every):
+        made, starts = memory.made(), runtime.generation()
+        print(f"{done:8d}{seconds:9.2f}{size:8.0f}{made:8d}{starts:8d}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
