@@ -1,4 +1,4 @@
-"""The kill matrix: every kind of mishap many times over, and what each has cost. Exit code 1 unless nothing."""
+"""The kill matrix: many mishaps of every kind, and what each has cost; exit code 1 unless nothing."""
 
 from __future__ import annotations
 
@@ -18,6 +18,11 @@ seed : of what is random. share : part of the full number of trials to make, 0..
 """
 
 
+def line(cells: list[str]) -> str:
+    """A row of the table, the name first."""
+    return f"{cells[0]:<44}" + "".join(f"{cell:>12}" for cell in cells[1:])
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="tests/soak.sh", description=__doc__)
     parser.add_argument("mishaps", nargs="*", help=f"of {', '.join(MISHAPS)}; all unless given")
@@ -25,14 +30,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of what is random")
     asked = parser.parse_args()
     print(f"seed {asked.seed}")
-    print("".join(f"{heading:>12}" if k else f"{heading:<44}" for k, heading in enumerate(Counts.headings())))
+    print(line(Counts.headings()))
     clean = True
     for name in asked.mishaps or MISHAPS:
         module = importlib.import_module(f"tests.soak.{name}")
         with tempfile.TemporaryDirectory() as folder:
             for counts in module.soak(asked.seed, asked.share, Path(folder)):
-                cells = counts.cells()
-                print("".join(f"{cell:>12}" if k else f"{cell:<44}" for k, cell in enumerate(cells)), flush=True)
+                print(line(counts.cells()), flush=True)
                 clean &= counts.clean
     return 0 if clean else 1
 
