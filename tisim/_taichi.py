@@ -5,11 +5,25 @@ Everything else writes ``from tisim._taichi import ti``. Only what both packages
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import warnings
 
+from tisim.errors import must
+
 BACKEND = os.environ.get("TISIM_BACKEND", "taichi")
 """The package that compiles the kernels: ``"taichi"`` or ``"quadrants"``."""
+
+
+def check_backend() -> None:
+    """InputError unless TISIM_BACKEND names one of the two packages, and it is installed.
+
+    The import goes on with Taichi, so that this is said in a line where the runtime or a command starts.
+    """
+    must(BACKEND in ("taichi", "quadrants"), "TISIM_BACKEND", "taichi or quadrants", BACKEND)
+    rule = "installed (python -m pip install 'tisim[quadrants]') or left out"
+    must(importlib.util.find_spec(BACKEND) is not None, "TISIM_BACKEND", rule, BACKEND)
+
 
 # No banner, and no call over the network for the newest version.
 for prefix in ("TI", "QD"):
@@ -18,21 +32,14 @@ for prefix in ("TI", "QD"):
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
 
-if BACKEND == "taichi":
+if BACKEND == "quadrants" and importlib.util.find_spec("quadrants") is not None:
+    import quadrants as ti
+else:
     with warnings.catch_warnings():
         # Taichi 1.7.4 imports with deprecations of newer Pythons; they are not ours to mend.
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.simplefilter("ignore", SyntaxWarning)
         import taichi as ti
-elif BACKEND == "quadrants":
-    try:
-        import quadrants as ti
-    except ImportError as missing:
-        raise ImportError(
-            "TISIM_BACKEND=quadrants needs the extra: python -m pip install 'tisim[quadrants]'"
-        ) from missing
-else:
-    raise ImportError(f"TISIM_BACKEND must be 'taichi' or 'quadrants'; received {BACKEND!r}")
 
 
 class _Probe:
@@ -44,4 +51,4 @@ class _Probe:
 DEVICE_FUNCTION: type = type(_Probe.__dict__["function"])
 """The type of a method decorated with ``ti.func`` (the packages differ); validated models let it pass."""
 
-__all__ = ["BACKEND", "DEVICE_FUNCTION", "ti"]
+__all__ = ["BACKEND", "DEVICE_FUNCTION", "check_backend", "ti"]

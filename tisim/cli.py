@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.table import Table
 from rich.text import Text
 
 from tisim import __version__, cli_cost, cli_search, cli_watch, request, runtime
+from tisim._taichi import check_backend
 from tisim.errors import InputError, RunError
 from tisim.interrupt import Interrupt, exit_code, handled, stop
 from tisim.options import (
@@ -35,8 +35,8 @@ from tisim.result import Result
 from tisim.simulation import Simulation
 from tisim.terminal import err, out, plain_table, progress_bar, stopping
 
-CHECKPOINT_SECONDS = float(os.environ.get("TISIM_CHECKPOINT_SECONDS", "60"))
-"""Wall time between checkpoints of a run."""
+UsageError: Any = typer.BadParameter.__base__
+"""What typer raises for words that no command knows."""
 
 Absent = Annotated[
     list[str] | None,
@@ -53,19 +53,23 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Exit codes: 0 done; 1 a run or check failed; 2 wrong input, nothing was run; 130, 143, 129 stopped by
     Ctrl-C, SIGTERM, SIGHUP.
     """
-    code: int | str | None = 0
+    code = 0
     with handled(stop):
         try:
-            app(arguments, prog_name="tisim")
+            check_backend()
+            code = app(arguments, prog_name="tisim", standalone_mode=False)
+            # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
+            code = exit_code() if code == 130 else code
+        except UsageError as error:
+            # Of one line; but where no command was named, this is the help.
+            print(error.format_message(), file=sys.stderr)
+            code = 2
         except InputError as error:
             print(error, file=sys.stderr)
             code = 2
         except RunError as error:
             print(error, file=sys.stderr)
             code = 1
-        except SystemExit as ended:
-            # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
-            code = exit_code() if ended.code == 130 else ended.code
         except KeyboardInterrupt:
             code = exit_code()
     sys.exit(code)
@@ -97,6 +101,7 @@ def run(
     from tisim import checkpoint, output
     from tisim.trajectory import asked, recorded
 
+    request.checkpoint_seconds()
     runtime.start(device, precision, threads)
     name, scene = request.scene(target, size, seed, absent or (), changes or ())
     place = output.Folder(folder or Path("out") / name)
@@ -135,7 +140,7 @@ def _advance(simulation: Simulation, name: str, path: Path) -> bool:
     """
     from tisim import checkpoint
 
-    saved = time.monotonic()
+    saved, between = time.monotonic(), request.checkpoint_seconds()
     with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
@@ -144,7 +149,7 @@ def _advance(simulation: Simulation, name: str, path: Path) -> bool:
             ahead = f"{name}, {simulation.ahead():.3g} steps ahead"
             bar.update(task, completed=fraction, description=ahead)
             ctrl_c.check()
-            if time.monotonic() - saved > CHECKPOINT_SECONDS:
+            if time.monotonic() - saved > between:
                 checkpoint.save(simulation, path)
                 saved = time.monotonic()
 

@@ -106,7 +106,12 @@ def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:
 
 def _numbers(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
-    must(all(part.isdecimal() for part in parts), "--starts", "whole numbers with commas between", text)
+    must(
+        all(part.isdecimal() and len(part) < 10 for part in parts),
+        "--starts",
+        "whole numbers with commas between",
+        text,
+    )
     return tuple(map(int, parts))
 
 

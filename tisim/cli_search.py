@@ -13,7 +13,7 @@ from tisim import claim, request
 from tisim.durable import replace_file
 from tisim.errors import RunError, must
 from tisim.interrupt import Interrupt
-from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads
+from tisim.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads, nameable
 from tisim.terminal import err, out, stopping
 
 Executor = Annotated[
@@ -143,7 +143,7 @@ def compare(
 
 
 def cache(
-    file: Annotated[Path, typer.Argument(help="The search.h5 of a search.")],
+    file: Annotated[Path, typer.Argument(help="The search.h5 of a search.", callback=nameable)],
     verify: Annotated[
         bool, typer.Option("--verify", help="Check every record; exit code 1 for damage.")
     ] = False,
@@ -153,6 +153,7 @@ def cache(
     from optimize import cache as store
     from optimize.listing import listing
 
+    must(not file.is_dir(), "cache file", "an existing file", str(file))
     if compact:
         print(f"{store.compact(file)} evaluations kept")
     if verify:

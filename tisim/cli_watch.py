@@ -13,7 +13,7 @@ import typer
 
 from tisim import claim, runtime
 from tisim.errors import InputError
-from tisim.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads
+from tisim.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads, nameable
 from tisim.terminal import err, progress_bar
 
 if TYPE_CHECKING:
@@ -22,11 +22,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 File = Annotated[
-    Path, typer.Argument(help="A run's folder, or its trajectory.h5 or result.h5.", metavar="FILE")
+    Path,
+    typer.Argument(
+        help="A run's folder, or its trajectory.h5 or result.h5.", metavar="FILE", callback=nameable
+    ),
 ]
 World = Annotated[int, typer.Option(help="Which world of a batch, from 0.")]
 Into = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to; that of the file by default.")
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", callback=nameable, help="Folder to write to; that of the file by default."
+    ),
 ]
 
 
@@ -82,7 +88,8 @@ def figures(
 def movie(
     file: File,
     to: Annotated[
-        Path | None, typer.Option("--to", metavar="NAME.gif", help="A .gif, or an .mp4 with ffmpeg.")
+        Path | None,
+        typer.Option("--to", metavar="NAME.gif", callback=nameable, help="A .gif, or an .mp4 with ffmpeg."),
     ] = None,
     rate: Annotated[int, typer.Option(help="Frames a second.")] = 20,
     world: World = 0,

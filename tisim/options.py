@@ -5,6 +5,27 @@ from typing import Annotated
 
 import typer
 
+from tisim.errors import InputError, shown
+
+
+def nameable(path: Path | None) -> Path | None:
+    """A path of a command line, where the system can have one of this name; InputError otherwise."""
+    if path is None:
+        return None
+    try:
+        str(path).encode()
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass
+    except (OSError, ValueError) as fault:
+        # Too long, a loop of links, a NUL, or bytes that are no text.
+        why = fault.strerror if isinstance(fault, OSError) else "not a name"
+        raise InputError(
+            f"path must be one that this system can have; received {shown(str(path))} ({why})"
+        ) from None
+    return path
+
+
 Target = Annotated[
     str, typer.Argument(metavar="CASE_OR_TOML", help="A case of 'tisim cases', or a scene file.")
 ]
@@ -16,7 +37,8 @@ Changes = Annotated[
     ),
 ]
 Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder to write to; out/NAME by default.")
+    Path | None,
+    typer.Option("--out", metavar="DIR", callback=nameable, help="Folder to write to; out/NAME by default."),
 ]
 Seed = Annotated[int | None, typer.Option(help="Of all that is random.")]
 Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]

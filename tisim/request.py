@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -36,6 +38,17 @@ def scene(
         case.size(size or "default")
         name, made = case.name, case.scene(size or "default", seed or 0)
     return name, made.without(*absent).replace(assignments(changes))
+
+
+def checkpoint_seconds() -> float:
+    """Wall time between checkpoints of a run, s: TISIM_CHECKPOINT_SECONDS, a minute unless given."""
+    text = os.environ.get("TISIM_CHECKPOINT_SECONDS", "60")
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    must(seconds >= 0, "TISIM_CHECKPOINT_SECONDS", "a number of seconds, at least 0", text)
+    return seconds
 
 
 def assignments(changes: Sequence[str]) -> dict[str, Any]:

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from tisim import kernel_cache
-from tisim._taichi import BACKEND, ti
+from tisim._taichi import BACKEND, check_backend, ti
 from tisim.errors import InputError, must
 from tisim.taichi_thread import in_taichi_thread
 
 DEVICES = ("cpu", "cuda")
 PRECISIONS = ("f64", "f32")
+THREADS = 1024
+"""The most threads that Taichi is asked for; it makes them all, whether there are cores for them or not."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,11 @@ class Runtime:
     threads: int = 0
 
     def __post_init__(self) -> None:
+        check_backend()
         must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
         must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
         must(self.threads >= 0, "threads", "at least 1 (0 for all cores)", self.threads)
+        must(self.threads <= THREADS, "threads", f"at most {THREADS}", self.threads)
 
     @property
     def real(self) -> Any:

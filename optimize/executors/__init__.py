@@ -31,7 +31,8 @@ def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 
     if kind == "processes":
         from optimize.executors.processes import Processes
 
-        must(rest.isdecimal() and int(rest) >= 1, "executor", "processes:N with N >= 1", name)
+        able = rest.isdecimal() and len(rest) < 5 and int(rest) >= 1
+        must(able, "executor", "processes:N with N >= 1 and of at most 4 digits", name)
         return Remote(Processes(int(rest)), wanted)
     from optimize.executors.dask_cluster import DaskCluster
 
