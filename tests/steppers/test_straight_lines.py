@@ -48,8 +48,8 @@ DECADES = 10.0 ** np.arange(-15, 4)
 NEAR = np.array([1.0, 1 - 1e-12, 1 + 1e-12, 1 - 1e-7, 1 + 1e-7, 1 + 3e-6])
 """A little less or more than whole steps, too."""
 RATIOS = np.unique(np.concatenate([DECADES, NEAR, 3 * NEAR, 1e-6 * NEAR, DECADES * np.pi / 2]))
-LONGEST = np.array([2.5e-4, 1e3])
-"""s; a small one and a generous one."""
+LONGEST = np.array([2.0**-12, 1e3])
+"""s; a small one and a generous one, both whole in single precision."""
 WORLDS = len(RATIOS) * len(LONGEST)
 
 
