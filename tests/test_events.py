@@ -209,13 +209,22 @@ def test_three_grains_in_a_row():
     np.testing.assert_allclose(by_id(result)["velocity"][:, 0], v, rtol=0, atol=1e-12)
 
 
-def test_more_contacts_than_there_is_room_for_is_a_clear_failure(rng):
-    """Sixty grains in one place: the list of contacts overflows, and the run says so and stops."""
+@pytest.mark.parametrize("spread", [1e-5, 0.0], ids=["close", "coincident"])
+def test_more_contacts_than_there_is_room_for_is_a_clear_failure(rng, spread):
+    """Sixty grains in one place: more than hard spheres can be, and the run says so and stops at once.
+
+    Where they coincide they part, and no impact is due; but each step would look at all pairs.
+    """
     n = 60
-    start = scene(rng.normal(size=(n, 3)) * 1e-5, rng.normal(size=(n, 3)), laws(1e9), dt=1e-12, steps=10)
+    start = scene(rng.normal(size=(n, 3)) * spread, rng.normal(size=(n, 3)), laws(1e9), dt=1e-12, steps=10)
     (result,) = run([start])
     assert not result.status.ok
     assert "more simultaneous contacts than there is room for, at particle" in result.status.reason
     assert result.time == 0.0
     for name in ("position", "velocity", "mass"):
         np.testing.assert_array_equal(result.state[name], result.start[name])
+    # Nothing of it is left to the next scene, in which two meet.
+    place, speed = RADIUS * (1 - 1e-9), [[1.0, 0, 0], [-1.0, 0, 0]]
+    (after,) = run([scene([[-place, 0, 0], [place, 0, 0]], speed, laws(1e9), dt=1e-12)])
+    assert after.status.ok
+    assert after.work["impacts"] == 1

@@ -7,7 +7,7 @@ from typing import Any
 
 from tisim.cells import listing
 from tisim.effect import Effect, Force, Mutual, Operator, PairEvent, PairForce, Settled, Source
-from tisim.events import Close, Contacts, Rearrange, Rounds, Survey, SurveyAgain
+from tisim.events import Clear, Contacts, Rearrange, Rounds, Survey, SurveyAgain
 from tisim.forces import FORCE, TORQUE, SumForces, SumForcesAgain, SumTrialForces, turning
 from tisim.halves import Halves
 from tisim.history import History, Remember, memory_fields
@@ -110,8 +110,8 @@ class Composition:
         first: list[Item] = [*lists, *parts.forces]
         if near and contacts:
             survey = Survey(near, contacts, control)
-            step += [survey]
-            first += [survey, Close(contacts)]
+            step += [Clear(contacts), survey]
+            first += [Clear(contacts), survey]
         if events and contacts:
             step += [Rounds(contacts)]
         if events or operators:
@@ -120,8 +120,6 @@ class Composition:
                 step += [*lists, SurveyAgain(near, contacts, control)]
             if parts.forces:
                 step += [*lists, *self._summed(SumForcesAgain)]
-        if contacts:
-            step += [Close(contacts)]
         self.step: tuple[Item, ...] = (*step, Finish(s))
         self.first: tuple[Item, ...] = tuple(first)
 

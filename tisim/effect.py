@@ -259,9 +259,14 @@ class Operator(Effect):
 
 
 class PairEvent(Effect):
-    """Something sudden between two particles, such as an impact."""
+    """Something sudden between two particles, such as an impact.
+
+    hard : its particles are hard spheres, which may touch but not lie in each other: a world stops in which
+        that is true of more pairs than can touch.
+    """
 
     contract: ClassVar[bool] = True
+    hard: ClassVar[bool] = False
 
     @ti.func
     def contact(self, s, w, i, j, separation):

@@ -97,6 +97,7 @@ class Impact(PairEvent):
     Source: Z04 Eqs (2.1)-(2.5), (3.1), (4.10), (4.12), (4.17), staggering scheme of section 6b.
     """
 
+    hard: ClassVar[bool] = True
     needs = ("radius", "mass", "velocity")
     counts = ("impacts", "bonds", "iterations", "unsettled")
 
