@@ -181,6 +181,29 @@ def test_middle_grain_of_three_in_contact_from_both_sides():
     assert v[0] < v[1] < v[2]
 
 
+def closing_in(number, delay):
+    """Grains around one that they touch, all at 2 m/s towards it; the later in order, the earlier."""
+    angle = 2 * np.pi * np.arange(number) / number
+    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(number)], axis=1)
+    place = (2 * RADIUS * (1 - 1e-7) + 2.0 * delay * np.arange(number)[::-1, None]) * out
+    return scene(
+        np.vstack([[[0, 0, 0]], place]), np.vstack([[[0, 0, 0]], -2.0 * out]), laws(2e8), dt=DT, steps=2000
+    )
+
+
+@pytest.mark.parametrize("number", [2, 3, 4])
+def test_a_tie_ends_as_the_limit_of_impacts_one_after_another(number):
+    """Of impacts in one instant that with the highest indices comes first: as if it were just earlier."""
+    tie, near = run([closing_in(number, delay) for delay in (0.0, 1e-13)])
+    assert tie.work["impacts"] >= number
+    assert tie.work == near.work
+    np.testing.assert_allclose(by_id(tie)["velocity"], by_id(near)["velocity"], rtol=0, atol=1e-12)
+    scale = 2.0 * number * tie.state["mass"][0]
+    np.testing.assert_allclose(momentum(tie.state), momentum(tie.start), rtol=0, atol=1e-15 * scale)
+    energy = [(state["velocity"] ** 2).sum() for state in (tie.start, tie.state)]
+    assert energy[1] < energy[0]
+
+
 def test_three_grains_in_a_row():
     """Newton's cradle with restitution e = 1 - v/v*: the pulse passes by binary impacts, in closed form."""
     hardness, speed = 2e6, 2.0

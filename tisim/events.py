@@ -14,6 +14,10 @@ event fell due, so earlier events go first. Why this is right:
   after another, earliest first.
 - Deterministic: bids are integers, compared by atomic maxima, which do not depend on order. Two pairs that
   share a particle never bid the same, as the sum of their indices breaks ties.
+
+Impacts in the same instant are therefore resolved one after another too, and their outcome is the limit of
+impacts that follow each other. It keeps momentum and never gains energy, but where e < 1 it need not be as
+symmetric as the grains were: see docs/agglomeration.md.
 """
 
 from __future__ import annotations
