@@ -199,10 +199,10 @@ def verlet_only(monkeypatch):
 def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
     run = Bench.run
 
-    def brittle(self, scenes, watch=None):
+    def brittle(self, scenes, *more):
         if scenes[0].stepper.control.dt > 0.02:
             raise RunError("a quantity is not finite")
-        return run(self, scenes, watch)
+        return run(self, scenes, *more)
 
     monkeypatch.setattr(Bench, "run", brittle)
     found = study(oscillator(), (KNOWN,), precisions=("f64",))
@@ -216,11 +216,11 @@ def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
 def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
     run, runs = Bench.run, []
 
-    def stopped(self, scenes, watch=None):
+    def stopped(self, scenes, *more):
         runs.append(scenes[0].stepper.control.dt)
         if runs.count(0.01) == 2:
             raise KeyboardInterrupt
-        return run(self, scenes, watch)
+        return run(self, scenes, *more)
 
     monkeypatch.setattr(Bench, "run", stopped)
     found = Study(oscillator(), (KNOWN,), precisions=("f64",))
