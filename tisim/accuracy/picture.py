@@ -47,10 +47,12 @@ def picture(study: Study) -> Figure:
     axes[0].set_ylabel("relative error")
     if any(row.errors and not row.trusted(k) for row in study.rows for k in range(wide)):
         axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: no more than this")
-    handles, names = axes[0].get_legend_handles_labels()
+    # Lines are in every panel, rings not.
+    named = {name: h for axis in axes for h, name in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(
-        handles, names, loc="outside lower center", ncols=1 if wide == 1 else 2, frameon=False, fontsize=8.5
-    )
+        named.values(), named.keys(), loc="outside lower center", ncols=1 if wide == 1 else 2, frameon=False,
+        fontsize=8.5,
+    )  # fmt: skip
     return figure
 
 
