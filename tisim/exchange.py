@@ -13,7 +13,13 @@ import numpy as np
 from tisim._taichi import ti
 from tisim.taichi_thread import in_taichi_thread
 
+MOST = 32
+"""Entries of a loop that Taichi unrolls without a warning."""
 TYPES = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32, ti.i64: np.int64}
+
+
+def _divided(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
+    return tuple(entries[k : k + MOST] for k in range(0, len(entries), MOST))
 
 
 @ti.data_oriented
@@ -35,9 +41,8 @@ class Exchange:
             sizes[column.dtype] += int(np.prod(shape))
         self.sizes = sizes
         placed.sort(key=lambda entry: entry[0])
-        self.groups = tuple(
-            (shape, tuple(e[1:] for e in of)) for shape, of in groupby(placed, lambda e: e[0])
-        )
+        groups = [(shape, tuple(entry[1:] for entry in of)) for shape, of in groupby(placed, lambda e: e[0])]
+        self.groups = tuple((shape, _divided(entries)) for shape, entries in groups)
 
     def _buffers(self) -> tuple[np.ndarray, ...]:
         """One for each type. No array may be empty."""
@@ -89,11 +94,12 @@ class Exchange:
         i64: ti.types.ndarray(),  # type: ignore[valid-type]
     ):
         for group in ti.static(self.groups):
-            for where in ti.grouped(group[1][0][1]):
+            for where in ti.grouped(group[1][0][0][1]):
                 at = self._at(group[0], where)
-                for entry in ti.static(group[1]):
-                    buffer = ti.static((f32, f64, i32, i64)[entry[0]])
-                    buffer[entry[2] + at * entry[3]] = entry[1][where]
+                for entries in ti.static(group[1]):
+                    for entry in ti.static(entries):
+                        buffer = ti.static((f32, f64, i32, i64)[entry[0]])
+                        buffer[entry[2] + at * entry[3]] = entry[1][where]
 
     @ti.kernel
     def _write(
@@ -104,8 +110,9 @@ class Exchange:
         i64: ti.types.ndarray(),  # type: ignore[valid-type]
     ):
         for group in ti.static(self.groups):
-            for where in ti.grouped(group[1][0][1]):
+            for where in ti.grouped(group[1][0][0][1]):
                 at = self._at(group[0], where)
-                for entry in ti.static(group[1]):
-                    buffer = ti.static((f32, f64, i32, i64)[entry[0]])
-                    entry[1][where] = buffer[entry[2] + at * entry[3]]
+                for entries in ti.static(group[1]):
+                    for entry in ti.static(entries):
+                        buffer = ti.static((f32, f64, i32, i64)[entry[0]])
+                        entry[1][where] = buffer[entry[2] + at * entry[3]]
