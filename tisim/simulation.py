@@ -147,6 +147,7 @@ class Simulation:
                 "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
                 "count": counts,
                 "next_id": counts,
+                "most": np.array([scene.capacity() for scene in scenes] + [0] * empty),
                 "status": np.array([RUNNING] * len(scenes) + [ENDED] * empty),
                 "end": np.array([scene.duration for scene in scenes] + [0.0] * empty),
                 "volume": np.array(

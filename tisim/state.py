@@ -128,6 +128,9 @@ class State:
                 setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
+        # Particles that its scene may ever have; the capacity may be that of a larger one.
+        self.most = ti.field(ti.i32)
+        builder.dense(ti.i, worlds).place(self.most)
         # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s), and at
         # ``until`` steps.
         self.hold, self.held, self.until = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.i64)
@@ -139,7 +142,8 @@ class State:
             setattr(self, name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
-        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *keeps, "seed", "hold", "held", "until")
+        own = ("seed", "most", "hold", "held", "until")
+        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *keeps, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -279,8 +283,8 @@ class State:
 
     @ti.func
     def room(self, w):
-        """Free slots."""
-        return self.capacity - self.count[w]
+        """Free slots, of those that its scene has, so that no world ends otherwise in a larger simulation."""
+        return self.most[w] - self.count[w]
 
     @ti.func
     def fail(self, w, status, i):
