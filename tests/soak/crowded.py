@@ -1,0 +1,228 @@
+"""Trials on a full disk, in a process: ``python -m tests.soak.crowded ROOM SEED FIRST LAST FOLDER``.
+
+ROOM is how the disk is made full: "limit", the system's limit on the size of files, or "tmpfs", a small file
+system, for which the process must have mounts of its own (``unshare -rm``). Each trial gives a command a
+random part of the room that it needs. Of each trial from FIRST to before LAST it prints, as lines of JSON,
+what is tried, and then the column of Counts in which that belongs, "" when all is well, and why.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from tests.soak import damage
+from tisim import Box, Cloud, Scene, Simulation, cli, runtime
+from tisim.checkpoint import restore, save
+from tisim.errors import RunError
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.verlet import Verlet
+
+FRAMES = 20
+SCENE = Scene(
+    particles=Cloud(number=30, radius=4e-4, density=3000.0, deviation=(60.0, 60.0, 60.0)),
+    domain=Box(low=(-5e-3,) * 3, high=(5e-3,) * 3),
+    stepper=Verlet(control=FixedStep(dt=1e-6)),
+    duration=1e-3,
+)
+
+
+class Wrong(Exception):
+    """A trial has gone wrong: the column of Counts, and why."""
+
+
+@contextlib.contextmanager
+def limited(folder: Path, size: int) -> Iterator[None]:
+    """No file grows beyond so many bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@contextlib.contextmanager
+def mounted(folder: Path, size: int) -> Iterator[None]:
+    """The file system of the folder has room for so many bytes more, in pages of the system."""
+    used = shutil.disk_usage(folder).used
+    mount(folder, f"remount,size={used + max(size, damage.BLOCK)}")
+    try:
+        yield
+    finally:
+        mount(folder, "remount,size=1g")
+
+
+def mount(folder: Path, options: str) -> None:
+    """Make the folder a file system in memory."""
+    subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)], check=True)
+
+
+class Bench:
+    """Commands of tisim on one scene, compiled once, and what they give on a disk with room."""
+
+    def __init__(self, folder: Path) -> None:
+        self.simulation = Simulation(SCENE)
+        self.toml = folder / "scene.toml"
+        self.toml.write_text(SCENE.to_toml())
+        self.whole = folder / "whole"
+        # All else in the command is as it is.
+        cli.Simulation = lambda scene: self.simulation  # type: ignore[assignment, misc]
+        assert self.call("run", self.toml, "--frames", FRAMES, "--out", self.whole) == 0
+        self.frames = damage._frames(self.whole / "trajectory.h5")
+        self.result = damage._frames(self.whole / "result.h5")
+        for words in EXPORTS.values():
+            assert self.call(*words(self.whole / "trajectory.h5", self.whole)) == 0
+
+    def call(self, *words: object) -> int:
+        """The exit code of a command."""
+        said = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                cli.main([str(word) for word in words])
+        except SystemExit as left:
+            if left.code not in (0, 1, 2):
+                raise Wrong("tracebacks", f"exit code {left.code}: {said.getvalue()}") from None
+            return int(left.code)
+        raise AssertionError("a command ends with an exit code")
+
+    def check(self, folder: Path, code: int) -> None:
+        """All files that a command has left must be those of a disk with room, or frames of them."""
+        for path in folder.iterdir():
+            if path.name.endswith(".new") or ".new." in path.name:
+                raise Wrong("wrong", f"{path.name} is left")
+            if path.suffix == ".h5" and path.name not in ("checkpoint.h5", "cost.h5"):
+                found = damage._frames(path)
+                expected = self.result if path.name == "result.h5" else self.frames
+                whole = path.name != "trajectory.h5" or code == 0
+                if found != (expected if whole else expected[: len(found)]):
+                    raise Wrong("wrong", f"{path.name} holds {len(found)} of {len(expected)} parts")
+            elif path.name in ("cloud.png", "courses.png") or path.suffix == ".gif":
+                with Image.open(path) as picture:
+                    picture.load()
+            elif path.suffix in (".vtu", ".pvd", ".xyz") and path.read_bytes() != (
+                (self.whole / path.name).read_bytes()
+            ):
+                raise Wrong("wrong", f"{path.name} is not what it is on a disk with room")
+
+
+def run(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+    """``tisim run --frames``; with room again, it goes on to the same end."""
+    command = ("run", bench.toml, "--frames", FRAMES, "--out", folder)
+    with room(folder, _part(rng, bench.whole / "trajectory.h5", bench.whole / "cloud.png")):
+        code = bench.call(*command)
+        bench.check(folder, code)
+    left = [path.name for path in folder.iterdir()]
+    if code:
+        code = bench.call(*command, "--resume" if "checkpoint.h5" in left else "--overwrite")
+    bench.check(folder, code)
+    if code or damage._frames(folder / "result.h5") != bench.result:
+        raise Wrong("lost", f"the run did not go on from {left}: exit code {code}")
+
+
+def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+    """A second checkpoint in the place of a first: it is one of the two."""
+    simulation, path = bench.simulation, folder / "checkpoint.h5"
+    simulation.load([SCENE])
+    simulation.run(steps=10)
+    save(simulation, path)
+    steps = 10
+    simulation.run(steps=10)
+    with room(folder, _part(rng, path)), contextlib.suppress(RunError):
+        save(simulation, path)
+        steps = 20
+    bench.check(folder, 0)
+    simulation.load([SCENE])
+    restore(simulation, path)
+    if simulation.results()[0].work["steps"] != steps:
+        raise Wrong("lost", f"the checkpoint of step {steps}")
+
+
+def cost(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+    """The rows of a study, written again when there is one more: all but the last, or all."""
+    from tisim.accuracy import files
+
+    path, study = damage._cost(folder), damage._study()
+    files.resume(study, folder)
+    rows = damage._rows(path)
+    study.rows.append(study.rows[0])
+    with room(folder, _part(rng, path)), contextlib.suppress(RunError):
+        files.write(study, folder)
+        rows = [repr(row) for row in study.rows]
+    if damage._rows(path) != rows:
+        raise Wrong("lost", f"some of {len(rows)} rows")
+
+
+def show(name: str) -> Callable:
+    """A command that draws or exports a trajectory."""
+
+    def trial(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
+        file = bench.whole / "trajectory.h5"
+        made = [
+            path for path in bench.whole.iterdir() if path.name in MADE[name] or path.suffix in MADE[name]
+        ]
+        with room(folder, _part(rng, *made)):
+            code = bench.call(*EXPORTS[name](file, folder))
+            bench.check(folder, code)
+
+    return trial
+
+
+EXPORTS: dict[str, Callable[[Path, Path], tuple]] = {
+    "plot": lambda file, to: ("plot", file, "--out", to, "--overwrite"),
+    "movie": lambda file, to: ("movie", file, "--to", to / "flow.gif"),
+    "export vtk": lambda file, to: ("export", file, "--out", to),
+    "export xyz": lambda file, to: ("export", file, "--format", "xyz", "--out", to),
+    "export h5md": lambda file, to: ("export", file, "--format", "h5md", "--out", to),
+}
+MADE = {
+    "plot": ("courses.png",), "movie": (".gif",), "export vtk": (".vtu", ".pvd"), "export xyz": (".xyz",),
+    "export h5md": ("trajectory_copy.h5",),
+}  # fmt: skip
+TRIALS = {"run": run, "checkpoint": checkpoint, "cost": cost, **{name: show(name) for name in EXPORTS}}
+
+
+def _part(rng: np.random.Generator, *files: Path) -> int:
+    """A random part of what the largest of these files takes, bytes; now and then all of it."""
+    return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in files))
+
+
+def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.Generator) -> tuple[str, str]:
+    """The column of Counts in which a trial belongs, and why; empty when all is well."""
+    folder.mkdir(parents=True)
+    try:
+        if room is mounted:
+            mount(folder, "size=1g")
+        TRIALS[name](bench, folder, room, rng)
+    except Wrong as wrong:
+        return wrong.args
+    except BaseException:
+        return "tracebacks", traceback.format_exc()
+    return "", ""
+
+
+def main() -> None:
+    room, seed, first, last, folder = sys.argv[1], *map(int, sys.argv[2:5]), Path(sys.argv[5])
+    runtime.start()
+    bench = Bench(folder)
+    for k in range(first, last):
+        name = list(TRIALS)[k % len(TRIALS)]
+        print(json.dumps([name]), flush=True)
+        rng = np.random.default_rng([seed, k])
+        made = {"limit": limited, "tmpfs": mounted}[room]
+        print(json.dumps(trial(bench, name, folder / str(k) / "out", made, rng)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

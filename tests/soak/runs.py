@@ -1,0 +1,161 @@
+"""Runs that are killed at random times; disks that are full at random sizes, for all that a run writes."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from tests.soak import damage
+from tests.soak.counts import Counts
+
+KILLS = 20
+"""Runs that are killed; each is gone on with, and may be killed again, until it ends."""
+SIZES = 20
+"""Sizes of the disk, for each command."""
+PATIENCE = 300.0
+"""Seconds after which a trial counts as hung; the first of a process has a simulation compiled."""
+ROOT = Path(__file__).parents[2]
+RUN = (
+    "run", "agglomeration", "--size", "paper", "--set", "effects.impact.hardness=1e7", "--set",
+    "duration=3e-3", "--seed", "4", "--frames", "300", "--out",
+)  # fmt: skip
+
+
+def begin(folder: Path, *more: str) -> subprocess.Popen[str]:
+    """A run that saves a checkpoint as often as it can."""
+    return subprocess.Popen(
+        [sys.executable, "-c", "from tisim.cli import main; main()", *RUN, str(folder), *more],
+        env={**os.environ, "TISIM_CHECKPOINT_SECONDS": "0", "PYTHONPATH": str(ROOT)},
+        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def ended(running: subprocess.Popen[str]) -> str:
+    """What a run says that ends in another way than it should; empty when all is well."""
+    said = running.communicate(timeout=PATIENCE)[1]
+    return said[-1500:] if running.returncode else ""
+
+
+def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
+    """Counts of killed runs, and of each command on a full disk; what went wrong is printed above them."""
+    yield _killed(np.random.default_rng(seed), max(round(KILLS * share), 1), folder / "kills")
+    yield from _crowded(seed, max(round(SIZES * share), 1), folder / "crowded")
+
+
+def _killed(rng: np.random.Generator, number: int, folder: Path) -> Counts:
+    counts = Counts("killed runs with frames")
+    began = time.monotonic()
+    assert not ended(begin(folder / "whole"))
+    whole = {name: damage._frames(folder / "whole" / name) for name in ("trajectory.h5", "result.h5")}
+    longest = time.monotonic() - began
+    for k in range(number):
+        counts.tried += 1
+        try:
+            why = _one(folder / str(k), rng, longest, whole)
+        except subprocess.TimeoutExpired:
+            why = "hung", "no end"
+        if why[0]:
+            setattr(counts, why[0], getattr(counts, why[0]) + 1)
+            print(f"killed runs: {why[0]}: {why[1]}", flush=True)
+    return counts
+
+
+def _one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) -> tuple[str, str]:
+    """Kill a run at random times, go on with it, and compare with the whole one."""
+    more: tuple[str, ...] = ()
+    for _ in range(int(rng.integers(1, 4))):
+        running = begin(folder, *more)
+        # Half of the kills while it starts or where it is, half where the files are made.
+        while rng.random() < 0.5 and running.poll() is None and not (folder / "trajectory.h5").exists():
+            time.sleep(0.001)
+        time.sleep(rng.uniform(0, longest) * rng.choice([0.01, 0.3, 1.0]))
+        running.kill()
+        running.communicate()
+        left = {path.name for path in folder.iterdir()} if folder.exists() else set()
+        for name in whole.keys() & left:
+            found = damage._frames(folder / name)
+            with h5py.File(folder / name):  # as any other program opens it
+                pass
+            if found != whole[name][: len(found)]:
+                return "wrong", f"{name} of a killed run differs from that of a whole one"
+        if "result.h5" in left:
+            break
+        more = ("--resume",) if "checkpoint.h5" in left else ("--overwrite",) if left else ()
+    if "result.h5" not in left and (why := ended(begin(folder, *more))):
+        return "tracebacks" if "Traceback" in why else "lost", why
+    for name, frames in whole.items():
+        if damage._frames(folder / name) != frames:
+            return "wrong", f"{name} differs from that of a run that was not killed"
+    shutil.rmtree(folder)
+    return "", ""
+
+
+def _crowded(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
+    """Half of the sizes are those of a small file system, where one can be mounted."""
+    mounts = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
+    counts: dict[str, Counts] = {}
+    for room, number in (
+        (("limit", sizes - sizes // 2), ("tmpfs", sizes // 2)) if mounts else (("limit", sizes),)
+    ):
+        _trials(room, seed, number, folder / room, counts)
+    yield from counts.values()
+
+
+def _trials(room: str, seed: int, sizes: int, folder: Path, counts: dict[str, Counts]) -> None:
+    from tests.soak.crowded import TRIALS
+
+    done, number = 0, sizes * len(TRIALS)
+    while done < number:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, what, why in _process(room, seed, done, number, folder):
+            done += 1
+            one = counts.setdefault(name, Counts(f"full disk: {name}"))
+            one.tried += 1
+            if what:
+                setattr(one, what, getattr(one, what) + 1)
+                print(f"full disk ({room}), {name}: {what}: {why[-1500:]}", flush=True)
+        shutil.rmtree(folder)
+
+
+def _process(room: str, seed: int, first: int, last: int, folder: Path) -> Iterator[tuple[str, str, str]]:
+    """What a process says of its trials, until it has made them all, crashes, or has to be ended."""
+    alone = ("unshare", "-rm") if room == "tmpfs" else ()
+    command = [
+        *alone,
+        sys.executable,
+        "-m",
+        "tests.soak.crowded",
+        room,
+        *map(str, (seed, first, last, folder)),
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0, env=environment, cwd=ROOT) as process:
+        name = ""
+        while True:
+            heard = select.select([process.stdout], [], [], PATIENCE)[0]
+            line = process.stdout.readline() if heard and process.stdout else b""
+            if not line:
+                break
+            said = json.loads(line)
+            if len(said) == 1:
+                name = said[0]
+            else:
+                yield name, *said
+                name = ""
+        if not heard:
+            process.kill()
+        process.wait()
+        if name:
+            yield name, "tracebacks" if heard else "hung", f"the process ended with {process.returncode}"
+        elif process.returncode:
+            raise RuntimeError(f"{command} ended with {process.returncode} before a trial")
