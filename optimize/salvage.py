@@ -17,6 +17,7 @@ from optimize import store
 from tisim.durable import locked, replace_file
 from tisim.errors import must
 from tisim.regular import content, status
+from tisim.seal import unsealed
 
 LIMIT = 300.0
 """s, for that process; reading a million rows takes a tenth of it."""
@@ -28,7 +29,7 @@ def mend(path: Path, lock: Path) -> None:
     Nothing happens when the file is whole, or nothing can be read. InputError when FILE.damaged is there.
     """
     old = content(path)
-    if old is None or store.unsealed(old) is not None:
+    if old is None or unsealed(old) is not None:
         return
     made = _salvaged(old)
     if made is None:
@@ -47,7 +48,7 @@ def _salvaged(old: bytes) -> bytes | None:
         done = subprocess.run(command, input=old, capture_output=True, timeout=LIMIT, check=False)
     except subprocess.TimeoutExpired:
         return None
-    return done.stdout if done.returncode == 0 and store.unsealed(done.stdout) is not None else None
+    return done.stdout if done.returncode == 0 and unsealed(done.stdout) is not None else None
 
 
 def _read(old: bytes) -> bytes:

@@ -23,13 +23,10 @@ import numpy as np
 from optimize.record import Record, canonical
 from tisim import regular
 from tisim.errors import InputError, must
-from tisim.framed import MAGIC, scan
-from tisim.seal import intact, sealed
+from tisim.seal import sealed, unsealed
 
 FORMAT = "tisim evaluations 1"
 ROWS = "evaluations"
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""How every HDF5 file begins."""
 
 _COLUMNS: dict[str, Any] = {
     "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
@@ -80,13 +77,6 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise
         except (OSError, KeyError, RuntimeError, ValueError) as error:
             raise InputError(f"{path} must be undamaged; received {error}") from error
-
-
-def unsealed(content: bytes) -> bytes | None:
-    """The HDF5 file in a cache file; None when it has no whole seal, or is not what was sealed."""
-    start = max(content.rfind(MAGIC), 0)
-    whole = content.startswith(SIGNATURE) and scan(content[start:]).payloads and intact(content)
-    return content[:start] if whole else None
 
 
 def image(

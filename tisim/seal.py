@@ -21,6 +21,9 @@ from tisim.durable import replace_file
 from tisim.errors import InputError, must
 from tisim.framed import MAGIC, frame, scan
 
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""The bytes with which every HDF5 file begins."""
+
 
 @contextlib.contextmanager
 def created(path: Path) -> Iterator[h5py.File]:
@@ -59,18 +62,19 @@ def sealed(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
 
 
 def unsealed(content: bytes) -> bytes | None:
-    """The file image without its seal; None when it has none, or is not what was sealed."""
+    """The HDF5 file without its seal; None when there is no whole seal, or the file is not what was sealed."""
     start = max(content.rfind(MAGIC), 0)
     payloads = scan(content[start:]).payloads
-    if not payloads:
+    if not content.startswith(SIGNATURE) or not payloads:
         return None
-    seal, image = json.loads(payloads[0]), content[:start]
-    return image if len(image) == seal["size"] and _checksum(image, seal["data"]) == seal["crc"] else None
-
-
-def intact(content: bytes) -> bool:
-    """Whether the structure is what was written. True without a seal (another program wrote the file)."""
-    return MAGIC not in content or unsealed(content) is not None
+    try:
+        seal = json.loads(payloads[0])
+        size, spans, crc = seal["size"], seal["data"], seal["crc"]
+    except (ValueError, KeyError, TypeError):
+        # A frame, but of something else.
+        return None
+    image = content[:start]
+    return image if len(image) == size and _checksum(image, spans) == crc else None
 
 
 def _checksum(image: bytes, spans: Iterable[Iterable[int]]) -> int:
