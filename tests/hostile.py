@@ -1,4 +1,4 @@
-"""Values that nobody means, and valid scenes with something of theirs put in the wrong place."""
+"""Hostile input: values that nobody means, and valid scenes with such a value in the wrong place."""
 
 from __future__ import annotations
 
@@ -156,3 +156,50 @@ def _required(kind: type[Spec]) -> dict[str, Any]:
 def _known(contract: type[Stepper]) -> dict[str, type[Stepper]]:
     kinds.load(steppers)
     return {name: kind for name, kind in contract.known().items() if kind.__module__.startswith("tisim.")}
+
+
+TOKENS = (
+    "nan", "inf", "-inf", "1e400", "-1", "0", "9" * 5000, "0x" + "f" * 5000, "[" * 500 + "]" * 500,
+    "[" * 5000, "{a=" * 400 + "1" + "}" * 400, "''", '""', '"""', "true", "[]", "{}", "[[]]", "[1, 'x']",
+    "{a=1}", "{self=1}", "{kind=[]}", "1979-05-27", "07:32:00", '"\\ud800"', '"\\u0000"', "'sphere'", "'😀'",
+    "1__0", "1e", "", "=", "'" + "x" * 100_000 + "'", "[0, 0, 0]", "[[0, 0, 0]]", "1e17", "1e-200", "3e296",
+    "18446744073709551616",
+)  # fmt: skip
+LINES = (
+    "self = 1", "kind = []", "[self]", "[effects.self]", "[[effects]]", "[effects]", "[[particles]]", "= 1",
+    "a" + ".a" * 20_000 + " = 1", "[a" + ".a" * 5000 + "]", "\x00", "\udcff", '"" = 1', "'a b' = 1",
+    "x" * 100_000,
+)  # fmt: skip
+
+
+def mutated_toml(random: Random) -> bytes:
+    """The text of a scene file that was valid, with one to three of its lines changed, and perhaps cut."""
+    lines = kinds.toml(random.choice(valid())).splitlines()
+    for _ in range(random.choice((1, 1, 1, 2, 3))):
+        at = random.randrange(len(lines))
+        kind = random.randrange(8)
+        if kind < 4:
+            lines[at] = f"{lines[at].partition('=')[0]}= {random.choice(TOKENS)}"
+        elif kind == 4:
+            lines.insert(at, random.choice(LINES))
+        elif kind == 5:
+            lines.insert(at, random.choice(lines))
+        elif kind == 6:
+            lines[at] = lines[at].replace(random.choice("aeinx.[]=_"), random.choice("aeinx.[]=_\n\t\"'#"))
+        elif len(lines) > 1:
+            del lines[at]
+    text = "\n".join(lines).encode(errors="surrogateescape")
+    return text[: random.randrange(len(text) + 1)] if random.randrange(10) == 0 else text
+
+
+def assignment(data: dict[str, Any], random: Random) -> str:
+    """What stands after --set: a setting of a scene, or nearly one, and a hostile value."""
+    path = [str(step) for step in random.choice(_places(data))]
+    kind = random.randrange(8)
+    if kind == 4:
+        path[random.randrange(len(path))] = random.choice(TEXTS)
+    elif kind == 5:
+        path.append(random.choice(("a", "0", "self", "kind", "9" * 5000, "", ".".join("a" * 20_000))))
+    elif kind == 6:
+        del path[-1]
+    return f"{'.'.join(path)}{'' if kind == 7 else '='}{random.choice(TOKENS)}"

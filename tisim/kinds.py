@@ -101,10 +101,23 @@ def _key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else inline(name)
 
 
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_DEEP = re.compile(rf"""(?<![\w."'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{64}}""")
+"""A dotted key of more parts than any scene has."""
+
+
+def parse(text: str) -> dict[str, Any]:
+    """The table that TOML text holds; ValueError or RecursionError where it cannot be read."""
+    # tomllib takes a time that grows as the square of the parts of a key: minutes for some ten thousand.
+    if _DEEP.search(text):
+        raise RecursionError("a key of too many parts")
+    return tomllib.loads(text)
+
+
 def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
     """The table that TOML text holds; InputError naming ``what`` and ``source`` where it is not TOML."""
     try:
-        return tomllib.loads(text)
+        return parse(text)
     except RecursionError:
         raise InputError(f"{what} must be less deeply nested; received {shown(source)}") from None
     except ValueError as fault:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tisim import kinds
 from tisim.errors import InputError, must, named, shown
 from tisim.scene import Scene
 
@@ -64,7 +65,7 @@ def assignments(changes: Sequence[str]) -> dict[str, Any]:
 def _value(key: str, text: str) -> Any:
     """What stands right of the equals sign: a TOML value, else text."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        return kinds.parse(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text.strip()
     except (RecursionError, ValueError):
