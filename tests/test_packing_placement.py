@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 import tomllib
+import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import tisim
-from tisim import Blast, Box, Cloud, Lattice, Open, RandomInBall, RandomInBox, Scene
+from tests.judged import check_message
+from tisim import (
+    Blast,
+    Box,
+    Cloud,
+    Lattice,
+    Open,
+    RandomAroundCylinder,
+    RandomInBall,
+    RandomInBox,
+    RandomInDomain,
+    Scene,
+    runtime,
+)
 from tisim.errors import InputError
 
 BALL = dict(number=2000, radius=0.05, density=7000.0, placement=RandomInBall(radius=1.0, centre=(3.0, 0, 0)))
@@ -139,6 +155,73 @@ WRONG = {
         "box must be wider than a sphere, 0.6 m, in each direction",
     ),
     "too many": (lambda: arrays(Cloud(**{**BALL, "number": 4000})), "must be at most 0.384.*received 0.5"),
+    "a ball far from the origin": (
+        lambda: arrays(
+            Cloud(number=9, radius=0.01, density=1.0, placement=RandomInBall(radius=1.0, centre=(1e17, 0, 0)))
+        ),
+        "places of the packing must be so near the origin that rounding, .* m there, is at most 1.0e-05 m",
+    ),
+    "a box far from the origin": (
+        lambda: arrays(
+            Cloud(
+                number=9,
+                radius=1.0,
+                density=1.0,
+                placement=RandomInBox(low=(1e17,) * 3, high=(1.00000000000001e17,) * 3),
+            )
+        ),
+        "places of the packing must be so near the origin",
+    ),
+    "a domain far from the origin": (
+        lambda: arrays(
+            Cloud(number=9, radius=1.0, density=1.0), Box(low=(1e17,) * 3, high=(1.00000000000001e17,) * 3)
+        ),
+        "places of the packing must be so near the origin",
+    ),
+    "a lattice far from the origin": (
+        lambda: arrays(
+            Cloud(
+                radius=0.1,
+                density=1.0,
+                placement=Lattice(shape=(2, 2, 2), spacing=1.0, centre=(0, 1e17, 0)),
+            )
+        ),
+        "lattice sites must be so near the origin",
+    ),
+    "a cylinder far from the origin": (
+        lambda: arrays(
+            Cloud(
+                number=9,
+                radius=0.01,
+                density=1.0,
+                placement=RandomAroundCylinder(radius=1.0, length=1.0, thickness=1.0, centre=(0, 0, 1e17)),
+            )
+        ),
+        "places around the cylinder must be so near the origin",
+    ),
+    "more around a cylinder than its layer holds": (
+        lambda: arrays(
+            Cloud(
+                number=10**6,
+                radius=0.1,
+                density=1.0,
+                placement=RandomAroundCylinder(radius=1.0, length=1.0, thickness=1.0),
+            )
+        ),
+        "volume fraction must be at most 1; received",
+    ),
+    "velocities beyond numbers": (
+        lambda: arrays(
+            Cloud(
+                number=2,
+                radius=0.1,
+                density=1.0,
+                placement=RandomInBall(radius=1.0),
+                pulse=Blast(energy=1.7e308),
+            )
+        ),
+        "velocity of the cloud must be finite; received -?inf",
+    ),
     "open domain": (lambda: arrays(Cloud(number=9, radius=1, density=1)), "domain must be bounded to hold"),
     "charge twice": (
         lambda: Cloud(**VIBRATION, specific_charge=1.0, quantities={"charge": 1.0}),
@@ -152,6 +235,70 @@ WRONG = {
 def test_wrong_starts_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_more_than_the_machine_holds_is_refused_before_it_is_allocated(monkeypatch):
+    """A cloud of 1e8 makes a scene, whose check takes little memory; making its start says what it takes."""
+    monkeypatch.setattr(runtime, "memory", lambda: 10**9)
+    most = Lattice(shape=(500, 500, 400), spacing=1.0)
+    for cloud in (Cloud(radius=0.1, density=1.0, placement=most), Cloud(number=10**8, radius=1, density=1)):
+        tracemalloc.start()
+        scene = Scene(particles=cloud, duration=1.0)
+        assert tracemalloc.get_traced_memory()[1] < 10**8
+        said = r"memory for a cloud of 100000000 particles must be within the 1 GB .*; received '30 GB'"
+        with pytest.raises(InputError, match=said):
+            scene.particles.arrays(scene.domain, 0)
+        assert tracemalloc.get_traced_memory()[1] < 10**8
+        tracemalloc.stop()
+
+
+def test_few_spheres_in_much_room_take_little_memory():
+    """A gas as thin as air: memory is that of the spheres, not of all that a cell could hold."""
+    placement = RandomInBox(low=(-1.0,) * 3, high=(1.0,) * 3)
+    tracemalloc.start()
+    assert len(arrays(Cloud(number=2000, radius=1e-6, density=1.0, placement=placement))["position"]) == 2000
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2e7
+
+
+def decades(low, high):
+    """Numbers of either end of a range of powers of ten, and between."""
+    return st.floats(low, high).map(lambda power: 10.0**power)
+
+
+@settings(max_examples=200, derandomize=True, database=None, deadline=None)
+@given(
+    number=st.integers(1, 12),
+    radius=decades(-110, 110),
+    density=decades(-300, 300),
+    room=decades(-1, 20),
+    away=st.one_of(st.just(0.0), decades(-3, 20)),
+    kind=st.sampled_from(["ball", "box", "domain", "lattice", "cylinder"]),
+)
+def test_a_start_of_any_size_is_apart_or_refused(number, radius, density, room, away, kind):
+    """Spheres of 1e-110 to 1e110 m in any room, any distance away: none overlap, or a message says why."""
+    side, centre = radius * room, (0.0, radius * away, 0.0)
+    low, high = ([c + s * side for c in centre] for s in (-1, 1))
+    try:
+        placement = {
+            "ball": lambda: RandomInBall(radius=side, centre=centre),
+            "box": lambda: RandomInBox(low=low, high=high),
+            "domain": RandomInDomain,
+            "lattice": lambda: Lattice(shape=(number, 1, 2), spacing=side, centre=centre),
+            "cylinder": lambda: RandomAroundCylinder(radius=side, length=side, thickness=side, centre=centre),
+        }[kind]()
+        fixed = {} if kind == "lattice" else {"number": number}
+        cloud = Cloud(**fixed, radius=radius, density=density, placement=placement)
+        made = arrays(cloud, Box(low=low, high=high) if kind == "domain" else None)
+    except InputError as fault:
+        check_message(str(fault))
+        return
+    assert all(np.isfinite(values).all() for values in made.values())
+    # Counted from the first sphere and in radii, whose squares are numbers.
+    places = (made["position"] - made["position"][0]) / radius
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(len(places), 1)]
+    assert (apart >= 2 * (1 - 2e-3)).all()
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from tests.judged import check_message
 from tests.scenes import DENSITY, RADIUS, by_id, compiled, energy, momentum, scene
 from tests.test_effects_contract import charges
 from tests.test_effects_contract import run as run_charges
 from tests.test_events import laws as merging
 from tests.test_events import run as run_merging
+from tisim.errors import InputError
 
 
 def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):
@@ -18,6 +22,54 @@ def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):
     return scene(
         [[0, 0, 0], gap * n], [approach * n, 0 * n], merging(hardness), radius=radius, dt=1e-30, **more
     )
+
+
+def decades(low, high):
+    """Numbers of either end of a range of powers of ten, and between."""
+    return st.floats(low, high).map(lambda power: 10.0**power)
+
+
+@pytest.mark.long
+@settings(max_examples=60, derandomize=True, database=None, deadline=None)
+@given(
+    masses=st.tuples(decades(-330, 308), decades(-110, 110)),
+    radius=decades(-110, 110),
+    away=decades(-3, 20),
+    approach=decades(-200, 308),
+    hardness=decades(-300, 300),
+)
+def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approach, hardness):
+    """Two grains that touch, of any masses and size, any distance away: a message, or only finite numbers,
+    those of a run that has failed among them."""
+    try:
+        n = np.array([2.0, -3.0, 6.0]) / 7
+        place = np.array([radius * away, 0, 0])
+        made = scene(
+            [place, place + 2 * radius * (1 - 1e-9) * n],
+            [approach * n, 0 * n],
+            merging(hardness),
+            radius=radius,
+            mass=masses,
+            dt=1e-30,
+        )
+        (result,) = run_merging([made])
+    except InputError as fault:
+        check_message(str(fault))
+        return
+    assert result.status.ok or "not finite" in result.status.reason
+    assert all(np.isfinite(values).all() for values in result.state.values())
+
+
+@pytest.mark.long
+def test_a_place_that_rounding_cannot_tell_is_refused():
+    """1 m from a place at 1e17 m, grains of a millimetre are in one point: nobody knows what they touch."""
+    place = np.array([1e17, 0, 0])
+    made = scene([place, place + 1e-3], np.zeros((2, 3)), merging(1e9), radius=1e-3, dt=1e-30)
+    said = (
+        r"particles.position must be so near the origin that f\d\d rounds it by less than a radius"
+    )
+    with pytest.raises(InputError, match=said):
+        run_merging([made])
 
 
 @pytest.mark.long

@@ -73,21 +73,8 @@ def test_settings(warm, file, random):
     judge(lambda: Scene.from_dict(data).replace(request.assignments([change])), file)
 
 
-NUMBERS = ("-1", "0", "nan", "inf", "x", "", "1e23", "1" + "0" * 23, "-" + "1" + "0" * 30, "9" * 5000)
-NAMES = (
-    "",
-    "x",
-    "x" * 300,
-    "x/" * 3000,
-    "a\x00b",
-    "/",
-    ".",
-    "/dev/null",
-    "a\nb",
-    "\udcff",
-    "none.toml",
-    "😀.h5",
-)
+NUMBERS = ("-1", "0", "nan", "x", "", "1" + "0" * 23, "9" * 5000)
+NAMES = ("", "x" * 300, "a\x00b", "/", "a\nb", "\udcff", "none.toml")
 NUMBERED = {
     ("run", "SCENE"): ("--threads", "--seed", "--every"),
     ("cost", "SCENE"): ("--error", "--coarser", "--repeats", "--starts"),
@@ -99,8 +86,8 @@ NAMED = {
 }
 TARGETS = ("run", "explain", "check", "cache", "plot", "export", "movie", "figures", "cost")
 SEARCH = (
-    "self=1", "options.self=1", "options=3", "method=[]", "method=3", "ensemble=[]", "seed=" + "9" * 5000, "=1",
-    ".".join("a" * 20_000) + "=1", "options.population=1e400", "generations=[" + "[" * 5000, "kind",
+    "self=1", "options.self=1", "options=3", "method=[]", "method=3", "ensemble=[]", "seed=" + "9" * 5000,
+    "=1", ".".join("a" * 20_000) + "=1", "options.population=1e400", "generations=[" + "[" * 5000, "kind",
 )  # fmt: skip
 COMMANDS = (
     *((*words, option, NUMBERS) for words, options in NUMBERED.items() for option in options),
