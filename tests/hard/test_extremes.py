@@ -65,9 +65,7 @@ def test_a_place_that_rounding_cannot_tell_is_refused():
     """1 m from a place at 1e17 m, grains of a millimetre are in one point: nobody knows what they touch."""
     place = np.array([1e17, 0, 0])
     made = scene([place, place + 1e-3], np.zeros((2, 3)), merging(1e9), radius=1e-3, dt=1e-30)
-    said = (
-        r"particles.position must be so near the origin that f\d\d rounds it by less than a radius"
-    )
+    said = r"particles.position must be so near the origin that f\d\d rounds it by less than a radius"
     with pytest.raises(InputError, match=said):
         run_merging([made])
 
