@@ -45,16 +45,18 @@ class Replay:
         sound : whether all is well with a world as it is.
         """
         s, program = self.simulation.s, self.simulation.program
-        failed = int(s.read("steps")[w]) + 1
+        last = int(s.read("steps")[w])
         self._rewind(w)
         good = s.image()
-        while failed - (steps := int(good["steps"][w])) > 1:
-            half = (failed - steps) // 2
+        # Steps from where it was last found good to where it was first found bad.
+        to_bad = last + 1 - int(good["steps"][w])
+        while to_bad > 1:
+            half = to_bad // 2
             program.advance(half)
             if sound(w):
-                good = s.image()
+                good, to_bad = s.image(), to_bad - half
             else:
-                failed = steps + half
+                to_bad = half
                 self.simulation.put(good)
         program.advance(1)
         return good
