@@ -67,6 +67,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.made: dict[Any, Simulation] = {}
+        self.warm: list[Simulation] = []
 
     def ready(self, scene: Scene, worlds: int) -> Simulation:
         """Compiled for a scene of this structure and size."""
@@ -85,6 +86,12 @@ class Bench:
         """
         simulation = self.ready(scenes[0], len(scenes))
         simulation.load(scenes)
+        if simulation not in self.warm:
+            # What is only compiled when it is first used: steps, and all that looks at them.
+            simulation.run(steps=1)
+            simulation.results()
+            simulation.load(scenes)
+            self.warm.append(simulation)
         if progress:
             progress(0.0)
         if look:
@@ -101,6 +108,7 @@ class Bench:
         for simulation in self.made.values():
             simulation.close()
         self.made.clear()
+        self.warm.clear()
 
 
 class OutOfTime(Exception):

@@ -47,14 +47,7 @@ class Run:
         study = self.study
         where = runtime.current()
         runtime.start(where.device, "f64", where.threads)
-        largest = [0.0 for _ in study.quantities]
-
-        def look(result: Result) -> None:
-            for k, q in enumerate(study.quantities):
-                largest[k] = max(largest[k], q.size(result))
-
-        returns = any(q.returns for q in study.quantities)
-        base = self._run([study.scene], 0.0, look=look if returns else None)
+        base = self._run([study.scene], 0.0)
         found = self._methods(base)
         self.base = base.seconds
         must(bool(found), "scene", "one that has something to turn", study.scene.stepper.kind())
@@ -65,7 +58,7 @@ class Run:
             for k in range(rounds)
         ]
         rest = sum(self._cost(m, k) for items in plan for m, k in items)
-        self._truths(base, largest, found, rest)
+        self._truths(base, found, rest)
         for precision in study.precisions:
             if runtime.current().precision != precision:
                 self.bench.close()
@@ -94,9 +87,21 @@ class Run:
                 return repeats * row.median * weights[k] / guesses[row.setting]
         return repeats * self.base * method.settings[k].starts * (weights[k] if method.knob else 1.0)
 
-    def _truths(self, base: Timed, largest: Sequence[float], found: Sequence[Method], rest: float) -> None:
-        """The true values, where they are not known yet. largest : of each quantity on the way. rest :
-        seconds planned for all that follows."""
+    def _largest(self) -> list[float]:
+        """How large each quantity has been on the way, of the scene as it is; 0 where nobody asks."""
+        largest = [0.0 for _ in self.study.quantities]
+
+        def look(result: Result) -> None:
+            for k, q in enumerate(self.study.quantities):
+                largest[k] = max(largest[k], q.size(result))
+
+        if any(q.returns for q in self.study.quantities):
+            self.what = "the size of the motion"
+            self._run([self.study.scene], self.base, look=look)
+        return largest
+
+    def _truths(self, base: Timed, found: Sequence[Method], rest: float) -> None:
+        """The true values, where they are not known yet. rest : seconds planned for all that follows."""
         study, self.planned = self.study, rest
         if study.truths:
             return
@@ -117,6 +122,7 @@ class Run:
                     runs.append(self._run(self._starts(attempt.scene, n, OTHERS), cost).results)
                 except RunError as error:
                     raise RunError(f"the {self.what}: {error}") from None
+        largest = self._largest()
         study.truths = tuple(
             reference.compared(q, runs, made, most)
             if q.exact is None

@@ -21,7 +21,8 @@ def table(study: Study) -> RenderableType:
     cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows}
     columns = zip(heads, *(line for line in cells.values() if len(line) == len(heads)), strict=True)
     widths = [max(map(len, column)) for column in columns]
-    blocks: list[RenderableType] = [_grid([heads], widths, "bold")]
+    relative = ", ".join(f"{q.name}: relative to {q.relative_to}" for q in study.quantities)
+    blocks: list[RenderableType] = [Text(f"errors of {relative}"), _grid([heads], widths, "bold")]
     for method in dict.fromkeys(row.method for row in study.rows):
         blocks += [Text(method, "bold"), _grid([cells[row.key] for row in study.line(method)], widths)]
     return Group(*blocks)
@@ -53,8 +54,7 @@ def sources(study: Study) -> list[str]:
     lines = []
     for quantity, truth in zip(study.quantities, study.truths, strict=False):
         own = f"; its own error at most {truth.error:.1e}" if truth.error else ""
-        relative = f"relative to {quantity.relative_to}"
-        lines.append(f"error of {quantity.name}: {relative}, against {truth.source}{own}")
+        lines.append(f"error of {quantity.name}: against {truth.source}{own}")
     if any(len(rows) > 1 for rows in study.decades().values()):
         lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
     if not study.complete:
