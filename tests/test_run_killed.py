@@ -12,6 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.soak import runs
+
 COMMAND = [
     sys.executable, "-c", "from tisim.cli import main; main()", "run", "agglomeration", "--size", "paper",
     "--set", "effects.impact.hardness=1e7", "--set", "duration=3e-3", "--seed", "4", "--out",
@@ -60,3 +62,10 @@ def test_sigkill_and_resume_end_as_if_never_stopped(whole, tmp_path, delay):
     assert work == whole[1]
     for name, values in whole[0].items():
         np.testing.assert_array_equal(state[name], values)
+
+
+@pytest.mark.slow
+def test_kills_and_full_disks_at_random_lose_nothing(tmp_path):
+    """Some of the trials of tests/soak.sh."""
+    for counts in runs.soak(seed=8, share=0.1, folder=tmp_path):
+        assert counts.clean, counts

@@ -16,6 +16,7 @@ import numpy as np
 from tisim import h5md, regular, seal
 from tisim.errors import InputError, must
 from tisim.particles import Arrays
+from tisim.reading import Reading
 from tisim.scene import Scene
 from tisim.superblock import SIGNATURE, SIZE, sound
 
@@ -148,13 +149,15 @@ def _opened(path: Path) -> Iterator[h5py.File]:
         with seal.opened(real, "file", RESULT, rule) as file:
             yield file
         return
-    with undamaged():
-        file = h5py.File(real, "r", locking="best-effort")
-    with file:
+    with Reading(real) as source:
+        must(source.whole, "file", "whole", f"{path}, which is cut short")
         with undamaged():
-            ours = h5md.CHECKSUMS in file and file["h5md/creator"].attrs.get("name") == b"tisim"
-        must(ours, "file", rule, str(path))
-        yield file
+            file = h5py.File(source, "r")
+        with file:
+            with undamaged():
+                ours = h5md.CHECKSUMS in file and file["h5md/creator"].attrs.get("name") == b"tisim"
+            must(ours, "file", rule, str(path))
+            yield file
 
 
 def _worlds(file: h5py.File) -> list[str | None]:

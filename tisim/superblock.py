@@ -22,7 +22,12 @@ def superblock(block: bytes, end: int) -> bytes:
 def sound(block: bytes) -> bool:
     """Whether these are SIZE bytes of an undamaged superblock of version 3, of a file that nobody writes."""
     ours = len(block) == SIZE and block.startswith(SIGNATURE + b"\x03")
-    return ours and block == superblock(block, _LAYOUT.unpack(block)[7])
+    return ours and block == superblock(block, ends(block))
+
+
+def ends(block: bytes) -> int:
+    """Where the file ends, by its superblock, bytes."""
+    return int(_LAYOUT.unpack(block)[7])
 
 
 def lookup3(data: bytes) -> int:

@@ -27,7 +27,7 @@ PATIENCE = 300.0
 ROOT = Path(__file__).parents[2]
 RUN = (
     "run", "agglomeration", "--size", "paper", "--set", "effects.impact.hardness=1e7", "--set",
-    "duration=3e-3", "--seed", "4", "--frames", "300", "--out",
+    "duration=1e-3", "--seed", "4", "--frames", "60", "--out",
 )  # fmt: skip
 
 
