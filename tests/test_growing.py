@@ -96,13 +96,12 @@ def test_it_can_be_read_while_it_is_written(tmp_path):
 def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
     """HDF5 itself would refuse them: they lie behind the end of the file that it has found."""
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
-        with frames(path) as found:
-            for k in range(5):
-                trajectory.write(0, frame(k))
-            assert len(found) == 5
-            for k in range(5):
-                same(found[k], k)
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory, frames(path) as found:
+        for k in range(5):
+            trajectory.write(0, frame(k))
+        assert len(found) == 5
+        for k in range(5):
+            same(found[k], k)
 
 
 def test_a_trajectory_that_is_cut_short_is_refused(tmp_path):

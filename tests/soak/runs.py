@@ -22,8 +22,8 @@ KILLS = 20
 """Runs that are killed; each is gone on with, and may be killed again, until it ends."""
 SIZES = 20
 """Sizes of the disk, for each command."""
-PATIENCE = 300.0
-"""Seconds after which a trial counts as hung; the first of a process has a simulation compiled."""
+PATIENCE = 900.0
+"""Seconds after which a trial counts as hung: many times what it takes on a machine under load."""
 ROOT = Path(__file__).parents[2]
 RUN = (
     "run", "agglomeration", "--size", "paper", "--set", "effects.impact.hardness=1e7", "--set",
@@ -42,7 +42,12 @@ def begin(folder: Path, *more: str) -> subprocess.Popen[str]:
 
 def ended(running: subprocess.Popen[str]) -> str:
     """What a run says that ends in another way than it should; empty when all is well."""
-    said = running.communicate(timeout=PATIENCE)[1]
+    try:
+        said = running.communicate(timeout=PATIENCE)[1]
+    except subprocess.TimeoutExpired:
+        running.kill()
+        running.communicate()
+        raise
     return said[-1500:] if running.returncode else ""
 
 
