@@ -15,7 +15,8 @@ from tisim import Box, Recording
 from tisim.errors import InputError
 from tisim.frames import frames
 from tisim.movie import movie
-from tisim.plots import clouds, courses, history
+from tisim.plots import clouds, courses, history, mark_missing
+from tisim.trajectory import Trajectory
 
 MOVING = dict(
     position=[(0, 0, 0), (0.01, 0, 0)],
@@ -62,6 +63,21 @@ def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
         centre = courses(found).axes[1]
     assert "velocity" in centre.get_ylabel()
     np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.5)
+
+
+def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
+    """The same frames of a run that was to last twice as long."""
+    longer = scene(**{**MOVING, "steps": 8})
+    with frames(file) as found, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
+        assert mark_missing(courses(found), found).get_supxlabel() == ""
+        for frame in found:
+            begun.write(0, frame)
+    with frames(tmp_path / "t.h5") as found:
+        figures = [mark_missing(draw(found), found) for draw in (clouds, courses)]
+    for figure in figures:
+        told = "the run has come to t = 0.004 s of 0.008 s; what follows is missing"
+        assert figure.get_supxlabel() == told
+    assert [axis.get_title().split(",")[0] for axis in figures[0].axes] == ["start", "last frame"]
 
 
 def test_clouds_are_of_the_first_and_last_frame(file):

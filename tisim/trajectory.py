@@ -30,15 +30,14 @@ from tisim.durable import replace_file
 from tisim.errors import InputError, RunError, must
 from tisim.frames import Frame, frames
 from tisim.growing import Growing
+from tisim.recorder import Recorder
 from tisim.scene import Scene
 from tisim.simulation import Simulation
-from tisim.state import RUNNING, Field, resolve_fields
+from tisim.state import Field, resolve_fields
 
 LIBRARY = ("v110", "v110")
 """The versions of HDF5 that can read the file; earlier ones have no checksums of its structure."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-EARLY = 1e-9
-"""Part of an interval by which a frame may come early, so that rounding of times costs no further step."""
 
 
 @dataclass(frozen=True)
@@ -176,43 +175,6 @@ class Trajectory:
         return Recorder(self, simulation, indices)
 
 
-class Recorder:
-    """Looks at a simulation between stretches of steps, and has its worlds wait where a frame is due."""
-
-    def __init__(self, trajectory: Trajectory, simulation: Simulation, indices: Sequence[int]) -> None:
-        self.trajectory, self.simulation, self.indices = trajectory, simulation, list(indices)
-        self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
-        self.last = [_last(trajectory.groups[index]) for index in self.indices]
-        self.due = np.full(simulation.worlds, np.inf)
-        for w, interval in enumerate(self.interval):
-            # A run that goes on may owe the frame of the time where it goes on: the disk was full.
-            self.due[w] = 0.0 if self.last[w] < 0 else self._after(self.last[w], interval)
-        simulation.look = self.look
-        self.look()
-
-    @staticmethod
-    def _after(time: float, interval: float) -> float:
-        """The first time after this one at which a frame is due, s."""
-        return float((np.floor(time / interval + EARLY) + 1 - EARLY) * interval)
-
-    def look(self) -> None:
-        """Write what is due, and say when each world is due next."""
-        s, good = self.simulation.s, self.simulation.watch.good
-        running = s.read("status") == RUNNING
-        steps = s.read("steps")
-        for w, interval in enumerate(self.interval):
-            time = float(good["time"][w])
-            if time < self.due[w] and running[w]:
-                continue
-            self.due[w] = self._after(time, interval)
-            if time > self.last[w]:
-                n = int(good["count"][w])
-                arrays = {f.name: good[f.name][w, :n] for f in self.trajectory.fields[self.indices[w]]}
-                self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
-                self.last[w] = time
-        s.write("hold", self.due)
-
-
 def asked(path: Path, frames: int | None, every: float | None, resume: bool) -> Recording | None:
     """What the options of a command ask for; None when that is nothing."""
     if frames is None and every is None:
@@ -261,9 +223,3 @@ def written(scene: Scene) -> tuple[Field, ...]:
     """The quantities in a trajectory of a scene: all but what particles remember of each other."""
     fields = resolve_fields(needed_fields(scene.effects, scene.stepper))
     return tuple(field for field in fields if not (field.slots or field.scratch))
-
-
-def _last(group: h5py.Group) -> float:
-    """Time of the last frame, s; below 0 when there is none."""
-    times = group["position/time"]
-    return float(times[-1]) if len(times) else -1.0
