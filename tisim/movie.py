@@ -47,7 +47,7 @@ def movie(
                 axis.clear()
                 picture.panel(axis, frame.arrays, square, seen, coloured)
                 figure.suptitle(picture.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
-                figure.supxlabel(found.missing, fontsize=8, y=0.005)
+                figure.supxlabel(found.missing, x=0.98, y=0.005, ha="right", fontsize=7)
                 writer.grab_frame()
                 progress((k + 1) / len(found))
     except CalledProcessError as error:
