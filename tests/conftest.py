@@ -60,7 +60,7 @@ def elsewhere(tmp_path_factory):
     """Results of test_schedules.crowd in another process: with one thread, and in single precision."""
     file = tmp_path_factory.mktemp("elsewhere") / "results.npz"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
     assert done.returncode == 0, done.stderr
     with np.load(file) as stored:
         return dict(stored)

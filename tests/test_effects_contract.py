@@ -119,10 +119,10 @@ def test_other_designs_compile_nothing():
     simulation = Simulation(first, worlds=2, capacity=2)
     taken = []
     for made in (first, second):
-        began = time.perf_counter()
+        began = time.process_time()
         simulation.load([made])
         simulation.run()
-        taken.append(time.perf_counter() - began)
+        taken.append(time.process_time() - began)
         assert simulation.results()[0].status.ok
     assert taken[1] < taken[0] / 5
     assert len(simulation.results()[0].state["mass"]) == 2

@@ -33,6 +33,11 @@ def hurt(path, dataset, row):
     path.write_bytes(content)
 
 
+PIPE = 4096
+"""Bytes (pipesize) that a process may write before they are read. It names evaluations by 72 bytes each: who
+reads some is less than 60 of them behind, and a search cannot end meanwhile, however fast the machine is."""
+
+
 def worker(*arguments, **options):
     """Start cache_worker.py."""
     command = [sys.executable, str(WORKER), *map(str, arguments)]

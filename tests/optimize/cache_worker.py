@@ -80,14 +80,25 @@ def limited(path, size):
 
 
 def search(path):
-    """A slow search."""
+    """A search that names each evaluation as soon as it counts as finished."""
     from optimize.search import search as run
     from optimize.settings import Settings
 
+    announce()
     with Cache(path) as cache:
-        print("began", flush=True)
-        run(fake_problem(3), FakeEvaluator(delay=0.004), cache, Settings(seed=2, generations=4))
-    print("done", flush=True)
+        run(fake_problem(3), FakeEvaluator(), cache, Settings(seed=2, generations=4))
+
+
+def announce():
+    """Have each evaluation named on standard output when it is stored; who reads slowly holds it up."""
+    put = Cache.put
+
+    def told(cache, record):
+        kept = put(cache, record)
+        os.write(1, f"stored {record.key}\n".encode())
+        return kept
+
+    Cache.put = told
 
 
 class Asleep:
@@ -111,7 +122,7 @@ def asleep():
 
 
 def tisim(*arguments):
-    """The command, naming each evaluation on standard output as soon as it counts as finished."""
+    """The command, naming each evaluation."""
     from drift_case import CASE
 
     from cases import case
@@ -119,14 +130,7 @@ def tisim(*arguments):
 
     every = case.every
     case.every = lambda: {**every(), CASE.name: CASE}
-    put = Cache.put
-
-    def told(cache, record):
-        kept = put(cache, record)
-        os.write(1, f"stored {record.key}\n".encode())
-        return kept
-
-    Cache.put = told
+    announce()
     main(arguments)
 
 

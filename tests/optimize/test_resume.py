@@ -1,8 +1,7 @@
 import random
-import subprocess
 
 import pytest
-from cache_files import worker
+from cache_files import PIPE, worker
 from fake_runs import FakeEvaluator, fake_problem
 
 from optimize.cache import Cache, verify
@@ -46,12 +45,10 @@ def test_resume_after_sigkill_equals_never_interrupted(path, uninterrupted):
     rng = random.Random(3)
     stored = []
     for _ in range(4):
-        with worker("search", path) as process:
-            assert process.stdout.readline() == "began\n"
-            with pytest.raises(subprocess.TimeoutExpired):
-                process.wait(rng.uniform(0.05, 0.4))
+        with worker("search", path, pipesize=PIPE) as process:
+            for _ in range(rng.randint(1, 30)):
+                assert process.stdout.readline().startswith("stored")
             process.kill()
-            assert process.stdout.read() == ""
         stored.append(len(Cache(path)))
         assert verify(path).ok
     assert stored == sorted(stored)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import signal
@@ -10,17 +11,23 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from optimize.cache import Cache, existing, verify
 from tests.soak.counts import Counts
+from tisim._taichi import BACKEND
+from tisim.kernel_cache import LOCKS
+from tisim.runtime import cores
 
 WORKER = Path(__file__).parents[1] / "optimize" / "cache_worker.py"
-SEARCH = ("optimize", "drift", "--generations", "8", "--seed", "3")
+SEARCH = ("optimize", "drift", "--generations", "3", "--seed", "3")
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
-KILLS = 5
+KILLS = 4
 """Of each kind, at full share."""
+PIPE = 4096
+"""Bytes that a search may write before they are read: it is not over before the shot."""
 HUNG_S = 600.0
 """A process that has not ended by then never will, seconds."""
 
@@ -53,12 +60,16 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
     for number in SIGNALS[1:]:
         if signal.getsignal(number) is signal.SIG_IGN:  # as in the background; searches would inherit it
             signal.signal(number, lambda *_: None)
-    alone = _Search(folder / "alone", "batch")
+    alone = _Search(folder / "alone" / "0", "batch")
     assert alone.wait() == 0, alone.said()
-    expected = found(folder / "alone")
-    for kind in KINDS:
+    expected = found(folder / "alone" / "0")
+
+    def one(kind: Kind) -> Counts:
         rng = random.Random(f"{seed} {kind.name}")
-        yield killed(kind, max(1, round(share * KILLS)), expected, rng, folder / kind.name.replace(" ", "-"))
+        return killed(kind, max(1, round(share * KILLS)), expected, rng, folder / kind.name.replace(" ", "-"))
+
+    with ThreadPoolExecutor(cores()) as side_by_side:
+        yield from side_by_side.map(one, KINDS)
 
 
 def killed(kind: Kind, kills: int, expected: dict, rng: random.Random, folder: Path) -> Counts:
@@ -91,24 +102,21 @@ def shoot(search: _Search, kind: Kind, rng: random.Random) -> bool:
 
     A part of the shots comes before there is anything: while Python starts, files are read, kernels compiled.
     """
-    early = (
-        kind.number != signal.SIGINT and rng.random() < 0.2
-    )  # Python itself starts with a stack for Ctrl-C
-    if early:
+    # Python itself starts with a stack for Ctrl-C.
+    if kind.number != signal.SIGINT and rng.random() < 0.2:
         time.sleep(rng.uniform(0.0, 3.0))
-    elif not search.follow(rng.randint(1, 60)):
+    elif not search.follow(rng.randint(1, 40)):
         return False
     time.sleep(rng.uniform(0.0, 0.03))
-    if kind.whom == "all":
-        os.killpg(search.process.pid, kind.number)
-    elif kind.whom == "search":
-        search.process.send_signal(kind.number)
-    else:
-        workers = [pid for pid, command in living(search.process.pid) if "spawn_main" in command]
-        if not workers:
-            return False
-        os.kill(rng.choice(workers), kind.number)
-    return True
+    there = dict(living(search.process.pid))
+    workers = [pid for pid, command in there.items() if "spawn_main" in command]
+    alone = {"search": [search.process.pid], "worker": [rng.choice(workers)] if workers else [], "all": []}
+    with contextlib.suppress(ProcessLookupError):  # it may just have ended
+        if kind.whom == "all":
+            os.killpg(search.process.pid, kind.number)
+        for pid in alone[kind.whom]:
+            os.kill(pid, kind.number)
+    return bool(there if kind.whom == "all" else there.keys() & alone[kind.whom])
 
 
 class _Search:
@@ -118,20 +126,14 @@ class _Search:
         self.hung, self.stored = False, set[str]()
         self._errors = folder.with_name(folder.name + ".stderr")
         self._errors.parent.mkdir(parents=True, exist_ok=True)
-        command = [
-            sys.executable,
-            str(WORKER),
-            "tisim",
-            *SEARCH,
-            "--executor",
-            executor,
-            "--out",
-            str(folder),
-        ]
+        command = [sys.executable, str(WORKER), "tisim", *SEARCH, "--executor", executor, "--out"]
+        paths = os.pathsep.join(filter(None, sys.path))
+        # The kernels of others on this machine are none of these kills' business.
+        kernels = {LOCKS[BACKEND][0]: str(self._errors.parents[1] / "kernels")}
         with self._errors.open("w") as errors:
             self.process = subprocess.Popen(
-                command, env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-                stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True,
+                [*command, str(folder)], env={**os.environ, "PYTHONPATH": paths, **kernels},
+                stdout=subprocess.PIPE, pipesize=PIPE, stderr=errors, text=True, start_new_session=True,
             )  # fmt: skip
         self._dog = threading.Timer(HUNG_S, self._end)
         self._dog.start()
@@ -169,10 +171,9 @@ class _Search:
 
 def living(group: int) -> list[tuple[int, str]]:
     """Ids and command lines of the processes of a group that have not ended."""
-    table = subprocess.run(
-        ["ps", "-eo", "pid=,pgid=,stat=,args="], capture_output=True, text=True, check=True
-    )
-    rows = (line.split(maxsplit=3) for line in table.stdout.splitlines())
+    asked = ["ps", "-eo", "pid=,pgid=,stat=,args="]
+    table = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    rows = (line.split(maxsplit=3) for line in table.splitlines())
     return [(int(row[0]), row[3]) for row in rows if int(row[1]) == group and not row[2].startswith("Z")]
 
 

@@ -242,7 +242,7 @@ slow = pytest.mark.slow
 def test_same_bits_with_one_thread_and_two(name, tmp_path):
     file = tmp_path / "places.npy"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file), name]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
     assert done.returncode == 0, done.stderr
     np.testing.assert_array_equal(PLACES[name](), np.load(file))
 
