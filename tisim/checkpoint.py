@@ -51,12 +51,11 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     another capacity; the simulation is then as it was.
     """
     simulation.s.check()
-    wanted = simulation.s.saved()
     with seal.opened(Path(path), "checkpoint", FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])
         wall_s = float(file.attrs["wall_s"])
-        columns = {name: np.asarray(file[name]) for name in wanted}
+        columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
     simulation.put(columns)
     simulation.wall_s = wall_s
     simulation.watch = Watch(simulation, columns)

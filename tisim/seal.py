@@ -62,7 +62,7 @@ def sealed(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
 
 
 def unsealed(content: bytes) -> bytes | None:
-    """The HDF5 file without its seal; None when there is no whole seal, or the file is not what was sealed."""
+    """The HDF5 file without its seal; None without a whole seal, or when the file is not what was sealed."""
     start = max(content.rfind(MAGIC), 0)
     payloads = scan(content[start:]).payloads
     if not content.startswith(SIGNATURE) or not payloads:
