@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             code = 1
         except KeyboardInterrupt:
             code = exit_code()
-    sys.exit(code)
+    sys.exit(code or 0)
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,5 +1,9 @@
 """Wrong input: a message of one line, exit code 2, and nothing written."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
@@ -68,3 +72,23 @@ def test_scene_files_that_are_none(tisim, impacts, tmp_path):
         assert message in err
     (tmp_path / "folder.toml").mkdir()
     assert tisim("run", "folder.toml")[0] == 2
+
+
+@pytest.mark.parametrize("seconds", ["x", "nan", "-1", ""])
+def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
+    monkeypatch.setenv("TISIM_CHECKPOINT_SECONDS", seconds)
+    code, out, err = tisim("run", impacts)
+    said = f"TISIM_CHECKPOINT_SECONDS must be a number of seconds, at least 0; received {seconds!r}\n"
+    assert (code, out, err) == (2, "", said)
+
+
+@pytest.mark.parametrize(
+    "code", ["from tisim.cli import main; main(['cases'])", "import tisim.cli as c; c.main()"]
+)
+def test_a_backend_that_is_none(code):
+    """Told in a line by the command, as importing the package has gone well."""
+    environment = {**os.environ, "TISIM_BACKEND": "os"}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    said = "TISIM_BACKEND must be taichi or quadrants; received 'os'\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
