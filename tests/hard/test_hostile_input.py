@@ -12,6 +12,8 @@ from tests.judged import ACCEPTED, check_file, check_message, command, nothing_r
 from tisim import Scene, request
 from tisim.errors import InputError
 
+pytestmark = pytest.mark.long
+
 EXAMPLES = settings(
     max_examples=200, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
 )
