@@ -459,12 +459,15 @@ def test_dask_futures_that_hold_no_answer_are_messages():
             "were lost again and again",
         ),
         (OSError("closed"), RunError, r"were lost again and again \(closed\)"),
-        (cf.CancelledError(), RunError, "Dask scheduler was lost"),
     ):
         future = cf.Future()
         (future.set_exception if isinstance(sent, BaseException) else future.set_result)(sent)
         with pytest.raises(error, match=message):
             dask_cluster.DaskCluster.outcome(None, future)
+    cancelled = cf.Future()
+    cancelled.cancel()
+    with pytest.raises(RunError, match="Dask scheduler was lost"):
+        dask_cluster.DaskCluster.outcome(None, cancelled)
 
 
 @pytest.mark.long
