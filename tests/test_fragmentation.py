@@ -146,6 +146,7 @@ def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density(
     results = run([light, light.replace({"particles.density": 7 * DENSITY}), given])
     assert [len(result.state["mass"]) for result in results] == [17, 17, 9]
     assert light.replace({"particles.density": DENSITY / 7}).capacity() == light.capacity() == 17
+    assert given.capacity() == 9
 
 
 def test_agglomerate_of_grains_breaks_into_all_of_them():

@@ -72,7 +72,7 @@ def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
         left(age=0.0)
         waits = begin()
         assert waits.stdout.readline() == "ready\n"
-        time.sleep(1.5)
+        time.sleep(4.0)
         kernel_cache.lock().unlink()
     assert warned(waits) == ""
 

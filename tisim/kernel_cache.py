@@ -1,9 +1,9 @@
 """The compiled kernels that Taichi keeps on disk for the next process.
 
-Taichi 1.7.4 and Quadrants 1.3.3 read them when they start, and write them when they stop: at the end of a
-process, not when it is killed. Meanwhile they lock them by a file. Another process waits a quarter of a
-second for it, then warns, and compiles all or keeps nothing; a process that is killed meanwhile leaves the
-file behind. Processes of tisim wait for each other here instead.
+Taichi 1.7.4 and Quadrants 1.3.3 read them with the first that they compile, and write them when they stop: at
+the end of a process, not when it is killed. Meanwhile they lock them by a file. Another process waits a
+quarter of a second for it, then warns, and compiles all or keeps nothing; a process that is killed meanwhile
+leaves the file behind. Processes of tisim wait for each other here instead.
 """
 
 from __future__ import annotations

@@ -108,11 +108,17 @@ def _start(wanted: Runtime) -> None:
                 # times as long to compile; LLVM optimises the same code afterwards.
                 cfg_optimization=False,
             )
+            _compile_first()
     except RuntimeError as failure:
         raise InputError(
             f"device must be present on this machine; received {wanted.device!r} ({failure})"
         ) from failure
     _current = wanted
+
+
+@ti.kernel
+def _compile_first():
+    """Nothing: with the first kernel that it compiles, Taichi reads those on the disk."""
 
 
 def _stop() -> None:

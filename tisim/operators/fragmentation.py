@@ -45,7 +45,8 @@ class Fragmentation(ImpactLaw, Operator):
         return self.model_copy(update={"grain_mass": self._grain(masses)})
 
     def capacity(self, masses: np.ndarray) -> int:
-        return max(len(masses), int(masses.sum() / self._grain(masses) * (1 + 1e-9)))
+        # What is lighter than a grain stays one piece.
+        return int(np.maximum(masses / self._grain(masses), 1.0).sum() * (1 + 1e-9))
 
     def _grain(self, masses: np.ndarray) -> float:
         return float(masses.min()) if self.grain_mass is None else self.grain_mass
