@@ -61,7 +61,7 @@ def files_of_at_most(size):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize("rows", [4, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("rows", [4, pytest.param(12, marks=pytest.mark.slow)])
 def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
     """So at whatever write the writer is killed. HDF5 opens it as any other file, and finds all frames."""
     path, left = tmp_path / "t.h5", []
