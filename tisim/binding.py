@@ -63,7 +63,7 @@ def _length_reader(table: Any, slot: int) -> Any:
 
 
 def _width(kind: type[Spec]) -> int:
-    return sum(size for _, _, size in kind.parameters())
+    return sum(size for _, size in kind.columns())
 
 
 def _slots(part: Spec) -> int:
@@ -75,7 +75,7 @@ def _slots(part: Spec) -> int:
 
 def _entries(part: Spec, where: str) -> Iterator[tuple[str, float]]:
     """What stands in the slots of a part, in order, each with its dotted name."""
-    names = [f"{where}.{name}" for name, _, size in part.parameters() for _ in range(size)]
+    names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
     yield from zip(names, part.values(), strict=True)
     for name, kind in part.lists():
         rows = getattr(part, name)
@@ -100,7 +100,7 @@ class Table:
     def bind(self, part: Part) -> Part:
         """A copy of a part, of the same class, whose parameters are functions of the world."""
         bound, slot = part.model_copy(), self._next
-        for name, _, size in part.parameters():
+        for name, size in part.columns():
             bound.__dict__[name] = _reader(self.field, slot, size)
             slot += size
         for name, kind in part.lists():
@@ -125,7 +125,7 @@ class Table:
         """The one bound row that stands for a list."""
         bound, first = kind.model_construct(), slot + 1
         bound.__dict__["size"] = _length_reader(self.field, slot)
-        for name, _, size in kind.parameters():
+        for name, size in kind.columns():
             bound.__dict__[name] = _row_reader(self.field, first, size, _width(kind))
             first += size
         return bound

@@ -102,8 +102,15 @@ class Spec(Checked):
             if rest == [...] and isinstance(row, type) and issubclass(row, Spec):
                 yield name, row
 
+    @classmethod
+    def columns(cls) -> Iterator[tuple[str, int]]:
+        """Name and number of components of what kernels read of each world: the parameters, and what a part
+        makes of them besides."""
+        for name, _, size in cls.parameters():
+            yield name, size
+
     def values(self) -> list[float]:
-        """The parameters of ``parameters()`` in order, vectors spread out; SI units."""
+        """The numbers of ``columns()`` in order, vectors spread out; SI units."""
         spread: list[float] = []
         for name, _, size in self.parameters():
             value = getattr(self, name)

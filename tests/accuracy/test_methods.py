@@ -167,7 +167,7 @@ def test_a_knob_is_turned_by_decades_of_error():
     turned = both.turned(Pace(dt=1.0, error=1e-3), 1)
     assert (turned.dt, turned.error) == (3.16, 1e-2)
     assert both.turned(Pace(dt=0.123456, error=1e-3), 0).dt == 0.123456
-    with pytest.raises(InputError, match=r"pace.dt must be greater than 0.0; received 0.0"):
+    with pytest.raises(InputError, match=r"pace.dt must be at least 1e-30; received 0.0"):
         Knob(dt=0.01).turned(Pace(dt=1.0), -4)
 
 

@@ -120,7 +120,7 @@ BAD = {
     "box inside out": (lambda: Box(low=(0, 0, 0), high=(1, 1, 0)), "box.high must be above box.low in every"),
     "box infinite": (lambda: Box(low=(0, 0, 0), high=(1, 1, INF)), "box.high.2 must be a finite number"),
     "box beyond numbers": (lambda: Box(low=(0, 0, 0), high=(1e200,) * 3), "box.high must be 0, or of"),
-    "step zero": (lambda: FixedStep(dt=0), "fixed_step.dt must be greater than 0"),
+    "step zero": (lambda: FixedStep(dt=0), "fixed_step.dt must be at least 1e-30"),
     "limits crossed": (
         lambda: ApproachTime(shortest=1e-2),
         "approach_time.longest must be at least shortest",

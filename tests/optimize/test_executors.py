@@ -290,8 +290,14 @@ def test_units_of_work():
     ("name", "message"),
     [
         ("threads:2", "executor must be batch, processes:N or dask://HOST:PORT; received 'threads:2'"),
-        ("processes:0", "executor must be processes:N with N >= 1; received 'processes:0'"),
-        ("processes:two", "executor must be processes:N with N >= 1; received 'processes:two'"),
+        (
+            "processes:0",
+            "executor must be processes:N with N >= 1 and of at most 4 digits; received 'processes:0'",
+        ),
+        (
+            "processes:two",
+            "executor must be processes:N with N >= 1 and of at most 4 digits; received 'processes:two'",
+        ),
         ("batch:2", "executor must be batch, processes:N or dask"),
         ("dask:localhost", "executor must be batch, processes:N or dask"),
     ],

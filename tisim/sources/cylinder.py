@@ -8,7 +8,6 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field as Option
 from pydantic import field_validator, model_validator
-from pydantic.fields import FieldInfo
 from scipy.constants import mu_0
 
 from tisim._taichi import ti
@@ -46,17 +45,15 @@ class Cylinder(Body):
         return a + u, b + v, c + w
 
     @classmethod
-    def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
+    def columns(cls) -> Iterator[tuple[str, int]]:
         """What it is given, and what kernels read in place of axis and magnetisation."""
-        yield from super().parameters()
-        for name, size in (("lead", 3), ("rest", 3), ("across", 3), ("along", 1)):
-            yield name, FieldInfo(annotation=Vector if size == 3 else float), size
+        yield from super().columns()
+        yield from (("lead", 3), ("rest", 3), ("across", 3), ("along", 1))
 
     def values(self) -> list[float]:
-        given = np.hstack([getattr(self, name) for name, _, _ in super().parameters()]).tolist()
         lead, rest = split_direction(self.axis)
         across, along = split_magnetisation(self.axis, self.magnetisation)
-        return [*given, *lead, *rest, *across, along]
+        return [*super().values(), *lead, *rest, *across, along]
 
     @ti.func
     def place(self, w, k, r):
