@@ -53,14 +53,14 @@ class Answer:
     worker: str = field(default_factory=lambda: f"worker (process {os.getpid()} of {platform.node()})")
 
 
-_taichi = cf.ThreadPoolExecutor(1)
-"""Taichi belongs to the thread that has started it; whoever calls, all of it happens in this one."""
+_work = cf.ThreadPoolExecutor(1)
+"""The thread in which units of work are run, one at a time, while others listen."""
 _evaluator: list[Evaluator] = []
 
 
 def run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
     """The answer of a worker whose share of the cores that is."""
-    return _answered(_taichi.submit(_run, scenes, wanted, share))
+    return _answered(_work.submit(_run, scenes, wanted, share))
 
 
 def serve(connection: Connection, share: int) -> None:
@@ -75,8 +75,8 @@ def serve(connection: Connection, share: int) -> None:
             question = connection.recv_bytes()
         except (EOFError, OSError):
             break
-        made = _taichi.submit(_run_pickled, question, share)
-        sent = _taichi.submit(_send, connection, made)
+        made = _work.submit(_run_pickled, question, share)
+        sent = _work.submit(_send, connection, made)
         sent.add_done_callback(_end_unless_sent)
     if sent is not None and not sent.done():
         os._exit(1)
