@@ -20,9 +20,7 @@ from tisim import regular
 from tisim.durable import replace_file
 from tisim.errors import InputError, must
 from tisim.framed import MAGIC, frame, scan
-
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""The bytes with which every HDF5 file begins."""
+from tisim.superblock import SIGNATURE
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ _LAYOUT = struct.Struct("<8sBBBBQQQQI")
 """Signature, version, bytes of an offset and of a length, marks of a writer, base address, address of the
 extension, end of the file, address of the root group, checksum."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""The bytes with which every HDF5 file begins."""
 SIZE = _LAYOUT.size
 """bytes"""
 
