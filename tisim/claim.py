@@ -15,6 +15,7 @@ from pathlib import Path
 from tisim import framed, regular
 from tisim.durable import append_at, locked, unfinished
 from tisim.errors import InputError
+from tisim.superblock import SIGNATURE
 
 MARKER = ".tisim"
 SHOWN = 5
@@ -131,4 +132,4 @@ def _marked(folder: Path) -> set[str]:
 def _is_ours(path: Path) -> bool:
     """Whether tisim has written an HDF5 file or a journal; its structure is not looked at."""
     head = regular.content(path, _HEAD) or b""
-    return head.startswith(framed.MAGIC) or (head.startswith(b"\x89HDF\r\n\x1a\n") and b"tisim" in head)
+    return head.startswith(framed.MAGIC) or (head.startswith(SIGNATURE) and b"tisim" in head)
