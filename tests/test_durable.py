@@ -136,7 +136,7 @@ def theirs(tmp_path):
     """A folder, and files in it, that one who is not root can read in part and write nothing of."""
     folder = tmp_path / "theirs"
     folder.mkdir()
-    for above in folder.parents[:3]:
+    for above in folder.parents[:4]:
         above.chmod(above.stat().st_mode | stat.S_IROTH | stat.S_IXOTH)
     (folder / "lock").touch(0o444)
     (folder / "secret").touch(0o000)

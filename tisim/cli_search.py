@@ -153,7 +153,6 @@ def cache(
     from optimize import cache as store
     from optimize.listing import listing
 
-    must(not file.is_dir(), "cache file", "an existing file", str(file))
     if compact:
         print(f"{store.compact(file)} evaluations kept")
     if verify:

@@ -36,6 +36,9 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             _check(f, start[f.name], n)
+    with np.errstate(over="ignore", invalid="ignore"):
+        momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
+    must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))
     # Where rounding is coarser than a particle, it is not known what it touches.
     farthest = np.abs(start["position"]).max(axis=1)
     coarse = np.spacing(farthest.astype(_real())) > start["radius"]

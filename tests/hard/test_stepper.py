@@ -41,7 +41,7 @@ def adaptive(name, first, longest, **more):
 
 
 def forced(
-    position, velocity, stepper, duration, tether=0.0, shell=1e-300, width=1e-300, near=(0, 0), **more
+    position, velocity, stepper, duration, tether=0.0, shell=1e-100, width=1e-100, near=(0, 0), **more
 ):
     """Particles on springs, within elastic shells, that attract by near[0]/d and repel by near[1]/d^2."""
     effects = (
