@@ -1,7 +1,8 @@
 """Save a simulation between two steps, and go on from there to the same bits.
 
 A checkpoint holds every particle field, the clock, the books and the counters of every world. Pair lists are
-not in it: they are made anew, and results do not depend on when that was.
+not in it: they are made anew, and results do not depend on when that was. A world that has failed is in it
+at its last good step, and why it has failed is found again when it is restored.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     simulation.put(columns)
     simulation.wall_s = wall_s
     simulation.watch = Watch(simulation, columns)
+    simulation.watch.look()
 
 
 def _agree(name: str, value: Any, received: Any) -> None:

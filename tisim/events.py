@@ -69,13 +69,18 @@ class Contacts:
             self.bid[w, c] = ((order + 1) << 31) + i + j
             self.waiting[w] += 1
         else:
-            self.s.fail(w, CROWDED, i)
+            self.overflow(w)
 
     @ti.func
-    def count(self, w, i, overlaps):
-        """Count the pairs of particle i that overlap; stop a world in which there are too many."""
+    def count(self, w, overlaps):
+        """Count pairs of a particle that overlap; stop a world in which there are too many."""
         if ti.atomic_add(self.overlaps[w], overlaps) + overlaps > CONTACTS_PER_PARTICLE * self.s.count[w]:
-            self.s.fail(w, CROWDED, i)
+            self.overflow(w)
+
+    @ti.func
+    def overflow(self, w):
+        """Stop a world, and accuse no particle: whose pair is one too many is up to the order of threads."""
+        ti.atomic_max(self.s.failed[w], CROWDED)
 
 
 class Survey(PerParticle):
@@ -108,7 +113,7 @@ class Survey(PerParticle):
                 soonest = ti.min(soonest, self.controller.pair(self.s, w, i, j, d))
         self.controller.note(self.s, w, i, soonest)
         if ti.static(self.hard):
-            self.contacts.count(w, i, overlaps)
+            self.contacts.count(w, overlaps)
 
 
 class SurveyAgain(Survey):

@@ -1,9 +1,13 @@
-"""The last good step of a world that has failed, found by running it once more.
+"""The last good step of worlds that have failed, found by running them once more.
 
 Whether all is finite is asked now and then only, between many steps, and a failing step can leave its work
-half done. But a run has the same bits again, so the world goes back to a time at which all of its state is
-known, and from there by bisection to the last step after which it was good. That takes no longer than the way
-from there to the failure did, and what is found does not depend on when anybody looked.
+half done. But a run has the same bits again, so worlds go back to a time at which all of their state is
+known, and from there by bisection to the last step after which they were good: all that have failed at once,
+each to its own. That takes no longer than about twice the way from there to the failure did, and what is
+found does not depend on when anybody looked, nor on what else is in the batch.
+
+Particles that do not feel each other have no state in common but at the end of a window of their longest
+step (steppers/alone.py). A window is a step of theirs here.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tisim.state import ENDED
+from tisim.state import ENDED, RUNNING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
 
 Image = dict[str, np.ndarray]
 EVERY = 10.0
-"""Wall time (s) between images of the whole state, from which a world can go on."""
+"""Wall time (s) between images of the whole state, from which worlds can go on."""
 
 
 class Replay:
@@ -35,37 +39,42 @@ class Replay:
         self.simulation, self.base, self.made = simulation, base, time.perf_counter()
 
     def keep(self) -> None:
-        """Make the image anew, where that is due; no world may have failed since it was last made."""
+        """Make the image anew, where that is due; every world that runs must be good."""
         if time.perf_counter() - self.made > EVERY:
             self.base, self.made = self.simulation.s.image(), time.perf_counter()
 
-    def last_good(self, w: int, sound: Callable[[int], bool]) -> Image:
-        """Bring a world to where it fails, and the others nowhere; the image of its last good step.
+    def last_good(self, worlds: np.ndarray, sound: Callable[[Image], np.ndarray]) -> Image:
+        """Bring worlds to where they fail, and the others nowhere; an image that has their last good steps.
 
-        sound : whether all is well with a world as it is.
+        worlds : indices. sound : whether all is well, for each world of an image. A world in which something
+        is wrong from the start is left there.
         """
-        s, program = self.simulation.s, self.simulation.program
-        last = int(s.read("steps")[w])
-        self._rewind(w)
-        good = s.image()
-        # Steps from where it was last found good to where it was first found bad.
-        to_bad = last + 1 - int(good["steps"][w])
-        while to_bad > 1:
-            half = to_bad // 2
-            program.advance(half)
-            if sound(w):
-                good, to_bad = s.image(), to_bad - half
-            else:
-                to_bad = half
-                self.simulation.put(good)
-        program.advance(1)
+        last = self.simulation.s.read("steps")
+        good = self._rewound()
+        going = worlds[sound(good)[worlds]]
+        # How many steps are good, from the highest binary digit of that number to the lowest.
+        jump = 1 << int((last - good["steps"])[going].max(initial=0)).bit_length()
+        while jump > 1:
+            jump //= 2
+            able = going[good["steps"][going] + jump <= last[going]]
+            now = self._after(good, able, jump)
+            fine = able[sound(now)[able]]
+            for name, values in good.items():
+                values[fine] = now[name][fine]
+        self._after(good, going, 1)
         return good
 
-    def _rewind(self, w: int) -> None:
+    def _rewound(self) -> Image:
         if self.base is None:
             self.simulation.begin()
         else:
             self.simulation.put(self.base)
-        status = self.simulation.s.read("status")
-        status[np.arange(len(status)) != w] = ENDED
-        self.simulation.s.write("status", status)
+        return self.simulation.s.image()
+
+    def _after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
+        """What an image becomes when only these worlds take a number of steps."""
+        image["status"][:] = ENDED
+        image["status"][worlds] = RUNNING
+        self.simulation.put(image)
+        self.simulation.program.advance(steps)
+        return self.simulation.s.image()

@@ -15,6 +15,7 @@ from tisim.state import (
     FULL,
     INDEFINITE,
     LOST,
+    NOBODY,
     NOT_FINITE,
     RUNNING,
     STEEP,
@@ -23,6 +24,8 @@ from tisim.state import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tisim.simulation import Simulation
 
 REASONS = {
@@ -51,61 +54,59 @@ class Watch:
         """``image`` : where the simulation has been put, when that is not its start."""
         self.simulation, self.s = simulation, simulation.s
         self.replay = Replay(simulation, image)
-        self.good = self._snapshot()
+        self.good = self.s.snapshot((*self._told(), "time", "count"))
         self.faults: dict[int, tuple[float, str]] = {}
-
-    def _snapshot(self) -> Image:
-        return self.s.snapshot((*(f.name for f in self.s.told), "time", "count"))
 
     def look(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
         now = self._snapshot()
-        found = self._found(now)
-        fresh = [w for w in found if w not in self.faults]
-        for name, values in now.items():
-            sound = [w for w in range(len(values)) if w not in found]
-            self.good[name][sound] = values[sound]
-        if fresh:
-            self._stop(fresh, now, found)
-        else:
-            self.replay.keep()
+        # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
+        wrong = ~self._sound(now) | ~np.isin(now["status"], (RUNNING, ENDED))
+        for name, kept in self.good.items():
+            kept[~wrong] = now[name][~wrong]
+        wrong[list(self.faults)] = False
+        if wrong.any():
+            self._stop(np.flatnonzero(wrong))
+        self.replay.keep()
 
-    def _stop(self, fresh: list[int], now: Image, found: dict[int, str]) -> None:
-        """Put worlds that have failed where they were last good; so a checkpoint holds that too."""
+    def _snapshot(self) -> Image:
+        return self.s.snapshot((*self._told(), *self.s.columns))
+
+    def _told(self) -> tuple[str, ...]:
+        return tuple(f.name for f in self.s.told)
+
+    def _stop(self, worlds: np.ndarray) -> None:
+        """Put worlds that have failed where they were last good, from where a step fails again: so a
+        checkpoint holds that too, and why they have failed is found once more when it is restored."""
         live = self.s.image()
-        for w in fresh:
-            good, then = self.good, now
-            # In a start that has failed nothing has been done yet.
-            if live["steps"][w] > 0:
-                good = self.replay.last_good(w, self._sound)
-                then = self._snapshot()
-                found = self._found(then)
-            self.faults[w] = float(then["time"][w]), found[w]
-            status = self.s.read("status")[w]
-            for name, values in good.items():
-                live[name][w] = values[w]
-            for name, kept in self.good.items():
-                kept[w] = good[name][w]
-            live["status"][w] = NOT_FINITE if status in (RUNNING, ENDED) else status
-        self.simulation.put(live)
+        try:
+            good = self.replay.last_good(worlds, self._sound)
+            if (self.s.read("blame") == ASKED).any():
+                self.simulation.made.inquest.hold()
+            then = self._snapshot()
+            for name, values in live.items():
+                values[worlds] = good[name][worlds]
+            failed = then["failed"][worlds]
+            live["status"][worlds] = np.where(failed > 0, failed, NOT_FINITE)
+        finally:
+            self.simulation.put(live)
+        for w in map(int, worlds):
+            self.faults[w] = float(then["time"][w]), self._fault(w, then)
+        for name, kept in self.good.items():
+            kept[worlds] = good[name][worlds]
 
-    def _found(self, now: Image) -> dict[int, str]:
-        """What is wrong, by world; ``now`` is a snapshot of how they are."""
-        if (self.s.read("blame") == ASKED).any():
-            self.simulation.made.inquest.hold()
-        found: dict[int, str] = {}
+    def _spoilt(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
+        """Each quantity with the live particles, (worlds, capacity), of which it is not finite."""
         live = np.arange(self.s.capacity) < now["count"][:, None]
         for f in self.s.told:
-            bad = live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
-            for w in map(int, np.flatnonzero(bad.any(axis=1))):
-                found.setdefault(w, f"{f.name} of particle {now['id'][w][bad[w]].min()} is not finite")
-        status = self.s.read("status")
-        for w in map(int, np.flatnonzero((status != RUNNING) & (status != ENDED))):
-            found[w] = self._fault(w, int(status[w]))
-        return found
+            yield f.name, live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
 
-    def _sound(self, w: int) -> bool:
-        return w not in self._found(self._snapshot())
+    def _sound(self, now: Image) -> np.ndarray:
+        """Whether no step has failed and every quantity is finite, by world."""
+        sound = now["failed"] == 0
+        for _, spoilt in self._spoilt(now):
+            sound &= ~spoilt.any(axis=1)
+        return sound
 
     def status(self, w: int, code: int) -> Status:
         """How a world whose status field holds ``code`` has ended, or that it runs."""
@@ -114,12 +115,18 @@ class Watch:
             return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
         return Status(code == ENDED, REASONS[code])
 
-    def _fault(self, w: int, code: int) -> str:
-        """What the kernels have recorded of a failure: reason, effect and particle."""
-        blame, who = int(self.s.read("blame")[w]), int(self.s.read("culprit")[w])
+    def _fault(self, w: int, then: Image) -> str:
+        """What is wrong with a world: what the kernels have recorded of it, or what is not finite."""
+        code = int(then["failed"][w])
+        if code == 0:
+            for name, spoilt in self._spoilt(then):
+                if spoilt[w].any():
+                    return f"{name} of particle {then['id'][w][spoilt[w]].min()} is not finite"
+        blame, who = int(then["blame"][w]), int(then["culprit"][w])
         effects = self.simulation.scenes[w].effects
-        by = f", by effects.{effects[blame].kind()}" if blame < len(effects) else ""
-        reason = REASONS[code]
+        reason = REASONS[code or NOT_FINITE]
         if code == UNSETTLED:
-            reason += f": a sweep multiplies the change by {self.s.read('sweep_factor')[w]:.3g}"
-        return f"{reason}{by}, at particle {who}"
+            reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
+        if blame < len(effects):
+            reason += f", by effects.{effects[blame].kind()}"
+        return reason if who == NOBODY else f"{reason}, at particle {who}"
