@@ -242,7 +242,8 @@ def test_more_contacts_than_there_is_room_for_is_a_clear_failure(rng, spread):
     start = scene(rng.normal(size=(n, 3)) * spread, rng.normal(size=(n, 3)), laws(1e9), dt=1e-12, steps=10)
     (result,) = run([start])
     assert not result.status.ok
-    assert "more simultaneous contacts than there is room for, at particle" in result.status.reason
+    # No particle is named: whose pair is one too many is up to the order of threads.
+    assert "more simultaneous contacts than there is room for; kept t = 0 s" in result.status.reason
     assert result.time == 0.0
     for name in ("position", "velocity", "mass"):
         np.testing.assert_array_equal(result.state[name], result.start[name])

@@ -5,6 +5,7 @@ import pytest
 
 from tests.scenes import compiled, fixed, scene
 from tisim._taichi import ti
+from tisim.checkpoint import restore, save
 from tisim.effect import Force, parameter
 from tisim.effects.impact import Impact
 from tisim.steppers.brownian import Brownian
@@ -71,7 +72,7 @@ def crowded():
 )
 def test_the_state_is_that_of_the_last_step_before_the_failure(made):
     start, step, fault = made()
-    simulation = compiled(start, worlds=2)
+    simulation = compiled(start, worlds=4)
     kept = []
     for stretches in (1, 7):
         simulation.load([start, start.replace({"duration": WHEN / 2})])
@@ -100,3 +101,81 @@ def test_the_state_is_that_of_the_last_step_before_the_failure(made):
     assert simulation.fraction() < 1
     simulation.run(steps=1)
     assert simulation.results()[0].status == kept[0].status
+
+
+def same(found, wanted):
+    """To the bit, how they ended and what they have done too."""
+    assert (found.status, found.time, found.work) == (wanted.status, wanted.time, wanted.work)
+    for name, values in wanted.state.items():
+        np.testing.assert_array_equal(found.state[name], values)
+
+
+def several():
+    """Worlds of 300 steps that fail in the first, the 110th and the 200th of them, and one that does not."""
+    return [
+        one(fixed(1e-4), when=when, later=1e308).replace({"duration": 0.03})
+        for when in (0.02, -1.0, 1.0, 0.011)
+    ]
+
+
+@pytest.fixture(params=[None, pytest.param("particle", marks=pytest.mark.slow)])
+def batch(request):
+    """A compiled simulation, the scenes of ``several``, and what becomes of each alone."""
+    scenes = several()
+    simulation = compiled(scenes[0], worlds=4, schedule=request.param)
+    alone = []
+    for each in scenes:
+        simulation.load([each])
+        simulation.run()
+        alone += simulation.results()
+    assert [result.status.ok for result in alone] == [False, False, True, False]
+    assert [result.work["steps"] for result in alone] == pytest.approx([200, 0, 300, 110], abs=1)
+    return simulation, scenes, alone
+
+
+@pytest.mark.parametrize("stretch", [300, 7])
+def test_worlds_that_fail_in_one_batch_end_as_each_does_alone(batch, stretch):
+    """In one look, where all fail within the first stretch, and in several."""
+    simulation, scenes, alone = batch
+    simulation.load(scenes)
+    while simulation.fraction() < 1:
+        simulation.run(steps=stretch)
+    for found, wanted in zip(simulation.results(), alone, strict=True):
+        same(found, wanted)
+
+
+def test_worlds_that_fail_together_are_run_once_more_together(batch, monkeypatch):
+    """The way from the start to the last failure is gone again once, however many worlds have failed."""
+    simulation, scenes, _ = batch
+    launched, advance = [], simulation.program.advance
+
+    def counted(steps):
+        launched.append(steps)
+        advance(steps)
+
+    monkeypatch.setattr(simulation.program, "advance", counted)
+    counts = []
+    for worlds in (scenes[:1], scenes):
+        simulation.load(worlds)
+        launched.clear()
+        simulation.run(steps=250)
+        counts.append(list(launched))
+    assert counts[0] == counts[1]
+    assert sum(counts[0][1:]) <= 2 * 250
+
+
+@pytest.mark.parametrize("steps", [150, 250])
+def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
+    simulation, scenes, alone = batch
+    simulation.load(scenes)
+    simulation.run(steps=steps)
+    before = simulation.results()
+    assert sum("kept t =" in result.status.reason for result in before) == (2 if steps == 150 else 3)
+    save(simulation, tmp_path / "c.h5")
+    simulation.load(scenes)
+    restore(simulation, tmp_path / "c.h5")
+    for found, wanted in zip(simulation.results(), before, strict=True):
+        same(found, wanted)
+    simulation.run()
+    for found, wanted in zip(simulation.results(), alone, strict=True):
+        same(found, wanted)
