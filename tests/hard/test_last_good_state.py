@@ -44,6 +44,13 @@ def stuck():
     return one(Trapezoid(control=control), later=1e9), 1e-3, "cannot be solved even at the shortest step"
 
 
+def stuck_in_a_window():
+    """Between two of the times at which particles that do not feel each other have a state in common."""
+    control = IterationControl(first=1e-3, longest=0.25, shortest=1e-3)
+    made = one(Trapezoid(control=control), later=1e9)
+    return made, 0.25, "found at t = 0.78"
+
+
 def steep():
     """A Brownian particle that a force would move too far in the shortest step."""
     control = DriftLimit(longest=1e-4, shortest=1e-5)
@@ -66,6 +73,7 @@ def crowded():
     [
         not_finite,
         pytest.param(stuck, marks=pytest.mark.slow),
+        pytest.param(stuck_in_a_window, marks=pytest.mark.slow),
         pytest.param(steep, marks=pytest.mark.slow),
         pytest.param(crowded, marks=pytest.mark.slow),
     ],
