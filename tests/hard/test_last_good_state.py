@@ -17,7 +17,7 @@ WHEN = 0.783
 """s, when things go wrong."""
 
 
-class Late(Force):
+class Stiffening(Force):
     """A spring towards the middle, which after a time is stiffer, beyond all measure where asked for."""
 
     when: float = parameter("s", WHEN)
@@ -30,7 +30,7 @@ class Late(Force):
 
 
 def one(stepper, **options):
-    return scene([[1.0, 0, 0]], [[0.0, 1, 0]], (Late(**options),), mass=[1.0], stepper=stepper, duration=1.0)
+    return scene([[1.0, 0, 0]], [[0.0, 1, 0]], (Stiffening(**options),), mass=[1.0], stepper=stepper, duration=1.0)
 
 
 def not_finite():
