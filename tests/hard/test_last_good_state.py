@@ -172,6 +172,28 @@ def test_worlds_that_fail_together_are_run_once_more_together(batch, monkeypatch
     assert sum(counts[0][1:]) <= 2 * 250
 
 
+def test_ctrl_c_while_worlds_are_run_once_more_leaves_the_batch_where_it_was(batch, monkeypatch):
+    """Whoever goes on from there comes to the same end."""
+    simulation, scenes, alone = batch
+    simulation.load(scenes)
+    reached, advance = [], simulation.program.advance
+
+    def stopped(steps):
+        if reached:
+            raise KeyboardInterrupt
+        advance(steps)
+        reached.append(simulation.s.read("steps"))
+
+    monkeypatch.setattr(simulation.program, "advance", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        simulation.run(steps=250)
+    monkeypatch.undo()
+    np.testing.assert_array_equal(simulation.s.read("steps"), reached[0])
+    simulation.run()
+    for found, wanted in zip(simulation.results(), alone, strict=True):
+        same(found, wanted)
+
+
 @pytest.mark.parametrize("steps", [150, 250])
 def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
     simulation, scenes, alone = batch
