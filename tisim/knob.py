@@ -7,6 +7,12 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     from tisim.spec import Spec
 
+
+def three_digits(value: float) -> float:
+    """What a study sets a setting to, rounded so that people can read it."""
+    return float(f"{value:.3g}")
+
+
 Part = TypeVar("Part", bound="Spec")
 
 
@@ -32,5 +38,5 @@ class Knob:
             return part
         values = {name: getattr(part, name) for name in type(part).model_fields}
         for name, order in self.orders.items():
-            values[name] = float(f"{values[name] * 10 ** (decades / order):.3g}")
+            values[name] = three_digits(values[name] * 10 ** (decades / order))
         return type(part)(**values)

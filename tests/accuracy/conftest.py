@@ -7,6 +7,8 @@ import pytest
 from tests.scenes import compiled
 from tisim.accuracy.bench import Bench
 
+READY = Bench.ready
+
 
 @pytest.fixture(autouse=True, scope="session")
 def shared():
@@ -17,3 +19,9 @@ def shared():
         patch.setattr(Bench, "ready", lambda self, scene, worlds: compiled(scene, worlds, scene.capacity()))
         patch.setattr(Bench, "close", lambda self: None)
         yield
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """A bench keeps what it has made, as it does outside of tests."""
+    monkeypatch.setattr(Bench, "ready", READY)

@@ -109,6 +109,16 @@ def test_only_what_suits_a_scene_is_tried():
     assert tried(drift()) == {"Verlet"}
 
 
+def test_settings_of_what_is_tried_are_rounded():
+    """They are pasted: 1e3 times 0.0556 is 55.599999999999994."""
+    for dt in (0.0556, 7.3e-11, 4.29e-13, 123.0):
+        for effects in (oscillator().effects, charged(accurate(1e-3), 1.0).effects):
+            for stepper in Verlet(control=FixedStep(dt=dt)).rivals(effects, dt):
+                values = stepper.control.model_dump().values()
+                rounded = [float(f"{v:.3g}") if isinstance(v, float) else v for v in values]
+                assert list(values) == rounded, expression(stepper)
+
+
 def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_chooses():
     """Temperature and viscosity are not of its choice."""
     fluid = Brownian(

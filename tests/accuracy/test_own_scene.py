@@ -1,18 +1,28 @@
 """What a study answers for a scene of one's own: closed paths, short runs, and laws that change nothing."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from tests.accuracy.scenes import RATE, SPEED, only, oscillator
-from tisim.accuracy import Study, files, study
+from tests.accuracy.scenes import RATE, SPEED, only, oscillator, place
+from tisim import runtime
+from tisim.accuracy import Quantity, Study, files, study
 from tisim.accuracy.bench import LOOKS, Bench
 from tisim.accuracy.listing import sources
+from tisim.accuracy.quantity import displacement
 from tisim.effects.tether import Tether
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.implicit_control import ErrorControl
+from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.verlet import Verlet
 
 PERIOD = 2 * np.pi / RATE
 FEW = {"precisions": ("f64",), "repeats": 1, "coarser": 2}
+RETURNING = Quantity("known", displacement, place, returns=True)
+MISSED = 1.1 * (1 - np.cos(np.pi / LOOKS))
+"""By how much looks may miss a turning point, of the size of the motion: it is half way between two."""
 
 
 @pytest.fixture
@@ -29,8 +39,7 @@ def closed():
 def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only, tmp_path):
     found = study(closed(), **FEW)
     (truth,) = found.truths
-    # 1 - cos of half the way between two looks is by how much the turning point may be missed.
-    assert truth.size == pytest.approx(SPEED / RATE, rel=1.1 * (1 - np.cos(np.pi / LOOKS)))
+    assert truth.size == pytest.approx(SPEED / RATE, rel=MISSED)
     assert np.linalg.norm(truth.estimate.value) < 1e-6 * truth.size
     # Verlet's phase runs ahead by (w dt)^2 / 24 of itself.
     for row in found.rows:
@@ -43,6 +52,44 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
     files.resume(again, tmp_path)
     assert again.truths[0].size == truth.size
     assert again.rows == found.rows
+
+
+@pytest.mark.parametrize(
+    ("stepper", "periods"),
+    [
+        # Particles alone are together at the end of the run, and nowhere before.
+        (Trapezoid(control=ErrorControl(longest=10.0)), 1),
+        (Verlet(control=FixedStep(dt=PERIOD / 4)), 1),
+        # Every other look of 128 is at the start, and the others half a period later.
+        (Verlet(control=FixedStep(dt=PERIOD / 400)), 64),
+        (Verlet(control=FixedStep(dt=PERIOD / 400)), 128),
+    ],
+    ids=["long windows", "long steps", "half a period from look to look", "a period from look to look"],
+)
+def test_looks_see_the_size_of_a_motion(monkeypatch, stepper, periods):
+    only(monkeypatch)
+    scene = oscillator().model_copy(update={"stepper": stepper, "duration": periods * PERIOD})
+    found = study(scene, (RETURNING,), **{**FEW, "coarser": 0})
+    # Verlet's amplitude is off by (w dt)^2 / 8 of itself.
+    error = (RATE * PERIOD / LOOKS) ** 2 / 8
+    assert found.truths[0].size == pytest.approx(SPEED / RATE, rel=MISSED + error)
+    assert len(found.rows) == len([row for row in found.rows if not row.failed]) > 0
+
+
+def test_other_threads_wait_while_a_study_starts_taichi_anew(verlet_only):
+    def free():
+        got = runtime.turn.acquire(blocking=False)
+        if got:
+            runtime.turn.release()
+        return got
+
+    seen = []
+    with ThreadPoolExecutor(1) as other:
+        made = Study(closed(), (RETURNING,), **{**FEW, "coarser": 0})
+        made.run(progress=lambda fraction, what: seen.append(other.submit(free).result()))
+        assert seen
+        assert not any(seen)
+        assert other.submit(free).result()
 
 
 def test_compiling_takes_nothing_of_the_budget(verlet_only, monkeypatch):

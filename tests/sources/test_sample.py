@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tisim import memory
 from tisim.effects.lorentz import Lorentz
 from tisim.errors import InputError
 from tisim.runtime import current
@@ -41,3 +42,17 @@ def test_nothing_to_sample_and_points_of_another_shape():
         sample((Lorentz(),), "magnetic_flux_density", [[0.0, 0, 0]])
     with pytest.raises(InputError, match=r"points must be of shape \(n, 3\); received"):
         sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [0.0, 0, 0])
+
+
+def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
+    """As it does for a source that does not compile. Whoever keeps the error keeps no memory."""
+    before = len(memory.in_use())
+
+    def broken(self, time, places, out):
+        raise RuntimeError("does not compile")
+
+    monkeypatch.setattr("tisim.sources.sample._Sum.at", broken)
+    with pytest.raises(RuntimeError, match="does not compile") as told:
+        sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [[0.0, 0, 0]])
+    assert len(memory.in_use()) == before
+    assert told.value

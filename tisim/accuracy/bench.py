@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from tisim import memory
 from tisim.batches import Progress
 from tisim.errors import RunError
 from tisim.result import Result
@@ -17,8 +19,11 @@ from tisim.scene import Scene
 from tisim.simulation import Simulation
 
 Look = Callable[[Result], None]
-LOOKS = 128
-"""Looks at a run on its way."""
+LOOKS = 127
+"""Looks at a run on its way. A prime number: of a motion of any whole number of periods, but for multiples of
+it, no two looks are at the same part of the period."""
+ROOM = 40
+"""Trees of fields that must be free before a simulation is made, which takes two to some ten."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ class Timed:
 
 def watched(simulation: Simulation, look: Look) -> None:
     """Let the first world wait ``LOOKS`` times on its way, and look at its state there."""
-    every = simulation.scenes[0].duration / LOOKS
+    times = np.append(simulation.scenes[0].duration / LOOKS * np.arange(LOOKS + 1), np.inf)
     due = 0.0
 
     def arrived() -> None:
@@ -53,7 +58,8 @@ def watched(simulation: Simulation, look: Look) -> None:
         (result,) = simulation.results([0])
         if result.time >= due:
             look(result)
-            due = (np.floor(result.time / every) + 1.0) * every
+            # Later than now by all means: a world that waits for what has been would wait for ever.
+            due = float(times[np.searchsorted(times, result.time, side="right")])
             hold = simulation.s.read("hold")
             hold[0] = due
             simulation.s.write("hold", hold)
@@ -63,18 +69,25 @@ def watched(simulation: Simulation, look: Look) -> None:
 
 
 class Bench:
-    """Compiled simulations, one for each structure and number of worlds: idle worlds would be timed too."""
+    """Compiled simulations, one for each structure and number of worlds: idle worlds would be timed too.
+
+    They are kept for as long as there is room for another. Those that were not used for longest go first.
+    """
 
     def __init__(self) -> None:
         self.made: dict[Any, Simulation] = {}
-        self.warm: list[Simulation] = []
+        self.warm: weakref.WeakSet[Simulation] = weakref.WeakSet()
 
     def ready(self, scene: Scene, worlds: int) -> Simulation:
         """Compiled for a scene of this structure and size."""
         key = scene.structure(), worlds, scene.capacity()
-        if key not in self.made:
-            self.made[key] = Simulation(scene, worlds)
-        return self.made[key]
+        found = self.made.pop(key, None)
+        if found is None:
+            while self.made and len(memory.in_use()) > memory.MOST - ROOM:
+                self.made.pop(next(iter(self.made))).close()
+            found = Simulation(scene, worlds)
+        self.made[key] = found
+        return found
 
     def run(
         self, scenes: Sequence[Scene], progress: Progress | None = None, look: Look | None = None
@@ -91,7 +104,7 @@ class Bench:
             simulation.run(steps=1)
             simulation.results()
             simulation.load(scenes)
-            self.warm.append(simulation)
+            self.warm.add(simulation)
         if progress:
             progress(0.0)
         if look:

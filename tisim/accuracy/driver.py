@@ -15,12 +15,13 @@ import numpy as np
 
 from tisim import runtime
 from tisim.accuracy import reference
-from tisim.accuracy.bench import Bench, Limit, Look, OutOfTime, Timed
-from tisim.accuracy.methods import Method, Setting, ensembles, methods
+from tisim.accuracy.bench import LOOKS, Bench, Limit, Look, OutOfTime, Timed
+from tisim.accuracy.methods import Method, Setting, ensembles, in_steps_of_at_most, methods
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.row import Row
 from tisim.accuracy.words import expression, options, pasted
 from tisim.errors import InputError, RunError, must
+from tisim.knob import three_digits
 from tisim.result import Result
 from tisim.scene import Scene
 
@@ -74,7 +75,7 @@ class Run:
         study, result = self.study, base.results[0]
         ends = (result.start["position"], result.state["position"])
         extent = max(float(np.linalg.norm(r.max(axis=0) - r.min(axis=0))) for r in ends)
-        dt = float(f"{study.scene.duration / max(base.work[0], 1.0):.3g}")
+        dt = three_digits(study.scene.duration / max(base.work[0], 1.0))
         found = methods(study.scene, dt, extent, study.levels, study.precisions, study.starts[-1])
         return [ensembles(study.scene, study.starts), *found] if study.random else found
 
@@ -88,7 +89,8 @@ class Run:
         return repeats * self.base * method.settings[k].starts * (weights[k] if method.knob else 1.0)
 
     def _largest(self) -> list[float]:
-        """How large each quantity has been on the way, of the scene as it is; 0 where nobody asks."""
+        """How large each quantity has been on the way, in steps that no look has to wait for; 0 where nobody
+        asks."""
         largest = [0.0 for _ in self.study.quantities]
 
         def look(result: Result) -> None:
@@ -97,7 +99,8 @@ class Run:
 
         if any(q.returns for q in self.study.quantities):
             self.what = "the size of the motion"
-            self._run([self.study.scene], self.base, look=look)
+            often = in_steps_of_at_most(self.study.scene, self.study.scene.duration / LOOKS)
+            self._run([often], self.base, look=look)
         return largest
 
     def _truths(self, base: Timed, found: Sequence[Method], rest: float) -> None:

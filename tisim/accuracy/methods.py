@@ -11,7 +11,7 @@ from tisim.accuracy.words import given
 from tisim.errors import InputError
 from tisim.knob import Knob
 from tisim.scene import Scene
-from tisim.spec import Spec
+from tisim.spec import Spec, unit_of
 from tisim.steppers.stepper import Stepper
 
 
@@ -88,6 +88,14 @@ def _put(part: Any, path: Sequence[str], new: Spec) -> Any:
 def turned(scene: Scene, path: str, knob: Knob, decades: float) -> Scene:
     """A copy with a knob of the part at ``path`` turned; InputError where the part refuses."""
     return exchanged(scene, path, knob.turned(dict(parts(scene))[path], decades))
+
+
+def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
+    """A copy whose steps are at most this long (s). Settings of a step control in s are lengths of steps."""
+    control = scene.stepper.control
+    lengths = [name for name, info in type(control).model_fields.items() if unit_of(info) == "s"]
+    shorter = {name: min(getattr(control, name), longest) for name in lengths}
+    return exchanged(scene, "stepper.control", control.model_copy(update=shorter))
 
 
 def finest(scene: Scene, decades: float) -> Scene:

@@ -24,7 +24,7 @@ class Quantity:
     exact : the true value in closed form, of the scene of a result; None where there is none.
     random : whether it is the mean over random starts that counts. Then ``exact`` is of that mean.
     returns : whether it may come back to zero, as the displacement on a closed path does. Then size is the
-        largest |value| on the way, of the scene as it is; else it is |true|, at the end.
+        largest |value| on the way, in steps short enough to see it; else it is |true|, at the end.
     """
 
     name: str

@@ -88,15 +88,16 @@ class Study:
         """Measure all that is not known yet. finished : called when a row, or the truth, has become known.
 
         InputError when the scene cannot be run at all or has nothing to turn. Rows that were finished are
-        kept when anything is raised.
+        kept when anything is raised. Other threads that call ``tisim.run`` meanwhile wait until it is over.
         """
         if self.complete:
             return
-        before = runtime.current()
-        try:
-            Run(self, progress or (lambda fraction, what: None), finished or (lambda: None)).all()
-        finally:
-            runtime.start(before.device, before.precision, before.threads)
+        with runtime.turn:
+            before = runtime.current()
+            try:
+                Run(self, progress or (lambda fraction, what: None), finished or (lambda: None)).all()
+            finally:
+                runtime.start(before.device, before.precision, before.threads)
 
     def cheapest(self, error: float, quantity: str | None = None) -> Row:
         """The cheapest setting whose error is at most this; of those that timings do not tell apart, the one

@@ -18,6 +18,7 @@ from pydantic import Field as Option
 
 from tisim._taichi import ti
 from tisim.effect import Effect, PairForce, parameter
+from tisim.knob import three_digits
 from tisim.powers import Exponent, power
 from tisim.state import Field
 
@@ -47,7 +48,7 @@ class NearField(PairForce):
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         own = {name: getattr(self, name) for name in NearField.model_fields}
-        return tuple(TruncatedNearField(**own, cutoff=float(f"{part * extent:.3g}")) for part in CUTS)
+        return tuple(TruncatedNearField(**own, cutoff=three_digits(part * extent)) for part in CUTS)
 
     def needed(self) -> tuple[str | Field, ...]:
         charge, polarity = self.needs

@@ -61,8 +61,8 @@ def _sample(given: Sequence[Source], real: Any, time: float, places: np.ndarray,
     with collected() as trees:
         table = Table(given, 1, real)
         bound = tuple(table.bind(source) for source in given)
-    connect(bound)
-    table.write([given])
-    _Sum(bound).at(time, places, out)
+        connect(bound)
+        table.write([given])
+        _Sum(bound).at(time, places, out)
     for tree in trees:
         tree.destroy()

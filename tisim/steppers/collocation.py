@@ -8,6 +8,7 @@ from pydantic import Field as Option
 from tisim.blocks import BlockSums
 from tisim.effect import Effect, Force, PairForce
 from tisim.forces import FORCE
+from tisim.knob import three_digits
 from tisim.program import Item
 from tisim.state import Field
 from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
@@ -54,7 +55,8 @@ class Collocation(Stepper):
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         forced = any(isinstance(effect, Force | PairForce) for effect in effects)
-        return (cls(control=StageControl(first=dt, shortest=min(1e-12, 1e-3 * dt))),) if forced else ()
+        shortest = min(1e-12, three_digits(1e-3 * dt))
+        return (cls(control=StageControl(first=dt, shortest=shortest)),) if forced else ()
 
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"]

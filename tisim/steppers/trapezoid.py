@@ -6,6 +6,7 @@ from typing import ClassVar, Literal, Self
 from tisim.blocks import BlockSums
 from tisim.effect import Effect, Force, PairForce
 from tisim.forces import FORCE
+from tisim.knob import three_digits
 from tisim.program import Item
 from tisim.spec import parameter
 from tisim.state import Field
@@ -59,9 +60,9 @@ class Trapezoid(Stepper):
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         if not any(isinstance(effect, Force | PairForce) for effect in effects):
             return ()
-        limits = {"first": dt, "longest": dt, "shortest": min(1e-12, 1e-3 * dt)}
+        limits = {"first": dt, "longest": dt, "shortest": min(1e-12, three_digits(1e-3 * dt))}
         papers = IterationControl(tolerance=1e-6, **limits)
-        own = ErrorControl(error=1e-4, tolerance=1e-5, **{**limits, "longest": 1e3 * dt})
+        own = ErrorControl(error=1e-4, tolerance=1e-5, **{**limits, "longest": three_digits(1e3 * dt)})
         together = any(isinstance(effect, PairForce) for effect in effects)
         accelerated = (cls(control=own, acceleration="anderson"),) if together else ()
         return (cls(control=own), *accelerated, cls(control=papers), cls(phi=1.0, control=papers))

@@ -1,0 +1,100 @@
+"""How a study looks at its runs, and how many simulations it keeps."""
+
+import numpy as np
+import pytest
+
+from tests.accuracy.scenes import oscillator
+from tisim import memory, steppers
+from tisim._taichi import ti
+from tisim.accuracy import bench
+from tisim.accuracy.bench import LOOKS, ROOM, Bench, watched
+from tisim.accuracy.methods import in_steps_of_at_most
+from tisim.kinds import load
+from tisim.memory import Tree
+from tisim.result import Result, Status
+from tisim.steppers.controller import StepControl
+from tisim.steppers.stepper import Stepper
+from tisim.taichi_thread import in_taichi_thread
+
+load(steppers)
+CONTROLS = {k: c for k, c in StepControl.known().items() if c.__module__.startswith("tisim.")}
+
+
+class Waiting:
+    """A world that is where it waits to be looked at, or at its end."""
+
+    def __init__(self, duration):
+        self.s, self.hold, self.time = self, np.zeros(1), 0.0
+        self.scenes = [oscillator().model_copy(update={"duration": duration})]
+
+    def results(self, worlds):
+        return [Result(self.scenes[0], {}, {}, self.time, {}, Status(True, ""), 0.0)]
+
+    def read(self, name):
+        return self.hold.copy()
+
+    def write(self, name, value):
+        self.hold = value
+
+
+def test_a_world_is_looked_at_each_time_once_and_waits_for_what_is_to_come():
+    """In one case of 20, n times a part of the duration is rounded to less than n such parts."""
+    for duration in np.random.default_rng(0).uniform(0.0, 10.0, 200):
+        seen, world = [], Waiting(duration)
+        watched(world, lambda result, seen=seen: seen.append(result.time))
+        while world.time < duration:
+            assert world.hold[0] > world.time
+            world.time = min(world.hold[0], duration)
+            world.look()
+        assert len(seen) == LOOKS + 1
+        np.testing.assert_allclose(np.diff(seen), duration / LOOKS, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", CONTROLS)
+def test_steps_of_every_control_can_be_kept_short(kind):
+    """Whatever a control calls its lengths, and whatever the shortest is."""
+    control = CONTROLS[kind]
+    told = {name: 1e-3 for name, info in control.model_fields.items() if info.is_required()}
+    duration = 1e-5
+    stepper = Stepper.known()["verlet"].model_construct(control=control(**told))
+    scene = oscillator().model_copy(update={"stepper": stepper, "duration": duration})
+    assert scene.stepper.control.fewest(duration) < LOOKS
+    short = in_steps_of_at_most(scene, duration / LOOKS).stepper.control
+    assert short.fewest(duration) >= LOOKS * (1 - 1e-12)
+    # Its parts still agree with each other, and what is compiled is the same.
+    assert control(**short.model_dump()) == short
+    assert short.structure() == control(**told).structure()
+
+
+class Memory:
+    """The trees of a simulation, without what they are for."""
+
+    def __init__(self, scene, worlds):
+        self.trees = [self.tree() for _ in range(4)]
+
+    @in_taichi_thread
+    def tree(self):
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, 4).place(ti.field(ti.f64))
+        return Tree(builder)
+
+    def close(self):
+        for tree in self.trees:
+            tree.destroy()
+
+
+def test_a_study_of_many_structures_gives_back_what_it_has_not_used_for_longest(own, monkeypatch):
+    monkeypatch.setattr(bench, "Simulation", Memory)
+    monkeypatch.setattr(memory, "MOST", len(memory.in_use()) + ROOM + 8)
+    made, scene = Bench(), oscillator()
+    first = made.ready(scene, 1)
+    for worlds in range(2, ROOM):
+        latest = made.ready(scene, worlds)
+        assert made.ready(scene, 1) is first
+        assert made.ready(scene, worlds) is latest
+    assert all(tree.alive for tree in first.trees + latest.trees)
+    # Two fit beside the room for another, and that one.
+    assert len(made.made) == 3
+    assert sum(tree.alive for kept in made.made.values() for tree in kept.trees) == 12
+    for kept in made.made.values():
+        kept.close()
