@@ -4,7 +4,8 @@
 
 The scenes are those of tests/steppers/calibrated.py. For each scene and control: the least and the largest of
 the error at the end over the error asked for, over 1e-2 to 1e-6 for the trapezoid, to 1e-10 for collocation;
-and the figure, where each line is a scene.
+and the figure, where each line is a scene. A second table: collocation from the first step that it takes by
+default, and both in single precision, over 1e-2 to 1e-5.
 """
 
 import argparse
@@ -16,12 +17,15 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 from matplotlib import colormaps
 
-from tests.steppers.calibrated import CHAOTIC, CONTROLS, KNOWN, ratios
+from tests.steppers.calibrated import CHAOTIC, CONTROLS, KNOWN, collocation, ratios, trapezoid
 from tests.steppers.test_calibration import BAND
 from tisim import runtime
 from tisim.figure import empty, plain
+from tisim.steppers.stage_control import StageControl
 
 Found = dict[str, dict[str, np.ndarray]]
+BY_DEFAULT = collocation("run", StageControl().first)
+SINGLE_PRECISION = 10.0 ** -np.arange(2, 6)
 
 
 def table(found: Found) -> None:
@@ -65,6 +69,13 @@ def main() -> None:
     found = {control: ratios(*settings) for control, settings in CONTROLS.items()}
     table(found)
     draw(found, asked.figure)
+    errors = CONTROLS["Collocation, StageControl"][1]
+    more = {"Collocation, by default": ratios(BY_DEFAULT, errors)}
+    runtime.start(device="cpu", precision="f32")
+    for name, make in (("Trapezoid, f32", trapezoid("run")), ("Collocation, by default, f32", BY_DEFAULT)):
+        more[name] = ratios(make, SINGLE_PRECISION)
+    print()
+    table(more)
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ class Single:
     place: tuple[float, float] = (0.0, 0.0)
     speed: tuple[float, float] = (0.0, 0.0)
     spring: float = 0.0
-    drag: float = 1e-300
+    drag: float = 1e-30
     flow: float = 0.0
     push: float = 0.0
     shake: float = 0.0
@@ -185,8 +185,8 @@ def trapezoid(per: str) -> Callable[[float], Stepper]:
     return lambda e: Trapezoid(control=ErrorControl(error=e, tolerance=1e-2 * e, per=per, **limits))
 
 
-def collocation(per: str) -> Callable[[float], Stepper]:
-    return lambda e: Collocation(control=StageControl(error=e, per=per, first=1e-4, longest=10.0))
+def collocation(per: str, first: float = 1e-4) -> Callable[[float], Stepper]:
+    return lambda e: Collocation(control=StageControl(error=e, per=per, first=first, longest=10.0))
 
 
 CONTROLS = {

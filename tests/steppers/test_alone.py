@@ -67,6 +67,18 @@ def test_a_step_that_time_does_not_tell_is_not_taken():
     assert result.time == 0.0
 
 
+def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
+    """10000 windows of 1e-4 s, of which two are asked for, and later a thousand."""
+    control = IterationControl(first=1e-4, longest=1e-4, shortest=1e-5, tolerance=1e-6)
+    start = ([[0.0, 0, 0]], [[1.0, 0, 0]])
+    made = scene(*start, (Cliff(place=5.0),), mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
+    simulation = compiled(made, worlds=2, capacity=3)
+    simulation.load([made])
+    for steps, ahead in ((2, 9998), (1000, 8998)):
+        simulation.run(steps=steps)
+        assert simulation.ahead() == pytest.approx(ahead, abs=1)
+
+
 @pytest.mark.slow
 def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bits(tmp_path):
     """A step of the world is a window; in one launch, in small ones, and from a checkpoint: the same bits."""

@@ -75,6 +75,15 @@ def test_sedimentation_at_stokes_velocity_and_shear_without_heat(together):
     np.testing.assert_allclose(result.state["position"], expected, rtol=0, atol=1e-17)
 
 
+def test_steps_ahead_are_windows():
+    """Of 300 longest steps, of which a launch takes a colloid by itself through many."""
+    made = colloids(np.zeros((1, 3)), steps=300)
+    simulation = compiled(made, 5, 10_000)
+    simulation.load([made])
+    simulation.run(steps=100)
+    assert simulation.ahead() == pytest.approx(200, abs=1)
+
+
 def test_diffusion_in_shear():
     """<x^2> = 2Dt (1 + (rate t)^2/3), <xy> = D rate t^2 (R. T. Foister, T. G. M. van de Ven 1980), with the
     sums over Euler's n steps in place of the integrals."""

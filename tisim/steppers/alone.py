@@ -176,7 +176,7 @@ class EndStretch(Phase):
         s = self.s
         s.windows[w] += s.stretch_windows[w]
         before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
-        s.dt[w] = s.time[w] - before
+        s.dt[w] = (s.time[w] - before) / s.stretch_windows[w]
         s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
         s.events[w] = 0
         if s.stuck[w] > 0.0:

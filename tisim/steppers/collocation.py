@@ -12,7 +12,8 @@ from tisim.knob import three_digits
 from tisim.program import Item
 from tisim.state import Field
 from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
-from tisim.steppers.collocation_phases import Conclude, Forget, Judge, Place, Predict, Sweep, Take, Try
+from tisim.steppers.collocation_phases import Conclude, Forget, Place, Predict, Sweep, Take, Try
+from tisim.steppers.collocation_verdict import Judge
 from tisim.steppers.kept import CHANGE, kept
 from tisim.steppers.phases import Arrive, Listen, Operate
 from tisim.steppers.span import Went, spans
@@ -71,7 +72,7 @@ class Collocation(Stepper):
         )
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, stages, sums = parts.s, Stages(parts, self.stages), BlockSums(parts.s, 3)
+        s, stages, sums = parts.s, Stages(parts, self.stages), BlockSums(parts.s, 4)
         parts.owned.append((stages, "coefficients of the stages", self.kind()))
         parts.owned.append((sums, "sums of the stages", self.kind()))
         listen = (Listen(parts),) if parts.near else ()

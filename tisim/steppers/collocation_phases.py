@@ -1,15 +1,13 @@
-"""The phases of an attempt at a step of collocation: sweeps over its stages, and the verdict on them."""
+"""The phases of an attempt at a step of collocation: sweeps over its stages; the verdict is next door."""
+
+import numpy as np
 
 from tisim._taichi import ti
 from tisim.blocks import PerBlock
+from tisim.exchange import TYPES
 from tisim.program import PerParticle, Phase, Repeat
-from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse, length
+from tisim.steppers.attempts import ACCEPTED, length
 from tisim.steppers.phases import note_stride
-
-GUESS = 0.5
-"""Taken for the factor by which a sweep makes the error smaller where nothing is known of it, and at most."""
-DIVERGED = 0.5
-"""The longest that a second attempt may be where sweeps did not converge, in lengths of the first."""
 
 
 class Forget(Phase):
@@ -101,11 +99,12 @@ class Place(OfStages):
 
 class Take(PerBlock):
     """The rates that the forces at the stage give; sums of their change, as displacements (m), and at the
-    last stage of the error and of what both are compared with."""
+    last stage of the error, of what both are compared with, and of what displacements are rounded to."""
 
     def __init__(self, parts, sums, stages) -> None:
         super().__init__(sums)
         self.control, self.stages = parts.control, stages
+        self.eps = float(np.finfo(TYPES[self.s.real]).eps)
 
     @ti.func
     def each(self, w, i):
@@ -113,7 +112,7 @@ class Take(PerBlock):
         dt, stage = ti.cast(s.dt[w], s.real), ti.cast(s.stage[w], ti.i32)
         new = stages.newest(w, i, stage, dt, s.time[w])
         change = self.take(s.stage_acceleration, w, i, stage, new)
-        error, scale = ti.cast(0.0, s.real), ti.cast(0.0, s.real)
+        error, scale, rounding = ti.cast(0.0, s.real), ti.cast(0.0, s.real), ti.cast(0.0, s.real)
         if ti.static(stages.turning):
             change += s.radius[w, i] * self.take(
                 s.stage_turning, w, i, stage, s.torque[w, i] / stages.inertia(w, i)
@@ -124,7 +123,9 @@ class Take(PerBlock):
             if ti.static(stages.turning):
                 error += dt * dt * s.radius[w, i] * self.estimate(s.stage_turning, w, i)
             scale = self.control.scale(s, w, i, stages.displacement(w, i, stage, dt).norm(), dt)
-        return ti.cast(ti.Vector([dt * dt * change, error, scale]), ti.f64)
+            # Of the place, and of what the force there adds to it.
+            rounding = self.eps * (s.position[w, i].norm() + dt * dt * new.norm())
+        return ti.cast(ti.Vector([dt * dt * change, error, scale, rounding]), ti.f64)
 
     @ti.func
     def take(self, rate: ti.template(), w, i, stage, new):  # type: ignore[valid-type]
@@ -151,84 +152,6 @@ class Take(PerBlock):
             factor, power = ti.static(self.stages.leading)
             error = largest * ti.pow(factor * error / ti.select(largest > 0.0, largest, 1.0), power)
         return error
-
-
-class Judge(Phase):
-    """To the next stage; after the last one: is the step solved, to be swept again, or to be given up?"""
-
-    def __init__(self, parts, sums, stages) -> None:
-        self.s, self.control, self.sums, self.stages = parts.s, parts.control, sums, stages
-        self.order = parts.control.order(stages.number)
-
-    @ti.func
-    def run(self, w, _k):
-        s, last = self.s, self.stages.number - 1
-        total = self.sums.total(w)
-        s.force_evaluations[w] += 1
-        # Not below infinity: also true of NaN, which a maximum would lose.
-        if not (total[0] < ti.math.inf) or s.unsound[w] > 0.0:
-            total[0] = ti.math.inf
-        s.sweep_change[w] = ti.max(s.sweep_change[w], total[0])
-        stage = ti.cast(s.stage[w], ti.i32)
-        if stage < last and s.sweep_change[w] < ti.math.inf:
-            s.stage[w] = stage + 1
-        else:
-            self.judge(w, total)
-            s.stage[w], s.sweep_change[w] = 1.0, 0.0
-            s.sweep[w] += 1.0
-            s.solver_iterations[w] += 1
-        here = self.stages.c[ti.cast(s.stage[w], ti.i32)]
-        s.time[w] = s.time_before[w] + s.dt[w] * here
-
-    @ti.func
-    def judge(self, w, total):
-        """At the end of a sweep."""
-        s = self.s
-        change, error = s.sweep_change[w], ti.cast(0.0, ti.f64)
-        # Nothing moves where nothing changes: 0/0 is no error.
-        if change > 0.0:
-            change /= total[2]
-        if total[1] > 0.0:
-            error = total[1] / total[2]
-        first = s.sweep[w] == 1.0
-        contraction = self.foreseen(w)
-        if not first and s.last_change[w] > 0.0:
-            contraction = change / s.last_change[w]
-            s.contraction[w], s.measured_dt[w] = contraction, s.dt[w]
-        s.last_change[w] = change
-        solved = change * contraction < ti.math.inf and self.control.solved(w, change * contraction)
-        if solved or (not first and not (contraction < 1.0)) or s.sweep[w] >= self.control.sweeps:
-            self.decide(w, solved, contraction, error)
-        elif not (change < ti.math.inf):
-            self.decide(w, False, change, error)
-
-    @ti.func
-    def foreseen(self, w):
-        """What a sweep multiplies the error by: it grows as dt^2 and, to be safe, falls as dt only."""
-        s = self.s
-        factor = ti.cast(GUESS, ti.f64)
-        if s.measured_dt[w] > 0.0:
-            ratio = s.dt[w] / s.measured_dt[w]
-            factor = ti.min(factor, s.contraction[w] * ratio * ti.max(1.0, ratio))
-        return factor
-
-    @ti.func
-    def decide(self, w, solved, contraction, error):
-        """The verdict, and how long the next step is to be."""
-        s = self.s
-        s.sweeping[w], s.verdict[w] = 0.0, TRIED
-        # One that is only foreseen may be of long ago: it is no reason for a shorter step.
-        known = ti.select(s.sweep[w] > 1.0 or not solved, contraction, 0.0)
-        factor = self.control.factor(w, known, error, self.order)
-        if solved and self.control.accepts(w, error):
-            s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
-        else:
-            # A step that was not accepted would fail again in the same way if it were as long.
-            factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
-            if self.control.hopeless(s, w, s.dt[w]):
-                s.verdict[w] = HOPELESS
-                accuse(s, w)
-        s.next_dt[w] = s.dt[w] * factor
 
 
 class Conclude(OfStages):
