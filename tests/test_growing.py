@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene
+from tisim import durable
 from tisim.errors import InputError, RunError
 from tisim.frames import Frame, frames
 from tisim.growing import Growing
@@ -184,6 +185,15 @@ def test_killed_while_it_is_made_it_is_not_there(tmp_path, monkeypatch):
 def test_a_folder_that_takes_no_file_is_told_before_anything_runs(tmp_path):
     (tmp_path / "t.h5").mkdir()
     with pytest.raises(InputError, match="trajectory must be a file that can be written; received"):
+        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+
+
+def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):
+    monkeypatch.setattr(durable, "PATIENCE", 0.01)
+    with (
+        durable.locked(tmp_path / "t.h5.new", exclusive=True),
+        pytest.raises(RunError, match=r"t\.h5\.new has been locked by another process for 0\.01 s$"),
+    ):
         Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
 
 

@@ -213,7 +213,7 @@ def _put(path: Path, image: bytes) -> None:
         replace_file(path, image)
     except RunError as error:
         cause = error.__cause__
-        if isinstance(cause, OSError) and cause.errno in NO_ROOM:
+        if not isinstance(cause, OSError) or cause.errno in NO_ROOM:
             raise
         rule = "a file that can be written"
         raise InputError(f"trajectory must be {rule}; received {str(path)!r} ({cause})") from None
