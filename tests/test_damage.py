@@ -46,6 +46,19 @@ def test_hundreds_of_damaged_files(tmp_path, name):
     assert counts.clean, counts
 
 
+def test_a_kind_whose_undamaged_file_is_refused_is_not_counted(tmp_path):
+    """All damaged ones would be refused as well, and none would be read wrong."""
+
+    def reader(name, action, path, whole=None, patience=0.0):
+        if action == "make":
+            (path / name).write_bytes(bytes(9))
+            return path / name
+        return "", "file must be another; received this one"
+
+    with pytest.raises(AssertionError, match="the undamaged result.h5 is not read: file must be another"):
+        damage._counted("result.h5", np.random.default_rng(0), 3, tmp_path / "files", reader)
+
+
 def test_every_lost_page_of_a_result_is_found(tmp_path):
     """HDF5 alone reads most of them as data."""
     path = damage._result(tmp_path)

@@ -83,3 +83,26 @@ def test_kills_and_full_disks_at_random_lose_nothing(tmp_path):
     """Some of the trials of tests/soak.sh."""
     for counts in runs.soak(seed=8, share=0.1, folder=tmp_path):
         assert counts.clean, counts
+
+
+def test_half_of_the_kills_wait_for_the_file(tmp_path, monkeypatch):
+    """The file is made after a hundred looks; whoever does not wait for it goes on at the first."""
+    looks = []
+
+    class Running:
+        @staticmethod
+        def poll():
+            looks.append(None)
+            if len(looks) == 100:
+                file.touch()
+
+    file = tmp_path / "trajectory.h5"
+    monkeypatch.setattr(runs.time, "sleep", lambda seconds: None)
+    waited = 0
+    for seed in range(100):
+        looks.clear()
+        file.unlink(missing_ok=True)
+        runs._wait(Running, file, np.random.default_rng(seed), 1.0)
+        assert len(looks) in (0, 100)
+        waited += len(looks) == 100
+    assert 30 < waited < 70

@@ -80,10 +80,7 @@ def _one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) ->
     more: tuple[str, ...] = ()
     for _ in range(int(rng.integers(1, 4))):
         running = begin(folder, *more)
-        # Half of the kills while it starts or where it is, half where the files are made.
-        while rng.random() < 0.5 and running.poll() is None and not (folder / "trajectory.h5").exists():
-            time.sleep(0.001)
-        time.sleep(rng.uniform(0, longest) * rng.choice([0.01, 0.3, 1.0]))
+        _wait(running, folder / "trajectory.h5", rng, longest)
         running.kill()
         running.communicate()
         left = {path.name for path in folder.iterdir()} if folder.exists() else set()
@@ -103,6 +100,15 @@ def _one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) ->
             return "wrong", f"{name} differs from that of a run that was not killed"
     shutil.rmtree(folder)
     return "", ""
+
+
+def _wait(running: subprocess.Popen[str], file: Path, rng: np.random.Generator, longest: float) -> None:
+    """Until a random instant, at most ``longest`` (s) from now or, half of the times, from when the file is
+    made."""
+    if rng.random() < 0.5:
+        while running.poll() is None and not file.exists():
+            time.sleep(0.001)
+    time.sleep(rng.uniform(0, longest) * rng.choice([0.01, 0.3, 1.0]))
 
 
 def _crowded(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
