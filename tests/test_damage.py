@@ -10,12 +10,12 @@ import pytest
 
 from tests.soak import damage
 from tests.test_growing import STILL, frame, same
-from tisim import checkpoint, seal
+from tisim import checkpoint, h5md, seal
 from tisim.accuracy import files
 from tisim.errors import InputError
 from tisim.export import export
 from tisim.frames import frames, worlds
-from tisim.trajectory import Recording, Trajectory
+from tisim.trajectory import LIBRARY, Recording, Trajectory
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_a_kind_whose_undamaged_file_is_refused_is_not_counted(tmp_path):
             return path / name
         return "", "file must be another; received this one"
 
-    with pytest.raises(AssertionError, match="the undamaged result.h5 is not read: file must be another"):
+    with pytest.raises(AssertionError, match=r"the undamaged result\.h5 is not read: file must be another"):
         damage._counted("result.h5", np.random.default_rng(0), 3, tmp_path / "files", reader)
 
 
@@ -143,6 +143,26 @@ def test_what_is_no_file_of_ours_is_refused(no_file, read):
         read(no_file)
     assert "\n" not in str(refused.value)
     assert {path.name for path in no_file.parent.iterdir()} <= {no_file.name, "fifo"}
+
+
+@pytest.mark.parametrize("name", ["result.h5", "trajectory.h5", "an older trajectory.h5"])
+def test_files_of_versions_without_checksums_are_told_from_those_of_others(tmp_path, name):
+    """As they were: a result without its seal; trajectories of HDF5's first and third superblock."""
+    path = tmp_path / "t.h5"
+    if name == "result.h5":
+        path.write_bytes(seal.unsealed(damage._result(tmp_path).read_bytes()))
+    else:
+        with h5py.File(path, "w", libver="earliest" if "older" in name else LIBRARY) as file:
+            h5md.metadata(file, "0.1.0")
+            file["particles/all/position/step"] = [0, 10]
+    told = "an older version has written it, whose files h5py still reads$"
+    with pytest.raises(InputError, match=told), frames(path):
+        pass
+    with h5py.File(path, "r"):
+        pass
+    if name == "result.h5":
+        with pytest.raises(InputError, match=told):
+            checkpoint.restore(_Loaded(), path)
 
 
 class _Loaded:

@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import resource
+import signal
 
 import h5py
 import numpy as np
@@ -16,6 +17,7 @@ from tisim import durable
 from tisim.errors import InputError, RunError
 from tisim.frames import Frame, frames
 from tisim.growing import Growing
+from tisim.reading import Reading
 from tisim.superblock import SIZE, lookup3, sound, superblock
 from tisim.trajectory import LIBRARY, Recording, Trajectory
 
@@ -105,6 +107,26 @@ def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
             same(found[k], k)
 
 
+def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
+    """At whatever block of the file that is: HDF5 alone would call it damaged."""
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        trajectory.write(0, frame(0))
+    calls, at = 0, 0
+
+    def torn(self, size, settled=Reading._settled):
+        nonlocal calls
+        calls += 1
+        found = settled(self, size)
+        return bytes(len(found) // 2) + found[len(found) // 2 :] if calls == at else found
+
+    monkeypatch.setattr(Reading, "_settled", torn)
+    while calls >= at:
+        calls, at = 0, at + 1
+        assert whole_frames(path, 1) == 1
+    assert at > 10
+
+
 def test_a_trajectory_that_is_cut_short_is_refused(tmp_path):
     path = tmp_path / "t.h5"
     with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
@@ -186,6 +208,73 @@ def test_a_folder_that_takes_no_file_is_told_before_anything_runs(tmp_path):
     (tmp_path / "t.h5").mkdir()
     with pytest.raises(InputError, match="trajectory must be a file that can be written; received"):
         Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+
+
+def interrupted(monkeypatch, owner, name, act, stride):
+    """Have act done again and again, with a Ctrl-C at one call of a method of owner after another, at so many
+    calls from each other, until there are no more; how many there were."""
+    method, calls, at = getattr(owner, name), 0, 1 - stride
+
+    def called(self, *arguments):
+        nonlocal calls
+        calls += 1
+        if calls == at:
+            signal.raise_signal(signal.SIGINT)
+        return method(self, *arguments)
+
+    monkeypatch.setattr(owner, name, called)
+    while calls >= at:
+        calls, at = 0, at + stride
+        try:
+            act()
+        except KeyboardInterrupt:
+            assert calls >= at
+        else:
+            assert calls < at, "the Ctrl-C was lost"
+    return calls
+
+
+@pytest.mark.parametrize("name", ["write", "readinto", "truncate"])
+def test_ctrl_c_while_hdf5_writes_waits_for_the_frame(tmp_path, monkeypatch, name):
+    path = tmp_path / "t.h5"
+
+    def write():
+        written = 0
+        try:
+            with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+                for k in range(2):
+                    trajectory.write(0, frame(k))
+                    written = k + 1
+        finally:
+            whole_frames(path, written)
+
+    stride, least = {"write": (4, 50), "readinto": (7, 2), "truncate": (1, 0)}[name]
+    assert interrupted(monkeypatch, Growing, name, write, stride) > least
+
+
+def test_ctrl_c_while_hdf5_reads_waits_for_the_frame(tmp_path, monkeypatch):
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        for k in range(2):
+            trajectory.write(0, frame(k))
+    assert interrupted(monkeypatch, Reading, "_settled", lambda: whole_frames(path, 2), 3) > 10
+
+
+def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypatch):
+    path = tmp_path / "t.h5"
+    recording = Recording(path, frames=99)
+    with Trajectory(recording, [STILL]) as trajectory:
+        for k in range(3):
+            trajectory.write(0, frame(k))
+
+    def go_on():
+        try:
+            Trajectory.going_on(recording, STILL, 1.0).close()
+        finally:
+            whole_frames(path, 3)
+            assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
+
+    assert interrupted(monkeypatch, Growing, "write", go_on, 17) > 50
 
 
 def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):

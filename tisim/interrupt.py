@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
 
@@ -75,6 +76,21 @@ def handled(handle: Callable[[int], None]) -> Iterator[None]:
     finally:
         for number in mine:
             signal.signal(number, before[number])
+
+
+@contextlib.contextmanager
+def held() -> Iterator[None]:
+    """Within it signals that ask to stop wait, and are raised again at its end: for a library that calls back
+    into Python and does not bear an exception from there. Python handles signals in the main thread only.
+    """
+    came: list[int] = []
+    here = threading.current_thread() is threading.main_thread()
+    try:
+        with handled(came.append) if here else contextlib.nullcontext():
+            yield
+    finally:
+        for number in came:
+            signal.raise_signal(number)
 
 
 def stop(number: int) -> None:

@@ -22,6 +22,9 @@ from tisim.errors import InputError, must
 from tisim.framed import MAGIC, frame, scan
 from tisim.superblock import SIGNATURE
 
+OLDER = "an older version has written it, whose files h5py still reads"
+"""What messages say of a file that is of tisim but has no checksum."""
+
 
 @contextlib.contextmanager
 def created(path: Path) -> Iterator[h5py.File]:
@@ -41,15 +44,23 @@ def opened(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> I
 
     kind : its attribute ``format``. what, rule : what it is called in messages, and what it must be.
     """
+    with h5py.File(io.BytesIO(image(path, what, rule)), "r") as found:
+        must(found.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
+        yield found
+
+
+def image(path: Path, what: str, rule: str) -> bytes:
+    """The HDF5 file that ``sealed`` has sealed. InputError unless it is there and whole; what, rule : as of
+    opened."""
     content = regular.content(Path(os.path.realpath(path)))
     if content is None:
         raise InputError(f"{what} must be an existing file; received {str(path)!r}")
-    image = unsealed(content)
-    if image is None:
-        raise InputError(f"{what} must be {rule}, whole and with its checksum; received {str(path)!r}")
-    with h5py.File(io.BytesIO(image), "r") as found:
-        must(found.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
-        yield found
+    found = unsealed(content)
+    if found is None:
+        bare = MAGIC not in content and content.startswith(SIGNATURE) and b"tisim" in content
+        why = f", without one: it was cut short or damaged, or {OLDER}" if bare else ""
+        raise InputError(f"{what} must be {rule}, whole and with its checksum; received {str(path)!r}{why}")
+    return found
 
 
 def sealed(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:

