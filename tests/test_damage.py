@@ -102,6 +102,24 @@ def test_numbers_that_hdf5_does_not_check_are_checked(tmp_path):
         len(found)
 
 
+def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
+    """As a killed run does, whose last row is none yet; the frames before are read."""
+    path, short = tmp_path / "t.h5", STILL.model_copy(update={"duration": frame(3).time})
+    with Trajectory(Recording(path, frames=9), [short]) as trajectory:
+        for k in range(4):
+            trajectory.write(0, frame(k))
+    with frames(path) as found:
+        assert (len(found), found.missing) == (4, "")
+    with h5py.File(path) as file:
+        place = file["particles/all/position/step"].id.get_chunk_info(0).byte_offset + 3 * 8
+    content = path.read_bytes()
+    path.write_bytes(content[:place] + b"\xff" * 8 + content[place + 8 :])
+    with frames(path) as found:
+        for k in range(3):
+            same(found[k], k)
+        assert found.missing == "the run has come to t = 0.003 s of 0.004 s; what follows is missing"
+
+
 @pytest.fixture(params=["none", "folder", "fifo", "link to a fifo", "device", "unreadable", "empty", "text",
                         "another program's", "another file of tisim's"])  # fmt: skip
 def no_file(request, tmp_path):

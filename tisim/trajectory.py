@@ -4,9 +4,10 @@ A frame is the state at the end of the first step at or after each wanted time; 
 without a trajectory. The file has a group of particles for each scene: ``all``, or ``world_0`` and so on.
 Particles are in the order of their ids; a frame with fewer particles than another is filled up (see h5md.py).
 
-The file can be read at every instant, by any reader, also while the run goes on and after it was killed (see
-growing.py): ``step`` grows last, so what it counts is whole. It is made under another name, with room for
-frames and none in it, and then put in its place.
+The file can be read after every single write, by any reader, so also after the run was killed (see
+growing.py); one that comes in the midst of a write must come again, as frames.py does. ``step`` grows last, so
+what it counts is whole. The file is made under another name, with room for frames and none in it, and then put
+in its place.
 """
 
 from __future__ import annotations
