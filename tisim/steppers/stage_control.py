@@ -25,7 +25,7 @@ class StageControl(ImplicitControl):
     at. resolution : part of its radius that is added to a particle's displacement or size of motion: for one
     that starts from rest the ratio of error and displacement has no limit.
 
-    With ``per="run"`` the error at the end was 0.06 to 12 times that asked for in 13 scenes, less under drag
+    With ``per="run"`` the error at the end was 0.03 to 30 times that asked for in 13 scenes, less under drag
     (docs/steppers.md); a chaotic motion multiplies it without bound.
 
     Sweeps end once the change in the last one, times the factor by which a sweep makes the error smaller, is
