@@ -115,7 +115,7 @@ def test_the_error_at_the_end_is_that_asked_for(name):
 
 @pytest.mark.slow
 def test_the_error_at_the_end_from_the_first_step_by_default():
-    """Collocation takes few steps, and where they fall matters: the motions are the same, the factor is 50."""
+    """Collocation takes few steps, and where they fall matters: a factor of 50, for the same motions."""
     found = ratios(collocation("run", StageControl().first), CONTROLS["Collocation, StageControl"][1])
     within({scene: values for scene, values in found.items() if scene != CHAOTIC}, 1 / 50, 50.0)
     assert (found[CHAOTIC] < 100).all(), found[CHAOTIC]

@@ -4,7 +4,6 @@ import numpy as np
 
 from tisim._taichi import ti
 from tisim.blocks import PerBlock
-from tisim.exchange import TYPES
 from tisim.program import PerParticle, Phase, Repeat
 from tisim.steppers.attempts import ACCEPTED, length
 from tisim.steppers.phases import note_stride
@@ -104,7 +103,7 @@ class Take(PerBlock):
     def __init__(self, parts, sums, stages) -> None:
         super().__init__(sums)
         self.control, self.stages = parts.control, stages
-        self.eps = float(np.finfo(TYPES[self.s.real]).eps)
+        self.eps = float(np.finfo(np.float64 if self.s.real == ti.f64 else np.float32).eps)
 
     @ti.func
     def each(self, w, i):
