@@ -19,6 +19,7 @@ import numpy as np
 
 from tisim import h5md, regular, seal
 from tisim.errors import InputError, must
+from tisim.interrupt import held
 from tisim.particles import Arrays
 from tisim.reading import Reading
 from tisim.scene import Scene
@@ -159,6 +160,8 @@ class _File:
         self._source = source
         self._file: h5py.File | None = None
 
+    # HDF5 calls Reading, in which no signal may be raised: it would be lost.
+    @held()
     def read(self, look: Callable[[h5py.File], T]) -> T:
         """What look finds in the file; InputError where that is damaged.
 
@@ -177,6 +180,7 @@ class _File:
                 time.sleep(PAUSE)
         raise AssertionError  # not reached
 
+    @held()
     def close(self) -> None:
         if self._file is not None:
             self._file.close()

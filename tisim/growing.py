@@ -9,15 +9,15 @@ date, and of what could not be written tells its owner and not HDF5, for which i
 
 from __future__ import annotations
 
-import io
 import os
 from pathlib import Path
 
 from tisim.durable import write_at
+from tisim.seekable import Seekable
 from tisim.superblock import SIZE, superblock
 
 
-class Growing(io.RawIOBase):
+class Growing(Seekable):
     """The HDF5 file at path, made with a superblock of version 3, as a file object for ``h5py.File``.
 
     failure : why something could not be written, after which nothing is; None while all is well.
@@ -25,11 +25,10 @@ class Growing(io.RawIOBase):
 
     def __init__(self, path: Path) -> None:
         self.failure: OSError | None = None
-        self._handle = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+        super().__init__(os.open(path, os.O_RDWR | os.O_CLOEXEC))
         self._end = os.fstat(self._handle).st_size
         self._superblock = os.pread(self._handle, SIZE, 0)
         self._unwritten: list[tuple[int, bytes]] = []
-        self._at = 0
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
         at, piece = self._at, bytes(data)
@@ -84,24 +83,8 @@ class Growing(io.RawIOBase):
         self._at = last
         return len(view)
 
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        end = max([self._end, *(at + len(piece) for at, piece in self._unwritten)])
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: end}[whence]
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def readable(self) -> bool:
-        return True
+    def _size(self) -> int:
+        return max([self._end, *(at + len(piece) for at, piece in self._unwritten)])
 
     def writable(self) -> bool:
         return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def close(self) -> None:
-        if not self.closed:
-            os.close(self._handle)
-        super().close()

@@ -7,11 +7,11 @@ checksum.
 
 from __future__ import annotations
 
-import io
 import os
 from pathlib import Path
 
 from tisim import regular
+from tisim.seekable import Seekable
 from tisim.superblock import SIZE, ends, superblock
 
 _FAR = 1 << 62
@@ -20,15 +20,15 @@ LOOKS = 100
 """Times that a block is read at most, as HDF5 does it for files that it knows to be written."""
 
 
-class Reading(io.RawIOBase):
+class Reading(Seekable):
     """The file at path, whose superblock is sound; ``whole``: whether it is as long as that says."""
 
     def __init__(self, path: Path) -> None:
-        self._handle = regular.opened(path, os.O_RDONLY)
+        super().__init__(regular.opened(path, os.O_RDONLY))
         block = os.pread(self._handle, SIZE, 0)
         # The writer makes the file longer before it says so: this order, and no other, is safe.
         self.whole = os.fstat(self._handle).st_size >= ends(block)
-        self._superblock, self._at = superblock(block, _FAR), 0
+        self._superblock = superblock(block, _FAR)
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
         view = memoryview(buffer).cast("B")
@@ -49,20 +49,5 @@ class Reading(io.RawIOBase):
                 break
         return found
 
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: _FAR}[whence]
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def close(self) -> None:
-        if not self.closed:
-            os.close(self._handle)
-        super().close()
+    def _size(self) -> int:
+        return _FAR

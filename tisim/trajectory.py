@@ -5,9 +5,9 @@ without a trajectory. The file has a group of particles for each scene: ``all``,
 Particles are in the order of their ids; a frame with fewer particles than another is filled up (see h5md.py).
 
 The file can be read after every single write, by any reader, so also after the run was killed (see
-growing.py); one that comes in the midst of a write must come again, as frames.py does. ``step`` grows last, so
-what it counts is whole. The file is made under another name, with room for frames and none in it, and then put
-in its place.
+growing.py); one that comes in the midst of a write must come again, as frames.py does. ``step`` grows last,
+so what it counts is whole. The file is made under another name, with room for frames and none in it, and then
+put in its place.
 """
 
 from __future__ import annotations
