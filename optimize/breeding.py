@@ -7,12 +7,11 @@ import inspect
 import math
 import random
 from collections.abc import Mapping, Sequence
-from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
 from deap import base, tools
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from optimize.genome import Box
 from optimize.individual import Individual
@@ -31,6 +30,7 @@ _UNFIT = {
 
 POPULATION, PARENTS = 20, 6
 """Of Z04 section 8."""
+_WHOLE = TypeAdapter(int)
 
 
 class Operator(Checked):
@@ -118,8 +118,7 @@ class Breeding(Checked):
     def _following(cls, data: dict[str, Any]) -> dict[str, Any]:
         """What the numbers that are given make of those that are not."""
         population, parents, offspring = (
-            int(value) if isinstance(value := data.get(name), Integral) else None
-            for name in ("population", "parents", "offspring")
+            _whole(data.get(name)) for name in ("population", "parents", "offspring")
         )
         follow: dict[str, int] = {}
         if "parents" not in data:
@@ -151,6 +150,14 @@ class Breeding(Checked):
             for operator, prefix in ((self.select, "sel"), (self.mate, "cx"), (self.mutate, "mut")):
                 operator.function(prefix)
         return self
+
+
+def _whole(value: Any) -> int | None:
+    """The whole number that a field makes of a value, say of 8.0 or "8"; None where it will refuse it."""
+    try:
+        return _WHOLE.validate_python(value)
+    except ValidationError:
+        return None
 
 
 def proportional(population: int) -> int:

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from tisim import durable, regular
-from tisim.durable import append_at, locked, replace_file
+from tisim.durable import append_at, locked, replace_file, replacing
 from tisim.errors import InputError, RunError
 
 VICTIM = b"the user's own"
@@ -25,11 +25,17 @@ def lock_to_read(path):
         pass
 
 
+def replace_by_name(path):
+    with replacing(path.with_suffix(""), path):
+        path.write_bytes(b"new")
+
+
 WAYS = {
     "lock": lock,
     "lock to read": lock_to_read,
     "append": lambda path: append_at(path, 0, b"new"),
     "replace": lambda path: replace_file(path.with_suffix(""), b"new"),
+    "replace by name": replace_by_name,
     "read": regular.content,
     "look": regular.status,
 }
@@ -74,6 +80,10 @@ def test_what_is_no_file_of_its_own_is_refused_and_left_alone(tmp_path, way, put
     victim.write_bytes(VICTIM)
     put(path, victim)
     before = path.lstat().st_mode, sorted(p.name for p in tmp_path.iterdir())
+    if put is put_hard_link and way == "replace by name":
+        WAYS[way](path)
+        assert victim.read_bytes() == VICTIM  # what it was another name of
+        return
     if put is put_hard_link and way in ("lock to read", "read", "look"):
         WAYS[way](path)  # nothing is written to it
     else:

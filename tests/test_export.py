@@ -16,6 +16,7 @@ from tisim import Recording
 from tisim.errors import InputError
 from tisim.export import export
 from tisim.frames import frames
+from tisim.movie import movie
 from tisim.output import Folder, write
 
 
@@ -30,6 +31,30 @@ def file(tmp_path_factory):
 def every_frame(path, world=0):
     with frames(path, world) as found:
         return list(found)
+
+
+def drawn(file, folder):
+    with frames(file) as found:
+        movie(found, folder / "flow.gif")
+
+
+@pytest.mark.parametrize(
+    ("write", "name"),
+    [
+        (lambda file, folder: export(file, "xyz", folder), "flow.xyz.new"),
+        (lambda file, folder: export(file, "vtk", folder), "flow_00000.vtu.new"),
+        (lambda file, folder: export(file, "h5md", folder), "flow_copy.h5.new"),
+        (drawn, "flow.new.gif"),
+    ],
+)
+def test_planted_links_are_refused_and_not_followed(file, tmp_path, write, name):
+    victim, link = tmp_path / "victim", tmp_path / name
+    victim.write_text("the user's own")
+    link.symlink_to(victim)
+    with pytest.raises(InputError, match=rf"{name} must be a regular file .*; received a symbolic link"):
+        write(file, tmp_path)
+    assert (victim.read_text(), link.is_symlink()) == ("the user's own", True)
+    assert {path.name for path in tmp_path.iterdir()} == {"victim", name}
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tisim.errors import InputError, RunError
-from tisim.regular import opened
+from tisim.regular import opened, status
 
 try:
     import fcntl
@@ -119,17 +119,28 @@ def unfinished(name: str) -> str:
 
 @contextlib.contextmanager
 def replacing(path: Path, new: Path) -> Iterator[None]:
-    """While this lasts, ``new`` is written; then it is put in the place of path.
+    """While this lasts, ``new``, an empty file at first, is written; then it is put in the place of path.
 
-    RunError if the disk is full; path is then the old file, and nothing unfinished is left.
+    RunError if the disk is full; path is then the old file, and nothing unfinished is left. InputError when
+    something that is no file is in the place of ``new``.
     """
     try:
-        yield
-        new.replace(path)
+        _fresh(new)
+        try:
+            yield
+            new.replace(path)
+        finally:
+            new.unlink(missing_ok=True)
     except OSError as error:
         raise _full(path, error) from error
-    finally:
-        new.unlink(missing_ok=True)
+
+
+def _fresh(path: Path) -> None:
+    """Make an empty file for those who write by name, in place of one that a killed process has left: that
+    may have another name, and a link in its place would have them write over what it points to."""
+    if status(path) is not None:
+        path.unlink()
+    os.close(opened(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
 
 
 def _names(path: Path, handle: int) -> bool:

@@ -114,3 +114,15 @@ def test_what_is_no_number_is_told_as_such():
             Breeding(population=wrong)
     with pytest.raises(InputError, match="method must be one of"):
         Settings(method=["genetic"])
+
+
+@pytest.mark.parametrize("same", [float, str, np.int64, np.float64])
+@pytest.mark.parametrize("given", [{"population": 5}, {"parents": 12}, {"offspring": 12}])
+def test_a_number_is_followed_however_it_is_written(given, same):
+    """As ``--set search.options.population=5.0``, which a file may also say as text."""
+    assert Breeding(**{name: same(number) for name, number in given.items()}) == Breeding(**given)
+
+
+def test_what_is_no_number_is_refused_as_such():
+    with pytest.raises(InputError, match="population must be .*whole number.*; received 5.5"):
+        Breeding(population=5.5)
