@@ -24,7 +24,7 @@ from tisim.claim import writable
 from tisim.durable import locked, replace_file
 from tisim.errors import must
 from tisim.framed import Scan
-from tisim.regular import status
+from tisim.regular import is_folder, status
 
 FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file
 
@@ -48,7 +48,7 @@ class Cache:
         if status(self.path) is not None:
             with store.opened(self.path):
                 pass  # before a lock file is left beside a file that is not ours
-        if not self.path.parent.is_dir():
+        if not is_folder(self.path.parent):
             writable(self.path.parent)
         self.refresh()
 

@@ -1,6 +1,8 @@
 """Nothing that has been put in the place of a file of ours is followed, written to or waited for."""
 
+import json
 import os
+import re
 import socket
 import stat
 import subprocess
@@ -167,3 +169,40 @@ def test_files_of_another_user_are_read_or_refused(theirs):
     ]  # fmt: skip
     assert all(line.endswith("received one without permission") for line in lines[2:])
     assert sorted(path.name for path in theirs.iterdir()) == ["closed", "lock", "secret"]
+
+
+COMMANDS = [
+    ["plot", "closed/run"], ["movie", "closed/run"], ["export", "closed/run"],
+    ["run", "concentration", "--out", "closed/run"],
+    ["run", "concentration", "--out", "closed/run", "--resume"],
+    ["figures", "concentration", "--out", "closed/run"],
+    ["cache", "closed/search.h5", "--verify"],
+]  # fmt: skip
+AS_ANOTHER = """
+import contextlib, io, json, os, sys
+import tisim.cli, cases.case, optimize.folder, optimize.cache, optimize.listing, matplotlib.figure
+from tisim import checkpoint, output, trajectory, plots, frames, movie, export
+cases.case.every()
+if os.geteuid() == 0:  # whom no mode stops
+    os.setgroups([]); os.setgid(65534); os.setuid(65534)
+os.chdir(sys.argv[1])
+ends = []
+for command in COMMANDS:
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            tisim.cli.main(command)
+    except SystemExit as ended:
+        ends.append((ended.code, said.getvalue()))
+print(json.dumps(ends))
+"""
+
+
+def test_commands_on_a_folder_that_may_not_be_entered_say_so(theirs):
+    code = f"COMMANDS = {COMMANDS}\n{AS_ANOTHER}"
+    done = subprocess.run([sys.executable, "-c", code, str(theirs)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    ends = json.loads(done.stdout.splitlines()[-1])
+    assert [code for code, _ in ends] == [2] * len(COMMANDS)
+    for _, said in ends:
+        assert re.fullmatch(r"closed/\S+ must be in a folder that may be entered; received .*denied\n", said)

@@ -55,6 +55,10 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     folder.check(resume=True)
     folder.check(overwrite=True)
     folder.checkpoint.unlink()
+    folder.trajectory.touch()
+    with pytest.raises(InputError, match=r"\(or give --overwrite; there is no checkpoint to go on from\)"):
+        folder.check()
+    folder.trajectory.unlink()
     folder.result.touch()
     with pytest.raises(InputError, match="without a finished run"):
         folder.check()

@@ -59,7 +59,7 @@ def check(
 
 def check_all(folder: Path, overwrite: bool = False) -> None:
     """As check for a command that does not know its names before it ends: all that is there must be ours."""
-    if overwrite or not folder.is_dir():
+    if overwrite or not regular.is_folder(folder):
         return
     mine = {MARKER, *_marked(folder)}
     mine |= {unfinished(name) for name in mine}

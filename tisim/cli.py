@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from tisim import __version__, cli_cost, cli_search, cli_watch, request, runtime
+from tisim import __version__, cli_cost, cli_search, cli_watch, regular, request, runtime
 from tisim._taichi import check_backend
 from tisim.errors import InputError, RunError
 from tisim.interrupt import Interrupt, exit_code, handled, stop
@@ -169,7 +169,7 @@ def _rescued(simulation: Simulation, path: Path) -> str:
     try:
         checkpoint.save(simulation, path)
     except RunError:
-        return "No checkpoint could be written either" + "; that of before is intact." * path.exists()
+        return "No checkpoint could be written either" + "; that of before is intact." * regular.exists(path)
     return f"{path} is written. To go on, make room and give the same command with --resume."
 
 

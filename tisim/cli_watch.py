@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tisim import claim, runtime
+from tisim import claim, regular, runtime
 from tisim.errors import InputError
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads, nameable
 from tisim.terminal import err, progress_bar
@@ -96,6 +96,7 @@ def movie(
     overwrite: Overwrite = False,
 ) -> None:
     """Draw a trajectory as a moving picture."""
+    from tisim import output
     from tisim.frames import frames
     from tisim.movie import check, while_drawn
     from tisim.movie import movie as draw
@@ -104,7 +105,7 @@ def movie(
     path = to or file.with_suffix(".gif")
     with frames(file, world) as found:
         check(found, path, rate)
-        claim.take(path.parent, (path.name, while_drawn(path)), overwrite)
+        claim.take(path.parent, (path.name, while_drawn(path)), overwrite, output.LEFT)
         with _bar("drawing") as progress:
             draw(found, path, rate, progress)
         _tell(found.missing)
@@ -118,6 +119,7 @@ def export(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the frames of a run for other programs; h5md is a copy."""
+    from tisim import output
     from tisim.export import check, names
     from tisim.export import export as write
     from tisim.frames import frames
@@ -125,7 +127,7 @@ def export(
     file = _file(file)
     check(file, kind)
     place = folder or file.parent
-    claim.take(place, names(file, kind), overwrite)
+    claim.take(place, names(file, kind), overwrite, output.LEFT)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
     with frames(file) as found:
@@ -139,11 +141,15 @@ def _tell(missing: str) -> None:
 
 
 def _file(path: Path) -> Path:
-    """The trajectory in a folder, or its result where it has none."""
-    if not path.is_dir():
+    """The trajectory in a folder, or its result where it has none; InputError where there is neither."""
+    if not regular.is_folder(path):
         return path
-    trajectory = path / "trajectory.h5"
-    return trajectory if trajectory.exists() else path / "result.h5"
+    for file in (path / "trajectory.h5", path / "result.h5"):
+        if regular.exists(file):
+            return file
+    begun = regular.exists(path / "checkpoint.h5")
+    why = ", with only the checkpoint of an unfinished run" if begun else ", with neither"
+    raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 
 
 def _saved(figure: Figure, path: Path) -> Path:

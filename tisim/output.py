@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 import tisim
-from tisim import claim, picture, runtime, seal
+from tisim import claim, picture, regular, runtime, seal
 from tisim.durable import replace_file
 from tisim.errors import must
 from tisim.frames import RESULT
@@ -27,10 +27,10 @@ from tisim.result import Result
 from tisim.scene import Scene
 from tisim.state import resolve_fields
 
-LEFT = claim.Leavings(
-    ("result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5"),
-    main=("result.h5", "checkpoint.h5", "trajectory.h5"),
-)
+NAMES = ("result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5")
+"""Of all files that a run writes."""
+LEFT = claim.Leavings((*NAMES, "courses.png"), main=("result.h5", "checkpoint.h5", "trajectory.h5"))
+"""Of a run and of ``tisim plot``, whose pictures are in the same folder."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +53,20 @@ class Folder:
 
     def check(self, overwrite: bool = False, resume: bool = False) -> None:
         """InputError when writing here would lose what is not to be lost; touches nothing."""
-        what, begun = "output folder", self.checkpoint.exists()
+        what, begun = "output folder", regular.exists(self.checkpoint)
         if resume:
             must(begun, what, "one that an interrupted run has left", str(self.path))
         elif not overwrite:
-            finished = self.result.exists()
+            finished = regular.exists(self.result)
             must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
-            rule = "without an interrupted run (or give --resume or --overwrite)"
-            must(not begun and not self.trajectory.exists(), what, rule, str(self.path))
-        claim.check(self.path, LEFT.names, overwrite or resume, LEFT)
+            how = "--resume or --overwrite" if begun else "--overwrite; there is no checkpoint to go on from"
+            rule = f"without an interrupted run (or give {how})"
+            must(not begun and not regular.exists(self.trajectory), what, rule, str(self.path))
+        claim.check(self.path, NAMES, overwrite or resume, LEFT)
 
     def take(self, overwrite: bool = False, resume: bool = False) -> None:
         """Make the folder and mark it as one of tisim's; InputError as of check, and where that cannot be."""
-        claim.take(self.path, LEFT.names, overwrite or resume, LEFT)
+        claim.take(self.path, NAMES, overwrite or resume, LEFT)
 
 
 def versions() -> dict[str, str]:

@@ -61,6 +61,27 @@ def status(path: Path) -> os.stat_result | None:
     return kind
 
 
+def exists(path: Path) -> bool:
+    """Whether there is anything of this name, links followed; InputError where that may not be known."""
+    return _followed(path) is not None
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder of this name, links followed; InputError where that may not be known."""
+    kind = _followed(path)
+    return kind is not None and stat.S_ISDIR(kind.st_mode)
+
+
+def _followed(path: Path) -> os.stat_result | None:
+    try:
+        return path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        why = error.strerror or error
+        raise InputError(f"{path} must be in a folder that may be entered; received {why}") from None
+
+
 def content(path: Path, most: int = -1) -> bytes | None:
     """The bytes of a file, at most so many from its beginning; None where there is none.
 

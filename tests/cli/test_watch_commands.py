@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from cases import case as catalogue
 from cases.case import Case, Size
 from tests.test_growing import STILL, files_of_at_most
+from tests.test_growing import frame as grown
 from tisim import Recording, Simulation, durable, seal
 from tisim.frames import frames
 from tisim.trajectory import Trajectory
@@ -57,6 +58,31 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
     (folder / "trajectory.h5").unlink()
     code, out, _ = tisim("export", folder, "--format", "xyz")
     assert (code, out.strip()) == (0, str(folder / "result.xyz"))
+
+
+@pytest.mark.parametrize(
+    "first", [("export", "out", "--format", "xyz"), ("movie", "out", "--rate", 5)], ids=["export", "movie"]
+)
+def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(tisim, tmp_path, first):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    with Trajectory(Recording(folder / "trajectory.h5", frames=1), [STILL]) as made:
+        made.write(0, grown(0))
+        made.write(0, grown(1))
+    for name in ("cloud.png", "courses.png"):
+        (folder / name).touch()
+    assert tisim(*first)[0] == 0
+    code, _, err = tisim("plot", "out")
+    assert (code, "not written" in err) == (0, False), err
+    assert (folder / "courses.png").stat().st_size > 0
+
+
+def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
+    (tmp_path / "out").mkdir()
+    rule = "folder must be one with a trajectory.h5 or result.h5; received 'out', with"
+    assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
+    (tmp_path / "out" / "checkpoint.h5").touch()
+    assert tisim("plot", "out") == (2, "", f"{rule} only the checkpoint of an unfinished run\n")
 
 
 @pytest.mark.slow

@@ -124,5 +124,5 @@ def test_a_number_is_followed_however_it_is_written(given, same):
 
 
 def test_what_is_no_number_is_refused_as_such():
-    with pytest.raises(InputError, match="population must be .*whole number.*; received 5.5"):
+    with pytest.raises(InputError, match=r"population must be .*; received 5\.5"):
         Breeding(population=5.5)

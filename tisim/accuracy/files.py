@@ -20,7 +20,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim import runtime, seal
+from tisim import regular, runtime, seal
 from tisim.accuracy.quantity import Estimate
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
@@ -106,7 +106,7 @@ def resume(study: Study, folder: Path) -> None:
     InputError when what is there is of another one; nothing happens where nothing is.
     """
     path = folder / HDF5
-    if not path.exists():
+    if not regular.exists(path):
         return
     with seal.opened(path, f"output folder's {HDF5}", FORMAT) as file:
         same = json.loads(file.attrs["identity"]) == study.identity()
