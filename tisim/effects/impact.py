@@ -28,6 +28,7 @@ the last bit, and an approach is one only above what rounding makes of rest. Wit
 velocity is known to u of itself, their difference is rounded once, and a product of three components thrice
 (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, Eq. 3.5): together that is
 5 u (|v_i| + |v_j|) . |r_ij|, by components. Closer than the rounding of its own way no such pair comes.
+Nor is it a collision when forces press a pair that is in contact already: see resting.py.
 """
 
 from __future__ import annotations
@@ -37,8 +38,9 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from tisim._taichi import ti
-from tisim.effect import Effect, PairEvent, parameter
+from tisim.effect import Effect, Force, PairEvent, PairForce, parameter
 from tisim.errors import must
+from tisim.resting import press, rests, rounding
 
 
 class ImpactLaw(Effect):
@@ -80,9 +82,6 @@ class ImpactLaw(Effect):
         """Join two grains that have bonded and have not broken."""
 
 
-ROUNDOFF = {ti.f64: 2.0**-53, ti.f32: 2.0**-24}
-"""u: a number is known to this part of itself."""
-
 HOOKS = ("hardness_factor", "limit", "supply", "temperature", "fracture", "bond")
 
 
@@ -94,12 +93,15 @@ class Impact(PairEvent):
     initial_area, final_area : a_0 and a_f, contact area over pi min(b)^2 at e = 1 and e = 0 (Z04 4.12).
     tolerance : change of e at which the coupling to temperature has settled.
 
+    ``impacts`` counts collisions, ``contacts`` the steps in which forces have pressed a pair in contact.
+
     Source: Z04 Eqs (2.1)-(2.5), (3.1), (4.10), (4.12), (4.17), staggering scheme of section 6b.
     """
 
     hard: ClassVar[bool] = True
     needs = ("radius", "mass", "velocity")
-    counts = ("impacts", "bonds", "iterations", "unsettled")
+    counts = ("impacts", "contacts", "bonds", "iterations", "unsettled")
+    forced: ClassVar[bool] = False
 
     hardness: float = parameter("Pa", gt=0)
     deformation_length: float = parameter("", 1.0, gt=0)
@@ -120,7 +122,8 @@ class Impact(PairEvent):
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         laws = [peer for peer in peers if isinstance(peer, ImpactLaw)]
-        return {hook: tuple(law for law in laws if type(law).offers(hook)) for hook in HOOKS}
+        offered = {hook: tuple(law for law in laws if type(law).offers(hook)) for hook in HOOKS}
+        return {**offered, "forced": any(isinstance(peer, Force | PairForce) for peer in peers)}
 
     @ti.func
     def contact(self, s, w, i, j, separation):
@@ -129,8 +132,8 @@ class Impact(PairEvent):
         reach = s.radius[w, i] + s.radius[w, j]
         due = ti.cast(-1.0, s.real)
         if closing > 0.0 and separation.norm_sqr() <= reach * reach:
-            speeds = ti.abs(s.velocity[w, i]) + ti.abs(s.velocity[w, j])
-            if closing > 5.0 * ROUNDOFF[s.real] * speeds.dot(ti.abs(separation)):
+            rest = rounding(s, w, i, j, separation)
+            if closing > rest:
                 distance = separation.norm()
                 due = (reach - distance) * distance / closing
         return due
@@ -216,6 +219,43 @@ class Impact(PairEvent):
 
     @ti.func
     def resolve(self, s, w, i, j, separation):
+        if ti.static(self.forced):
+            if rests(s, w, i, j, separation):
+                self.support(s, w, i, j, separation)
+            else:
+                self.collide(s, w, i, j, separation)
+        else:
+            self.collide(s, w, i, j, separation)
+
+    @ti.func
+    def support(self, s, w, i, j, separation):
+        """What forces press together stays together, and slides as friction lets it; what that takes of its
+        kinetic energy is heat, and nothing else happens."""
+        m_i, m_j = s.mass[w, i], s.mass[w, j]
+        reduced = m_i * m_j / (m_i + m_j)
+        n = separation.normalized()
+        slip = s.velocity[w, i] - s.velocity[w, j]
+        v_n = slip.dot(n)
+        slip -= v_n * n
+        v_t = slip.norm()
+        impulse, most = reduced * v_n * n, 0.0 * v_n
+        for law in ti.static(self.limit):
+            most += law.limit(w, reduced * v_n)
+        slid = v_t
+        if v_t > 0.0:
+            stopped = ti.min(v_t, most / reduced)
+            impulse += reduced * stopped / v_t * slip
+            slid -= stopped
+        press(s, w, i, -impulse)
+        press(s, w, j, impulse)
+        lost = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
+        for law in ti.static(self.temperature):
+            s.temperature[w, i] = law.temperature(s, w, i, lost * m_j / (m_i + m_j))
+            s.temperature[w, j] = law.temperature(s, w, j, lost * m_i / (m_i + m_j))
+        ti.atomic_add(s.contacts[w], 1)
+
+    @ti.func
+    def collide(self, s, w, i, j, separation):
         m_i, m_j = s.mass[w, i], s.mass[w, j]
         reduced = m_i * m_j / (m_i + m_j)
         smaller = ti.min(s.radius[w, i], s.radius[w, j])
