@@ -30,7 +30,9 @@ class Stiffening(Force):
 
 
 def one(stepper, **options):
-    return scene([[1.0, 0, 0]], [[0.0, 1, 0]], (Stiffening(**options),), mass=[1.0], stepper=stepper, duration=1.0)
+    return scene(
+        [[1.0, 0, 0]], [[0.0, 1, 0]], (Stiffening(**options),), mass=[1.0], stepper=stepper, duration=1.0
+    )
 
 
 def not_finite():
