@@ -29,7 +29,8 @@ def lock_to_read(path):
 
 def replace_by_name(path):
     with replacing(path.with_suffix(""), path):
-        path.write_bytes(b"new")
+        with path.open("r+b") as file:  # of a fifo it says that it is none, where "wb" would wait
+            file.write(b"new")
 
 
 WAYS = {
@@ -200,7 +201,9 @@ print(json.dumps(ends))
 
 def test_commands_on_a_folder_that_may_not_be_entered_say_so(theirs):
     code = f"COMMANDS = {COMMANDS}\n{AS_ANOTHER}"
-    done = subprocess.run([sys.executable, "-c", code, str(theirs)], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(theirs)], capture_output=True, text=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr
     ends = json.loads(done.stdout.splitlines()[-1])
     assert [code for code, _ in ends] == [2] * len(COMMANDS)
