@@ -28,9 +28,9 @@ def lock_to_read(path):
 
 
 def replace_by_name(path):
-    with replacing(path.with_suffix(""), path):
-        with path.open("r+b") as file:  # of a fifo it says that it is none, where "wb" would wait
-            file.write(b"new")
+    # Of a fifo "r+b" says that it is none; "wb" would wait.
+    with replacing(path.with_suffix(""), path), path.open("r+b") as file:
+        file.write(b"new")
 
 
 WAYS = {
