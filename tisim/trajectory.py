@@ -25,7 +25,7 @@ import h5py
 import numpy as np
 
 import tisim
-from tisim import h5md
+from tisim import h5md, regular
 from tisim.composition import needed_fields
 from tisim.durable import replace_file
 from tisim.errors import InputError, RunError, must
@@ -115,7 +115,7 @@ class Trajectory:
     def going_on(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
         """The file that a stopped run has left, less its frames after ``time`` (s); a new one if none is."""
         path = Path(recording.path)
-        if not path.exists():
+        if not regular.exists(path):
             return cls(recording, [scene], real)
         unfinished = path.with_name(path.name + ".new")
         with ExitStack() as given_up:
@@ -191,7 +191,7 @@ class Trajectory:
 def asked(path: Path, frames: int | None, every: float | None, resume: bool) -> Recording | None:
     """What the options of a command ask for; None when that is nothing."""
     if frames is None and every is None:
-        begun = resume and path.exists()
+        begun = resume and regular.exists(path)
         must(not begun, "--frames or --every", "given as before, to go on with trajectory.h5", "neither")
         return None
     return Recording(path, frames, every)
