@@ -111,6 +111,7 @@ class Table:
             bound.__dict__[name] = self._place(values)
         return bound
 
+    @in_taichi_thread
     def _place(self, values: np.ndarray) -> Any:
         """An array in device memory."""
         column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
