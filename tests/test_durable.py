@@ -201,9 +201,11 @@ print(json.dumps(ends))
 
 def test_commands_on_a_folder_that_may_not_be_entered_say_so(theirs):
     code = f"COMMANDS = {COMMANDS}\n{AS_ANOTHER}"
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(theirs)], capture_output=True, text=True, timeout=300
-    )
+    # Nor may the folder of compiled kernels be entered, which is at home unless named.
+    elsewhere = {name: value for name, value in os.environ.items() if "OFFLINE_CACHE" not in name}
+    command = [sys.executable, "-c", code, str(theirs)]
+    home = {**elsewhere, "HOME": str(theirs / "closed")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=home)
     assert done.returncode == 0, done.stderr
     ends = json.loads(done.stdout.splitlines()[-1])
     assert [code for code, _ in ends] == [2] * len(COMMANDS)

@@ -9,9 +9,11 @@ leaves the file behind. Processes of tisim wait for each other here instead.
 from __future__ import annotations
 
 import os
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from tisim._taichi import BACKEND, ti
@@ -33,6 +35,25 @@ def lock() -> Path:
     """Where Taichi's lock is, when it is held."""
     variable, name = LOCKS[BACKEND]
     return Path(os.environ.get(variable) or ti.lang.impl.default_cfg().offline_cache_file_path) / name
+
+
+def options() -> dict[str, str]:
+    """What the compiler is to be told of the folder for kernels: nothing, or another one.
+
+    It stops where it may not look into its folder. A process that may not gets one of its own, which goes
+    with it.
+    """
+    folder = lock().parent
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+            return {}
+    return {"offline_cache_file_path": _own().name}
+
+
+@cache
+def _own() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="tisim-kernels-")
 
 
 def unlock() -> None:

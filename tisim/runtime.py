@@ -107,6 +107,7 @@ def _start(wanted: Runtime) -> None:
                 # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
                 # times as long to compile; LLVM optimises the same code afterwards.
                 cfg_optimization=False,
+                **kernel_cache.options(),
             )
             _compile_first()
     except RuntimeError as failure:
