@@ -1,0 +1,109 @@
+"""Whether two versions of the code give the same bits: fingerprints of a trajectory of each case.
+
+python tests/regression/same_bits.py --write FILE [--check]     with one version
+python tests/regression/same_bits.py --compare FILE [--check]   with the other: exit code 1 where one differs
+
+A fingerprint is a SHA-256 hash of every frame (names, shapes and bytes of all its arrays), of the end and of
+the counts of the work. With --check, every number that ``tisim check`` finds is compared too (an hour).
+Bits belong to a machine and a backend: write and compare on one. The fitness record has its own tool,
+fitness_record.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FRAMES = 5
+RUNS = (
+    ("agglomeration", "small", 1.0),
+    ("blast", "small", 1.0),
+    ("blast", "contact", 0.02),
+    ("blast", "clumps", 0.02),
+    ("capture", "default", 0.05),
+    ("cascade", "default", 0.2),
+    ("concentration", "flow", 0.05),
+    ("vibration", "alone", 0.2),
+    ("vibration", "default", 0.05),
+)
+"""Cases and sizes, and the part of their duration that is run."""
+
+
+def fingerprint(name: str, size: str, part: float) -> str:
+    """SHA-256, hexadecimal, of what one case gives from its start number 1."""
+    import tisim
+    from cases.case import find
+    from tisim.frames import frames
+
+    scene = find(name).scene(size, 1)
+    scene = scene.model_copy(update={"duration": part * scene.duration})
+    digest = hashlib.sha256()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "trajectory.h5"
+        result = tisim.run(scene, record=tisim.Recording(path, frames=FRAMES))
+        with frames(path) as found:
+            for frame in found:
+                _add(digest, {"time": np.asarray(frame.time), **frame.arrays})
+    _add(digest, result.state)
+    digest.update(json.dumps([result.time, result.work, result.measures], sort_keys=True).encode())
+    return digest.hexdigest()
+
+
+def _add(digest: Any, arrays: dict[str, np.ndarray]) -> None:
+    """Add names, shapes and bytes of arrays to a hash."""
+    for name in sorted(arrays):
+        values = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {values.shape} {values.dtype}".encode())
+        digest.update(values.tobytes())
+
+
+def checked(name: str) -> dict[str, str]:
+    """All numbers that the checks of a case find, by what they are of, bit by bit."""
+    from cases.case import find
+
+    return {item.name: repr(item) for item in find(name).check()}
+
+
+def measure(check: bool) -> dict[str, Any]:
+    """Fingerprints of all runs, and the numbers of all checks where they are asked for."""
+    found: dict[str, Any] = {}
+    for name, size, part in RUNS:
+        found[f"{name}, {size}"] = fingerprint(name, size, part)
+        print(f"{name}, {size}: {found[f'{name}, {size}'][:16]}", flush=True)
+    for name in dict.fromkeys(name for name, _, _ in RUNS if check):
+        found[f"check {name}"] = checked(name)
+        print(f"check {name}: {len(found[f'check {name}'])} numbers", flush=True)
+    return found
+
+
+def main() -> int:
+    """Write, or compare."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--write", type=Path, metavar="FILE")
+    what.add_argument("--compare", type=Path, metavar="FILE")
+    parser.add_argument("--check", action="store_true", help="also the numbers of tisim check")
+    options = parser.parse_args()
+    found = measure(options.check)
+    if options.write:
+        options.write.write_text(json.dumps(found, indent=1) + "\n")
+        return 0
+    before = json.loads(options.compare.read_text())
+    different = [name for name in found if found[name] != before.get(name)]
+    for name in different:
+        print(f"{name}: different bits")
+    if not different:
+        print(f"all {len(found)} have the same bits")
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[2]))
+    sys.exit(main())
