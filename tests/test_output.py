@@ -65,6 +65,33 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     folder.check(overwrite=True)
 
 
+def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
+    folder = Folder(tmp_path / "out")
+    with folder.taken():
+        folder.checkpoint.touch()
+        for call in (folder.check, lambda: folder.taken(overwrite=True).__enter__()):
+            with pytest.raises(InputError, match="must be without a command that is still at work there"):
+                call()
+    folder.check(resume=True)
+
+
+def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
+    Folder(tmp_path).check()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
+    folder = Folder(tmp_path)
+    folder.check()
+    with folder.taken():
+        folder.result.touch()
+    with pytest.raises(InputError, match="without a finished run"), folder.taken():
+        pass
+    folder.result.unlink()
+    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.taken(resume=True):
+        pass
+
+
 def test_unwritable_folder_is_an_input_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="output folder must be writable; received"):

@@ -110,22 +110,22 @@ def run(
     with err().status("compiling"):
         simulation = Simulation(scene)
         simulation.load([scene])
-    if resume:
-        checkpoint.restore(simulation, place.checkpoint)
-    place.take(overwrite, resume)
-    try:
-        with recorded(recording, place.trajectory, simulation, resume):
-            done = _advance(simulation, name, place.checkpoint)
-        paths = output.write(simulation.results()[0], place) if done else []
-    except RunError as error:
-        raise RunError(f"{error}. {_rescued(simulation, place.checkpoint)}") from error
-    if not done:
-        checkpoint.save(simulation, place.checkpoint)
-        err().print(
-            f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
-            "To go on, give the same command with --resume."
-        )
-        raise typer.Exit(130)
+    with place.taken(overwrite, resume):
+        if resume:
+            checkpoint.restore(simulation, place.checkpoint)
+        try:
+            with recorded(recording, place.trajectory, simulation, resume):
+                done = _advance(simulation, name, place.checkpoint)
+            paths = output.write(simulation.results()[0], place) if done else []
+        except RunError as error:
+            raise RunError(f"{error}. {_rescued(simulation, place.checkpoint)}") from error
+        if not done:
+            checkpoint.save(simulation, place.checkpoint)
+            err().print(
+                f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
+                "To go on, give the same command with --resume."
+            )
+            raise typer.Exit(130)
     result = simulation.results()[0]
     paths += [place.trajectory] if recording else []
     out().print(_summary(result, simulation.setup_s, paths))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tisim import claim, request, runtime
+from tisim import claim, lock, request, runtime
 from tisim.errors import must
 from tisim.interrupt import Interrupt
 from tisim.options import Changes, Device, Out, Overwrite, Seed, Size, Target, Threads
@@ -83,15 +83,15 @@ def cost(
     )
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
-    claim.check(place, files.LEFT.names, overwrite, files.LEFT)
-    if not overwrite:
-        files.resume(study, place)
     claim.take(place, files.LEFT.names, overwrite, files.LEFT)
-    done = _measure(study, place)
-    if study.truths and study.rows:
-        out().print(listing.table(study))
-        written = [*files.write(study, place), save(study, place / files.PICTURE)]
-        out().print("\n".join([*listing.sources(study), *map(str, written)]))
+    with lock.held(place):
+        if not overwrite:
+            files.resume(study, place)
+        done = _measure(study, place)
+        if study.truths and study.rows:
+            out().print(listing.table(study))
+            written = [*files.write(study, place), save(study, place / files.PICTURE)]
+            out().print("\n".join([*listing.sources(study), *map(str, written)]))
     if not done:
         err().print(f"stopped; {place / files.HDF5} has what is done. To go on, give the same command again.")
         raise typer.Exit(130)

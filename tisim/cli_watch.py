@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tisim import claim, regular, runtime
+from tisim import claim, lock, regular, runtime
 from tisim.errors import InputError
 from tisim.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads, nameable
 from tisim.terminal import err, progress_bar
@@ -73,16 +73,17 @@ def figures(
     runtime.start(device, precision, threads)
     place = folder or Path("out") / f"{case}-figures"
     claim.check_all(place, overwrite)
-    claim.writable(place)
-    with _bar("running") as progress:
-        made = found.figures(chosen, progress)
-    claim.take(place, made, overwrite)
-    for name, what in made.items():
-        if isinstance(what, str):
-            replace_file(place / name, what.encode())
-            print(place / name)
-        else:
-            print(_saved(what, place / name))
+    claim.take(place, (lock.LOCK,), overwrite)
+    with lock.held(place):
+        with _bar("running") as progress:
+            made = found.figures(chosen, progress)
+        claim.take(place, made, overwrite)
+        for name, what in made.items():
+            if isinstance(what, str):
+                replace_file(place / name, what.encode())
+                print(place / name)
+            else:
+                print(_saved(what, place / name))
 
 
 def movie(

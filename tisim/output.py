@@ -11,6 +11,8 @@ from __future__ import annotations
 import json
 import platform
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +20,7 @@ import h5py
 import numpy as np
 
 import tisim
-from tisim import claim, picture, regular, runtime, seal
+from tisim import claim, lock, picture, regular, runtime, seal
 from tisim.durable import replace_file
 from tisim.errors import must
 from tisim.frames import RESULT
@@ -27,7 +29,9 @@ from tisim.result import Result
 from tisim.scene import Scene
 from tisim.state import resolve_fields
 
-NAMES = ("result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5")
+NAMES = (
+    "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,
+)  # fmt: skip
 """Of all files that a run writes."""
 LEFT = claim.Leavings((*NAMES, "courses.png"), main=("result.h5", "checkpoint.h5", "trajectory.h5"))
 """Of a run and of ``tisim plot``, whose pictures are in the same folder."""
@@ -52,7 +56,12 @@ class Folder:
         return self.path / "checkpoint.h5"
 
     def check(self, overwrite: bool = False, resume: bool = False) -> None:
-        """InputError when writing here would lose what is not to be lost; touches nothing."""
+        """InputError when a run is under way here, or writing here would lose what is not to be lost; touches
+        nothing."""
+        lock.check(self.path)
+        self._check(overwrite, resume)
+
+    def _check(self, overwrite: bool, resume: bool) -> None:
         what, begun = "output folder", regular.exists(self.checkpoint)
         if resume:
             must(begun, what, "one that an interrupted run has left", str(self.path))
@@ -64,9 +73,16 @@ class Folder:
             must(not begun and not regular.exists(self.trajectory), what, rule, str(self.path))
         claim.check(self.path, NAMES, overwrite or resume, LEFT)
 
-    def take(self, overwrite: bool = False, resume: bool = False) -> None:
-        """Make the folder and mark it as one of tisim's; InputError as of check, and where that cannot be."""
+    @contextmanager
+    def taken(self, overwrite: bool = False, resume: bool = False) -> Iterator[None]:
+        """Make the folder, mark it as one of tisim's, and be alone at work there while this lasts.
+
+        InputError as of check, and where that cannot be.
+        """
         claim.take(self.path, NAMES, overwrite or resume, LEFT)
+        with lock.held(self.path):
+            self._check(overwrite, resume)  # another run may have come and gone since that was looked at
+            yield
 
 
 def versions() -> dict[str, str]:

@@ -19,6 +19,7 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
         "versions.json",
         "cloud.png",
         ".tisim",
+        ".tisim.lock",
     }
     written = Scene.from_toml(folder / "scene.toml")
     assert (written.seed, written.particles.density) == (7, 2e3)
@@ -68,7 +69,9 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
         code, _, err = tisim("run", toml, "--out", "cut")
     assert code == 130
     assert "same command with --resume" in " ".join(err.split())
-    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [".tisim", "checkpoint.h5"]
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [
+        ".tisim", ".tisim.lock", "checkpoint.h5",
+    ]  # fmt: skip
     code, _, err = tisim("run", toml, "--out", "cut")
     assert code == 2
     assert "--resume" in err
@@ -83,7 +86,7 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
 def test_second_ctrl_c_stops_at_once(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):
     press_ctrl_c(monkeypatch, after=1, times=2)
     assert tisim("run", toml)[0] == 130
-    assert [path.name for path in (tmp_path / "out" / "flow").iterdir()] == [".tisim"]
+    assert {path.name for path in (tmp_path / "out" / "flow").iterdir()} == {".tisim", ".tisim.lock"}
 
 
 BEYOND_RANGE = [

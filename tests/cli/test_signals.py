@@ -68,7 +68,8 @@ def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c
     ended, _, err = tisim("run", toml, "--out", "cut")
     assert ended == code
     assert "same command with --resume" in " ".join(err.split())
-    assert {path.name for path in (tmp_path / "cut").iterdir()} == {".tisim", "checkpoint.h5"}
+    left = {path.name for path in (tmp_path / "cut").iterdir()}
+    assert left == {".tisim", ".tisim.lock", "checkpoint.h5"}
 
 
 @pytest.mark.long

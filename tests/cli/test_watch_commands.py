@@ -124,7 +124,8 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     assert (code, out) == (1, "")
     assert "trajectory.h5 could not be written: File too large; frames before are intact" in err
     assert "checkpoint.h5 is written. To go on, make room and give the same command with --resume" in err
-    assert {path.name for path in folder.iterdir()} == {".tisim", "checkpoint.h5", "trajectory.h5"}
+    left = {path.name for path in folder.iterdir()}
+    assert left == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
     begun = every_frame(folder / "trajectory.h5")
     assert 2 < len(begun) < 21
 

@@ -20,7 +20,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim import regular, runtime, seal
+from tisim import lock, regular, runtime, seal
 from tisim.accuracy.quantity import Estimate
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
@@ -32,7 +32,7 @@ from tisim.output import versions
 
 FORMAT = "tisim cost 2"
 CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-LEFT = Leavings((CSV, HDF5, PICTURE), main=(HDF5,))
+LEFT = Leavings((CSV, HDF5, PICTURE, lock.LOCK), main=(HDF5,))
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
