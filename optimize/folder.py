@@ -21,7 +21,7 @@ from optimize.cache import Cache
 from optimize.record import canonical
 from optimize.settings import FORMAT, search_name
 from optimize.stored import searches
-from tisim import claim
+from tisim import claim, lock
 from tisim.durable import locked
 from tisim.errors import InputError, must
 from tisim.regular import status
@@ -37,22 +37,24 @@ BESIDE = (
     "best_cloud.png",
     "best_run.csv",
 )
-LEFT = claim.Leavings((FILE, f"{FILE}.journal", f"{FILE}.lock", *BESIDE), main=(FILE, f"{FILE}.journal"))
+LEFT = claim.Leavings(
+    (FILE, f"{FILE}.journal", f"{FILE}.lock", *BESIDE, lock.LOCK), main=(FILE, f"{FILE}.journal")
+)
 HOW = "--fresh --overwrite"
 """The options that let a search replace what is there."""
 
 
 def clear(folder: Path, overwrite: bool) -> None:
-    """Make way for a new search; InputError when there is one already and it is not to be overwritten."""
+    """Make way for a new search; InputError when there is one already that goes on, or is to be kept."""
     claim.check(folder, LEFT.names, overwrite, LEFT, HOW)
     begun = any(status(folder / name) is not None for name in LEFT.main)
     must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
     # The lock file stays: without it two processes could lock two different files.
     if begun:
-        with locked(folder / f"{FILE}.lock", exclusive=True) as lock:
+        with lock.held(folder), locked(folder / f"{FILE}.lock", exclusive=True) as handle:
             for name in (*LEFT.main, *BESIDE):
                 (folder / name).unlink(missing_ok=True)
-            os.ftruncate(lock, 0)
+            os.ftruncate(handle, 0)
 
 
 def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:

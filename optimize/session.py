@@ -17,6 +17,7 @@ from optimize.problem import Problem
 from optimize.runs import Evaluator, start_seed
 from optimize.search import search
 from optimize.settings import Settings, identity
+from tisim import lock
 from tisim.claim import take
 from tisim.durable import replace_file
 from tisim.interrupt import Interrupt
@@ -36,18 +37,20 @@ def session(
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
     search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.
-    InputError when the folder is another search's, has such files, or cannot be written.
+    InputError when the folder is another search's, has such files, or cannot be written. Other processes may
+    join the search, but not begin anew.
     """
     take(folder, LEFT.names, overwrite, LEFT, HOW)
-    with Cache(folder / FILE) as cache:
-        check(folder, cache, identity(problem, settings, evaluator.settings))
-        outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
-    paths = [folder / FILE]
-    if outcome.best is not None:
-        say.print(report.best_table(outcome))
-        paths += report.write(outcome, folder).values()
-        if not outcome.interrupted:
-            paths += _show_best(outcome.best, outcome, evaluator, folder, say)
+    with lock.held(folder, exclusive=False):
+        with Cache(folder / FILE) as cache:
+            check(folder, cache, identity(problem, settings, evaluator.settings))
+            outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
+        paths = [folder / FILE]
+        if outcome.best is not None:
+            say.print(report.best_table(outcome))
+            paths += report.write(outcome, folder).values()
+            if not outcome.interrupted:
+                paths += _show_best(outcome.best, outcome, evaluator, folder, say)
     say.print("written  " + "\n         ".join(map(str, paths)), highlight=False, markup=False)
     return outcome
 

@@ -10,9 +10,10 @@ from fake_runs import FakeEvaluator, fake_problem
 from cases import case as catalogue
 from cases.case import Case, Size
 from optimize.cache import Cache
-from optimize.folder import LEFT
+from optimize.folder import LEFT, clear
 from tisim.claim import MARKER
 from tisim.cli import main
+from tisim.errors import InputError
 
 BOWL = Case(
     "bowl", "A bowl", "none", {"default": Size("", {}, {"options": {"population": 8, "parents": 2}})},
@@ -65,6 +66,25 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
     assert optimize("--seed", 1)[0] == 2
+
+
+def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp_path, monkeypatch):
+    assert optimize("--generations", 0)[0] == 0
+    asked = []
+
+    class Joined(FakeEvaluator):
+        def evaluate(self, scenes, progress=None):
+            if not asked:
+                asked.append(scenes)
+                assert optimize()[0] == 0
+                with pytest.raises(InputError, match="without a command that is still at work there"):
+                    clear(tmp_path / "s", overwrite=True)
+            return super().evaluate(scenes, progress)
+
+    monkeypatch.setattr("optimize.executors.Evaluator", Joined)
+    assert optimize("--generations", 3)[0] == 0
+    assert asked
+    assert optimize("--generations", 3, "--fresh", "--overwrite")[0] == 0
 
 
 def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path, monkeypatch):
