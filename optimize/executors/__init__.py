@@ -14,7 +14,8 @@ def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 
     """The evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
 
     "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
-    "dask://host:port": the workers of the Dask scheduler there (needs the extra ``dask``).
+    "dask://host:port": the workers of the Dask scheduler there (needs the extra ``dask``), or
+    "dask://tls://host:port" where it speaks another protocol than TCP.
     threads : CPU threads of this process, or of each worker; 0 for all cores, or a worker's share of them.
     """
     kind, _, rest = name.partition(":")

@@ -7,41 +7,39 @@ import logging
 import time
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from optimize.executors import handshake, worker
 from optimize.executors.worker import Answer, Wanted
 from tisim.errors import InputError, RunError, must
 from tisim.scene import Scene
 
+if TYPE_CHECKING:
+    from distributed import Client
+
 CONNECT_S = 10.0
 """Time that a scheduler has to answer, seconds."""
 SILENCE_S = 60.0
 """Time without any worker after which the search gives up, seconds: a cluster may start others."""
+ENCRYPTED = ("tls", "wss")
+SCHEMES = ("tcp", "ws", *ENCRYPTED)
+"""In which a scheduler may be spoken to."""
 LOOK_S = 1.0
 """Time between looks at whether there are workers, seconds."""
 
 
 class DaskCluster:
-    """The workers of the scheduler at address (host:port).
+    """The workers of the scheduler at address: host:port, or scheme://host:port with one of SCHEMES.
 
     Every worker must have this package, the same compiler and Python. Taichi gets as many threads as the
     worker was given (``dask worker --nthreads``). A unit of work whose worker is lost is given to another one
-    by the scheduler, a few times at most. InputError when there is no scheduler, it has no workers, or one of
-    them is of another program.
+    by the scheduler, a few times at most. Certificates, for what is encrypted, are those of Dask's own
+    configuration, ``distributed.comm.tls``. InputError when they are missing, when there is no scheduler, and
+    when it has no workers or one of another program.
     """
 
     def __init__(self, address: str) -> None:
-        try:
-            from distributed import Client
-        except ImportError as missing:
-            rule = "one that is installed (pip install 'tisim[dask]')"
-            raise InputError(f"executor must be {rule}; received 'dask' ({missing})") from None
-        try:
-            self._client = Client(f"tcp://{address}", timeout=CONNECT_S, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as failure:
-            raise InputError(
-                f"executor must be the address of a running Dask scheduler; received {address!r} ({failure})"
-            ) from None
+        self._client = _client(address)
         # A scheduler that is lost is told below; Dask would tell it too, with all of its stacks.
         for logger in ("distributed", "distributed.client"):
             logging.getLogger(logger).setLevel(logging.CRITICAL)
@@ -113,6 +111,31 @@ class DaskCluster:
         """Cancel what is waiting; what a worker is at, it finishes for nothing."""
         self._executor.shutdown(wait=False)
         self._client.close()
+
+
+def _client(address: str) -> Client:
+    """Of the scheduler at the address; nothing is begun that Dask could not end where the address is none."""
+    try:
+        from distributed import Client, Security
+        from distributed.comm import parse_host_port
+    except ImportError as missing:
+        rule = "one that is installed (pip install 'tisim[dask]')"
+        raise InputError(f"executor must be {rule}; received 'dask' ({missing})") from None
+    scheme, _, place = address.rpartition("://")
+    scheme = scheme or "tcp"
+    must(scheme in SCHEMES, "scheme of the Dask scheduler's address", f"one of {', '.join(SCHEMES)}", scheme)
+    try:
+        parse_host_port(place)
+        security = Security() if scheme in ENCRYPTED else None
+        if security is None or security.get_connection_args("client")["ssl_context"] is not None:
+            full = f"{scheme}://{place}"
+            return Client(full, security=security, timeout=CONNECT_S, set_as_default=False)
+        failure = "there are no certificates in Dask's configuration, distributed.comm.tls"
+    except (OSError, TimeoutError, ValueError) as error:
+        failure = str(error)
+    raise InputError(
+        f"executor must be the address of a running Dask scheduler; received {address!r} ({failure})"
+    )
 
 
 def _scheduler_lost() -> RunError:

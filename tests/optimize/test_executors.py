@@ -316,6 +316,56 @@ def test_nobody_at_the_address(monkeypatch):
         executors.made("dask://127.0.0.1:9")
 
 
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        (
+            "udp://h:1",
+            "scheme of the Dask scheduler's address must be one of tcp, ws, tls, wss; received 'udp'",
+        ),
+        ("tls://h", r"address of a running Dask scheduler; received 'tls://h' \(missing port number"),
+        ("h", r"address of a running Dask scheduler; received 'h' \(missing port number"),
+        ("tls://h:1", "received 'tls://h:1' .there are no certificates in Dask's configuration"),
+        ("wss://h:1", "received 'wss://h:1' .there are no certificates in Dask's configuration"),
+    ],
+)
+def test_addresses_that_are_none(monkeypatch, address, message):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", lambda *a, **k: pytest.fail("nobody is to be asked"))
+    with pytest.raises(InputError, match=message):
+        executors.made(f"dask://{address}")
+
+
+@pytest.fixture
+def encrypted():
+    """A Dask cluster in this process that speaks TLS: its address, and the settings of whom it lets in."""
+    pytest.importorskip("cryptography")
+    distributed = pytest.importorskip("distributed")
+    lets_in = distributed.Security.temporary()
+    settings = {
+        "distributed.comm.tls.ca-file": lets_in.tls_ca_file,
+        "distributed.comm.tls.client.cert": lets_in.tls_client_cert,
+        "distributed.comm.tls.client.key": lets_in.tls_client_key,
+    }
+    with distributed.LocalCluster(
+        1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tls", security=lets_in
+    ) as made:
+        yield made.scheduler_address, settings
+
+
+def test_dask_cluster_with_tls(encrypted):
+    """Connecting asks its worker what program it is."""
+    import dask
+
+    address, settings = encrypted
+    assert address.startswith("tls://")
+    with dask.config.set(settings), closing(executors.made(f"dask://{address}")) as evaluator:
+        assert evaluator.pool.workers == 1
+    strangers = {**settings, "distributed.comm.tls.ca-file": "/nowhere/ca.pem"}
+    with dask.config.set(strangers), pytest.raises(InputError, match=r"\(\[Errno 2\] No such file"):
+        executors.made(f"dask://{address}")
+
+
 def test_dask_is_optional(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"one that is installed \(pip install 'tisim\[dask\]'\)"):
