@@ -1,0 +1,174 @@
+"""Damaged files of every kind that a command reads: one line, exit code 2, and nothing else becomes of it."""
+
+import os
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.accuracy.scenes import only, oscillator
+from tests.soak import damage
+from tisim import Simulation, lock, seal
+from tisim.claim import MARKER
+from tisim.figure import empty
+from tisim.interrupt import Interrupt
+
+
+def replaced(make):
+    def put(path):
+        path.unlink()
+        make(path)
+
+    return put
+
+
+def another_program(path):
+    with h5py.File(path, "w") as file:
+        file["x"] = range(9)
+
+
+def another_of_ours(path):
+    with seal.created(path) as file:
+        file.attrs["format"] = "tisim something else"
+
+
+def zeroed(first, size):
+    def put(path):
+        content = bytearray(path.read_bytes())
+        content[first : first + size] = bytes(size)
+        path.write_bytes(content)
+
+    return put
+
+
+DAMAGE = {
+    "empty": lambda path: path.write_bytes(b""),
+    "cut": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "signature": zeroed(0, 8),
+    "superblock": zeroed(9, 30),
+    "structure": zeroed(60, 500),
+    "zeros": lambda path: path.write_bytes(bytes(path.stat().st_size)),
+    "text": lambda path: path.write_text("particles = 3\n" * 100),
+    "another program's": another_program,
+    "another of ours": another_of_ours,
+    "folder": replaced(lambda path: path.mkdir()),
+    "fifo": replaced(os.mkfifo),
+    "device": replaced(lambda path: path.symlink_to("/dev/zero")),
+    "link to nothing": replaced(lambda path: path.symlink_to("nowhere")),
+}
+RANDOM = 12
+"""More that are hurt at random, which may be read as they were."""
+
+
+def damages(path, whole):
+    """Damage the file in one way after another: yields what was done, and whether that must be told."""
+    rng = np.random.default_rng(3)
+    random = {f"random {k}": lambda p: p.write_bytes(damage.damaged(whole, rng)) for k in range(RANDOM)}
+    for name, hurt in (DAMAGE | random).items():
+        if path.is_dir() and not path.is_symlink():
+            path.rmdir()
+        path.unlink(missing_ok=True)
+        path.write_bytes(whole)
+        hurt(path)
+        yield name, name in DAMAGE
+
+
+def refused(answer, must, what):
+    """Whether a command has refused; told in one line then, after its progress bar."""
+    code, out, err = answer
+    assert code == 2 if must else code in (0, 2), (what, answer)
+    if code:
+        told = [line for line in err.strip().splitlines() if "% 0:00" not in line]
+        assert len(told) == 1, (what, err)
+        assert "must be" in told[0], (what, err)
+        assert out == "", what
+    return bool(code)
+
+
+@pytest.fixture
+def compiled_once(monkeypatch):
+    """All runs of this process share one simulation."""
+    made = []
+
+    def simulation(scene):
+        made[:] = made or [Simulation(scene)]
+        return made[0]
+
+    monkeypatch.setattr("tisim.cli.Simulation", simulation)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["checkpoint.h5", "trajectory.h5"])
+def test_resume(tisim, toml, tmp_path, monkeypatch, press_ctrl_c, compiled_once, name):
+    command = ("run", toml, "--every", "2e-4", "--out", "cut")
+    with monkeypatch.context() as patch:
+        press_ctrl_c(patch, after=4)
+        assert tisim(*command)[0] == 130
+    cut, kept = tmp_path / "cut", tmp_path / "kept"
+    whole = (cut / name).read_bytes()
+    shutil.copytree(cut, kept)
+    gone_on = 0
+    for what, told in damages(cut / name, whole):
+        other = [path.name for path in kept.iterdir() if path.name != name]
+        if refused(tisim(*command, "--resume"), told, what):
+            left = {path.name for path in cut.iterdir()}
+            assert left == {path.name for path in kept.iterdir()}, what
+            assert all((cut / one).read_bytes() == (kept / one).read_bytes() for one in other), what
+        else:
+            gone_on += 1
+            shutil.rmtree(cut)
+            shutil.copytree(kept, cut)
+    assert gone_on < RANDOM
+    shutil.rmtree(cut)
+    shutil.copytree(kept, cut)
+    assert tisim(*command, "--resume")[0] == 0
+
+
+def test_cost(tisim, tmp_path, monkeypatch):
+    only(monkeypatch)
+    monkeypatch.setattr(Interrupt, "check", lambda self: pytest.fail("nothing is to be measured"))
+    (tmp_path / "swing.toml").write_text(oscillator().to_toml())
+    path = tmp_path / "c" / "cost.h5"
+    path.parent.mkdir()
+    whole = damage._cost(path.parent).read_bytes()
+    (path.parent / MARKER).write_text("cost.h5\ncost.csv\n")
+    for what, _ in damages(path, whole):
+        refused(tisim("cost", "swing.toml", "--out", "c"), must=True, what=what)
+        assert {one.name for one in path.parent.iterdir()} == {MARKER, lock.LOCK, "cost.h5", "cost.csv"}
+
+
+@pytest.mark.parametrize("name", ["result.h5", "trajectory.h5"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("plot", "FILE"),
+        ("movie", "FILE"),
+        ("export", "FILE", "--format", "vtk"),
+        ("export", "FILE", "--format", "xyz"),
+        ("export", "FILE", "--format", "h5md"),
+    ],
+    ids=" ".join,
+)
+def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
+    # Drawing is slow; what is drawn is read all the same.
+    monkeypatch.setattr("tisim.movie.PillowWriter.grab_frame", lambda self, **more: None)
+    monkeypatch.setattr("tisim.movie.PillowWriter.finish", lambda self: None)
+    monkeypatch.setattr("tisim.plots.start_and_end", lambda *drawn: empty(2.0, 2.0))
+    path = damage.KINDS[name].make(tmp_path)
+    whole = path.read_bytes()
+    for what, told in damages(path, whole):
+        words = [str(path) if word == "FILE" else word for word in command]
+        if refused(tisim(*words, "--" + ("to" if command[0] == "movie" else "out"), "m/x.gif"), told, what):
+            assert list(tmp_path.rglob("*.new*")) == [], what
+
+
+@pytest.mark.parametrize("name", [MARKER, lock.LOCK])
+def test_what_is_in_the_place_of_our_own(tisim, impacts, tmp_path, name):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for make in (os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")):
+        make(folder / name)
+        refused(tisim("run", impacts, "--out", "out"), must=True, what=make)
+        assert [path.name for path in folder.iterdir()] == [name]
+        (folder / name).rmdir() if make is os.mkdir else (folder / name).unlink()
