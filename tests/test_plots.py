@@ -6,14 +6,14 @@ import itertools
 
 import numpy as np
 import pytest
-from matplotlib.animation import FFMpegWriter
+from matplotlib.animation import FFMpegWriter, PillowWriter
 from PIL import Image
 
 import tisim
 from tests.scenes import scene
 from tisim import Box, Recording
 from tisim.errors import InputError
-from tisim.frames import frames
+from tisim.frames import Frames, frames
 from tisim.movie import movie
 from tisim.plots import clouds, courses, history, mark_missing
 from tisim.trajectory import Trajectory
@@ -100,6 +100,31 @@ def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
             read.seek(k)
             pictures.append(np.asarray(read.convert("RGB")).astype(int))
     assert all(np.abs(a - b).max() > 100 for a, b in itertools.pairwise(pictures))
+
+
+def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path, monkeypatch):
+    """In the narrowest picture, with numbers of all digits."""
+    seen = []
+
+    def grab(writer, **more):
+        figure = writer.fig
+        figure.draw_without_rendering()
+        seen.append([(part, part.get_window_extent()) for part in (*figure.texts, *figure.axes)])
+
+    monkeypatch.setattr(PillowWriter, "grab_frame", grab)
+    monkeypatch.setattr(PillowWriter, "finish", lambda writer: None)
+    told = "the run has come to t = 1.83413e-06 s of 1.23457e-05 s; what follows is missing"
+    monkeypatch.setattr(Frames, "missing", told)
+    with frames(file) as found:
+        movie(found, tmp_path / "t.gif")
+    assert len(seen) == 5
+    for parts in seen:
+        ((note, place),) = [pair for pair in parts if getattr(pair[0], "get_text", str)() == told]
+        whole = note.figure.bbox
+        assert whole.x0 < place.x0 < place.x1 < whole.x1
+        others = [other for part, other in parts if part is not note]
+        assert len(others) == 2, "caption, grains"
+        assert not any(place.overlaps(other) for other in others)
 
 
 def test_movies_that_cannot_be_made_are_refused(file, tmp_path, monkeypatch):

@@ -40,6 +40,8 @@ def movie(
     if coloured is not None:
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         picture.scale(figure, None, coloured, side)
+    # Between the caption and what is drawn, where it covers neither grains nor their scale.
+    figure.text(0.5, 0.935, found.missing, ha="center", fontsize=7)
     unfinished = path.with_name(while_drawn(path))
     try:
         with replacing(path, unfinished), writer.saving(figure, str(unfinished), DPI):
@@ -47,7 +49,6 @@ def movie(
                 axis.clear()
                 picture.panel(axis, frame.arrays, square, seen, coloured)
                 figure.suptitle(picture.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
-                figure.supxlabel(found.missing, x=0.98, y=0.005, ha="right", fontsize=7)
                 writer.grab_frame()
                 progress((k + 1) / len(found))
     except CalledProcessError as error:
