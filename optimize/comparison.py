@@ -19,12 +19,11 @@ from optimize.problem import Problem
 from optimize.runs import Evaluator
 from optimize.search import search
 from optimize.settings import Settings, fit, proposed
-from tisim.claim import Leavings
 from tisim.errors import RunError, must
 from tisim.terminal import plain_table
 
 FILE, CSV = "compare.h5", "compare.csv"
-LEFT = Leavings((FILE, f"{FILE}.journal", f"{FILE}.lock", CSV), main=(FILE, f"{FILE}.journal"))
+NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV)
 FRESH = 10**6
 """Seed of the starts from which what was found is run again: that of no search."""
 

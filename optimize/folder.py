@@ -37,22 +37,22 @@ BESIDE = (
     "best_cloud.png",
     "best_run.csv",
 )
-LEFT = claim.Leavings(
-    (FILE, f"{FILE}.journal", f"{FILE}.lock", *BESIDE, lock.LOCK), main=(FILE, f"{FILE}.journal")
-)
+MAIN = (FILE, f"{FILE}.journal")
+"""What there is to go on from."""
+NAMES = (*MAIN, f"{FILE}.lock", *BESIDE, lock.LOCK)
 HOW = "--fresh --overwrite"
 """The options that let a search replace what is there."""
 
 
 def clear(folder: Path, overwrite: bool) -> None:
     """Make way for a new search; InputError when there is one already that goes on, or is to be kept."""
-    claim.check(folder, LEFT.names, overwrite, LEFT, HOW)
-    begun = any(status(folder / name) is not None for name in LEFT.main)
+    claim.check(folder, NAMES, overwrite, HOW)
+    begun = any(status(folder / name) is not None for name in MAIN)
     must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
     # The lock file stays: without it two processes could lock two different files.
     if begun:
         with lock.held(folder), locked(folder / f"{FILE}.lock", exclusive=True) as handle:
-            for name in (*LEFT.main, *BESIDE):
+            for name in (*MAIN, *BESIDE):
                 (folder / name).unlink(missing_ok=True)
             os.ftruncate(handle, 0)
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from optimize import report
 from optimize.cache import Cache
 from optimize.display import Display
-from optimize.folder import FILE, HOW, LEFT, check
+from optimize.folder import FILE, HOW, NAMES, check
 from optimize.individual import Individual
 from optimize.outcome import Outcome, Progress
 from optimize.problem import Problem
@@ -40,7 +40,7 @@ def session(
     InputError when the folder is another search's, has such files, or cannot be written. Other processes may
     join the search, but not begin anew.
     """
-    take(folder, LEFT.names, overwrite, LEFT, HOW)
+    take(folder, NAMES, overwrite, HOW)
     with lock.held(folder, exclusive=False):
         with Cache(folder / FILE) as cache:
             check(folder, cache, identity(problem, settings, evaluator.settings))

@@ -6,11 +6,16 @@ import h5py
 import pytest
 
 from tisim import claim
-from tisim.claim import MARKER, NOTHING, Leavings, check, check_all, take
+from tisim.claim import MARKER, Leavings, check, check_all, take
 from tisim.errors import InputError
 from tisim.framed import MAGIC
 
-LEFT = Leavings(("all.h5", "all.csv"), main=("all.h5",))
+
+@pytest.fixture(autouse=True)
+def before(monkeypatch):
+    """What a version without markers is said to have left."""
+    left = (Leavings(("all.h5",), ("all.csv",)), Leavings(("more.h5",), ("more.csv",)))
+    monkeypatch.setattr(claim, "BEFORE", left)
 
 
 def written(folder, name, text="theirs"):
@@ -72,17 +77,16 @@ def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_pat
     make(tmp_path / "all.h5")
     written(tmp_path, "all.csv")
     written(tmp_path, "other.csv")
-    with pytest.raises(InputError, match=r"with all\.csv"):
-        check(tmp_path, ["all.csv"])
     if ours:
-        take(tmp_path, ["all.csv"], before=LEFT)
-        assert (tmp_path / MARKER).read_text() == "all.csv\nall.h5\n"
+        take(tmp_path, ["new.csv"])
+        assert (tmp_path / MARKER).read_text() == "all.csv\nall.h5\nnew.csv\n"
+        take(tmp_path, ["all.csv"])
     else:
         with pytest.raises(InputError, match=r"with all\.csv"):
-            take(tmp_path, ["all.csv"], before=LEFT)
+            take(tmp_path, ["all.csv"])
         assert not (tmp_path / MARKER).exists()
     with pytest.raises(InputError, match=r"with other\.csv"):
-        check(tmp_path, ["other.csv"], before=LEFT)
+        check(tmp_path, ["other.csv"])
 
 
 def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
@@ -123,8 +127,12 @@ def test_processes_that_take_one_folder_lose_no_name(tmp_path):
 
 
 def test_nothing_is_taken_for_granted(tmp_path):
-    """Without a word on what was there before, a folder without a marker is another's."""
+    """Of what such a version has not left there, nothing is ours."""
     hdf5(tmp_path / "all.h5", "tisim")
-    assert NOTHING.names == ()
-    with pytest.raises(InputError, match=r"with all\.h5"):
-        claim.check(tmp_path, ["all.h5"])
+    hdf5(tmp_path / "another.h5", "tisim")
+    written(tmp_path, "more.csv")
+    for name in ("another.h5", "more.csv"):
+        with pytest.raises(InputError, match=f"with {name}"):
+            check(tmp_path, [name])
+    with pytest.raises(InputError, match=r"with another\.h5, more\.csv"):
+        check_all(tmp_path)

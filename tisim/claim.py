@@ -1,8 +1,8 @@
 """Who may write to a folder: what tisim has written there it may replace, anything else only when told to.
 
 The marker ``.tisim`` in a folder names the files that tisim has written to it, one a line; a file that it
-does not name is of another origin. A folder without a marker may be of a version that made none: it is known
-by its main files.
+does not name is of another origin. A folder without a marker may be of version 0.1.0, which made none: it is
+known by its main files.
 """
 
 from __future__ import annotations
@@ -26,29 +26,46 @@ _HEAD = 1 << 20
 
 @dataclass(frozen=True)
 class Leavings:
-    """What a command leaves in a folder. names : of the files. main : those of them from which tisim can go
-    on or draw; where a folder has one but no marker, all names are of tisim's writing."""
+    """What version 0.1.0 left in a folder. main : files from which it could go on or draw; where there is one
+    but no marker, these and the others are of tisim's writing."""
 
-    names: tuple[str, ...]
-    main: tuple[str, ...] = ()
+    main: tuple[str, ...]
+    others: tuple[str, ...]
 
 
-NOTHING = Leavings(())
+BEFORE = (
+    Leavings(
+        ("result.h5", "checkpoint.h5", "trajectory.h5"),
+        (
+            "scene.toml", "versions.json", "cloud.png", "courses.png", "sequence.png", "velocities.png",
+            "envelope.png", "trajectories.png", "chains.png", "response.png",
+        ),
+    ),
+    Leavings(("cost.h5",), ("cost.csv", "cost.png")),
+    Leavings(
+        ("search.h5", "search.h5.journal"),
+        (
+            "search.h5.lock", "best.csv", "convergence.png", "convergence.pdf", "front.png", "front.pdf",
+            "best_scene.toml", "best_cloud.png", "best_run.csv",
+        ),
+    ),
+    Leavings(("compare.h5", "compare.h5.journal"), ("compare.h5.lock", "compare.csv")),
+)  # fmt: skip
+"""Whatever is written to a folder first, it is all in the marker that is then made."""
 
 
 def check(
     folder: Path,
     names: Iterable[str],
     overwrite: bool = False,
-    before: Leavings = NOTHING,
     how: str = "--overwrite",
 ) -> None:
     """InputError when writing files of these names would replace what tisim has not written; touches nothing.
 
-    overwrite : replace it all the same. before : what a version without markers left in such a folder. how :
-    the option that a message speaks of. A link, folder, fifo or device of such a name is refused always.
+    overwrite : replace it all the same. how : the option that a message speaks of. A link, folder, fifo or
+    device of such a name is refused always.
     """
-    mine, others = _ours(folder, before), []
+    mine, others = _ours(folder), []
     for name in names:
         for file in (name, unfinished(name)):
             if regular.status(folder / file) is not None and name not in mine:
@@ -61,7 +78,7 @@ def check_all(folder: Path, overwrite: bool = False) -> None:
     """As check for a command that does not know its names before it ends: all that is there must be ours."""
     if overwrite or not regular.is_folder(folder):
         return
-    mine = {MARKER, *_marked(folder)}
+    mine = {MARKER, *_ours(folder)}
     mine |= {unfinished(name) for name in mine}
     try:
         others = sorted({path.name for path in folder.iterdir()} - mine)
@@ -77,7 +94,6 @@ def take(
     folder: Path,
     names: Iterable[str],
     overwrite: bool = False,
-    before: Leavings = NOTHING,
     how: str = "--overwrite",
 ) -> None:
     """Make the folder, and mark it: from now on files of these names are of tisim's writing.
@@ -85,15 +101,15 @@ def take(
     InputError as of check, and when the folder cannot be written to.
     """
     wanted = list(names)
-    check(folder, wanted, overwrite, before, how)
+    check(folder, wanted, overwrite, how)
     writable(folder)
     if set(wanted) <= _marked(folder):
         return
     with locked(folder / MARKER, exclusive=True):
-        check(folder, wanted, overwrite, before, how)  # another process may have come first
+        check(folder, wanted, overwrite, how)  # another process may have come first
         text = regular.content(folder / MARKER) or b""
         whole = b"\n" if text and not text.endswith(b"\n") else b""  # a killed writer's last name is not
-        new = sorted({*wanted, *_ours(folder, before)} - _marked(folder))
+        new = sorted({*wanted, *_ours(folder)} - _marked(folder))
         append_at(folder / MARKER, len(text), whole + "".join(f"{name}\n" for name in new).encode())
 
 
@@ -117,12 +133,13 @@ def _refusal(folder: Path, others: Sequence[str], why: str) -> InputError:
     )
 
 
-def _ours(folder: Path, before: Leavings) -> set[str]:
+def _ours(folder: Path) -> set[str]:
     """Names of files that tisim has written, or would have."""
     marked = _marked(folder)
-    if not marked and any(_is_ours(folder / name) for name in before.main):
-        return set(before.names)
-    return marked
+    if marked:
+        return marked
+    found = [left for left in BEFORE if any(_is_ours(folder / name) for name in left.main)]
+    return {name for left in found for name in (*left.main, *left.others)}
 
 
 def _marked(folder: Path) -> set[str]:

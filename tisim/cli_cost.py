@@ -83,7 +83,7 @@ def cost(
     )
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
-    claim.take(place, files.LEFT.names, overwrite, files.LEFT)
+    claim.take(place, files.NAMES, overwrite)
     with lock.held(place):
         if not overwrite:
             files.resume(study, place)

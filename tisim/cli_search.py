@@ -117,7 +117,7 @@ def compare(
     base = request.nested(followed(usual, given), given)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
-    claim.take(place, comparison.LEFT.names, overwrite, comparison.LEFT)
+    claim.take(place, comparison.NAMES, overwrite)
     found = []
     with (
         closing(made(executor, device, precision, threads)) as evaluator,

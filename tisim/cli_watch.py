@@ -39,7 +39,7 @@ Into = Annotated[
 def plot(file: File, world: World = 0, folder: Into = None, overwrite: Overwrite = False) -> None:
     """Draw the cloud, energy, centre of gravity and number of particles in time, and what its case shows."""
     from cases.case import every
-    from tisim import output, plots
+    from tisim import plots
     from tisim.frames import frames
 
     file = _file(file)
@@ -52,7 +52,7 @@ def plot(file: File, world: World = 0, folder: Into = None, overwrite: Overwrite
         for figure in pictures.values():
             plots.mark_missing(figure, found)
         _tell(found.missing)
-    claim.take(place, pictures, overwrite, output.LEFT)
+    claim.take(place, pictures, overwrite)
     for name, figure in pictures.items():
         print(_saved(figure, place / name))
 
@@ -97,7 +97,6 @@ def movie(
     overwrite: Overwrite = False,
 ) -> None:
     """Draw a trajectory as a moving picture."""
-    from tisim import output
     from tisim.frames import frames
     from tisim.movie import check, while_drawn
     from tisim.movie import movie as draw
@@ -106,7 +105,7 @@ def movie(
     path = to or file.with_suffix(".gif")
     with frames(file, world) as found:
         check(found, path, rate)
-        claim.take(path.parent, (path.name, while_drawn(path)), overwrite, output.LEFT)
+        claim.take(path.parent, (path.name, while_drawn(path)), overwrite)
         with _bar("drawing") as progress:
             draw(found, path, rate, progress)
         _tell(found.missing)
@@ -120,7 +119,6 @@ def export(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the frames of a run for other programs; h5md is a copy."""
-    from tisim import output
     from tisim.export import check, names
     from tisim.export import export as write
     from tisim.frames import frames
@@ -128,7 +126,7 @@ def export(
     file = _file(file)
     check(file, kind)
     place = folder or file.parent
-    claim.take(place, names(file, kind), overwrite, output.LEFT)
+    claim.take(place, names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
     with frames(file) as found:

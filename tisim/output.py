@@ -33,8 +33,6 @@ NAMES = (
     "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,
 )  # fmt: skip
 """Of all files that a run writes."""
-LEFT = claim.Leavings((*NAMES, "courses.png"), main=("result.h5", "checkpoint.h5", "trajectory.h5"))
-"""Of a run and of ``tisim plot``, whose pictures are in the same folder."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class Folder:
             how = "--resume or --overwrite" if begun else "--overwrite; there is no checkpoint to go on from"
             rule = f"without an interrupted run (or give {how})"
             must(not begun and not regular.exists(self.trajectory), what, rule, str(self.path))
-        claim.check(self.path, NAMES, overwrite or resume, LEFT)
+        claim.check(self.path, NAMES, overwrite or resume)
 
     @contextmanager
     def taken(self, overwrite: bool = False, resume: bool = False) -> Iterator[None]:
@@ -79,7 +77,7 @@ class Folder:
 
         InputError as of check, and where that cannot be.
         """
-        claim.take(self.path, NAMES, overwrite or resume, LEFT)
+        claim.take(self.path, NAMES, overwrite or resume)
         with lock.held(self.path):
             self._check(overwrite, resume)  # another run may have come and gone since that was looked at
             yield

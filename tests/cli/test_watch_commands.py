@@ -11,7 +11,7 @@ from cases import case as catalogue
 from cases.case import Case, Size
 from tests.test_growing import STILL, files_of_at_most
 from tests.test_growing import frame as grown
-from tisim import Recording, Simulation, claim, durable, output, seal
+from tisim import Recording, Simulation, claim, durable, seal
 from tisim.frames import frames
 from tisim.trajectory import Trajectory
 
@@ -61,21 +61,28 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "first", [("export", "out", "--format", "xyz"), ("movie", "out", "--rate", 5)], ids=["export", "movie"]
+    "first",
+    [("export", "out", "--format", "xyz"), ("movie", "out", "--rate", 5), ("figures", "toy", "--out", "out")],
+    ids=lambda words: words[0],
 )
 def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
     tisim, tmp_path, first, monkeypatch
 ):
     monkeypatch.setattr("tisim.movie.movie", lambda *arguments: None)  # drawing is slow
+    sizes = {"default": Size("", {})}
+    parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
+    toy = Case(*parts, figures=lambda size, progress: {"many.csv": "1\n"})
+    monkeypatch.setattr(catalogue, "every", lambda: {"toy": toy})
     folder = tmp_path / "out"
     folder.mkdir()
     with Trajectory(Recording(folder / "trajectory.h5", frames=1), [STILL]) as made:
         made.write(0, grown(0))
         made.write(0, grown(1))
-    for name in ("cloud.png", "courses.png"):
+    pictures = ("cloud.png", "courses.png", "sequence.png")
+    for name in pictures:
         (folder / name).touch()
     assert tisim(*first)[0] == 0
-    claim.check(folder, ["cloud.png", "courses.png"], before=output.LEFT)  # as tisim plot does
+    claim.check(folder, pictures)  # as tisim plot does
 
 
 def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):

@@ -10,7 +10,7 @@ from fake_runs import FakeEvaluator, fake_problem
 from cases import case as catalogue
 from cases.case import Case, Size
 from optimize.cache import Cache
-from optimize.folder import LEFT, clear
+from optimize.folder import NAMES, clear
 from tisim.claim import MARKER
 from tisim.cli import main
 from tisim.errors import InputError
@@ -116,7 +116,7 @@ def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
     assert optimize()[0] == 0
 
 
-@pytest.mark.parametrize("name", ["best.csv", "best.csv.new", *LEFT.names[:3]])
+@pytest.mark.parametrize("name", ["best.csv", "best.csv.new", *NAMES[:3]])
 @pytest.mark.parametrize("way", [(), ("--fresh",), ("--fresh", "--overwrite")])
 def test_planted_links_are_refused_and_not_followed(optimize, tmp_path, name, way):
     victim, folder = tmp_path / "victim", tmp_path / "s"

@@ -25,14 +25,14 @@ from tisim.accuracy.quantity import Estimate
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
 from tisim.accuracy.study import Study
-from tisim.claim import Leavings, writable
+from tisim.claim import writable
 from tisim.durable import replace_file
 from tisim.errors import must
 from tisim.output import versions
 
 FORMAT = "tisim cost 2"
 CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-LEFT = Leavings((CSV, HDF5, PICTURE, lock.LOCK), main=(HDF5,))
+NAMES = (CSV, HDF5, PICTURE, lock.LOCK)
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
