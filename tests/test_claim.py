@@ -79,7 +79,7 @@ def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_pat
     written(tmp_path, "other.csv")
     if ours:
         take(tmp_path, ["new.csv"])
-        assert (tmp_path / MARKER).read_text() == "all.csv\nall.h5\nnew.csv\n"
+        assert (tmp_path / MARKER).read_text() == ".tisim.lock\nall.csv\nall.h5\nnew.csv\n"
         take(tmp_path, ["all.csv"])
     else:
         with pytest.raises(InputError, match=r"with all\.csv"):

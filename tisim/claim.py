@@ -15,6 +15,7 @@ from pathlib import Path
 from tisim import framed, regular
 from tisim.durable import append_at, locked, unfinished
 from tisim.errors import InputError
+from tisim.lock import LOCK
 from tisim.superblock import SIGNATURE
 
 MARKER = ".tisim"
@@ -139,7 +140,8 @@ def _ours(folder: Path) -> set[str]:
     if marked:
         return marked
     found = [left for left in BEFORE if any(_is_ours(folder / name) for name in left.main)]
-    return {name for left in found for name in (*left.main, *left.others)}
+    # A lock file is there only where a marker was, which somebody has removed.
+    return {LOCK for _ in found} | {name for left in found for name in (*left.main, *left.others)}
 
 
 def _marked(folder: Path) -> set[str]:
