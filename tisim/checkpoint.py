@@ -2,7 +2,8 @@
 
 A checkpoint holds every particle field, the clock, the books and the counters of every world. Pair lists are
 not in it: they are made anew, and results do not depend on when that was. A world that has failed is in it
-at its last good step, and why it has failed is found again when it is restored.
+at its last good step, and why it has failed is found again when it is restored. Where a step is under way it
+holds besides where worlds were before.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from tisim.simulation import Simulation
 from tisim.watch import Watch
 
 FORMAT = "tisim checkpoint 1"
+BEFORE = "before"
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:
@@ -41,8 +43,12 @@ def save(simulation: Simulation, path: str | Path) -> None:
     simulation.s.check()
     with seal.created(Path(path)) as file:
         file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
-        for name, values in simulation.s.image().items():
+        now = simulation.s.image()
+        for name, values in now.items():
             file[name] = values
+        if now["underway"].any():
+            for name, values in simulation.watch.replay.whole().items():
+                file[f"{BEFORE}/{name}"] = values
 
 
 def restore(simulation: Simulation, path: str | Path) -> None:
@@ -57,9 +63,11 @@ def restore(simulation: Simulation, path: str | Path) -> None:
             _agree(name, value, file.attrs[name])
         wall_s = float(file.attrs["wall_s"])
         columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
+        group = file.get(BEFORE, file)
+        before = {name: np.asarray(group[name]) for name in columns}
     simulation.put(columns)
     simulation.wall_s = wall_s
-    simulation.watch = Watch(simulation, columns)
+    simulation.watch = Watch(simulation, before)
     simulation.watch.look()
 
 

@@ -108,7 +108,8 @@ class Program:
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
-        """At most ``steps`` steps of every running world; none goes on past its ``hold``."""
+        """At most ``steps`` steps of every running world; none goes on past its ``hold`` or its ``goal``, or
+        after a launch that was long enough."""
         self.s.check()
         if self.schedule == "world":
             self._advance_worlds(steps)
@@ -149,7 +150,7 @@ class Program:
         for k in range(self.s.worlds * TASK):
             if k % TASK == 0:
                 w = k // TASK
-                self.s.until[w] = self.s.steps[w] + steps
+                self._allow_world(w, steps)
                 step = 0
                 while self.s.status[w] == RUNNING and step < steps and not self._waits(w):
                     self._run(self.items, w)
@@ -189,7 +190,11 @@ class Program:
     @ti.kernel
     def _allow(self, steps: ti.i32):
         for w in range(self.s.worlds):
-            self.s.until[w] = self.s.steps[w] + steps
+            self._allow_world(w, steps)
+
+    @ti.func
+    def _allow_world(self, w, steps):
+        self.s.until[w] = ti.min(self.s.steps[w] + steps, self.s.goal[w])
 
     @ti.func
     def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]

@@ -18,7 +18,7 @@ from tisim.program import Nest, Program
 from tisim.result import Result
 from tisim.scene import Scene
 from tisim.starts import check_start, laid_out, volume
-from tisim.state import ENDED, NOBODY, RUNNING, State, resolve_fields
+from tisim.state import ENDED, NEVER, NOBODY, RUNNING, State, resolve_fields
 from tisim.taichi_thread import in_taichi_thread
 from tisim.watch import Watch
 
@@ -111,7 +111,7 @@ class Simulation:
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.look: Callable[[], None] | None = None
-        self.s.write("hold", np.inf)
+        self.s.fill({"hold": np.inf, "goal": NEVER})
         self.begin()
         self.watch = Watch(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
@@ -142,7 +142,7 @@ class Simulation:
         self.s.fill(
             {
                 # What worlds wait for is asked of them by others, and stays.
-                **dict.fromkeys((name for name in self.s.columns if name != "hold"), 0),
+                **dict.fromkeys((name for name in self.s.columns if name not in ("hold", "goal")), 0),
                 "frame": np.array(frame + [np.zeros(3)] * empty),
                 "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
                 "count": counts,
@@ -172,33 +172,37 @@ class Simulation:
         """The same in stretches of some steps, about four a second: between them, whoever runs this may look
         at the state, save a checkpoint, or stop for good or for a while.
 
-        What a recorder has put in ``look`` is called there too; worlds wait at ``s.hold`` for it, so some of
-        them may have taken fewer than ``steps`` steps at the end.
+        What a recorder has put in ``look`` is called there too; worlds wait at ``s.hold`` for it.
         """
         self.s.check()
+        self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
         # Short enough to be heard from soon, long enough that looking costs little.
-        done, chunk = 0, max(8, FIRST // (self.worlds * self.s.capacity))
-        while (self.s.read("status") == RUNNING).any() and (steps is None or done < steps):
-            n = chunk if steps is None else min(chunk, steps - done)
+        chunk = max(8, FIRST // (self.worlds * self.s.capacity))
+        while self.going_on():
             began = time.perf_counter()
-            self.program.advance(n)
+            self.program.advance(chunk)
             self.watch.look()
             if self.look:
                 self.look()
             taken = time.perf_counter() - began
             self.wall_s += taken
-            done += n
             if taken < CHUNK_SECONDS / 2:
                 chunk = min(2 * chunk, 100_000)
             elif taken > 2 * CHUNK_SECONDS:
                 chunk = max(chunk // 2, 1)
             yield
 
+    def going_on(self) -> bool:
+        """Whether any world runs that has not taken all of the steps asked for."""
+        now = self.s.snapshot(("status", "steps", "goal"))
+        return bool(((now["status"] == RUNNING) & (now["steps"] < now["goal"])).any())
+
     def fraction(self) -> float:
         """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
         n = len(self.scenes)
-        ended = self.s.read("status")[:n] != RUNNING
-        return float(np.where(ended, 1.0, self.s.read("time")[:n] / self.s.read("end")[:n]).mean())
+        now = self.s.snapshot(("status", "time", "reached", "end"))
+        done = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
+        return float(np.where(now["status"][:n] != RUNNING, 1.0, done).mean())
 
     def ahead(self) -> float:
         """Steps before the world that has most of them, if they go on as long as its last one; those that it

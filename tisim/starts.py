@@ -74,7 +74,8 @@ def _real() -> type:
 def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
     """A field of all worlds: what each start says of it, else its default; ids count from 0."""
     copied, number = (f.default, 0) if isinstance(f.default, str) else (None, f.default or 0)
-    column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=np.int32 if f.integer else _real())
+    kind = np.int32 if f.integer else np.float64 if f.double else _real()
+    column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=kind)
     for w, start in enumerate(starts):
         n = len(start["mass"])
         default = start[copied] if copied else column[w, :n]

@@ -28,7 +28,7 @@ class Field:
     default : what a particle starts with where the start does not say: a number, or the name of a field of
         which it is a copy then, such as "position"; None where the start must say.
     minimum : the least value that a start may give.
-    scratch : of use to a stepper only: results do not have it.
+    scratch : of use to a stepper only: results do not have it. double : in f64 also in single precision.
     """
 
     name: str
@@ -40,6 +40,7 @@ class Field:
     default: float | str | None = 0.0
     minimum: float | None = None
     scratch: bool = False
+    double: bool = False
 
     def __post_init__(self) -> None:
         if self.slots and (self.merge != "keep" or self.components != 1):
@@ -82,8 +83,14 @@ NOBODY = 2**31 - 1
 ASKED = NOBODY - 1
 """The same: a force, not yet known which."""
 
-CLOCK = ("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "asked_at")
-BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id")
+NEVER = 2**62
+"""A number of steps that no world gets to."""
+
+CLOCK = (
+    *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "asked_at"),
+    *("reached", "cut"),
+)
+BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id", "underway")
 MOTION = ("frame", "stride", "travel")
 TALLIES = ("steps", "particle_steps")
 
@@ -104,6 +111,11 @@ class State:
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
     ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
     and quantities (f64) that effects and steppers declare.
+
+    A step that takes long may be made in several launches. ``underway`` is the number of particles that have
+    not ended it yet: unless that is 0 the particles have no time in common, ``time`` is that of when the step
+    began, and ``reached`` (s) one that all have got to. ``cut`` is how far into such a step all was well (s),
+    when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
     """
 
     def __init__(
@@ -131,10 +143,11 @@ class State:
         # Particles that its scene may ever have; the capacity may be that of a larger one.
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)
-        # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s), and at
-        # ``until`` steps.
-        self.hold, self.held, self.until = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.i64)
-        builder.dense(ti.i, worlds).place(self.hold, self.held, self.until)
+        # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s), at
+        # ``goal`` steps, and for the next launches at ``until`` steps.
+        self.hold, self.held = ti.field(ti.f64), ti.field(ti.i32)
+        self.goal, self.until = ti.field(ti.i64), ti.field(ti.i64)
+        builder.dense(ti.i, worlds).place(self.hold, self.held, self.goal, self.until)
         for name in MOTION:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
             column = ti.field(ti.f64)
@@ -142,7 +155,7 @@ class State:
             setattr(self, name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
-        own = ("seed", "most", "hold", "held", "until")
+        own = ("seed", "most", "hold", "held", "goal", "until")
         self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *keeps, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
@@ -162,7 +175,7 @@ class State:
         def __getattr__(self, name: str) -> Any: ...
 
     def _place(self, builder: Any, field: Field) -> Any:
-        dtype = ti.i32 if field.integer else self.real
+        dtype = ti.i32 if field.integer else ti.f64 if field.double else self.real
         if field.slots:
             column = ti.field(dtype)
             builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).dense(ti.k, field.slots).place(column)
@@ -180,7 +193,8 @@ class State:
         """Bytes of each particle field, all worlds together."""
         size = 8 if self.real == ti.f64 else 4
         return {
-            f.name: int(np.prod(f.shape(self.worlds, self.capacity))) * (4 if f.integer else size)
+            f.name: int(np.prod(f.shape(self.worlds, self.capacity)))
+            * (4 if f.integer else 8 if f.double else size)
             for f in self.fields
         }
 
@@ -209,7 +223,7 @@ class State:
     def saved(self) -> tuple[str, ...]:
         """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
         fields = (field.name for field in self.fields)
-        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.keeps, "frame", "seed")
+        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.keeps, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
         """A copy of all worlds as they are, by the names that are saved."""

@@ -45,16 +45,18 @@ REASONS = {
 class Watch:
     """The last good state of a loaded batch, and what has gone wrong in it.
 
-    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look; those
-        of the last good step, where a world has failed.
+    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
+        between two steps; those of the last good step, where a world has failed.
     faults : world -> (time found, s; what is wrong).
     """
 
     def __init__(self, simulation: Simulation, image: Image | None = None) -> None:
-        """``image`` : where the simulation has been put, when that is not its start."""
+        """``image`` : where the simulation has been put, or where it was before the step under way, when that
+        is not its start."""
         self.simulation, self.s = simulation, simulation.s
         self.replay = Replay(simulation, image)
-        self.good = self.s.snapshot((*self._told(), "time", "count"))
+        names = (*self._told(), "time", "count")
+        self.good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
         self.faults: dict[int, tuple[float, str]] = {}
 
     def look(self) -> None:
@@ -62,8 +64,9 @@ class Watch:
         now = self._snapshot()
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
         wrong = ~self._sound(now) | ~np.isin(now["status"], (RUNNING, ENDED))
+        known = ~wrong & (now["underway"] == 0)
         for name, kept in self.good.items():
-            kept[~wrong] = now[name][~wrong]
+            kept[known] = now[name][known]
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))

@@ -46,13 +46,6 @@ def stuck():
     return one(Trapezoid(control=control), later=1e9), 1e-3, "cannot be solved even at the shortest step"
 
 
-def stuck_in_a_window():
-    """Between two of the times at which particles that do not feel each other have a state in common."""
-    control = IterationControl(first=1e-3, longest=0.25, shortest=1e-3)
-    made = one(Trapezoid(control=control), later=1e9)
-    return made, 0.25, "found at t = 0.78"
-
-
 def steep():
     """A Brownian particle that a force would move too far in the shortest step."""
     control = DriftLimit(longest=1e-4, shortest=1e-5)
@@ -75,7 +68,6 @@ def crowded():
     [
         not_finite,
         pytest.param(stuck, marks=pytest.mark.slow),
-        pytest.param(stuck_in_a_window, marks=pytest.mark.slow),
         pytest.param(steep, marks=pytest.mark.slow),
         pytest.param(crowded, marks=pytest.mark.slow),
     ],
@@ -170,8 +162,8 @@ def test_worlds_that_fail_together_are_run_once_more_together(batch, monkeypatch
         launched.clear()
         simulation.run(steps=250)
         counts.append(list(launched))
-    assert counts[0] == counts[1]
-    assert sum(counts[0][1:]) <= 2 * 250
+    assert set(counts[0]) <= set(counts[1])
+    assert all(sum(count[1:]) <= 2 * 250 for count in counts)
 
 
 def test_ctrl_c_while_worlds_are_run_once_more_leaves_the_batch_where_it_was(batch, monkeypatch):

@@ -37,11 +37,23 @@ class Abreast(Wander):
         s = self.s
         if i % LANES == 0:
             done = 0
-            if i + LANES <= s.count[w]:
+            if i + LANES <= s.count[w] and self.level(w, i) > 0:
                 done = self.tile(w, i)
+                for j in range(i, i + LANES):
+                    s.own_window[w, j] = s.windows[w] + done
             if done < s.stretch_windows[w]:
                 for j in range(i, ti.min(i + LANES, s.count[w])):
-                    self.alone(w, j, done)
+                    self.alone(w, j)
+
+    @ti.func
+    def level(self, w, first):
+        """Whether all particles of a tile are where the launch begins, and have whole windows before them."""
+        s = self.s
+        level = ti.select(s.cut[w] > 0.0, 0, 1)
+        for j in range(first, first + LANES):
+            if s.own_window[w, j] > s.windows[w] or s.own_elapsed[w, j] > 0.0:
+                level = 0
+        return level
 
     @ti.func
     def tile(self, w, first):

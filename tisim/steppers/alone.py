@@ -1,28 +1,37 @@
 """Particles that do not feel each other: each takes its own implicit steps, many of them in one go.
 
 There is no norm over all of them and nothing to wait for. They meet at every multiple of the longest step, a
-window, which is what counts as a step of the world; how many windows a launch takes them through makes no
-difference to what they do.
+window, which is what counts as a step of the world. Where each of them is between two meetings is kept, so
+that a launch may end there: how many windows or steps it takes them through makes no difference to what they
+do.
 """
 
 from tisim._taichi import ti
 from tisim.program import PerParticle, Phase
-from tisim.state import STUCK
+from tisim.state import ENDED, STUCK, Field
 from tisim.steppers.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.kept import kept
 from tisim.steppers.registers import Registers
 from tisim.steppers.span import went
 
 LAUNCH = 2**20
-"""Windows of a launch at most, of all particles together, where more than WINDOWS of them."""
+"""Windows of a launch at most, of all particles together, where more than WINDOWS of them; and attempts at a
+step: about a second."""
 WINDOWS = 64
 LITTLE = 1e-6
 """Of a window or step: a remainder as small as rounding leaves is not worth one of its own."""
+PLACE = tuple(
+    Field(name, unit, 1, "keep", scratch=True, double=True)
+    for name, unit in (("own_window", ""), ("own_elapsed", "s"), ("own_carry", "s"))
+)
+"""Where a particle is on its way: the number of its window, how far it is in it, and the rounding error of
+that."""
+KEEPS = ("windows", "stretch_windows", "stuck", "allowance")
 
 
 class Stretch(Phase):
     """The windows of a launch: up to the end, to the next time at which somebody looks, or to as many as are
-    asked for.
+    asked for; and the attempts of a particle. What an earlier launch has left is done first.
 
     The world's time is counted in windows, so that it does not drift.
     """
@@ -34,12 +43,16 @@ class Stretch(Phase):
     @ti.func
     def run(self, w, _k):
         s = self.s
-        window = ti.cast(self.control.longest(w), ti.f64)
-        until = ti.min(s.hold[w], s.end[w])
-        wanted = ti.ceil(until / window - LITTLE) - s.windows[w]
-        allowed = ti.cast(ti.min(s.until[w] - s.steps[w], self.most), ti.f64)
-        s.stretch_windows[w] = ti.max(1.0, ti.min(wanted, allowed))
-        s.stuck[w] = 0.0
+        going = s.underway[w]
+        if going == 0:
+            going = s.count[w]
+            window = ti.cast(self.control.longest(w), ti.f64)
+            until = ti.min(s.hold[w], s.end[w])
+            wanted = ti.ceil(until / window - LITTLE) - s.windows[w]
+            allowed = ti.cast(ti.min(s.until[w] - s.steps[w], self.most), ti.f64)
+            s.stretch_windows[w], s.stuck[w] = ti.max(1.0, ti.min(wanted, allowed)), 0.0
+        s.allowance[w] = ti.max(WINDOWS, LAUNCH // (s.worlds * ti.max(1, going)))
+        s.underway[w] = 0
 
 
 @ti.func
@@ -48,6 +61,19 @@ def beginning(s, control: ti.template(), w, window):  # type: ignore[valid-type]
     length = ti.cast(control.longest(w), ti.f64)
     over = window > 0.0 and (window + LITTLE) * length >= s.end[w]
     return ti.select(over, s.end[w], window * length)
+
+
+@ti.func
+def duration(s, control: ti.template(), w, window, begin):  # type: ignore[valid-type]
+    """Of a window that begins then; one that is cut ends there. s, f64."""
+    length = beginning(s, control, w, window + 1.0) - begin
+    return ti.select(s.cut[w] > 0.0, ti.min(length, s.cut[w]), length)
+
+
+@ti.func
+def own_time(s, control: ti.template(), w, i):  # type: ignore[valid-type]
+    """How far a particle has come. s, f64."""
+    return beginning(s, control, w, s.own_window[w, i]) + s.own_elapsed[w, i]
 
 
 class Alone(PerParticle):
@@ -67,36 +93,48 @@ class Alone(PerParticle):
     def run(self, w, i):
         s = self.s
         self.registers.load(w, i)
-        begin, passed = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        steps, tries, iterations, going = ti.i64(0), ti.i64(0), ti.i64(0), 1
-        aim = self.control.aim(w)
-        for k in range(ti.cast(s.stretch_windows[w], ti.i32)):
-            if going > 0:
-                begin = beginning(s, self.control, w, s.windows[w] + k)
-                length = beginning(s, self.control, w, s.windows[w] + k + 1) - begin
-                passed, more_steps, more_tries, more_iterations = self.window(w, i, begin, length, aim)
-                steps += more_steps
-                tries += more_tries
-                iterations += more_iterations
-                if passed < length:
+        window, end = s.own_window[w, i], s.windows[w] + s.stretch_windows[w]
+        elapsed, carry = s.own_elapsed[w, i], s.own_carry[w, i]
+        steps, tries, iterations, verdict = ti.i64(0), ti.i64(0), ti.i64(0), ACCEPTED
+        aim, allowance = self.control.aim(w), ti.cast(s.allowance[w], ti.i64)
+        going = ti.select(window < end, 1, 0)
+        while going > 0:
+            begin = beginning(s, self.control, w, window)
+            length = duration(s, self.control, w, window, begin)
+            elapsed, carry, verdict, more_steps, more_tries, more_iterations = self.window(
+                w, i, begin, length, elapsed, carry, allowance - tries, aim
+            )
+            steps += more_steps
+            tries += more_tries
+            iterations += more_iterations
+            if elapsed < length:
+                going = 0
+                if verdict == HOPELESS:
+                    ti.atomic_max(s.stuck[w], 1.0)
+                else:
+                    ti.atomic_add(s.underway[w], 1)
+            elif s.cut[w] > 0.0:
+                going = 0
+            else:
+                window, elapsed, carry = window + 1.0, 0.0, 0.0
+                if window >= end:
                     going = 0
         self.registers.store(w, i)
-        s.own_time[w, i] = ti.cast(begin + passed, s.real)
-        if going == 0:
-            ti.atomic_max(s.stuck[w], 1.0)
+        s.own_window[w, i], s.own_elapsed[w, i], s.own_carry[w, i] = window, elapsed, carry
         ti.atomic_add(s.particle_steps[w], steps)
         ti.atomic_add(s.rejections[w], tries - steps)
         ti.atomic_add(s.solver_iterations[w], iterations)
         ti.atomic_add(s.force_evaluations[w], iterations)
 
     @ti.func
-    def window(self, w, i, begin, length, aim):
-        """A particle through a window: how far it gets (s), to the end unless stuck; its steps, attempts and
-        iterations."""
+    def window(self, w, i, begin, length, start, rounding, allowance, aim):
+        """A particle through a window from ``start`` (s) on: how far it gets, to the end unless it is stuck
+        or has made as many attempts as are allowed; the rounding error of that; its last verdict, steps,
+        attempts and iterations."""
         s = self.own
-        elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+        elapsed, carry = start, rounding
         steps, tries, iterations, verdict = ti.i64(0), ti.i64(0), ti.i64(0), ACCEPTED
-        while elapsed < length and verdict != HOPELESS:
+        while elapsed < length and verdict != HOPELESS and tries < allowance:
             self.solve.keep(w, i)
             verdict = TRIED
             while verdict == TRIED:
@@ -117,7 +155,7 @@ class Alone(PerParticle):
                         went(s, w, i, self.solve.gone(w, i, ti.cast(dt, s.real)))
                     # That a step has been cut short says nothing about the next one.
                     s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, wanted, 0.0), s.real))
-        return elapsed, steps, tries, iterations
+        return elapsed, carry, verdict, steps, tries, iterations
 
     @ti.func
     def attempt(self, w, i, t, dt, aim):
@@ -166,7 +204,8 @@ class Alone(PerParticle):
 
 
 class EndStretch(Phase):
-    """The windows are done; or the first particle to be stuck is found."""
+    """The windows are done, or a part of them, or one that is cut; or the first particle to be stuck is
+    found."""
 
     def __init__(self, parts) -> None:
         self.s, self.control = parts.s, parts.control
@@ -174,23 +213,42 @@ class EndStretch(Phase):
     @ti.func
     def run(self, w, _k):
         s = self.s
-        s.windows[w] += s.stretch_windows[w]
-        before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
-        s.dt[w] = (s.time[w] - before) / s.stretch_windows[w]
-        s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
         s.events[w] = 0
-        if s.stuck[w] > 0.0:
+        if s.underway[w] > 0:
+            s.reached[w] = own_time(s, self.control, w, self.slowest(w))
+        elif s.stuck[w] > 0.0:
             self.accuse(w)
+        elif s.cut[w] > 0.0:
+            s.time[w] = beginning(s, self.control, w, s.windows[w]) + s.cut[w]
+            s.status[w], s.cut[w] = ENDED, 0.0
+        else:
+            s.windows[w] += s.stretch_windows[w]
+            before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
+            s.dt[w] = (s.time[w] - before) / s.stretch_windows[w]
+            s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
+        # Whoever asks for more may look first.
+        s.until[w] = s.steps[w]
+
+    @ti.func
+    def slowest(self, w):
+        """The particle that has come least far."""
+        s = self.s
+        least = 0
+        for i in range(s.count[w]):
+            if own_time(s, self.control, w, i) < own_time(s, self.control, w, least):
+                least = i
+        return least
 
     @ti.func
     def accuse(self, w):
         """The particle that got stuck first, and when."""
+        self.stop(w, self.slowest(w), STUCK)
+        self.s.ask(w, self.s.time[w])
+
+    @ti.func
+    def stop(self, w, i, fault):
+        """The world, where a particle has been stopped by this; windows that all have passed are good."""
         s = self.s
-        first = 0
-        for i in range(s.count[w]):
-            if s.own_time[w, i] < s.own_time[w, first]:
-                first = i
-        s.time[w] = ti.cast(s.own_time[w, first], ti.f64)
-        s.failed[w] = STUCK
-        s.culprit[w] = s.id[w, first]
-        s.ask(w, s.time[w])
+        s.steps[w] += ti.cast(s.own_window[w, i] - s.windows[w], ti.i64)
+        s.time[w], s.cut[w] = own_time(s, self.control, w, i), s.own_elapsed[w, i]
+        s.failed[w], s.culprit[w] = fault, s.id[w, i]

@@ -13,7 +13,7 @@ from tisim.program import Item
 from tisim.spec import parameter
 from tisim.state import Field
 from tisim.steppers.abreast import Abreast, abreast
-from tisim.steppers.alone import Stretch
+from tisim.steppers.alone import KEEPS, Stretch
 from tisim.steppers.drift_limit import DriftLimit
 from tisim.steppers.exact_noise import GAUSS, Exact
 from tisim.steppers.fast_noise import SUMS, Fast
@@ -56,7 +56,7 @@ class Brownian(Stepper):
     noise: Literal["exact", "fast"] = "exact"
 
     random: ClassVar = True
-    keeps: ClassVar = ("windows", "stretch_windows", "stuck", "beta")
+    keeps: ClassVar = (*KEEPS, "beta")
 
     @property
     def order(self) -> int:

@@ -11,7 +11,7 @@ from tisim.program import Item
 from tisim.spec import parameter
 from tisim.state import Field
 from tisim.steppers.acceleration import accelerated, memory_of_iterates
-from tisim.steppers.alone import Alone, EndStretch, Stretch
+from tisim.steppers.alone import KEEPS, PLACE, Alone, EndStretch, Stretch
 from tisim.steppers.attempts import Attempt, Begin, Decide, GiveUp, Keep
 from tisim.steppers.implicit_control import ErrorControl, IterationControl
 from tisim.steppers.implicit_phases import Correct, Iteration, Judge, Predict, Try
@@ -21,8 +21,8 @@ from tisim.steppers.solve import Solve
 from tisim.steppers.span import Went, spans
 from tisim.steppers.stepper import Parts, Stepper
 
-OWN = (Field("own_dt", "s", 1, "keep", scratch=True), Field("own_time", "s", 1, "keep", scratch=True))
-"""Of a particle alone: its next step, and how far it has come."""
+OWN = (Field("own_dt", "s", 1, "keep", scratch=True), *PLACE)
+"""Of a particle alone: its next step, and where it is on its way."""
 
 
 class Trapezoid(Stepper):
@@ -49,7 +49,7 @@ class Trapezoid(Stepper):
     counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     keeps: ClassVar = (
         *("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt"),
-        *("windows", "stretch_windows", "stuck"),
+        *KEEPS,
     )
 
     @property

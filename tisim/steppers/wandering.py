@@ -1,22 +1,24 @@
 """Brownian particles that do not feel each other: each takes its own steps, many of them in one go.
 
 They meet at every multiple of the longest step, a window, which is what counts as a step of the world (see
-alone.py). A step of a particle is numbered by its window and within it, so that how many windows a launch
-takes them through makes no difference to the noise either.
+alone.py). A step of a particle is numbered by its window and within it, so that how many windows or steps a
+launch takes them through makes no difference to the noise either.
 """
 
 from tisim._taichi import ti
 from tisim.program import PerParticle
 from tisim.state import LOST, NOT_FINITE, Field
-from tisim.steppers.alone import LITTLE, EndStretch, beginning
+from tisim.steppers.alone import LITTLE, PLACE, EndStretch, beginning, duration
 from tisim.steppers.drift_limit import fault
 from tisim.steppers.registers import Registers
 
 OWN = (
-    Field("own_time", "s", 1, "keep", scratch=True),
+    *PLACE,
+    Field("own_steps", "", 1, "keep", integer=True, scratch=True),
     Field("own_fault", "", 1, "keep", integer=True, scratch=True),
 )
-"""How far a particle has come, and what has stopped it: a status of the world, or 0."""
+"""Where a particle is on its way, after how many steps in its window, and what has stopped it: a status of
+the world, or 0."""
 AHEAD = 8
 """Windows for which the noise of the first step, mostly the only one, is drawn at once: in vectors."""
 
@@ -43,28 +45,46 @@ class Wander(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        self.alone(w, i, 0)
+        self.alone(w, i)
 
     @ti.func
-    def alone(self, w, i, begin):
-        """Particle i through the windows of the launch from the ``begin``-th on."""
+    def alone(self, w, i):
+        """Particle i through the windows of the launch, from where it is."""
         s = self.s
         self.registers.load(w, i)
-        taken, going, windows = 0, self.able(w, i), ti.cast(s.stretch_windows[w], ti.i32)
-        for ahead in range((windows - begin + AHEAD - 1) // AHEAD):
-            if going > 0:
-                first = begin + ahead * AHEAD
-                kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
-                for lane in range(AHEAD):
-                    g = self.fluid.normals(w, i, self.number(s.windows[w] + first + lane))
-                    for k in ti.static(range(3)):
-                        kicks[k][lane] = g[k]
-                for lane in range(ti.min(AHEAD, windows - first)):
-                    if going > 0:
-                        kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
-                        taken += self.window(w, i, s.windows[w] + first + lane, kick)
-                        going = self.able(w, i)
+        window, end = s.own_window[w, i], s.windows[w] + s.stretch_windows[w]
+        elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
+        taken, going, short = ti.i64(0), self.able(w, i), 0
+        while going > 0 and window < end:
+            kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
+            for lane in range(AHEAD):
+                g = self.fluid.normals(w, i, self.number(window + lane))
+                for k in ti.static(range(3)):
+                    kicks[k][lane] = g[k]
+            for lane in range(ti.min(AHEAD, ti.cast(end - window, ti.i32))):
+                if going > 0:
+                    kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
+                    most = ti.cast(s.allowance[w], ti.i64) - taken
+                    elapsed, carry, steps, over = self.window(
+                        w, i, window, kick, elapsed, carry, before, most
+                    )
+                    taken += steps - before
+                    before = steps
+                    going = over * self.able(w, i)
+                    if over == 0:
+                        short = self.able(w, i)
+                    elif s.cut[w] > 0.0:
+                        going = 0
+                    else:
+                        window, elapsed, carry, before = window + 1.0, 0.0, 0.0, 0
+        if self.able(w, i) == 0 and s.own_fault[w, i] == 0:
+            # It waits where the others will meet.
+            window, elapsed, carry, before = end, 0.0, 0.0, 0
         self.registers.store(w, i)
+        s.own_window[w, i], s.own_elapsed[w, i], s.own_carry[w, i] = window, elapsed, carry
+        s.own_steps[w, i] = before
+        if short > 0:
+            ti.atomic_add(s.underway[w], 1)
         ti.atomic_add(s.particle_steps[w], taken)
 
     @ti.func
@@ -80,13 +100,14 @@ class Wander(PerParticle):
         return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
 
     @ti.func
-    def window(self, w, i, window, kick):
-        """A particle through a window, to the end of which it gets unless stopped; its steps. ``kick`` are
-        the normal numbers of the first of them."""
+    def window(self, w, i, window, kick, start, rounding, before, most):
+        """A particle through a window from ``start`` (s) on, ``before`` steps after its beginning: how far it
+        gets, to the end unless stopped, in ``most`` further steps; the rounding error of that; its steps in
+        the window; and 1 at the end, else 0. ``kick`` are the normal numbers of the first in the window."""
         begin = beginning(self.s, self.control, w, window)
-        length = beginning(self.s, self.control, w, window + 1) - begin
-        elapsed, carry = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        taken, going, g = 0, 1, kick
+        length = duration(self.s, self.control, w, window, begin)
+        elapsed, carry = start, rounding
+        taken, going, g = before, 1, kick
         while elapsed < length and going > 0:
             # An operator may have changed the radius in the last step.
             mobility = self.fluid.mobility(w, i)
@@ -98,7 +119,7 @@ class Wander(PerParticle):
                 rate = self.control.rate(self.own, w, i, pushed)
                 dt = self.control.step(w, rate)
                 if self.control.hopeless(w, rate):
-                    self.stop(w, i, fault(rate), begin + elapsed)
+                    self.stop(w, i, fault(rate))
                     going = 0
             if going > 0:
                 # The rounding error of the sum is carried along (W. Kahan 1965).
@@ -110,10 +131,13 @@ class Wander(PerParticle):
                 if taken > 0:
                     g = self.fluid.normals(w, i, self.number(window) + taken)
                 self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
-                elapsed = total
-                taken += 1
+                if self.s.own_fault[w, i] == 0:
+                    elapsed = total
+                    taken += 1
                 going = self.able(w, i)
-        return taken
+                if taken - before >= most:
+                    going = 0
+        return elapsed, carry, taken, ti.select(elapsed < length, 0, 1)
 
     @ti.func
     def move(self, w, i, mobility, pushed, t, dt, g):
@@ -125,17 +149,17 @@ class Wander(PerParticle):
         r = s.position[w, i]
         # Not below infinity: also true of NaN.
         if not (r.norm_sqr() < ti.math.inf):
-            self.stop(w, i, NOT_FINITE, t)
+            self.stop(w, i, NOT_FINITE)
         elif self.domain.lost(w, r):
-            self.stop(w, i, LOST, t)
+            self.stop(w, i, LOST)
         else:
             s.position[w, i] = self.domain.wrap(w, r)
 
     @ti.func
-    def stop(self, w, i, fault, t):
+    def stop(self, w, i, fault):
         """It goes no further, and its world ends with the launch."""
         s = self.s
-        s.own_fault[w, i], s.own_time[w, i] = fault, ti.cast(t, s.real)
+        s.own_fault[w, i] = fault
         ti.atomic_max(s.stuck[w], 1.0)
 
 
@@ -150,12 +174,7 @@ class EndWandering(EndStretch):
     def accuse(self, w):
         """The particle that was stopped first, and when."""
         s = self.s
-        first = -1
-        for i in range(s.count[w]):
-            if s.own_fault[w, i] > 0 and (first < 0 or s.own_time[w, i] < s.own_time[w, ti.max(first, 0)]):
-                first = i
-        s.time[w] = ti.cast(s.own_time[w, first], ti.f64)
-        s.failed[w] = s.own_fault[w, first]
-        s.culprit[w] = s.id[w, first]
+        first = self.slowest(w)
+        self.stop(w, first, s.own_fault[w, first])
         if ti.static(self.forced):
             s.ask(w, s.time[w])

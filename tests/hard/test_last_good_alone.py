@@ -1,0 +1,153 @@
+"""Particles that do not feel each other, with a longest step as long as the run: what is given back when one
+fails on the way, and what there is to go on from when a launch ends there."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, scene
+from tisim import Particles, Scene, Simulation
+from tisim._taichi import ti
+from tisim.checkpoint import restore, save
+from tisim.effect import Force, parameter
+from tisim.sources.flow import UniformFlow
+from tisim.steppers import alone
+from tisim.steppers.brownian import Brownian
+from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.implicit_control import IterationControl
+from tisim.steppers.trapezoid import Trapezoid
+
+SPEED = np.resize([1.0, 0.5, 0.25], 10)
+"""m/s; some particles arrive at the cliff at 0.783 s, others never. More than a tile that goes together."""
+CLIFF = 0.783
+STEP = 1e-3
+"""s, of steps where nothing is in the way."""
+
+
+class Ledge(Force):
+    """A push across, and beyond a place along x a spring that is far too stiff."""
+
+    place: float = parameter("m")
+    push: float = parameter("N", 0.0)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        beyond = ti.max(s.position[w, i][0] - self.place(w), 0.0)
+        return ti.Vector([-1e13 * beyond, self.push(w) + 0.0 * beyond, 0.0 * beyond])
+
+
+def inert(place=CLIFF, step=STEP, duration=1.0):
+    """Steps that do not grow."""
+    control = IterationControl(first=step, longest=1.0, shortest=1e-2 * step, most=1.0)
+    start = np.zeros((len(SPEED), 3)), np.outer(SPEED, [1.0, 0, 0])
+    return scene(
+        *start, (Ledge(place=place),), mass=1.0, stepper=Trapezoid(control=control), duration=duration
+    )
+
+
+def drifting(place=CLIFF, step=STEP, duration=1.0):
+    """Colloids without heat that a flow carries and a force pushes across at 1 m/s, a step at a time."""
+    control = DriftLimit(longest=1.0, shortest=max(1e-6 * step, 1e-9), drift=step)
+    return Scene(
+        particles=Particles(
+            position=np.outer(SPEED - 1.0, [1.0, 0, 0]), velocity=0.0 * np.outer(SPEED, [1.0, 0, 0]),
+            radius=1.0, density=1.0,
+        ),
+        effects=(Ledge(place=place, push=1.0), UniformFlow(velocity=(1.0, 0.0, 0.0))),
+        stepper=Brownian(temperature=0.0, viscosity=1 / (6 * np.pi), control=control),
+        duration=duration,
+    )  # fmt: skip
+
+
+def gone(made):
+    """Velocities on the way to the cliff, m/s."""
+    ahead = SPEED if isinstance(made.stepper, Trapezoid) else np.ones(len(SPEED))
+    return np.outer(ahead, [1.0, 0, 0]) + np.array([0.0, made.effects[0].push, 0.0])
+
+
+BOTH = pytest.mark.parametrize("made", [inert, pytest.param(drifting, marks=pytest.mark.slow)])
+
+
+def in_launches(made, monkeypatch, attempts):
+    """A simulation of which a launch has a particle make so many attempts at a step."""
+    monkeypatch.setattr(alone, "LAUNCH", 1)
+    monkeypatch.setattr(alone, "WINDOWS", attempts)
+    return Simulation(made, worlds=2)
+
+
+def same(found, wanted):
+    """To the bit."""
+    assert (found.status, found.time, found.work) == (wanted.status, wanted.time, wanted.work)
+    for name, values in wanted.state.items():
+        np.testing.assert_array_equal(found.state[name], values, err_msg=name)
+
+
+@BOTH
+def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(made, tmp_path):
+    """All particles are where they are at that time; whoever goes on from there fails at once."""
+    fails, ends = made(), made(duration=CLIFF / 2)
+    simulation = compiled(fails, worlds=2, capacity=len(SPEED))
+    simulation.load([fails, ends])
+    simulation.run()
+    bad, good = simulation.results()
+    assert good.status.ok
+    assert not bad.status.ok
+    assert bad.time == pytest.approx(CLIFF, abs=2 * STEP)
+    found, kept = (float(part.split("t = ")[1].split(" s")[0]) for part in bad.status.reason.split("kept"))
+    assert found == kept == pytest.approx(bad.time, rel=1e-5)
+    assert "by effects.ledge" in bad.status.reason
+    assert "at particle 0" in bad.status.reason
+    way, free = bad.state["position"] - bad.start["position"], gone(fails) * bad.time
+    np.testing.assert_allclose(way, free, atol=1e-2 * STEP)
+    there = bad.state["position"][:, 0] > CLIFF - 1e-2 * STEP
+    assert there.sum() == 4
+    np.testing.assert_allclose(way[~there], free[~there], rtol=1e-12)
+    assert bad.work["particle_steps"] == pytest.approx(len(SPEED) * bad.time / STEP, rel=0.2)
+    save(simulation, tmp_path / "c.h5")
+    simulation.load([fails, ends])
+    restore(simulation, tmp_path / "c.h5")
+    for result, wanted in zip(simulation.results(), (bad, good), strict=True):
+        same(result, wanted)
+
+
+@BOTH
+def test_launches_that_end_within_a_step(made, monkeypatch, tmp_path):
+    """Looked at every 64 steps of a particle, and stopped and restored there: progress, the last state that
+    all particles have had in common, and the same bits at the end, fail or not."""
+    fails, ends = made(), made(place=5.0)
+    whole = compiled(fails, worlds=2, capacity=len(SPEED))
+    whole.load([fails, ends])
+    whole.run()
+    wanted = whole.results()
+    assert [result.status.ok for result in wanted] == [False, True]
+    simulation = in_launches(fails, monkeypatch, 64)
+    simulation.load([fails, ends])
+    done = []
+    for _ in simulation.chunks():
+        done.append(simulation.fraction())
+        ended = simulation.s.read("underway")[1] == 0
+        assert simulation.results()[1].time == (1.0 if ended else 0.0)
+        if len(done) in (3, 9):
+            save(simulation, tmp_path / "c.h5")
+            before = simulation.results()
+            simulation.load([fails, ends])
+            restore(simulation, tmp_path / "c.h5")
+            for result, other in zip(simulation.results(), before, strict=True):
+                same(result, other)
+            assert simulation.fraction() == done[-1]
+    assert len(done) > 10
+    assert (np.diff(done) > 0).all()
+    assert done[-1] == 1
+    for result, other in zip(simulation.results(), wanted, strict=True):
+        same(result, other)
+
+
+@BOTH
+def test_a_launch_is_of_so_many_steps(made):
+    """Of all particles together: so Ctrl-C is heard, and progress seen, within a run of one longest step."""
+    long = made(step=1e-7, place=5.0)
+    simulation = compiled(long, worlds=2, capacity=len(SPEED))
+    simulation.load([long])
+    next(simulation.chunks())
+    steps = simulation.s.read("particle_steps")[0]
+    assert 0.1 * alone.LAUNCH < steps <= alone.LAUNCH
+    assert simulation.fraction() == pytest.approx(steps / (1e7 * len(SPEED)), rel=1e-3)
