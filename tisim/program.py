@@ -109,7 +109,7 @@ class Program:
     @in_taichi_thread
     def advance(self, steps: int) -> None:
         """At most ``steps`` steps of every running world; none goes on past its ``hold`` or its ``goal``, or
-        after a launch that was long enough."""
+        after a launch that has left a step under way."""
         self.s.check()
         if self.schedule == "world":
             self._advance_worlds(steps)

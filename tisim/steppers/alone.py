@@ -216,6 +216,8 @@ class EndStretch(Phase):
         s.events[w] = 0
         if s.underway[w] > 0:
             s.reached[w] = own_time(s, self.control, w, self.slowest(w))
+            # Whoever asks for more may look first.
+            s.until[w] = s.steps[w]
         elif s.stuck[w] > 0.0:
             self.accuse(w)
         elif s.cut[w] > 0.0:
@@ -226,8 +228,6 @@ class EndStretch(Phase):
             before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
             s.dt[w] = (s.time[w] - before) / s.stretch_windows[w]
             s.steps[w] += ti.cast(s.stretch_windows[w], ti.i64)
-        # Whoever asks for more may look first.
-        s.until[w] = s.steps[w]
 
     @ti.func
     def slowest(self, w):

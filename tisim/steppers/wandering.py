@@ -55,6 +55,7 @@ class Wander(PerParticle):
         window, end = s.own_window[w, i], s.windows[w] + s.stretch_windows[w]
         elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
         taken, going, short = ti.i64(0), self.able(w, i), 0
+        allowance, cut = ti.cast(s.allowance[w], ti.i64), s.cut[w]
         while going > 0 and window < end:
             kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
             for lane in range(AHEAD):
@@ -64,16 +65,15 @@ class Wander(PerParticle):
             for lane in range(ti.min(AHEAD, ti.cast(end - window, ti.i32))):
                 if going > 0:
                     kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
-                    most = ti.cast(s.allowance[w], ti.i64) - taken
                     elapsed, carry, steps, over = self.window(
-                        w, i, window, kick, elapsed, carry, before, most
+                        w, i, window, kick, elapsed, carry, before, allowance - taken
                     )
                     taken += steps - before
                     before = steps
-                    going = over * self.able(w, i)
+                    going = self.able(w, i)
                     if over == 0:
-                        short = self.able(w, i)
-                    elif s.cut[w] > 0.0:
+                        short, going = going, 0
+                    elif cut > 0.0:
                         going = 0
                     else:
                         window, elapsed, carry, before = window + 1.0, 0.0, 0.0, 0
