@@ -54,8 +54,8 @@ class Wander(PerParticle):
         self.registers.load(w, i)
         window, end = s.own_window[w, i], s.windows[w] + s.stretch_windows[w]
         elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
-        taken, going, short = ti.i64(0), self.able(w, i), 0
-        allowance, cut = ti.cast(s.allowance[w], ti.i64), s.cut[w]
+        taken, going, short = 0, self.able(w, i), 0
+        allowance, cut = ti.cast(s.allowance[w], ti.i32), s.cut[w]
         while going > 0 and window < end:
             kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
             for lane in range(AHEAD):
@@ -65,12 +65,11 @@ class Wander(PerParticle):
             for lane in range(ti.min(AHEAD, ti.cast(end - window, ti.i32))):
                 if going > 0:
                     kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
-                    elapsed, carry, steps, over = self.window(
+                    elapsed, carry, steps, going, over = self.window(
                         w, i, window, kick, elapsed, carry, before, allowance - taken
                     )
                     taken += steps - before
                     before = steps
-                    going = self.able(w, i)
                     if over == 0:
                         short, going = going, 0
                     elif cut > 0.0:
@@ -103,12 +102,13 @@ class Wander(PerParticle):
     def window(self, w, i, window, kick, start, rounding, before, most):
         """A particle through a window from ``start`` (s) on, ``before`` steps after its beginning: how far it
         gets, to the end unless stopped, in ``most`` further steps; the rounding error of that; its steps in
-        the window; and 1 at the end, else 0. ``kick`` are the normal numbers of the first in the window."""
+        the window; whether it can go on, and whether it is at the end. ``kick`` are the normal numbers of the
+        first step in the window."""
         begin = beginning(self.s, self.control, w, window)
         length = duration(self.s, self.control, w, window, begin)
         elapsed, carry = start, rounding
         taken, going, g = before, 1, kick
-        while elapsed < length and going > 0:
+        while elapsed < length and going > 0 and taken - before < most:
             # An operator may have changed the radius in the last step.
             mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
@@ -135,9 +135,7 @@ class Wander(PerParticle):
                     elapsed = total
                     taken += 1
                 going = self.able(w, i)
-                if taken - before >= most:
-                    going = 0
-        return elapsed, carry, taken, ti.select(elapsed < length, 0, 1)
+        return elapsed, carry, taken, going, ti.select(elapsed < length, 0, 1)
 
     @ti.func
     def move(self, w, i, mobility, pushed, t, dt, g):
