@@ -19,7 +19,7 @@ from tisim.errors import must
 from tisim.simulation import Simulation
 from tisim.watch import Watch
 
-FORMAT = "tisim checkpoint 1"
+FORMAT = "tisim checkpoint 2"
 BEFORE = "before"
 
 
