@@ -324,3 +324,9 @@ class State:
         """Stop a world in which an effect, by its index in the scene, has made something not finite."""
         self.fail(w, NOT_FINITE, i)
         ti.atomic_min(self.blame[w], effect)
+
+    @ti.func
+    def spoilt(self, w, effect):
+        """The same of a quantity of the world, which is of no particle."""
+        ti.atomic_max(self.failed[w], NOT_FINITE)
+        ti.atomic_min(self.blame[w], effect)

@@ -26,4 +26,7 @@ class PeakDisplacement(Operator):
             shift += s.mass[w, i] * (s.position[w, i] - s.origin[w, i])
             mass += s.mass[w, i]
         farthest = ti.cast(shift.norm() / mass, ti.f64)
+        # Not below infinity: also true of NaN, which the maximum would drop.
+        if not (farthest < ti.math.inf):
+            s.spoilt(w, self.index)
         s.peak_displacement[w] = ti.max(s.peak_displacement[w], farthest)
