@@ -68,3 +68,11 @@ def test_it_is_said_of_files_too():
     data = moving(fixed(1e-3), 1.0).to_dict()
     with pytest.raises(InputError, match=r"^scene\.duration must be reached"):
         Scene.from_dict({**data, "duration": 1e300})
+
+
+@pytest.mark.parametrize("control", [ErrorControl, StageControl])
+def test_a_safety_that_leaves_but_the_shortest_steps_is_refused(control):
+    """No step is so short that the error of it is 1e-300 of that asked for: rounding makes it larger."""
+    with pytest.raises(InputError, match=r"safety must be at least 0.01; received 1e-300"):
+        control(safety=1e-300)
+    assert control(safety=0.01).safety == 0.01

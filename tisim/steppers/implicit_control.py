@@ -14,6 +14,10 @@ from tisim.spec import parameter
 from tisim.steppers.controller import LEAST, StepControl, told
 from tisim.steppers.span import Per, compared
 
+LEAST_SAFETY = 0.01
+"""The least part of an error asked for that steps may aim at. Where that is below what rounding makes of an
+error, no step is short enough, and all would be the shortest."""
+
 
 class ImplicitControl(StepControl):
     """What control of implicit steppers has in common: the limits of a step.
@@ -151,7 +155,7 @@ class ErrorControl(IterationControl):
     """
 
     error: float = parameter("", 1e-4, gt=0)
-    safety: float = parameter("", 0.8, gt=0, lt=1)
+    safety: float = parameter("", 0.8, ge=LEAST_SAFETY, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
     per: Per = "step"
 

@@ -8,7 +8,7 @@ from tisim._taichi import ti
 from tisim.knob import Knob
 from tisim.spec import parameter
 from tisim.steppers.controller import LEAST
-from tisim.steppers.implicit_control import ImplicitControl
+from tisim.steppers.implicit_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.span import Per, compared
 
 CONTRACTION = 0.25
@@ -37,7 +37,7 @@ class StageControl(ImplicitControl):
     error: float = parameter("", 1e-6, gt=0)
     part: float = parameter("", 0.3, gt=0)
     sweeps: int = Field(10, ge=2)
-    safety: float = parameter("", 0.85, gt=0, lt=1)
+    safety: float = parameter("", 0.85, ge=LEAST_SAFETY, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
     per: Per = "step"
     first: float = parameter("s", 1e-6, ge=LEAST)
