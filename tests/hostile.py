@@ -129,16 +129,16 @@ def valid() -> tuple[dict[str, Any], ...]:
         needed = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
         control = {"control": controls[name]} if name in controls else {}
         found.append({**base.to_dict(), "stepper": kinds.to_dict(kind(**needed, **control))})
-    return (*found, *({**base.to_dict(), "effects": _with_needed(kind)} for kind in known_effects()))
+    return (*found, *({**base.to_dict(), "effects": with_needed(kind)} for kind in known_effects()))
 
 
-def _with_needed(kind: type[Effect]) -> dict[str, Any]:
+def with_needed(kind: type[Effect]) -> dict[str, Any]:
     """Plain data of an effect, after those that it needs."""
     partners: dict[str, Any] = {}
     for contract in kind.requires:
-        partners |= _with_needed(next(known for known in known_effects() if issubclass(known, contract)))
+        partners |= with_needed(next(known for known in known_effects() if issubclass(known, contract)))
     if kind.feels:
-        partners |= _with_needed(MagneticField)
+        partners |= with_needed(MagneticField)
     rows = {name: [_required(row)] for name, row in kind.lists()}
     return {**partners, kind.kind(): kinds.to_dict(kind(**_required(kind), **rows), named=False)}
 

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
+
 from tisim import Scene
 from tisim.cli import main
 from tisim.errors import RunError
+from tisim.result import Result
 from tisim.runtime import Runtime
+from tisim.state import CROWDED, FULL, RUNNING
+from tisim.watch import REASONS
 
 ACCEPTED = "accepted"
 """What a command says in place of running."""
+OF_THE_WORLD = FULL, CROWDED
+"""Failures that are of no particle and no force: there is no more room."""
 
 
 def check_message(text: str) -> None:
@@ -64,3 +72,20 @@ def command(words: Sequence[str]) -> tuple[int, str]:
         except SystemExit as end:
             code = end.code
     return code, err.getvalue()
+
+
+def check_result(result: Result) -> None:
+    """What a run gives back is finite; a failure says when, and which particle or force or what of the world.
+
+    A start that fails is given back as it was: what should have followed from it, such as forces, may be what
+    is not finite.
+    """
+    begun = result.status.ok or result.time > 0
+    told = {name: values for name, values in result.state.items() if begun or name in result.start}
+    for name, values in {**told, **result.measures, "time": result.time}.items():
+        assert np.isfinite(values).all(), f"{name} is not finite, and the status is {result.status}"
+    if result.status.ok or result.status.reason == REASONS[RUNNING]:
+        return
+    assert re.fullmatch(r"found at t = \S+ s: .+; kept t = \S+ s", result.status.reason), result.status.reason
+    named = "particle" in result.status.reason or "effects." in result.status.reason
+    assert named or any(REASONS[code] in result.status.reason for code in OF_THE_WORLD), result.status.reason

@@ -1,22 +1,25 @@
-"""Hostile scenes: plain data, files and settings, each accepted or refused in a line, within a second."""
+"""Hostile scenes: plain data, files and settings, each accepted or refused in a line, within a second; and
+some steps of scenes that are accepted though numbers in them are extreme."""
 
 from __future__ import annotations
 
-import multiprocessing
 import time
-from collections.abc import Iterator
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
-from tests import hostile
+from tests import extremes, hostile
 from tests.judged import ACCEPTED, check_file, check_message, command, nothing_runs
+from tests.soak.apart import Apart, Came
 from tests.soak.counts import Counts
+from tests.soak.running import ENDED, REFUSED, Runs
 from tisim import Scene
 from tisim.errors import InputError
 
 TRIALS = 1000
 """Of each kind."""
+OF_ONE = 50
+"""Runs of a scene with one set of numbers after another: compiling takes as long as some hundred of them."""
 SECOND = 1.0
 """The work of one trial, s of the processor: what a loaded machine does not lengthen."""
 PATIENCE = 120.0
@@ -60,70 +63,46 @@ def _command(words: list[str], folder: Path) -> None:
 KINDS = {"hostile plain data": plain_data, "hostile scene files": files, "hostile settings": settings}
 
 
-def work(calls: Connection, folder: Path) -> None:
-    """Answer each (kind, seed) with what came of it: "", "wrong", "hung" or "traceback"."""
+def reader(folder: Path) -> Callable[[tuple[str, int]], str]:
+    """In a process of its own: trials by (kind, seed)."""
     hostile.valid()
-    calls.send("ready")
-    while True:
-        kind, seed = calls.recv()
-        began, came = time.thread_time(), ""
-        try:
-            KINDS[kind](Random(seed), folder)
-        except AssertionError:
-            came = "wrong"
-        except BaseException:
-            came = "traceback"
-        calls.send("hung" if time.thread_time() - began > SECOND else came)
 
+    def trial(call: tuple[str, int]) -> str:
+        kind, seed = call
+        began = time.thread_time()
+        KINDS[kind](Random(seed), folder)
+        if time.thread_time() - began > SECOND:
+            raise TimeoutError(f"{time.thread_time() - began:.3g} s")
+        return ENDED
 
-class Worker:
-    """A process that makes trials, and another in its place when it dies or does not answer."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._start()
-
-    def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.calls, theirs = context.Pipe()
-        self.process = context.Process(target=work, args=(theirs, self.folder), daemon=True)
-        self.process.start()
-        theirs.close()
-        self.calls.recv()
-
-    def trial(self, kind: str, seed: int) -> str:
-        """What came of a trial."""
-        self.calls.send((kind, seed))
-        try:
-            if self.calls.poll(PATIENCE):
-                return str(self.calls.recv())
-            came = "hung"
-        except EOFError:
-            came = "traceback"
-        self.end()
-        self._start()
-        return came
-
-    def end(self) -> None:
-        """End the process."""
-        self.process.kill()
-        self.process.join()
+    return trial
 
 
 def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
     """Counts of each kind; tests/soak/__main__.py says what they are."""
-    worker = Worker(folder)
+    number = max(1, round(share * TRIALS))
+    worker = Apart(reader, folder)
     try:
-        for number, kind in enumerate(KINDS):
-            counts = Counts(kind)
-            for k in range(max(1, round(share * TRIALS))):
-                came = worker.trial(kind, (seed * len(KINDS) + number) * TRIALS + k)
-                counts.tried += 1
-                counts.wrong += came == "wrong"
-                counts.hung += came == "hung"
-                counts.tracebacks += came == "traceback"
-                if came:
-                    print(f"{kind}, seed {(seed * len(KINDS) + number) * TRIALS + k}: {came}")
-            yield counts
+        for k, kind in enumerate(KINDS):
+            seeds = range((seed * len(KINDS) + k) * TRIALS, (seed * len(KINDS) + k) * TRIALS + number)
+            yield _counted(kind, ((f"seed {s}", worker.trial((kind, s), PATIENCE)) for s in seeds))
     finally:
         worker.end()
+    runs, names = Runs(), list(extremes.scenes())
+    try:
+        seeds = range(seed * TRIALS, seed * TRIALS + number)
+        chosen = ((names[s // OF_ONE % len(names)], s) for s in seeds)
+        yield _counted("extreme scenes run", ((f"{name}, seed {s}", runs(name, s)) for name, s in chosen))
+    finally:
+        runs.end()
+
+
+def _counted(kind: str, trials: Iterator[tuple[str, Came]]) -> Counts:
+    """Counts of trials, each with what it is; what went wrong is printed."""
+    counts = Counts(kind)
+    for what, (column, word) in trials:
+        counts.tried += word != REFUSED
+        if column:
+            setattr(counts, column, getattr(counts, column) + 1)
+            print(f"{kind}, {what}: {column}: {word[-1500:]}", flush=True)
+    return counts

@@ -1,0 +1,220 @@
+"""Scenes of every kind of effect, operator, source and stepper, with numbers at the ends of what is accepted.
+
+Three particles, two of which press into each other while the third comes near, with all that makes the kind
+act: a field has somebody who feels it, a moment a field. Numbers are of common size, until one of them, or
+some, are made extreme; then the scene may be refused, but what is accepted must run, or fail in words.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator
+from functools import cache
+from random import Random
+from typing import Any
+
+from tests.hostile import with_needed
+from tisim import Scene, kinds, steppers
+from tisim.composition import needed_fields
+from tisim.effect import Effect, Settled, Source
+from tisim.effects.drag import StokesDrag
+from tisim.effects.impact import Impact
+from tisim.effects.lorentz import Lorentz
+from tisim.effects.magnetophoresis import Magnetophoresis
+from tisim.effects.mie import Mie
+from tisim.effects.moment import MOMENT, InducedMoment, LangevinMoment
+from tisim.effects.near_field import NearField
+from tisim.effects.tether import Tether
+from tisim.explain import known_effects
+from tisim.operators.agglomeration import Agglomeration
+from tisim.sources.sphere import MagneticSpheres
+from tisim.sources.uniform import ElectricField, MagneticField
+from tisim.steppers.stepper import Stepper
+
+MAGNITUDES = (
+    5e-324, 2.3e-308, 1e-300, 1e-155, 1e-100, 1e-60, 1e-30, 1e-15, 1e-9, 1e-3, 0.5, math.nextafter(1.0, 0.0),
+    1.0, 1e3, 1e9, 1e15, 1e30, 1e60, 1e100, 1e155, 1e300, 1.7e308,
+)  # fmt: skip
+"""From the least to the most that a number can be, through those whose squares and cubes still are one."""
+VALUES = (0.0, *MAGNITUDES, *(-size for size in MAGNITUDES))
+DT, STEPS = 1e-5, 30
+"""s, a step of common length; how many of them make a run."""
+
+COMMON: dict[str, dict[str, Any]] = {
+    "impact": {"hardness": 1e5},
+    "heating": {"heat_capacity": 500.0},
+    "friction": {"coefficient": 0.3},
+    "fragmentation": {"surface_energy": 0.05},
+    "reaction": {"energy_density": 1e3},
+    "softening": {"activation_energy": 300.0},
+    "cooling": {"convection": 10.0},
+    "contact": {"stiffness": 1e9},
+    "contact_bond": {"stiffness": 1e9, "grip_stiffness": 1e6, "threshold": 1e-3},
+    "contact_dissipation": {"damping": 1e3},
+    "contact_friction": {"stiffness": 1e6},
+    "contact_softening": {"reference_temperature": 300.0, "floor": 1e3},
+    "hertz": {"young": 1e7, "poisson": 0.3},
+    "mie": {"epsilon": 4e-21, "cutoff": 2.0},
+    "near_field": {"alpha1": 1e-6, "alpha2": 1e-9},
+    "truncated_near_field": {"alpha1": 1e-6, "alpha2": 1e-9},
+    "tether": {"stiffness": [1.0, 1.0, 2.0]},
+    "stokes_drag": {"viscosity": 1e-3},
+    "chow_drag": {"density": 1.2, "viscosity": 1.8e-5},
+    "darcy_flow": {"pressure_gradient": [0.0, 0.0, 1e3], "viscosity": 1e-3, "diameter": 1e-3},
+    "magnetic_field": {"constant": [0.0, 0.0, 0.1], "amplitude": [0.1, 0.0, 0.0], "omega": [1e3, 0.0, 0.0]},
+    "electric_field": {"constant": [1e3, 0.0, 0.0], "amplitude": [0.0, 1e3, 0.0], "omega": [0.0, 1e3, 0.0]},
+    "magnetic_spheres": {
+        "spheres": [{"centre": [0, 0, -3e-3], "magnetisation": [0, 0, 1e6], "radius": 1e-3}]
+    },
+    "magnetic_cylinders": {
+        "cylinders": [
+            {"centre": [0, 0, -4e-3], "magnetisation": [0, 1e5, 1e6], "radius": 1e-3, "length": 5e-3}
+        ]
+    },
+    "langevin_moment": {"temperature": 300.0},
+    "mutual_langevin_moment": {"temperature": 300.0},
+    "magnetic_body_force": {"gamma": 1e-4},
+}
+"""Numbers of common size, of effects for which 1/2 is none. All together make something happen."""
+FIELDS = {"flow_velocity": (StokesDrag,), "electric_field": (Lorentz,)}
+"""Who feels a field; a magnetic one is felt by charges and moments."""
+CONTROLLED = {
+    "verlet": (
+        ({"kind": "fixed_step", "dt": DT}, {}, (NearField, Tether)),
+        ({"kind": "approach_time"}, {}, (Impact,)),
+    ),
+    "boris": (({"kind": "fixed_step", "dt": DT}, {}, (Lorentz, MagneticField, Tether)),),
+    "trapezoid": (
+        ({"kind": "iteration_control"}, {}, (Lorentz, MagneticField, StokesDrag, Tether)),
+        ({"kind": "iteration_control"}, {}, (NearField, StokesDrag)),
+        ({"kind": "error_control", "per": "run"}, {"acceleration": "anderson"}, (NearField, Tether)),
+        ({"kind": "error_control"}, {}, (Lorentz, MagneticField, Tether)),
+    ),
+    "collocation": (
+        ({"kind": "stage_control"}, {}, (NearField, StokesDrag)),
+        ({"kind": "stage_control", "per": "run"}, {}, (Lorentz, MagneticField, Tether)),
+    ),
+    "brownian": (
+        ({"kind": "drift_limit", "longest": DT}, {}, (Tether,)),
+        ({"kind": "drift_limit", "longest": DT}, {}, (Mie,)),
+        ({"kind": "drift_limit", "longest": DT}, {"hydrodynamics": "rotne-prager"}, (Mie,)),
+        ({"kind": "drift_limit", "longest": DT}, {"hydrodynamics": "oseen", "noise": "fast"}, (NearField,)),
+    ),
+}  # fmt: skip
+"""Of each stepper, the controls that it is tried with: control, options, effects."""
+QUANTITIES: dict[str, Any] = {
+    "temperature": 300.0, "charge": 1e-9, "spin": [0.0, 0.0, 10.0], "saturation_moment": 1e-6,
+    "domain_moment": 1e-18, "polarity": 1,
+}  # fmt: skip
+"""What each particle carries, where something needs it."""
+FLUID = {"temperature": 300.0, "viscosity": 1e-3}
+
+
+@cache
+def scenes() -> dict[str, dict[str, Any]]:
+    """Plain data by name: a scene of each effect, source and operator, and those of each stepper."""
+    kinds.load(steppers)
+    found = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
+    for name in sorted(Stepper.known()):
+        needed = FLUID if name == "brownian" else {}
+        for k, (control, options, effects) in enumerate(CONTROLLED[name]):
+            stepper = {"kind": name, **needed, **options, "control": control}
+            found[f"stepper.{name}.{k}"] = _scene(_effects(effects), stepper)
+    return found
+
+
+def _company(kind: type[Effect]) -> dict[str, Any]:
+    """An effect, what it needs, and what makes it do something."""
+    felt: tuple[type[Effect], ...] = ()
+    if issubclass(kind, Source):
+        felt = FIELDS.get(kind.quantity, (Lorentz, LangevinMoment, Magnetophoresis))
+    elif issubclass(kind, Settled):
+        felt = (MagneticSpheres, Magnetophoresis)
+    elif MOMENT in kind.needs or "magnetic_flux_density" in kind.feels:
+        felt = (MagneticSpheres, *((InducedMoment,) if MOMENT in kind.needs else ()))
+        felt += (ElectricField,) if kind is Lorentz else ()
+    return _effects((*felt, kind))
+
+
+def _effects(wanted: tuple[type[Effect], ...]) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    for kind in wanted:
+        table |= {name: {**values, **COMMON.get(name, {})} for name, values in with_needed(kind).items()}
+    if Agglomeration in wanted:
+        table["impact"]["hardness"] = 1.0
+    return table
+
+
+def _scene(effects: dict[str, Any], stepper: dict[str, Any] | None = None) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "name": "extreme",
+        "duration": STEPS * DT,
+        "seed": 7,
+        "particles": {
+            "kind": "particles",
+            "position": [[0.0, 0.0, 0.0], [1.99e-3, 0.0, 1e-4], [0.0, 2.5e-3, 0.0]],
+            "velocity": [[1.0, 0.0, 0.5], [-1.0, 0.0, 0.0], [0.0, -3.0, 0.0]],
+            "radius": [1e-3, 1e-3, 0.5e-3],
+            "mass": [1e-5, 1e-5, 2e-6],
+        },
+        "domain": {"kind": "open"},
+        "stepper": stepper or {"kind": "verlet", "control": {"kind": "fixed_step", "dt": DT}},
+        "effects": effects,
+    }
+    made = Scene.from_dict(data)
+    needed = {
+        need if isinstance(need, str) else need.name for need in needed_fields(made.effects, made.stepper)
+    }
+    quantities = {name: [value] * 3 for name, value in QUANTITIES.items() if name in needed}
+    data["particles"]["quantities"] = quantities
+    return Scene.from_dict(data).to_dict()
+
+
+Place = tuple[str | int, ...]
+"""The keys that lead to a number in plain data."""
+
+
+def places(data: Any, path: Place = ()) -> Iterator[Place]:
+    """Every number in plain data that is not a whole one."""
+    for key, inner in data.items() if isinstance(data, dict) else enumerate(data):
+        if isinstance(inner, dict | list):
+            yield from places(inner, (*path, key))
+        elif isinstance(inner, float):
+            yield (*path, key)
+
+
+def own(name: str) -> list[Place]:
+    """The places of a scene that are of its kind, of its first particle, or its duration."""
+    what, kind, *_ = name.split(".")
+    return [
+        place
+        for place in places(scenes()[name])
+        if place[0] == "duration"
+        or (place[0] == "particles" and place[3 if place[1] == "quantities" else 2] == 0)
+        or (place[0] == what and (what == "stepper" or place[1] == kind))
+    ]
+
+
+def changed(data: dict[str, Any], values: dict[Place, Any]) -> dict[str, Any]:
+    """A copy with other numbers at some places."""
+    made = copy.deepcopy(data)
+    for (*path, last), value in values.items():
+        inner: Any = made
+        for key in path:
+            inner = inner[key]
+        inner[last] = value
+    return made
+
+
+def one_by_one(name: str) -> Iterator[dict[Place, float]]:
+    """Every number of a kind and of its particles, to every extreme, and the others as they are."""
+    for place in own(name):
+        for value in VALUES:
+            yield {place: value}
+
+
+def drawn(name: str, random: Random) -> dict[Place, float]:
+    """One to four numbers of a scene at random, each at an extreme."""
+    found = list(places(scenes()[name]))
+    return {place: random.choice(VALUES) for place in random.sample(found, random.choice((1, 1, 2, 3, 4)))}

@@ -1,0 +1,66 @@
+"""Trials in a process of their own: one that dies or does not answer costs a trial, and is replaced."""
+
+from __future__ import annotations
+
+import multiprocessing
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+Came = tuple[str, str]
+"""What came of a trial: the column of Counts in which it belongs, "" when all is well; a word about it."""
+
+
+def _work(calls: Connection, make: Callable[..., Callable[[Any], str]], given: tuple[Any, ...]) -> None:
+    """Answer each call with what came of it."""
+    answer = make(*given)
+    calls.send("ready")
+    while True:
+        call = calls.recv()
+        try:
+            came: Came = "", answer(call)
+        except AssertionError:
+            came = "wrong", traceback.format_exc()
+        except TimeoutError:
+            came = "hung", traceback.format_exc()
+        except BaseException:
+            came = "tracebacks", traceback.format_exc()
+        calls.send(came)
+
+
+class Apart:
+    """A process in which ``make(*given)`` gives a function of a call, which does a trial and may raise:
+    AssertionError for what is wrong, TimeoutError for what takes too long."""
+
+    def __init__(self, make: Callable[..., Callable[[Any], str]], *given: Any) -> None:
+        self.make, self.given = make, given
+        self._start()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.calls, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs, self.make, self.given), daemon=True)
+        self.process.start()
+        theirs.close()
+        self.calls.recv()
+
+    def trial(self, call: Any, patience: float) -> Came:
+        """What came of a trial; one that takes longer than ``patience`` (s, wall time) is ended."""
+        self.calls.send(call)
+        try:
+            if self.calls.poll(patience):
+                column, word = self.calls.recv()
+                return column, word
+            came = "hung", f"no answer in {patience:g} s"
+        except EOFError:
+            self.process.join()
+            came = "tracebacks", f"the process ended with {self.process.exitcode}"
+        self.end()
+        self._start()
+        return came
+
+    def end(self) -> None:
+        """End the process."""
+        self.process.kill()
+        self.process.join()

@@ -1,0 +1,88 @@
+"""Runs of scenes with extreme numbers, some steps of each: to their end, or to a failure in words."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable
+from itertools import islice
+from random import Random
+
+from tests import extremes
+from tests.judged import check_message, check_result
+from tests.soak.apart import Apart, Came
+from tisim import Scene, Simulation, runtime
+from tisim.errors import InputError
+
+STEPS = 50
+"""Of a run, at most."""
+COMPILING, PATIENCE = 900.0, 60.0
+"""Wall time, s, after which compiling a scene, and a run, which takes some hundredths, count as hung."""
+DRAWS = 1000
+"""Scenes that are drawn for one that is accepted, at most; of three about two are."""
+REFUSED, FAILED, ENDED = "refused", "failed", "ended"
+
+Values = dict[extremes.Place, float]
+"""What is changed in a scene."""
+Call = tuple[str, Values | int | None]
+"""A name among ``extremes.scenes()``, and what to do: run it with these numbers, run it with such drawn from
+this seed as are accepted, or only compile it."""
+
+
+def runner() -> Callable[[Call], str]:
+    """In a process of its own: what has come of a run, in which nothing was wrong."""
+    warnings.simplefilter("error")
+    runtime.start(threads=1)
+    compiled: dict[str, Simulation] = {}
+
+    def run(call: Call) -> str:
+        name, what = call
+        if name not in compiled:
+            compiled[name] = Simulation(Scene.from_dict(extremes.scenes()[name]))
+        if what is None:
+            return ENDED
+        tries: Iterable[Values] = (what,)
+        if isinstance(what, int):
+            random = Random(what)
+            tries = islice(iter(lambda: extremes.drawn(name, random), None), DRAWS)
+        came = (_ran(compiled[name], name, values) for values in tries)
+        return next((end for end in came if end != REFUSED), REFUSED)
+
+    return run
+
+
+def _ran(simulation: Simulation, name: str, values: Values) -> str:
+    try:
+        scene = Scene.from_dict(extremes.changed(extremes.scenes()[name], values))
+        simulation.load([scene])
+    except InputError as fault:
+        check_message(str(fault))
+        return REFUSED
+    simulation.run(steps=STEPS)
+    (result,) = simulation.results()
+    check_result(result)
+    return ENDED if result.status.ok else FAILED
+
+
+class Runs:
+    """Scenes run in a process of their own, in which each is compiled once, and given time for that."""
+
+    def __init__(self) -> None:
+        self.apart = Apart(runner)
+        self.compiled: set[str] = set()
+
+    def __call__(self, name: str, what: Values | int) -> Came:
+        """What came of a scene with these numbers, or with those drawn from a seed."""
+        if name not in self.compiled:
+            came = self.apart.trial((name, None), COMPILING)
+            if came[0]:
+                return came
+            self.compiled.add(name)
+        came = self.apart.trial((name, what), PATIENCE)
+        if came[0]:
+            # Another process may have taken the place of the one that has compiled.
+            self.compiled.clear()
+        return came
+
+    def end(self) -> None:
+        """End the process."""
+        self.apart.end()
