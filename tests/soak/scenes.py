@@ -12,7 +12,7 @@ from tests import extremes, hostile
 from tests.judged import ACCEPTED, check_file, check_message, command, nothing_runs
 from tests.soak.apart import Apart, Came
 from tests.soak.counts import Counts
-from tests.soak.running import ENDED, REFUSED, Runs
+from tests.soak.running import RAN, REFUSED, Runs
 from tisim import Scene
 from tisim.errors import InputError
 
@@ -73,7 +73,7 @@ def reader(folder: Path) -> Callable[[tuple[str, int]], str]:
         KINDS[kind](Random(seed), folder)
         if time.thread_time() - began > SECOND:
             raise TimeoutError(f"{time.thread_time() - began:.3g} s")
-        return ENDED
+        return RAN
 
     return trial
 
