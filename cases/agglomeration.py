@@ -14,19 +14,19 @@ import numpy as np
 from cases.agglomeration_accuracy import quantities
 from cases.agglomeration_strings import designs
 from cases.case import Case, Check, Size
-from optimize.genome import Gene, Genome
-from optimize.problem import Problem
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
 from tisim import Box, Cloud, Result, Scene
-from tisim.effects.friction import Friction
-from tisim.effects.heating import DeformationWork, Heating
-from tisim.effects.impact import Impact
-from tisim.effects.reaction import Reaction
-from tisim.effects.softening import Softening
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.friction import Friction
+from tisim.effects.impact.heating import DeformationWork, Heating
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.reaction import Reaction
+from tisim.effects.impact.softening import Softening
 from tisim.errors import must
-from tisim.operators.agglomeration import Agglomeration
 from tisim.operators.cooling import Cooling
 from tisim.operators.fragmentation import Fragmentation
-from tisim.picture import cloud
+from tisim.plotting.cloud import cloud
 
 HALF_SIDE = 0.01
 """D, half the side of the control volume, m (Z04 section 8)."""

@@ -15,12 +15,12 @@ import tisim
 from cases import agglomeration
 from cases.case import Check
 from tisim import Particles, Result, Scene
-from tisim.effect import Effect
-from tisim.effects.heating import Heating
-from tisim.effects.impact import Impact
-from tisim.operators.agglomeration import Agglomeration
+from tisim.effects.base import Effect
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import Impact
 from tisim.operators.fragmentation import Fragmentation
-from tisim.steppers.controller import FixedStep
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 HARDNESS, DENSITY, RADIUS, LENGTH = 3e5, 2000.0, 1e-3, 0.8
@@ -139,7 +139,7 @@ def energy(result: Result) -> tuple[float, float]:
     what reaction and deformation work have supplied."""
     capacity = next(e for e in result.scene.effects if isinstance(e, Heating)).heat_capacity
 
-    def held(s: tisim.particles.Arrays) -> float:
+    def held(s: tisim.scene.initial_state.Arrays) -> float:
         kinetic = 0.5 * (s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum()
         return float(kinetic + (s["mass"] * capacity * s["temperature"]).sum())
 

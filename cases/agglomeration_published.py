@@ -18,8 +18,8 @@ import tisim
 from cases.agglomeration import cost, scene
 from cases.agglomeration_strings import PUBLISHED, designs
 from tisim import Scene
-from tisim.confidence import half_width
-from tisim.steppers.controller import ApproachTime
+from tisim.numerics.statistics import half_width
+from tisim.steppers.step_control import ApproachTime
 from tisim.steppers.verlet import Verlet
 
 

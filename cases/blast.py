@@ -18,24 +18,24 @@ from numpy.typing import ArrayLike
 
 from cases.blast_accuracy import half_axes, quantities
 from cases.case import Case, Check, Size
-from optimize.problem import Problem
+from optimize.problem.problem import Problem
 from tisim import Cloud, Result, Scene, run
-from tisim.batches import Progress
-from tisim.effect import Effect
-from tisim.effects.contact import Contact
-from tisim.effects.contact_dissipation import ContactDissipation
-from tisim.effects.contact_friction import ContactFriction
-from tisim.effects.contact_softening import ContactSoftening
-from tisim.effects.drag import ChowDrag
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.near_field import NearField, TruncatedNearField
+from tisim.effects.base import Effect
+from tisim.effects.contact.dissipation import ContactDissipation
+from tisim.effects.contact.friction import ContactFriction
+from tisim.effects.contact.power_law import Contact
+from tisim.effects.contact.softening import ContactSoftening
+from tisim.effects.external.drag import ChowDrag
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.pair.near_field import NearField, TruncatedNearField
+from tisim.engine.batches import Progress
 from tisim.errors import must
-from tisim.frames import Frames
+from tisim.io.reader import Frames
 from tisim.packing.placement import RandomInBall
-from tisim.pulses import Blast
+from tisim.scene.initial_velocity import Blast
 from tisim.sources.uniform import MagneticField
-from tisim.steppers.implicit_control import IterationControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.implicit.step_control import IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,8 +6,8 @@ import numpy as np
 
 from tisim import Result, Scene
 from tisim.accuracy.quantity import Quantity, displacement
-from tisim.effect import PairForce
-from tisim.particles import Arrays
+from tisim.effects.base import PairForce
+from tisim.scene.initial_state import Arrays
 
 
 def half_axes(state: Arrays) -> np.ndarray:

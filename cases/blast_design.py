@@ -13,10 +13,10 @@ import numpy as np
 
 from cases import blast
 from cases.blast_shape import ball, ellipsoid, moments, principal_half_axes
-from optimize.genome import Gene, Genome
-from optimize.problem import Problem
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
 from tisim import Result, Scene
-from tisim.picture import cloud
+from tisim.plotting.cloud import cloud
 
 FLUX = np.array([0.6, 0.3, -0.2])
 """T. Within DURATION particles go a third of a circle."""

@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from cases import blast
 from cases.blast_shape import contacts, extents
 from tisim import Recording, run
-from tisim.batches import Progress, share
+from tisim.engine.batches import Progress, share
 from tisim.errors import RunError
-from tisim.figure import empty, plain
-from tisim.frames import Frame, Frames, frames
-from tisim.particles import Arrays
-from tisim.picture import SEEN, corners, panel, view
-from tisim.plots import COLOURS
+from tisim.io.reader import Frame, Frames, frames
+from tisim.plotting.cloud import SEEN, corners, panel, view
+from tisim.plotting.style import empty, plain
+from tisim.plotting.time_series import COLOURS
+from tisim.scene.initial_state import Arrays
 
 SHOWN = 6
 """Frames of a sequence."""

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cases.blast import SPECIFIC_CHARGE, SPEED
-from tisim.particles import Arrays
+from tisim.scene.initial_state import Arrays
 
 
 def moments(state: Arrays) -> np.ndarray:

@@ -18,25 +18,25 @@ import numpy as np
 
 from cases.case import Case, Check, Size
 from cases.statistics import Claim
-from optimize.problem import Problem
+from optimize.problem.problem import Problem
 from tisim import Cloud, RandomAroundCylinder, Scene
 from tisim.accuracy.quantity import Quantity
-from tisim.batches import Progress
-from tisim.effects.magnetophoresis import Magnetophoresis
-from tisim.effects.moment import FixedMoment
+from tisim.components.component import Vector
+from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
+from tisim.effects.magnetic.moment import FixedMoment
+from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.operators.capture import Capture
-from tisim.sources.cylinder import Cylinder, MagneticCylinders
-from tisim.sources.stoner_wohlfarth import magnetisation
+from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.sources.magnetic.stoner_wohlfarth import magnetisation
 from tisim.sources.uniform import MagneticField
-from tisim.spec import Vector
-from tisim.steppers.brownian import Brownian
-from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tisim.frames import Frames
+    from tisim.io.reader import Frames
 
 DIAMETER, SATURATION, FLUX = 600e-6, 985e3, 1.0
 """Of the cylinder, m and A/m; of the field along x, T (B16 section 6.3)."""

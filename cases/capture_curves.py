@@ -24,9 +24,9 @@ from cases.capture_statistics import (
     results,
 )
 from cases.statistics import Mean
-from tisim.batches import Progress, share
-from tisim.figure import empty, plain
-from tisim.result import Result
+from tisim.engine.batches import Progress, share
+from tisim.engine.result import Result
+from tisim.plotting.style import empty, plain
 
 REPEATS = 10
 """Of a setting; the checks take more."""

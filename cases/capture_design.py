@@ -23,22 +23,22 @@ from matplotlib.patches import Rectangle
 
 from cases.capture import DENSITY, DIAMETER, MOMENT, SATURATION, TEMPERATURE, VISCOSITY
 from cases.capture_statistics import MICRO
-from optimize.genome import Gene, Genome
-from optimize.objective import Objective
-from optimize.problem import Problem
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.objective import Objective
+from optimize.problem.problem import Problem
 from tisim import Cloud, RandomInBox, Result, Scene
-from tisim.effects.magnetophoresis import Magnetophoresis
-from tisim.effects.moment import LangevinMoment
+from tisim.components.component import Vector
+from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
+from tisim.effects.magnetic.moment import LangevinMoment
 from tisim.errors import must
-from tisim.figure import empty, plain
 from tisim.operators.capture import Capture
-from tisim.sources.cylinder import Cylinder, MagneticCylinders
+from tisim.plotting.style import empty, plain
 from tisim.sources.flow import UniformFlow
-from tisim.sources.soft_magnet import magnetisation
+from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.sources.uniform import MagneticField
-from tisim.spec import Vector
-from tisim.steppers.brownian import Brownian
-from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
 
 WIRE = 20 * DIAMETER
 """Of all fibres together, m: one of B16's longest."""

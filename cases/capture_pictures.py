@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from cases import capture, capture_curves
 from cases.capture_statistics import MICRO
 from tisim import Scene
-from tisim.batches import Progress
-from tisim.figure import empty, plain
-from tisim.frames import Frames
-from tisim.sources.cylinder import Cylinder, MagneticCylinders
+from tisim.engine.batches import Progress
+from tisim.io.reader import Frames
+from tisim.plotting.style import empty, plain
+from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
 from tisim.sources.sample import sample
 
 LEAST_FORCE = 0.5e-15

@@ -21,14 +21,14 @@ from cases import capture
 from cases.case import Case, Check, Size
 from cases.statistics import Claim
 from tisim import RandomAroundCylinder, Scene, run
-from tisim.batches import Progress
+from tisim.engine.batches import Progress
 from tisim.errors import RunError
-from tisim.sources.cylinder import MagneticCylinders
+from tisim.sources.magnetic.cylinder import MagneticCylinders
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tisim.frames import Frames
+    from tisim.io.reader import Frames
 
 Orientation = Literal["optimal", "directions", "angles"]
 STAGE = {25: 10.0, 125: 0.5}

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from cases.cascade import SHARE, STAGE, Cascade, Orientation, captured_at, time_to
 from cases.cascade_statistics import OFF, ORIENTATIONS, PUBLISHED, RANDOM
 from cases.statistics import Mean
-from tisim.batches import Progress
-from tisim.figure import empty, plain
+from tisim.engine.batches import Progress
+from tisim.plotting.style import empty, plain
 
 SHOWN = 0.97
 """Share of the particles up to which curves go."""

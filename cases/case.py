@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import cases
 from cases.statistics import Claim
-from optimize.problem import Problem
+from optimize.problem.problem import Problem
 from tisim.accuracy.quantity import Quantity
-from tisim.batches import Progress
+from tisim.engine.batches import Progress
 from tisim.errors import InputError, must
-from tisim.frames import Frames
-from tisim.scene import Scene
+from tisim.io.reader import Frames
+from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -27,22 +27,22 @@ from cases.case import Case, Check, Size
 from cases.statistics import Claim
 from tisim import Cloud, Scene
 from tisim.accuracy.quantity import Quantity, usual
-from tisim.batches import Progress
-from tisim.effects.dipole_dipole import TruncatedDipoleDipole
-from tisim.effects.magnetophoresis import Magnetophoresis
-from tisim.effects.mie import Mie
-from tisim.effects.moment import FixedMoment
+from tisim.effects.magnetic.dipole_dipole import TruncatedDipoleDipole
+from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
+from tisim.effects.magnetic.moment import FixedMoment
+from tisim.effects.pair.mie import Mie
+from tisim.engine.batches import Progress
 from tisim.operators.capture import Capture
 from tisim.packing.placement import RandomInBox
-from tisim.sources.cylinder import MagneticCylinders
+from tisim.sources.magnetic.cylinder import MagneticCylinders
 from tisim.sources.uniform import MagneticField
-from tisim.steppers.brownian import Brownian
-from tisim.steppers.drift_limit import DriftLimit
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tisim.frames import Frames
+    from tisim.io.reader import Frames
 
 DENSITY = 5000.0
 """kg/m^3 (B16 section 6.4.6)."""

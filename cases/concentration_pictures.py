@@ -20,10 +20,10 @@ from cases.concentration import coupling
 from cases.concentration_statistics import CAPTURE, chain, held
 from tisim import Recording, run
 from tisim.analysis.clusters import head_to_tail, labels
-from tisim.batches import Progress, share
-from tisim.figure import empty, plain
-from tisim.frames import Frames, frames
-from tisim.particles import Arrays
+from tisim.engine.batches import Progress, share
+from tisim.io.reader import Frames, frames
+from tisim.plotting.style import empty, plain
+from tisim.scene.initial_state import Arrays
 
 MICRO = 1e-6
 SHOWN: dict[str, Any] = {"number": 125, "duration": 2e-3}

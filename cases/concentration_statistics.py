@@ -13,9 +13,9 @@ from cases.case import Check
 from cases.concentration import chain_length, coupling
 from cases.statistics import Claim, Mean
 from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
+from tisim.engine.result import Result
 from tisim.errors import RunError
-from tisim.particles import Arrays
-from tisim.result import Result
+from tisim.scene.initial_state import Arrays
 
 GAMMA = {25: 1.0, 125: 825.0}
 """B16 Eq. (6.25) by radius in nm, as the text gives it."""

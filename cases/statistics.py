@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tisim.confidence import CONFIDENCE, half_width
+from tisim.numerics.statistics import CONFIDENCE, half_width
 
 
 @dataclass(frozen=True)

@@ -23,20 +23,20 @@ import numpy as np
 from cases.case import Case, Check, Size
 from cases.charged_closed_forms import resonances
 from cases.vibration_accuracy import centre, exact, quantities
-from optimize.problem import Problem
+from optimize.problem.problem import Problem
 from tisim import Cloud, Result, Scene, run
-from tisim.batches import Progress
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.near_field import NearField, TruncatedNearField
-from tisim.effects.tether import Tether
-from tisim.frames import Frames
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.external.tether import Tether
+from tisim.effects.pair.near_field import NearField, TruncatedNearField
+from tisim.engine.batches import Progress
+from tisim.io.reader import Frames
 from tisim.operators.peak_displacement import PeakDisplacement
 from tisim.packing.placement import Lattice
 from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.implicit_control import ErrorControl
-from tisim.steppers.stage_control import StageControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

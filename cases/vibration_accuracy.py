@@ -13,11 +13,11 @@ import numpy as np
 from cases.charged_closed_forms import response
 from tisim import Open, Result, Scene
 from tisim.accuracy.quantity import Quantity, displacement
-from tisim.effect import PairForce
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.tether import Tether
+from tisim.effects.base import PairForce
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.external.tether import Tether
 from tisim.operators.peak_displacement import PeakDisplacement
-from tisim.particles import Arrays
+from tisim.scene.initial_state import Arrays
 from tisim.sources.uniform import ElectricField, MagneticField
 
 

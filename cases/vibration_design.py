@@ -15,8 +15,8 @@ from cases import vibration
 from cases.charged_closed_forms import resonances
 from cases.vibration import CHARGE, FIELD, MASS
 from cases.vibration_response import peak
-from optimize.genome import Gene, Genome
-from optimize.problem import Problem
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
 from tisim import Result, Scene
 from tisim.errors import must
 

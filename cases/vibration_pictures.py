@@ -14,19 +14,10 @@ from matplotlib.ticker import EngFormatter
 from cases import vibration
 from cases.charged_closed_forms import resonances, response
 from cases.vibration_accuracy import constants
-from cases.vibration_response import (
-    DRIVE,
-    FAST,
-    SLOW,
-    Course,
-    Sweep,
-    beats,
-    fast_scenes,
-    slow_scenes,
-)
-from tisim.batches import Progress, share
-from tisim.figure import empty, plain
-from tisim.frames import Frames
+from cases.vibration_response import DRIVE, FAST, SLOW, Course, Sweep, beats, fast_scenes, slow_scenes
+from tisim.engine.batches import Progress, share
+from tisim.io.reader import Frames
+from tisim.plotting.style import empty, plain
 
 LEAST = 9
 """Frames that make a spectrum."""

@@ -19,10 +19,10 @@ from cases import vibration
 from cases.charged_closed_forms import resonances, response
 from cases.vibration import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS
 from tisim import Recording, Scene, run
-from tisim.batches import Progress
+from tisim.engine.batches import Progress
 from tisim.errors import RunError
-from tisim.frames import Frames, frames
-from tisim.plots import history
+from tisim.io.reader import Frames, frames
+from tisim.plotting.time_series import history
 from tisim.sources.uniform import ElectricField
 
 SLOW, FAST = resonances(CYCLOTRON, STIFFNESS / MASS)

@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from deap import tools
 
-from optimize.hall import compromise
-from optimize.individual import Individual
-from optimize.problem import Problem
+from optimize.hall_of_fame import compromise
+from optimize.methods.individual import Individual
+from optimize.problem.problem import Problem
 from optimize.settings import Settings, search_name
 
 Stopped = Literal["", "generations", "target", "patience", "evaluations", "wall clock", "interrupted"]

@@ -9,17 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from optimize.cache import Cache
-from optimize.ensemble import Ensemble
-from optimize.hall import Hall
-from optimize.individual import Individual
-from optimize.log import statistics
-from optimize.method import find
+from optimize.evaluation.ensemble import Ensemble
+from optimize.evaluation.runs import Evaluator
+from optimize.hall_of_fame import Hall
+from optimize.methods.base import find
+from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress, Stopped
-from optimize.problem import Problem
-from optimize.runs import Evaluator
+from optimize.problem.problem import Problem
+from optimize.report.generation_log import statistics
 from optimize.settings import Settings, fit, identity
-from optimize.stored import searches, store
+from optimize.storage.cache import Cache
+from optimize.storage.search_records import searches, store
 
 
 class _OutOfTime(Exception):

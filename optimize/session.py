@@ -7,19 +7,19 @@ from pathlib import Path
 
 from rich.console import Console
 
-from optimize import report
-from optimize.cache import Cache
-from optimize.display import Display
-from optimize.folder import FILE, HOW, NAMES, check
-from optimize.individual import Individual
+from optimize.evaluation.runs import Evaluator, start_seed
+from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress
-from optimize.problem import Problem
-from optimize.runs import Evaluator, start_seed
+from optimize.problem.problem import Problem
+from optimize.report import report
+from optimize.report.display import Display
 from optimize.search import search
 from optimize.settings import Settings, identity
-from tisim import lock
-from tisim.claim import take
-from tisim.durable import replace_file
+from optimize.storage.cache import Cache
+from optimize.storage.folder import FILE, HOW, NAMES, check
+from tisim.files import lock
+from tisim.files.atomic import replace_file
+from tisim.files.ownership import take
 from tisim.interrupt import Interrupt
 
 
@@ -33,7 +33,7 @@ def session(
     stopping: Callable[[], None],
     overwrite: bool = False,
 ) -> Outcome:
-    """Search, or go on with the search in the folder, and write all that is listed in optimize.folder.
+    """Search, or go on with the search in the folder, and write all that is listed in optimize.storage.folder.
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
     search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.

@@ -8,12 +8,12 @@ from typing import Any
 
 from pydantic import Field, SerializeAsAny, model_validator
 
-from optimize.ensemble import EnsembleSettings
-from optimize.method import every, find
-from optimize.problem import Problem
-from optimize.record import canonical
+from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.methods.base import every, find
+from optimize.problem.problem import Problem
+from optimize.storage.record import canonical
+from tisim.components.component import Checked
 from tisim.errors import must
-from tisim.spec import Checked
 
 FORMAT = 2
 """Of the identity below; raised when a search of before cannot be gone on with."""
@@ -22,7 +22,7 @@ FORMAT = 2
 class Settings(Checked):
     """All that decides a search, and when it stops.
 
-    seed : of the search and of its random starts. method : by name, see optimize.method; options : its own
+    seed : of the search and of its random starts. method : by name, see optimize.methods.base; options : its own
     settings. generations : after generation 0, the random start. ensemble : averaging over starts.
     hall_of_fame : best designs kept; a front is kept whole.
     Stopping rules, None = off, looked at after each generation: target - best fitness as good as that;

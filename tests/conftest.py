@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tisim import runtime
+from tisim.backend import runtime
 
 
 @pytest.fixture(scope="session", autouse=True)

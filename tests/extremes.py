@@ -15,20 +15,21 @@ from random import Random
 from typing import Any
 
 from tests.hostile import with_needed
-from tisim import Scene, kinds, steppers
-from tisim.composition import needed_fields
-from tisim.effect import Effect, Settled, Source
-from tisim.effects.drag import StokesDrag
-from tisim.effects.impact import Impact
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.magnetophoresis import Magnetophoresis
-from tisim.effects.mie import Mie
-from tisim.effects.moment import MOMENT, InducedMoment, LangevinMoment
-from tisim.effects.near_field import NearField
-from tisim.effects.tether import Tether
-from tisim.explain import known_effects
-from tisim.operators.agglomeration import Agglomeration
-from tisim.sources.sphere import MagneticSpheres
+from tisim import Scene, steppers
+from tisim.components import serialization
+from tisim.effects.base import Effect, Settled, Source
+from tisim.effects.external.drag import StokesDrag
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.external.tether import Tether
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.impact import Impact
+from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
+from tisim.effects.magnetic.moment import MOMENT, InducedMoment, LangevinMoment
+from tisim.effects.pair.mie import Mie
+from tisim.effects.pair.near_field import NearField
+from tisim.engine.assembly import needed_fields
+from tisim.engine.explain import known_effects
+from tisim.sources.magnetic.sphere import MagneticSpheres
 from tisim.sources.uniform import ElectricField, MagneticField
 
 MAGNITUDES = (
@@ -113,7 +114,7 @@ FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 @cache
 def scenes() -> dict[str, dict[str, Any]]:
     """Plain data by name: a scene of each effect, source and operator, and those of each stepper."""
-    kinds.load(steppers)
+    serialization.load(steppers)
     found = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
     for name in sorted(CONTROLLED):
         needed = FLUID if name == "brownian" else {}

@@ -8,16 +8,17 @@ from functools import cache
 from random import Random
 from typing import Any
 
+from tests.packing.test_placement import BALL, VIBRATION
 from tests.scenes import flow, scene
-from tests.test_packing_placement import BALL, VIBRATION
-from tisim import Blast, Cloud, RandomAroundCylinder, RandomInBox, kinds, steppers
-from tisim.effect import Effect
-from tisim.explain import known_effects
+from tisim import Blast, Cloud, RandomAroundCylinder, RandomInBox, steppers
+from tisim.components import serialization
+from tisim.components.component import Spec
+from tisim.effects.base import Effect
+from tisim.engine.explain import known_effects
 from tisim.sources.uniform import MagneticField
-from tisim.spec import Spec
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.drift_limit import DriftLimit
-from tisim.steppers.stepper import Stepper
+from tisim.steppers.base import Stepper
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers.step_control import FixedStep
 
 
 def nested(levels: int) -> list[Any]:
@@ -123,12 +124,12 @@ def valid() -> tuple[dict[str, Any], ...]:
         Cloud(number=5, radius=0.1, density=1.0),
     )
     for start in starts:
-        found.append({**base.to_dict(), "domain": box, "particles": kinds.to_dict(start)})
+        found.append({**base.to_dict(), "domain": box, "particles": serialization.to_dict(start)})
     controls = {"brownian": DriftLimit(longest=1e-9), "boris": FixedStep(dt=1e-9)}
     for name, kind in _known(Stepper).items():
         needed = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
         control = {"control": controls[name]} if name in controls else {}
-        found.append({**base.to_dict(), "stepper": kinds.to_dict(kind(**needed, **control))})
+        found.append({**base.to_dict(), "stepper": serialization.to_dict(kind(**needed, **control))})
     return (*found, *({**base.to_dict(), "effects": with_needed(kind)} for kind in known_effects()))
 
 
@@ -140,7 +141,7 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
     if kind.feels:
         partners |= with_needed(MagneticField)
     rows = {name: [_required(row)] for name, row in kind.lists()}
-    return {**partners, kind.kind(): kinds.to_dict(kind(**_required(kind), **rows), named=False)}
+    return {**partners, kind.kind(): serialization.to_dict(kind(**_required(kind), **rows), named=False)}
 
 
 def _required(kind: type[Spec]) -> dict[str, Any]:
@@ -154,7 +155,7 @@ def _required(kind: type[Spec]) -> dict[str, Any]:
 
 
 def _known(contract: type[Stepper]) -> dict[str, type[Stepper]]:
-    kinds.load(steppers)
+    serialization.load(steppers)
     return {name: kind for name, kind in contract.known().items() if kind.__module__.startswith("tisim.")}
 
 
@@ -174,7 +175,7 @@ LINES = (
 
 def mutated_toml(random: Random) -> bytes:
     """The text of a scene file that was valid, with one to three of its lines changed, and perhaps cut."""
-    lines = kinds.toml(random.choice(valid())).splitlines()
+    lines = serialization.toml(random.choice(valid())).splitlines()
     for _ in range(random.choice((1, 1, 1, 2, 3))):
         at = random.randrange(len(lines))
         kind = random.randrange(8)

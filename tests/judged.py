@@ -13,12 +13,12 @@ from unittest.mock import patch
 import numpy as np
 
 from tisim import Scene
-from tisim.cli import main
+from tisim.backend.runtime import Runtime
+from tisim.cli.main import main
+from tisim.engine.monitor import REASONS
+from tisim.engine.result import Result
 from tisim.errors import RunError
-from tisim.result import Result
-from tisim.runtime import Runtime
-from tisim.state import CROWDED, FULL, RUNNING
-from tisim.watch import REASONS
+from tisim.worlds.state import CROWDED, FULL, RUNNING
 
 ACCEPTED = "accepted"
 """What a command says in place of running."""
@@ -56,9 +56,9 @@ def nothing_runs() -> Iterator[list[Scene]]:
         raise RunError(ACCEPTED)
 
     with ExitStack() as patches:
-        for place in ("tisim.cli.Simulation", "tisim.cli_cost._measure", "optimize.session.session"):
+        for place in ("tisim.cli.main.Simulation", "tisim.cli.cost._measure", "optimize.session.session"):
             patches.enter_context(patch(place, accept))
-        patches.enter_context(patch("tisim.runtime.start", Runtime))
+        patches.enter_context(patch("tisim.backend.runtime.start", Runtime))
         yield scenes
 
 

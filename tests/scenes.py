@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tisim import Box, Particles, Scene, Simulation, runtime
-from tisim.effects.friction import Friction
-from tisim.effects.heating import DeformationWork, Heating
-from tisim.effects.impact import Impact
-from tisim.effects.reaction import Reaction
-from tisim.effects.softening import Softening
-from tisim.operators.agglomeration import Agglomeration
+from tisim import Box, Particles, Scene, Simulation
+from tisim.backend import runtime
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.friction import Friction
+from tisim.effects.impact.heating import DeformationWork, Heating
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.reaction import Reaction
+from tisim.effects.impact.softening import Softening
 from tisim.operators.cooling import Cooling
 from tisim.operators.fragmentation import Fragmentation
-from tisim.steppers.controller import FixedStep
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 DENSITY = 2000.0

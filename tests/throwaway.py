@@ -3,10 +3,10 @@
 import numpy as np
 
 from tests.scenes import scene, simulate
-from tisim import noise
-from tisim._taichi import ti
-from tisim.effect import Force, Operator, PairForce, parameter
-from tisim.state import Field
+from tisim.backend.taichi import ti
+from tisim.effects.base import Force, Operator, PairForce, parameter
+from tisim.numerics import philox
+from tisim.worlds.state import Field
 
 K_E = 8.9875517873681764e9
 """Coulomb's constant, N m^2/C^2."""
@@ -46,8 +46,8 @@ class RandomKicks(Operator):
 
     @ti.func
     def particle(self, s, w, i, t, dt):
-        a = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 0))
-        b = noise.normal(noise.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 1))
+        a = philox.normal(philox.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 0))
+        b = philox.normal(philox.bits(s.seed[w], 77, s.id[w, i], s.steps[w], 1))
         kick = self.sigma(w) * ti.sqrt(dt) * ti.cast(ti.Vector([a[0], a[1], b[0]]), s.real)
         s.velocity[w, i] += kick
         s.kicked[w, i] += kick

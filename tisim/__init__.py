@@ -1,14 +1,14 @@
 """tisim: clouds of interacting particles, simulated in batches of worlds."""
 
+from tisim.engine.result import Result
+from tisim.engine.run import run
+from tisim.engine.simulation import Simulation
+from tisim.io.trajectory import Recording
 from tisim.packing.around_cylinder import RandomAroundCylinder
 from tisim.packing.placement import Lattice, RandomInBall, RandomInBox, RandomInDomain
-from tisim.particles import Cloud, Particles
-from tisim.pulses import Blast
-from tisim.result import Result
-from tisim.run import run
-from tisim.scene import Box, Open, Scene
-from tisim.simulation import Simulation
-from tisim.trajectory import Recording
+from tisim.scene.initial_state import Cloud, Particles
+from tisim.scene.initial_velocity import Blast
+from tisim.scene.scene import Box, Open, Scene
 
 __version__ = "0.1.0"
 __all__ = [

@@ -1,1 +1,1 @@
-"""Search methods, one a file; what they must do stands in optimize/method.py."""
+"""Search methods, one a file; what they must do stands in optimize/methods/base.py."""

@@ -9,9 +9,9 @@ from deap import cma
 from numpy.typing import NDArray
 from pydantic import Field
 
-from optimize.individual import Individual
-from optimize.method import Method
-from tisim.spec import Checked
+from optimize.methods.base import Method
+from optimize.methods.individual import Individual
+from tisim.components.component import Checked
 
 
 class CmaOptions(Checked):

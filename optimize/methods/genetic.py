@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from optimize.breeding import Breeder, Breeding
-from optimize.individual import Individual
-from optimize.method import Method
+from optimize.methods.base import Method
+from optimize.methods.breeding import Breeder, Breeding
+from optimize.methods.individual import Individual
 
 
 class Genetic(Method):
-    """Z04 sections 7 and 8; see optimize.breeding."""
+    """Z04 sections 7 and 8; see optimize.methods.breeding."""
 
     name = "genetic"
     Options = Breeding

@@ -10,11 +10,11 @@ import numpy as np
 from deap import tools
 from pydantic import Field, model_validator
 
-from optimize.individual import Individual
-from optimize.method import Method
-from optimize.own_random import OwnRandom
+from optimize.methods.base import Method
+from optimize.methods.individual import Individual
+from optimize.methods.random_state import OwnRandom
+from tisim.components.component import Checked
 from tisim.errors import must
-from tisim.spec import Checked
 
 
 class Nsga2Options(Checked):

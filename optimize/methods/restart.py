@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from optimize.breeding import Breeding
-from optimize.genome import Box
-from optimize.individual import Individual
+from optimize.methods.breeding import Breeding
 from optimize.methods.genetic import Genetic
+from optimize.methods.individual import Individual
+from optimize.problem.genome import Box
 
 
 class RestartOptions(Breeding):

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from tests.scenes import compiled
-from tisim.accuracy.bench import Bench
+from tisim.accuracy.timing import Bench
 
 READY = Bench.ready
 

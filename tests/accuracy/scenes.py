@@ -8,10 +8,10 @@ from tests.scenes import scene
 from tisim import Box, Cloud, Scene, steppers
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import displacement, kinetic_energy
-from tisim.effects.tether import Tether
-from tisim.kinds import load
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.stepper import Stepper
+from tisim.components.serialization import load
+from tisim.effects.external.tether import Tether
+from tisim.steppers.base import Stepper
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 RATE, SPEED, DURATION, STEP = 3.0, 1.0, 2.0, 0.001

@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 
 from tests.accuracy.scenes import oscillator
-from tisim import memory, steppers
-from tisim._taichi import ti
-from tisim.accuracy import bench
-from tisim.accuracy.bench import LOOKS, ROOM, Bench, watched
-from tisim.accuracy.methods import in_steps_of_at_most
-from tisim.kinds import load
-from tisim.memory import Tree
-from tisim.result import Result, Status
-from tisim.steppers.controller import StepControl
-from tisim.steppers.stepper import Stepper
-from tisim.taichi_thread import in_taichi_thread
+from tisim import steppers
+from tisim.accuracy import timing
+from tisim.accuracy.sweep import in_steps_of_at_most
+from tisim.accuracy.timing import LOOKS, ROOM, Bench, watched
+from tisim.backend import memory
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.components.serialization import load
+from tisim.engine.result import Result, Status
+from tisim.steppers.base import Stepper
+from tisim.steppers.step_control import StepControl
 
 load(steppers)
 CONTROLS = {k: c for k, c in StepControl.known().items() if c.__module__.startswith("tisim.")}
@@ -84,7 +85,7 @@ class Memory:
 
 
 def test_a_study_of_many_structures_gives_back_what_it_has_not_used_for_longest(own, monkeypatch):
-    monkeypatch.setattr(bench, "Simulation", Memory)
+    monkeypatch.setattr(timing, "Simulation", Memory)
     monkeypatch.setattr(memory, "MOST", len(memory.in_use()) + ROOM + 8)
     made, scene = Bench(), oscillator()
     first = made.ready(scene, 1)

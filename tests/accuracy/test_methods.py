@@ -9,23 +9,23 @@ from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
 from tisim.accuracy import Quantity, Study
-from tisim.accuracy.methods import exchanged, finest, methods, parts
-from tisim.accuracy.picture import picture
+from tisim.accuracy.formatting import expression, options
+from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import Row, decades, tied
-from tisim.accuracy.words import expression, options
-from tisim.effects.moment import InducedMoment
-from tisim.effects.mutual_moment import MutualInducedMoment
-from tisim.effects.near_field import NearField, TruncatedNearField
-from tisim.effects.tether import Tether
+from tisim.accuracy.sweep import exchanged, finest, methods, parts
+from tisim.components.accuracy_parameter import Knob
+from tisim.components.component import parameter
+from tisim.effects.external.tether import Tether
+from tisim.effects.magnetic.moment import InducedMoment
+from tisim.effects.magnetic.mutual_moment import MutualInducedMoment
+from tisim.effects.pair.near_field import NearField, TruncatedNearField
 from tisim.errors import InputError, RunError
-from tisim.knob import Knob
 from tisim.sources.uniform import MagneticField
-from tisim.spec import parameter
-from tisim.steppers.brownian import Brownian
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.drift_limit import DriftLimit
-from tisim.steppers.stepper import Stepper
+from tisim.steppers.base import Stepper
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 LEVELS = (2.0, 1.0, 0.0)

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from tests.accuracy.scenes import RATE, SPEED, only, oscillator, place
-from tisim import runtime
-from tisim.accuracy import Quantity, Study, files, study
-from tisim.accuracy.bench import LOOKS, Bench
-from tisim.accuracy.listing import sources
+from tisim.accuracy import Quantity, Study, storage, study
 from tisim.accuracy.quantity import displacement
-from tisim.effects.tether import Tether
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.implicit_control import ErrorControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.accuracy.table import sources
+from tisim.accuracy.timing import LOOKS, Bench
+from tisim.backend import runtime
+from tisim.effects.external.tether import Tether
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 PERIOD = 2 * np.pi / RATE
@@ -49,7 +49,7 @@ def test_a_motion_that_returns_to_its_start_is_measured_by_its_size(verlet_only,
     assert "displacement: relative to its largest on the way" in found.table().renderables[0].plain
     found.write(tmp_path)
     again = Study(closed(), **FEW)
-    files.resume(again, tmp_path)
+    storage.resume(again, tmp_path)
     assert again.truths[0].size == truth.size
     assert again.rows == found.rows
 

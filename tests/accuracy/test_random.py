@@ -7,11 +7,11 @@ from tests.accuracy.scenes import DEVIATION, ENERGY, GRAIN, GRAINS, MEAN, drift,
 from tests.scenes import head_on, simulate
 from tisim import Box
 from tisim.accuracy import Quantity, Study
-from tisim.accuracy.methods import methods
 from tisim.accuracy.quantity import displacement, estimate, kinetic_energy, mean, usual
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import TRUSTED
-from tisim.effects.impact import Impact
+from tisim.accuracy.sweep import methods
+from tisim.effects.impact.impact import Impact
 from tisim.errors import InputError
 
 ENSEMBLES, STARTS = 60, 8

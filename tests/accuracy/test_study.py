@@ -14,17 +14,18 @@ from rich.console import Console
 import tisim
 from tests.accuracy.scenes import DURATION, KNOWN, STEP, UNKNOWN, only, oscillator
 from tests.steppers.charged import charged
-from tisim import request, runtime
-from tisim.accuracy import Quantity, Study, files, study
-from tisim.accuracy.bench import Bench, Timed
+from tisim.accuracy import Quantity, Study, storage, study
 from tisim.accuracy.quantity import displacement
+from tisim.accuracy.timing import Bench, Timed
+from tisim.backend import runtime
+from tisim.cli import scene_arguments
+from tisim.engine.result import Result, Status
 from tisim.errors import InputError, RunError
-from tisim.result import Result, Status
 from tisim.steppers.boris import Boris
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.implicit_control import ErrorControl, IterationControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 pytestmark = pytest.mark.slow
@@ -157,7 +158,7 @@ def test_words_and_python_of_a_row_make_its_scene(measured):
         stepper = eval(row.python, names)
         words = shlex.split(row.options)
         assert words[::2] == ["--set"] * (len(words) // 2)
-        assert measured.scene.replace(request.assignments(words[1::2])).stepper == stepper
+        assert measured.scene.replace(scene_arguments.assignments(words[1::2])).stepper == stepper
         asked = row.setting.split(", ")[0].split("=")
         assert getattr(stepper.control, asked[0]) == pytest.approx(float(asked[1]), rel=5e-3)
 
@@ -176,17 +177,17 @@ def test_files_are_read_back(measured, tmp_path, monkeypatch):
         assert file.attrs["scene"] == measured.scene.to_toml()
         assert file["truths/unknown"].attrs["uncertainty"] == measured.truths[1].estimate.uncertainty
     again = Study(measured.scene, (KNOWN, UNKNOWN), precisions=("f64",))
-    files.resume(again, tmp_path)
+    storage.resume(again, tmp_path)
     assert again.rows == measured.rows
     assert again.complete
     monkeypatch.setattr(tisim, "__version__", "0.0.1")
     with pytest.raises(InputError, match="of another scene, version"):
-        files.resume(again, tmp_path)
+        storage.resume(again, tmp_path)
     monkeypatch.undo()
     again.run(progress=lambda fraction, what: pytest.fail("nothing is left to measure"))
     other = Study(oscillator(dt=0.02), (KNOWN, UNKNOWN))
     with pytest.raises(InputError, match="output folder must be without the study of another scene"):
-        files.resume(other, tmp_path)
+        storage.resume(other, tmp_path)
     assert (tmp_path / "cost.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 

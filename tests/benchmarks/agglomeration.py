@@ -28,8 +28,9 @@ import numpy as np
 
 from cases.agglomeration import DURATION, cost, scene
 from cases.agglomeration_strings import designs
-from tisim import Result, Scene, Simulation, runtime
-from tisim.particles import Arrays
+from tisim import Result, Scene, Simulation
+from tisim.backend import runtime
+from tisim.scene.initial_state import Arrays
 
 DESIGNS = designs()
 """Z04 tables 1 and 2."""

@@ -19,7 +19,8 @@ import numba
 import numpy as np
 
 from cases.blast import AIR, FLUX, VISCOSITY, scene
-from tisim import Scene, Simulation, runtime
+from tisim import Scene, Simulation
+from tisim.backend import runtime
 
 WINDOW = 64
 """Steps of the numba program between two barriers, as many as ours at most."""

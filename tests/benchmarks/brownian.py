@@ -26,9 +26,10 @@ import numba
 import numpy as np
 
 from tests.benchmarks import brownian_numba as peer
-from tests.steppers.colloids import DIFFUSIVITY, MOBILITY, RADIUS, colloids
-from tisim import Simulation, runtime
-from tisim.effects.tether import Tether
+from tests.steppers.brownian.colloids import DIFFUSIVITY, MOBILITY, RADIUS, colloids
+from tisim import Simulation
+from tisim.backend import runtime
+from tisim.effects.external.tether import Tether
 
 RATE, DT = 100.0, 1e-4
 PULL, WIDTH = RATE * DT, float(np.sqrt(2 * DIFFUSIVITY * DT))

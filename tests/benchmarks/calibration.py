@@ -19,9 +19,9 @@ from matplotlib import colormaps
 
 from tests.steppers.calibrated import CHAOTIC, CONTROLS, KNOWN, collocation, ratios, trapezoid
 from tests.steppers.test_calibration import BAND
-from tisim import runtime
-from tisim.figure import empty, plain
-from tisim.steppers.stage_control import StageControl
+from tisim.backend import runtime
+from tisim.plotting.style import empty, plain
+from tisim.steppers.implicit.stage_control import StageControl
 
 Found = dict[str, dict[str, np.ndarray]]
 BY_DEFAULT = collocation("run", StageControl().first)

@@ -20,9 +20,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import tisim
-from tisim import Particles, Scene, memory, runtime
-from tisim.effects.near_field import NearField
-from tisim.steppers.controller import FixedStep
+from tisim import Particles, Scene
+from tisim.backend import memory, runtime
+from tisim.effects.pair.near_field import NearField
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 PAGE = 4096

@@ -16,14 +16,15 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from cases.vibration import ATTRACTION, REPULSION, scene
-from tisim import Result, run, runtime
-from tisim.effects.near_field import NearField
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.implicit_control import ErrorControl, IterationControl
-from tisim.steppers.stage_control import StageControl
-from tisim.steppers.stepper import Stepper
-from tisim.steppers.trapezoid import Trapezoid
+from tisim import Result, run
+from tisim.backend import runtime
+from tisim.effects.pair.near_field import NearField
+from tisim.steppers.base import Stepper
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 

@@ -18,11 +18,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from tisim import runtime
-from tisim._taichi import ti
-from tisim.binding import Table, connect
-from tisim.sources.cylinder import Cylinder, MagneticCylinders
-from tisim.taichi_thread import in_taichi_thread
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.worlds.parameter_table import Table, connect
 
 RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 

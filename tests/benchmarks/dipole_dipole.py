@@ -19,9 +19,10 @@ os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp workqueue tbb")
 import numba
 import numpy as np
 
-from tisim import Particles, Scene, Simulation, runtime
-from tisim.effects.dipole_dipole import DipoleDipole
-from tisim.steppers.controller import FixedStep
+from tisim import Particles, Scene, Simulation
+from tisim.backend import runtime
+from tisim.effects.magnetic.dipole_dipole import DipoleDipole
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 

@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cases import capture_design
 from cases.statistics import Mean
-from optimize.comparison import FRESH
-from optimize.runs import start_seed
+from optimize.evaluation.runs import start_seed
+from optimize.report.comparison import FRESH
 from tisim import run
 
 SOFT = {"flux": 0.48, "field_angle": 75.0, "aspect": 2.45, "number": 8.0, "spacing": 3.6}

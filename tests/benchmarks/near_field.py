@@ -23,9 +23,10 @@ import near_field_numba as peer
 import numba
 import numpy as np
 
-from tisim import Particles, Scene, Simulation, runtime
-from tisim.effects.near_field import NearField
-from tisim.steppers.controller import FixedStep
+from tisim import Particles, Scene, Simulation
+from tisim.backend import runtime
+from tisim.effects.pair.near_field import NearField
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 FLOPS = 21

@@ -18,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 from cases import capture, vibration
-from tisim import Result, Scene, Simulation, runtime
+from tisim import Result, Scene, Simulation
+from tisim.backend import runtime
 
 SWEEPS = {
     "vibration": lambda: [vibration.scene(ratio, "printed", 2e-4) for ratio in vibration.RATIOS],

@@ -30,13 +30,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from cases import vibration
-from tisim import Simulation, runtime
-from tisim.figure import empty, plain
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.implicit_control import ErrorControl
-from tisim.steppers.stage_control import StageControl
-from tisim.steppers.stepper import Stepper
-from tisim.steppers.trapezoid import Trapezoid
+from tisim import Simulation
+from tisim.backend import runtime
+from tisim.plotting.style import empty, plain
+from tisim.steppers.base import Stepper
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 RATIO, DURATION = 0.8, 0.005
 OMEGA = RATIO * vibration.CYCLOTRON

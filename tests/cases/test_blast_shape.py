@@ -7,16 +7,16 @@ from cases import blast
 from cases.blast_design import DURATION, FLUX, details, field, misfit, problem, start
 from cases.blast_pictures import SHOWN, Course, beside, pictures, table
 from cases.blast_shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
-from optimize.cache import Cache
-from optimize.evaluator import Evaluator
+from optimize.evaluation.evaluator import Evaluator
 from optimize.search import search
 from optimize.settings import Settings
+from optimize.storage.cache import Cache
 from tests.scenes import simulate
 from tisim import Recording, run
+from tisim.engine.result import Result, Status
 from tisim.errors import InputError
-from tisim.frames import frames
-from tisim.picture import SEEN
-from tisim.result import Result, Status
+from tisim.io.reader import frames
+from tisim.plotting.cloud import SEEN
 
 
 def shell(rng, number=200_000):

@@ -7,7 +7,7 @@ from cases import capture, capture_curves, capture_pictures, capture_statistics
 from cases.case import Check
 from cases.statistics import Claim, Mean
 from tisim import Recording, run
-from tisim.frames import frames
+from tisim.io.reader import frames
 
 
 def test_mean_and_its_interval():

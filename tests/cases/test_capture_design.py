@@ -7,16 +7,16 @@ from cases import capture, capture_design
 from cases.capture import DIAMETER, SATURATION
 from cases.capture_design import HEIGHT, WIDTH, WIRE, Filter
 from cases.statistics import Claim, Mean
-from optimize.cache import Cache
-from optimize.comparison import FRESH
-from optimize.evaluator import Evaluator
-from optimize.runs import start_seed
+from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.runs import start_seed
+from optimize.report.comparison import FRESH
 from optimize.search import search
 from optimize.settings import Settings
+from optimize.storage.cache import Cache
 from tisim import Result, run
+from tisim.engine.result import Status
 from tisim.errors import InputError
-from tisim.result import Status
-from tisim.sources.cylinder import MagneticCylinders
+from tisim.sources.magnetic.cylinder import MagneticCylinders
 from tisim.sources.uniform import MagneticField
 
 FIBRES = {"flux": 0.8, "field_angle": 90.0, "aspect": 2.5, "number": 8.2, "spacing": 3.0}

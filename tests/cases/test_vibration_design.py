@@ -6,10 +6,10 @@ import pytest
 import tisim
 from cases import vibration
 from cases.vibration_design import DRIVE, closed_form, details, displacement, nearest, problem, scene
-from optimize.cache import Cache
-from optimize.evaluator import Evaluator
+from optimize.evaluation.evaluator import Evaluator
 from optimize.search import search
 from optimize.settings import Settings
+from optimize.storage.cache import Cache
 from tisim.errors import InputError
 
 DESIGNS = {

@@ -6,10 +6,10 @@ import signal
 import pytest
 
 from tisim import Box, Cloud, Scene
-from tisim.cli import main
-from tisim.effects.impact import Impact
+from tisim.cli.main import main
+from tisim.effects.impact.impact import Impact
 from tisim.interrupt import Interrupt
-from tisim.steppers.controller import FixedStep
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 

@@ -9,7 +9,7 @@ import pytest
 from cases import case as catalogue
 from cases.case import Case, Size
 from tests.accuracy.scenes import only, oscillator
-from tisim import lock
+from tisim.files import lock
 
 STOPPED = """
 import os, signal

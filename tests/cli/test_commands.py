@@ -34,7 +34,7 @@ def test_check_tells_right_from_wrong(tisim, monkeypatch):
 
 
 def test_doctor(tisim, monkeypatch):
-    monkeypatch.setattr("tisim.doctor.rate_of", lambda backend: {"taichi": 1e8}.get(backend))
+    monkeypatch.setattr("tisim.backend.diagnostics.rate_of", lambda backend: {"taichi": 1e8}.get(backend))
     code, out, _ = tisim("doctor")
     assert code == 0
     for word in ("backend", "LLVM", "processor", "cores", "memory", "cuda", "numpy", "'tisim[quadrants]'"):

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from tests.accuracy.scenes import only, oscillator
-from tisim.accuracy import files
+from tisim.accuracy import storage
 
 CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
 WRONG = [
@@ -45,7 +45,7 @@ def swing(tmp_path, monkeypatch):
 
 
 def rows(folder):
-    with (folder / files.CSV).open(newline="") as file:
+    with (folder / storage.CSV).open(newline="") as file:
         return list(csv.DictReader(file))
 
 
@@ -55,7 +55,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
     code, out, _ = tisim(*command, "1e-3")
     assert code == 0
     folder = tmp_path / "out" / "swing-cost"
-    assert {path.name for path in folder.iterdir()} == {".tisim", *files.NAMES}
+    assert {path.name for path in folder.iterdir()} == {".tisim", *storage.NAMES}
     # dt = 0.0316 and 0.01 come before: their errors are 7e-3 and 7e-4.
     assert [row["setting"] for row in rows(folder)] == ["dt=0.0316", "dt=0.01", "dt=0.00316"]
     (answer,) = [line for line in out.splitlines() if line.startswith("  tisim run")]
@@ -63,7 +63,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
     chosen = answer.split("dt=")[1]
     errors = {row["setting"]: float(row["error of displacement"]) for row in rows(folder)}
     assert errors[f"dt={chosen}"] < 1e-3
-    before = (folder / files.HDF5).read_bytes()
+    before = (folder / storage.HDF5).read_bytes()
     code, again, _ = tisim(*command, "1e-3")
     assert code == 0
     assert [line for line in again.splitlines() if line.startswith("  tisim run")] == [answer]
@@ -73,7 +73,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
     assert "error of displacement must be at least" in told
     assert "finer settings go further); received 1e-09" in told
     assert "Traceback" not in told
-    assert (folder / files.HDF5).read_bytes() == before
+    assert (folder / storage.HDF5).read_bytes() == before
     code, _, err = tisim(*command[:-1], "--set", "duration=1.0")
     assert code == 2
     assert "output folder must be without the study of another scene" in " ".join(err.split())
@@ -83,7 +83,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
 def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--repeats", "1", "--out", "cut")
     with monkeypatch.context() as patch:
-        write, pressed = files.write, []
+        write, pressed = storage.write, []
 
         def press(study, folder):
             if len(study.rows) == 2 and not pressed:
@@ -91,7 +91,7 @@ def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch
                 os.kill(os.getpid(), signal.SIGINT)
             return write(study, folder)
 
-        patch.setattr(files, "write", press)
+        patch.setattr(storage, "write", press)
         code, out, err = tisim(*command)
     assert code == 130
     assert "To go on, give the same command again" in " ".join(err.split())

@@ -9,10 +9,11 @@ import pytest
 
 from tests.accuracy.scenes import only, oscillator
 from tests.soak import damage
-from tisim import Simulation, lock, seal
-from tisim.claim import MARKER
-from tisim.figure import empty
+from tisim import Simulation
+from tisim.files import checksum, lock
+from tisim.files.ownership import MARKER
 from tisim.interrupt import Interrupt
+from tisim.plotting.style import empty
 
 
 def replaced(make):
@@ -29,7 +30,7 @@ def another_program(path):
 
 
 def another_of_ours(path):
-    with seal.created(path) as file:
+    with checksum.created(path) as file:
         file.attrs["format"] = "tisim something else"
 
 
@@ -95,7 +96,7 @@ def compiled_once(monkeypatch):
         made[:] = made or [Simulation(scene)]
         return made[0]
 
-    monkeypatch.setattr("tisim.cli.Simulation", simulation)
+    monkeypatch.setattr("tisim.cli.main.Simulation", simulation)
 
 
 @pytest.mark.long
@@ -152,9 +153,9 @@ def test_cost(tisim, tmp_path, monkeypatch):
 )
 def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
     # Drawing is slow; what is drawn is read all the same.
-    monkeypatch.setattr("tisim.movie.PillowWriter.grab_frame", lambda self, **more: None)
-    monkeypatch.setattr("tisim.movie.PillowWriter.finish", lambda self: None)
-    monkeypatch.setattr("tisim.plots.start_and_end", lambda *drawn: empty(2.0, 2.0))
+    monkeypatch.setattr("tisim.plotting.movie.PillowWriter.grab_frame", lambda self, **more: None)
+    monkeypatch.setattr("tisim.plotting.movie.PillowWriter.finish", lambda self: None)
+    monkeypatch.setattr("tisim.plotting.time_series.start_and_end", lambda *drawn: empty(2.0, 2.0))
     path = damage.KINDS[name].make(tmp_path)
     whole = path.read_bytes()
     for what, told in damages(path, whole):

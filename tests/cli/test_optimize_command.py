@@ -7,12 +7,12 @@ import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from optimize.cache import Cache
-from optimize.genome import Gene, Genome
-from optimize.problem import Problem
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
+from optimize.storage.cache import Cache
 from tisim import Box, Cloud, Scene
-from tisim.picture import cloud
-from tisim.steppers.controller import FixedStep
+from tisim.plotting.cloud import cloud
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 

@@ -11,7 +11,8 @@ import termios
 import pytest
 
 from tests.optimize.drift_case import CASE
-from tisim import Scene, interrupt, runtime
+from tisim import Scene, interrupt
+from tisim.backend import runtime
 from tisim.interrupt import Interrupt
 
 ASKED = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]

@@ -9,11 +9,12 @@ from matplotlib.figure import Figure
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from tests.test_growing import STILL, files_of_at_most
-from tests.test_growing import frame as grown
-from tisim import Recording, Simulation, claim, durable, seal
-from tisim.frames import frames
-from tisim.trajectory import Trajectory
+from tests.files.test_growing_hdf5 import STILL, files_of_at_most
+from tests.files.test_growing_hdf5 import frame as grown
+from tisim import Recording, Simulation
+from tisim.files import atomic, checksum, ownership
+from tisim.io.reader import frames
+from tisim.io.trajectory import Trajectory
 
 
 def every_frame(path):
@@ -68,7 +69,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
     tisim, tmp_path, first, monkeypatch
 ):
-    monkeypatch.setattr("tisim.movie.movie", lambda *arguments: None)  # drawing is slow
+    monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
     sizes = {"default": Size("", {})}
     parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
     toy = Case(*parts, figures=lambda size, progress: {"many.csv": "1\n"})
@@ -82,7 +83,7 @@ def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first
     for name in pictures:
         (folder / name).touch()
     assert tisim(*first)[0] == 0
-    claim.check(folder, pictures)  # as tisim plot does
+    ownership.check(folder, pictures)  # as tisim plot does
 
 
 def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
@@ -164,7 +165,7 @@ def test_damaged_trajectories_are_refused_in_a_line(tisim, tmp_path, command):
 
 
 def test_a_full_disk_at_the_end_of_a_run_loses_nothing(tisim, toml, monkeypatch):
-    replace = durable.replace_file
+    replace = atomic.replace_file
 
     def full(path, data):
         if path.name == "result.h5":
@@ -173,7 +174,7 @@ def test_a_full_disk_at_the_end_of_a_run_loses_nothing(tisim, toml, monkeypatch)
         replace(path, data)
 
     with monkeypatch.context() as patch:
-        patch.setattr(seal, "replace_file", full)
+        patch.setattr(checksum, "replace_file", full)
         code, out, err = tisim("run", toml)
     assert (code, out) == (1, "")
     assert "result.h5 could not be written: File too large; everything stored before is intact. " in err

@@ -3,12 +3,20 @@
 import numpy as np
 import pytest
 
-from tests.effects.loads import WORLDS, close, cloud, fields_beside_the_core, jacobians, loads, vector
-from tests.effects.magnets import Quadrupole
+from tests.effects.contact.loads import (
+    WORLDS,
+    close,
+    cloud,
+    fields_beside_the_core,
+    jacobians,
+    loads,
+    vector,
+)
+from tests.effects.magnetic.magnets import Quadrupole
 from tests.scenes import scene, simulate
 from tisim import Scene
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.magnetic_body_force import MagneticBodyForce
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.magnetic.body_force import MagneticBodyForce
 from tisim.errors import InputError
 from tisim.sources.uniform import ElectricField, MagneticField
 

@@ -4,16 +4,16 @@ import numpy as np
 from scipy.integrate import quad
 
 from tests.scenes import by_id, compiled, fixed, scene
-from tisim._taichi import ti
-from tisim.effect import Force, parameter
-from tisim.effects.contact import Contact
-from tisim.effects.contact_bond import ContactBond
-from tisim.effects.contact_dissipation import ContactDissipation
-from tisim.effects.contact_friction import ContactFriction
-from tisim.effects.contact_softening import ContactSoftening
-from tisim.effects.gravity import Gravity
-from tisim.effects.tether import Tether
-from tisim.spec import Vector
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.effects.base import Force, parameter
+from tisim.effects.contact.bond import ContactBond
+from tisim.effects.contact.dissipation import ContactDissipation
+from tisim.effects.contact.friction import ContactFriction
+from tisim.effects.contact.power_law import Contact
+from tisim.effects.contact.softening import ContactSoftening
+from tisim.effects.external.gravity import Gravity
+from tisim.effects.external.tether import Tether
 
 WORLDS, CAPACITY = 6, 12
 K, R, SPRING = 1e6, 1.0, 1e5

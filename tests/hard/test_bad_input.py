@@ -6,12 +6,12 @@ import pytest
 import tisim
 from tests.scenes import flow
 from tisim import Box, Cloud, Lattice, Particles, RandomAroundCylinder, Scene, Simulation
-from tisim.effects.impact import Impact
-from tisim.effects.mie import Mie
+from tisim.effects.impact.impact import Impact
+from tisim.effects.pair.mie import Mie
 from tisim.errors import InputError
 from tisim.operators.cooling import Cooling
 from tisim.operators.fragmentation import Fragmentation
-from tisim.steppers.controller import ApproachTime, FixedStep
+from tisim.steppers.step_control import ApproachTime, FixedStep
 from tisim.steppers.verlet import Verlet
 
 NAN, INF = float("nan"), float("inf")

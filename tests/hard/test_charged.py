@@ -12,15 +12,15 @@ import pytest
 
 from tests.scenes import by_id, scene, simulate
 from tests.throwaway import K_E
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.near_field import NearField
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.pair.near_field import NearField
 from tisim.sources.uniform import ElectricField, MagneticField
 from tisim.steppers.boris import Boris
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.implicit_control import ErrorControl
-from tisim.steppers.stage_control import StageControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import FixedStep
 
 WORLDS = 8
 W, DRIFT = 3.0, 0.75

@@ -8,9 +8,10 @@ import pytest
 
 from tests import extremes
 from tests.soak.running import FAILED, RAN, REFUSED, Runs
-from tisim import kinds, steppers
-from tisim.steppers.controller import StepControl
-from tisim.steppers.stepper import Stepper
+from tisim import steppers
+from tisim.components import serialization
+from tisim.steppers.base import Stepper
+from tisim.steppers.step_control import StepControl
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def test_extremes_of_one_kind(runs):
 
 def test_every_kind_is_there():
     """Each stepper and control of the package is in some scene; effects are taken as they are found."""
-    kinds.load(steppers)
+    serialization.load(steppers)
     found = [data["stepper"] for data in extremes.scenes().values()]
     for contract, names in (
         (Stepper, {stepper["kind"] for stepper in found}),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import compiled, energy, fixed, flow, simulate
-from tisim._taichi import ti
-from tisim.effect import Operator, parameter
+from tisim.backend.taichi import ti
+from tisim.effects.base import Operator, parameter
 
 
 class Poison(Operator):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.engine.test_schedules import BATCH
 from tests.scenes import GRAIN, HEAT_CAPACITY, RADIUS, check_sums, flow, hit, laws, momentum, simulate
-from tests.test_schedules import BATCH
-from tisim.effects.heating import Heating
-from tisim.effects.impact import Impact
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import Impact
 from tisim.operators.fragmentation import Fragmentation
 
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from tests import hostile
 from tests.judged import ACCEPTED, check_file, check_message, command, nothing_runs
-from tisim import Scene, request
+from tisim import Scene
+from tisim.cli import scene_arguments
 from tisim.errors import InputError
 
 pytestmark = pytest.mark.long
@@ -72,7 +73,7 @@ def test_files(file, random):
 def test_settings(warm, file, random):
     data = random.choice(warm)
     change = hostile.assignment(data, random)
-    judge(lambda: Scene.from_dict(data).replace(request.assignments([change])), file)
+    judge(lambda: Scene.from_dict(data).replace(scene_arguments.assignments([change])), file)
 
 
 NUMBERS = ("-1", "0", "nan", "x", "", "1" + "0" * 23, "9" * 5000)

@@ -6,15 +6,15 @@ import pytest
 
 from tests.scenes import compiled, scene
 from tisim import Particles, Scene, Simulation
-from tisim._taichi import ti
-from tisim.checkpoint import restore, save
-from tisim.effect import Force, parameter
+from tisim.backend.taichi import ti
+from tisim.effects.base import Force, parameter
+from tisim.io.checkpoint import restore, save
 from tisim.sources.flow import UniformFlow
-from tisim.steppers import alone
-from tisim.steppers.brownian import Brownian
-from tisim.steppers.drift_limit import DriftLimit
-from tisim.steppers.implicit_control import IterationControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers.implicit import independent
+from tisim.steppers.implicit.step_control import IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 SPEED = np.resize([1.0, 0.5, 0.25], 10)
 """m/s; some particles arrive at the cliff at 0.783 s, others never. More than a tile that goes together."""
@@ -69,8 +69,8 @@ BOTH = pytest.mark.parametrize("made", [inert, pytest.param(drifting, marks=pyte
 
 def in_launches(made, monkeypatch, attempts):
     """A simulation of which a launch has a particle make so many attempts at a step."""
-    monkeypatch.setattr(alone, "LAUNCH", 1)
-    monkeypatch.setattr(alone, "WINDOWS", attempts)
+    monkeypatch.setattr(independent, "LAUNCH", 1)
+    monkeypatch.setattr(independent, "WINDOWS", attempts)
     return Simulation(made, worlds=2)
 
 
@@ -149,5 +149,5 @@ def test_a_launch_is_of_so_many_steps(made):
     simulation.load([long])
     next(simulation.chunks())
     steps = simulation.s.read("particle_steps")[0]
-    assert 0.1 * alone.LAUNCH < steps <= alone.LAUNCH
+    assert 0.1 * independent.LAUNCH < steps <= independent.LAUNCH
     assert simulation.fraction() == pytest.approx(steps / (1e7 * len(SPEED)), rel=1e-3)

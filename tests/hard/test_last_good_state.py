@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from tests.scenes import compiled, fixed, scene
-from tisim._taichi import ti
-from tisim.checkpoint import restore, save
-from tisim.effect import Force, parameter
-from tisim.effects.impact import Impact
-from tisim.steppers.brownian import Brownian
-from tisim.steppers.drift_limit import DriftLimit
-from tisim.steppers.implicit_control import IterationControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.backend.taichi import ti
+from tisim.effects.base import Force, parameter
+from tisim.effects.impact.impact import Impact
+from tisim.io.checkpoint import restore, save
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers.implicit.step_control import IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 WHEN = 0.783
 """s, when things go wrong."""

@@ -3,24 +3,24 @@
 import numpy as np
 import pytest
 
-from tests.effects.loads import WORLDS, close, loads
-from tests.effects.magnets import K_B, MU_0, Quadrupole, dipole_field, flux_density
-from tests.effects.test_dipole_dipole import SIDE, magnets
-from tests.effects.test_moment import langevin
+from tests.effects.contact.loads import WORLDS, close, loads
+from tests.effects.magnetic.magnets import K_B, MU_0, Quadrupole, dipole_field, flux_density
+from tests.effects.magnetic.test_dipole_dipole import SIDE, magnets
+from tests.effects.magnetic.test_moment import langevin
 from tests.scenes import by_id, fixed, scene, simulate
 from tisim import Simulation
-from tisim._taichi import ti
-from tisim.effects.dipole_dipole import DipoleDipole
-from tisim.effects.magnetophoresis import Magnetophoresis
-from tisim.effects.mie import Mie
-from tisim.effects.moment import FixedMoment, LangevinMoment
-from tisim.effects.mutual_moment import MutualInducedMoment, MutualLangevinMoment
-from tisim.effects.near_field import NearField
-from tisim.langevin import langevin_ratio
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects.magnetic.dipole_dipole import DipoleDipole
+from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
+from tisim.effects.magnetic.moment import FixedMoment, LangevinMoment
+from tisim.effects.magnetic.mutual_moment import MutualInducedMoment, MutualLangevinMoment
+from tisim.effects.pair.mie import Mie
+from tisim.effects.pair.near_field import NearField
+from tisim.numerics.langevin import langevin_ratio
 from tisim.sources.uniform import MagneticField
-from tisim.steppers.implicit_control import ErrorControl
-from tisim.steppers.trapezoid import Trapezoid
-from tisim.taichi_thread import in_taichi_thread
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 N = np.array([2.0, -3.0, 6.0]) / 7
 ARGUMENTS = np.concatenate(

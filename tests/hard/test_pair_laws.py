@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from tests.effects.loads import WORLDS, loads
+from tests.effects.contact.loads import WORLDS, loads
 from tests.scenes import by_id, fixed, scene, simulate
 from tisim import Box
-from tisim._taichi import ti
-from tisim.effect import Operator, parameter
-from tisim.effects.contact import Contact
-from tisim.effects.hertz import Hertz
-from tisim.effects.near_field import NearField
+from tisim.backend.taichi import ti
+from tisim.effects.base import Operator, parameter
+from tisim.effects.contact.hertz import Hertz
+from tisim.effects.contact.power_law import Contact
+from tisim.effects.pair.near_field import NearField
 
 CROWD = 1000
 BOX = Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0))

@@ -5,14 +5,14 @@ import pytest
 
 from tests.scenes import compiled, scene, simulate
 from tisim import Scene
-from tisim.effects.gravity import Gravity
-from tisim.effects.impact import Impact
-from tisim.effects.magnetic_body_force import MagneticBodyForce
-from tisim.effects.tether import Tether
+from tisim.effects.external.gravity import Gravity
+from tisim.effects.external.tether import Tether
+from tisim.effects.impact.impact import Impact
+from tisim.effects.magnetic.body_force import MagneticBodyForce
 from tisim.errors import InputError
 from tisim.operators.capture import Capture
-from tisim.sources.cylinder import Cylinder, MagneticCylinders
-from tisim.sources.sphere import MagneticSpheres, Sphere
+from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.sources.magnetic.sphere import MagneticSpheres, Sphere
 from tisim.sources.uniform import MagneticField
 
 DT, STEPS, RADIUS = 0.02, 60, 0.05

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fake_runs import FakeEvaluator, fake_problem, fake_record
 
-from optimize.cache import Cache
+from optimize.storage.cache import Cache
 from tisim.errors import RunError
 
 
@@ -110,8 +110,8 @@ class Asleep:
 
 def asleep():
     """Two worker processes that are busy, and a parent that waits for them."""
-    from optimize.executors.processes import Processes
-    from optimize.executors.worker import Wanted
+    from optimize.evaluation.executors.processes import Processes
+    from optimize.evaluation.executors.worker import Wanted
 
     pool = Processes(2)
     given = [pool.submit([Asleep()], Wanted()) for _ in range(2)]
@@ -126,7 +126,7 @@ def tisim(*arguments):
     from drift_case import CASE
 
     from cases import case
-    from tisim.cli import main
+    from tisim.cli.main import main
 
     every = case.every
     case.every = lambda: {**every(), CASE.name: CASE}

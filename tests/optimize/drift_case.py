@@ -3,10 +3,10 @@
 import numpy as np
 
 from cases.case import Case, Size
-from optimize.genome import Gene, Genome
-from optimize.problem import Problem
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
 from tisim import Box, Cloud, Scene
-from tisim.steppers.controller import FixedStep
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 

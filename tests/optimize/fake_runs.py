@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from optimize.genome import Gene, Genome
-from optimize.problem import Problem
-from optimize.record import Record, evaluation_key
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
+from optimize.storage.record import Record, evaluation_key
 
 
 class FakeScene:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ("typer", "tisim.cli", "tisim.cli_search", "tisim.options", "tisim.request")
+COMMANDS = ("typer", "tisim.cli.main", "tisim.cli.search", "tisim.cli.options", "tisim.cli.scene_arguments")
 ABOVE = {"tisim": ("optimize", "cases"), "optimize": ("cases", *COMMANDS), "cases": COMMANDS}
 
 

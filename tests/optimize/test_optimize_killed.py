@@ -7,7 +7,7 @@ import time
 import pytest
 from cache_files import PIPE, worker
 
-from optimize.cache import Cache, existing, verify
+from optimize.storage.cache import Cache, existing, verify
 
 QUICK = ("drift",)
 REAL = ("agglomeration", "--size", "small")

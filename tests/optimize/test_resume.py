@@ -4,9 +4,9 @@ import pytest
 from cache_files import PIPE, worker
 from fake_runs import FakeEvaluator, fake_problem
 
-from optimize.cache import Cache, verify
 from optimize.search import search
 from optimize.settings import Settings
+from optimize.storage.cache import Cache, verify
 
 SETTINGS = Settings(seed=2, generations=4)
 

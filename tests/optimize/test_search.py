@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from fake_runs import FakeEvaluator, bowl, fake_problem
 
-from optimize.breeding import Operator
-from optimize.cache import Cache, verify
-from optimize.ensemble import EnsembleSettings
-from optimize.runs import start_seed
+from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.evaluation.runs import start_seed
+from optimize.methods.breeding import Operator
 from optimize.search import search
 from optimize.settings import Settings
-from optimize.stored import searches
+from optimize.storage.cache import Cache, verify
+from optimize.storage.search_records import searches
 from tisim.errors import InputError, RunError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)  # a function without noise needs no averaging
@@ -237,7 +237,7 @@ def test_full_disk_ends_the_search_clearly(path, monkeypatch):
         def evaluate(self, scenes, progress):
             for number, pair in enumerate(super().evaluate(scenes, progress)):
                 if number == 5:
-                    monkeypatch.setattr("tisim.durable.os.pwrite", _full)
+                    monkeypatch.setattr("tisim.files.atomic.os.pwrite", _full)
                 yield pair
 
     with pytest.raises(RunError, match="could not be written: No space left on device"):

@@ -10,17 +10,18 @@ import pytest
 from fake_runs import FakeEvaluator, fake_problem, fake_record
 from matplotlib.image import imread
 
-from optimize import report, store
-from optimize.cache import Cache, compact, existing, verify
-from optimize.ensemble import EnsembleSettings
-from optimize.estimate import Estimate
-from optimize.hall import Hall, compromise
-from optimize.individual import Individual
-from optimize.journal import frame
-from optimize.objective import Objective
-from optimize.record import Record
+from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.evaluation.estimate import Estimate
+from optimize.hall_of_fame import Hall, compromise
+from optimize.methods.individual import Individual
+from optimize.problem.objective import Objective
+from optimize.report import report
 from optimize.search import search
 from optimize.settings import Settings
+from optimize.storage import hdf5_store
+from optimize.storage.cache import Cache, compact, existing, verify
+from optimize.storage.journal import frame
+from optimize.storage.record import Record
 from tisim.errors import InputError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
@@ -177,8 +178,8 @@ def test_file_of_before_there_were_several_objectives_is_read(path):
     assert Cache(path).records() == [record]
     assert compact(path) == 1
     with h5py.File(path) as file:
-        assert "others" not in file[store.ROWS]
-        assert int(file[store.ROWS]["crc"][0]) == zlib.crc32(old)
+        assert "others" not in file[hdf5_store.ROWS]
+        assert int(file[hdf5_store.ROWS]["crc"][0]) == zlib.crc32(old)
 
 
 def test_what_cannot_be_is_refused(path):

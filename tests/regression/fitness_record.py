@@ -73,8 +73,8 @@ def deviations(values: dict[str, list[float]], record: dict[str, Any]) -> dict[s
 
 def main() -> int:
     """Compare, or store."""
-    from tisim import runtime
-    from tisim.scene import PHYSICS_VERSION
+    from tisim.backend import runtime
+    from tisim.scene.scene import PHYSICS_VERSION
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--write", action="store_true", help="store this machine's values")

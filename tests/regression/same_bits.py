@@ -40,7 +40,7 @@ def fingerprint(name: str, size: str, part: float) -> str:
     """SHA-256, hexadecimal, of what one case gives from its start number 1."""
     import tisim
     from cases.case import find
-    from tisim.frames import frames
+    from tisim.io.reader import frames
 
     scene = find(name).scene(size, 1)
     scene = scene.model_copy(update={"duration": part * scene.duration})

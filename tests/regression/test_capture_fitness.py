@@ -12,7 +12,7 @@ import pytest
 import tisim
 from cases import capture_design
 from cases.capture_design import HEIGHT, NUMBER, SPEED, WIDTH
-from tisim import runtime
+from tisim.backend import runtime
 
 CAUGHT = {
     "throughput": {

@@ -11,7 +11,7 @@ import pytest
 
 import tisim
 from cases import blast_design, vibration_design
-from tisim import runtime
+from tisim.backend import runtime
 
 VIBRATION = {
     (1.0, 1.0): -0.7005773424878275,

@@ -12,8 +12,8 @@ import pytest
 
 import tisim
 from tests.regression import fitness_record
-from tisim import runtime
-from tisim.scene import PHYSICS_VERSION
+from tisim.backend import runtime
+from tisim.scene.scene import PHYSICS_VERSION
 
 STANDARD_ERRORS = 4.0
 """Bound on the difference of two means: exceeded by chance once in 16,000 comparisons."""

@@ -23,10 +23,12 @@ import numpy as np
 from PIL import Image
 
 from tests.soak import damage
-from tisim import Box, Cloud, Scene, Simulation, cli, runtime
-from tisim.checkpoint import restore, save
+from tisim import Box, Cloud, Scene, Simulation
+from tisim.backend import runtime
+from tisim.cli import main
 from tisim.errors import RunError
-from tisim.steppers.controller import FixedStep
+from tisim.io.checkpoint import restore, save
+from tisim.steppers.step_control import FixedStep
 from tisim.steppers.verlet import Verlet
 
 FRAMES = 20
@@ -78,7 +80,7 @@ class Bench:
         self.toml.write_text(SCENE.to_toml())
         self.whole = folder / "whole"
         # All else in the command is as it is.
-        cli.Simulation = lambda scene: self.simulation  # type: ignore[assignment, misc]
+        main.Simulation = lambda scene: self.simulation  # type: ignore[assignment, misc]
         assert self.call("run", self.toml, "--frames", FRAMES, "--out", self.whole) == 0
         self.frames = damage._frames(self.whole / "trajectory.h5")
         self.result = damage._frames(self.whole / "result.h5")
@@ -90,7 +92,7 @@ class Bench:
         said = io.StringIO()
         try:
             with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-                cli.main([str(word) for word in words])
+                main.main([str(word) for word in words])
         except SystemExit as left:
             if left.code not in (0, 1, 2):
                 raise Wrong("tracebacks", f"exit code {left.code}: {said.getvalue()}") from None
@@ -151,14 +153,14 @@ def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Genera
 
 def cost(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
     """The rows of a study, written again when there is one more: all but the last, or all."""
-    from tisim.accuracy import files
+    from tisim.accuracy import storage
 
     path, study = damage._cost(folder), damage._study()
-    files.resume(study, folder)
+    storage.resume(study, folder)
     rows = damage._rows(path)
     study.rows.append(study.rows[0])
     with room(folder, _part(rng, path)), contextlib.suppress(RunError):
-        files.write(study, folder)
+        storage.write(study, folder)
         rows = [repr(row) for row in study.rows]
     if damage._rows(path) != rows:
         raise Wrong("lost", f"some of {len(rows)} rows")
@@ -195,7 +197,7 @@ TRIALS = {"run": run, "checkpoint": checkpoint, "cost": cost, **{name: show(name
 
 def _part(rng: np.random.Generator, *files: Path) -> int:
     """A random part of what the largest of these files takes, bytes; now and then all of it."""
-    return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in files))
+    return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in storage))
 
 
 def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.Generator) -> tuple[str, str]:

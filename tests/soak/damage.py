@@ -39,14 +39,14 @@ def _grains():
 
 
 def _still():
-    from tests.test_growing import STILL
+    from tests.files.test_growing_hdf5 import STILL
 
     return STILL
 
 
 def _trajectory(folder: Path) -> Path:
-    from tests.test_growing import frame
-    from tisim.trajectory import Recording, Trajectory
+    from tests.files.test_growing_hdf5 import frame
+    from tisim.io.trajectory import Recording, Trajectory
 
     with Trajectory(Recording(folder / "trajectory.h5", frames=9), [_still()]) as trajectory:
         for k in range(40):
@@ -55,9 +55,9 @@ def _trajectory(folder: Path) -> Path:
 
 
 def _result(folder: Path) -> Path:
-    from tests.test_growing import frame
-    from tisim.output import write_result
-    from tisim.result import Result, Status
+    from tests.files.test_growing_hdf5 import frame
+    from tisim.engine.result import Result, Status
+    from tisim.io.run_folder import write_result
 
     start, end = frame(0).arrays, frame(1).arrays
     result = Result(_still(), end, start, 1.0, {"steps": 3}, Status(True, "reached its end"), 0.1)
@@ -66,7 +66,7 @@ def _result(folder: Path) -> Path:
 
 
 def _frames(path: Path) -> list[str]:
-    from tisim.frames import frames
+    from tisim.io.reader import frames
 
     with frames(path) as found:
         return [found.scene.digest(), *(_digest(f.time, f.step, *sorted(f.arrays.items())) for f in found)]
@@ -91,7 +91,7 @@ def _simulation():
 
 
 def _checkpoint(folder: Path) -> Path:
-    from tisim.checkpoint import save
+    from tisim.io.checkpoint import save
 
     simulation = _simulation()
     simulation.run(steps=3)
@@ -100,7 +100,7 @@ def _checkpoint(folder: Path) -> Path:
 
 
 def _restored(path: Path) -> list[str]:
-    from tisim.checkpoint import restore
+    from tisim.io.checkpoint import restore
 
     simulation = _simulation()
     restore(simulation, path)
@@ -115,7 +115,7 @@ def _study():
 
 
 def _cost(folder: Path) -> Path:
-    from tisim.accuracy import files
+    from tisim.accuracy import storage
     from tisim.accuracy.row import Row
 
     study = _study()
@@ -124,26 +124,26 @@ def _cost(folder: Path) -> Path:
         study.rows.append(
             Row("Verlet", f"dt={k}", "Verlet()", "--set", "f64", 1, (0.1 * k,), k, k, 0.0, errors)
         )
-    files.write(study, folder)
+    storage.write(study, folder)
     return folder / "cost.h5"
 
 
 def _rows(path: Path) -> list[str]:
-    from tisim.accuracy import files
+    from tisim.accuracy import storage
 
     study = _study()
-    files.resume(study, path.parent)
+    storage.resume(study, path.parent)
     return [repr(row) for row in study.rows]
 
 
 def _record(k: int):
-    from optimize.record import Record
+    from optimize.storage.record import Record
 
     return Record(f"{k:064x}", "soak", 1 / (k + 3), True, "", k, {"x": k / 7}, {"steps": k}, 0.1, 1e9 + k)
 
 
 def _journal(folder: Path) -> Path:
-    from optimize.cache import Cache
+    from optimize.storage.cache import Cache
 
     cache = Cache(folder / "search.h5")
     for k in range(20):
@@ -152,7 +152,7 @@ def _journal(folder: Path) -> Path:
 
 
 def _search(folder: Path) -> Path:
-    from optimize.cache import Cache
+    from optimize.storage.cache import Cache
 
     with Cache(folder / "search.h5") as cache:
         for k in range(20):
@@ -162,7 +162,7 @@ def _search(folder: Path) -> Path:
 
 
 def _records(path: Path) -> list[str]:
-    from optimize.cache import existing
+    from optimize.storage.cache import existing
 
     cache = existing(path.parent / "search.h5")
     tables = [repr(cache.table(name)) for name in cache.tables()]
@@ -223,7 +223,7 @@ def verdict(kind: Kind, path: Path, whole: list[str] | None) -> tuple[str, objec
 
 def _reader(pipe: Connection) -> None:
     """Makes and reads files as it is told, in a process of its own."""
-    from tisim import runtime
+    from tisim.backend import runtime
 
     runtime.start(threads=1)
     while True:

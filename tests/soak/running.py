@@ -10,10 +10,11 @@ from random import Random
 from tests import extremes
 from tests.judged import check_message, check_result
 from tests.soak.apart import Apart, Came
-from tisim import Scene, Simulation, runtime
+from tisim import Scene, Simulation
+from tisim.backend import runtime
+from tisim.engine.monitor import REASONS
 from tisim.errors import InputError
-from tisim.state import RUNNING
-from tisim.watch import REASONS
+from tisim.worlds.state import RUNNING
 
 STEPS = 50
 """Of a run, at most."""

@@ -15,11 +15,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from optimize.cache import Cache, existing, verify
+from optimize.storage.cache import Cache, existing, verify
 from tests.soak.counts import Counts
-from tisim._taichi import BACKEND
-from tisim.kernel_cache import LOCKS
-from tisim.runtime import cores
+from tisim.backend.kernel_cache import LOCKS
+from tisim.backend.runtime import cores
+from tisim.backend.taichi import BACKEND
 
 WORKER = Path(__file__).parents[1] / "optimize" / "cache_worker.py"
 SEARCH = ("optimize", "drift", "--generations", "3", "--seed", "3")

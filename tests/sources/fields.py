@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tisim import runtime
-from tisim._taichi import ti
-from tisim.binding import Table, connect
-from tisim.taichi_thread import in_taichi_thread
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.worlds.parameter_table import Table, connect
 
 WORLDS = 4
 _bound: dict = {}

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from tisim import memory
-from tisim.effects.lorentz import Lorentz
+from tisim.backend import memory
+from tisim.backend.runtime import current
+from tisim.effects.external.lorentz import Lorentz
 from tisim.errors import InputError
-from tisim.runtime import current
+from tisim.sources.magnetic.sphere import MagneticSpheres, Sphere
 from tisim.sources.sample import sample
-from tisim.sources.sphere import MagneticSpheres, Sphere
 from tisim.sources.uniform import ElectricField, MagneticField
 
 

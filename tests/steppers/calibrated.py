@@ -16,18 +16,18 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from tests.scenes import scene, simulate
-from tisim.effects.drag import StokesDrag
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.near_field import NearField
-from tisim.effects.tether import Tether
-from tisim.result import Result
+from tisim.effects.external.drag import StokesDrag
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.external.tether import Tether
+from tisim.effects.pair.near_field import NearField
+from tisim.engine.result import Result
 from tisim.sources.flow import UniformFlow
 from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.implicit_control import ErrorControl
-from tisim.steppers.stage_control import StageControl
-from tisim.steppers.stepper import Stepper
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.base import Stepper
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
 
 TURN = 2 * np.pi
 """rad/s: one turn or vibration a second."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from tests.scenes import scene
-from tisim.effects.lorentz import Lorentz
-from tisim.effects.tether import Tether
+from tisim.effects.external.lorentz import Lorentz
+from tisim.effects.external.tether import Tether
 from tisim.sources.uniform import ElectricField, MagneticField
 from tisim.steppers.boris import Boris
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.implicit_control import ErrorControl, IterationControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import FixedStep
 
 
 def equal_steps(dt, phi=0.5, tolerance=1e-13, **more):

@@ -6,12 +6,12 @@ from tests.scenes import fixed, scene
 from tests.steppers.test_straight_lines import straight
 from tisim import Scene
 from tisim.errors import InputError
-from tisim.steppers.collocation import Collocation
-from tisim.steppers.controller import LEAST, ApproachTime, FixedStep
-from tisim.steppers.drift_limit import DriftLimit
-from tisim.steppers.implicit_control import ErrorControl, IterationControl
-from tisim.steppers.stage_control import StageControl
-from tisim.steppers.trapezoid import Trapezoid
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import LEAST, ApproachTime, FixedStep
 from tisim.steppers.verlet import Verlet
 
 ORIGIN = [[0.0, 0.0, 0.0]]

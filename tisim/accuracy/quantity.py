@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tisim.confidence import half_width
-from tisim.effect import Operator, PairEvent
+from tisim.effects.base import Operator, PairEvent
+from tisim.engine.result import Result
 from tisim.errors import must
-from tisim.result import Result
-from tisim.scene import Scene
+from tisim.numerics.statistics import half_width
+from tisim.scene.scene import Scene
 
 Value = Callable[[Result], "np.ndarray | float"]
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tisim.accuracy.methods import Method, finest
 from tisim.accuracy.quantity import Estimate, Quantity, estimate
+from tisim.accuracy.sweep import Method, finest
+from tisim.engine.result import Result
 from tisim.errors import must
-from tisim.result import Result
-from tisim.scene import Scene
+from tisim.scene.scene import Scene
 
 TIGHTER = 2.0
 """Decades between the finest setting of the sweep and the reference."""

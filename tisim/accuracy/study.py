@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import tisim
-from tisim import runtime
-from tisim.accuracy.driver import Progress, Run
 from tisim.accuracy.quantity import Quantity, usual
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row, decades, tied
+from tisim.accuracy.runner import Progress, Run
+from tisim.backend import runtime
 from tisim.errors import RunError, must
-from tisim.scene import Scene
+from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -130,19 +130,19 @@ class Study:
 
     def table(self) -> RenderableType:
         """Every setting with its time, work and errors, for rich."""
-        from tisim.accuracy.listing import table
+        from tisim.accuracy.table import table
 
         return table(self)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write cost.csv and cost.h5 (see files.py) into a folder, made if missing; returns their paths."""
-        from tisim.accuracy.files import write
+        """Write cost.csv and cost.h5 (see storage.py) into a folder, made if missing; returns their paths."""
+        from tisim.accuracy.storage import write
 
         return write(self, Path(folder))
 
     def picture(self, path: str | Path) -> Path:
         """Draw error against time, a line for each method, as a PNG file."""
-        from tisim.accuracy.picture import save
+        from tisim.accuracy.plot import save
 
         return save(self, Path(path))
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from tisim._taichi import ti
-from tisim.effect import Operator, PairEvent
-from tisim.sources.magnets import Magnets
-from tisim.state import Field
+from tisim.backend.taichi import ti
+from tisim.effects.base import Operator, PairEvent
+from tisim.sources.magnetic.magnets import Magnets
+from tisim.worlds.state import Field
 
 
 class Capture(Operator):

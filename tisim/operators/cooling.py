@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from tisim._taichi import ti
-from tisim.effect import Effect, Operator, parameter
-from tisim.effects.heating import Heating
-from tisim.state import Field
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Operator, parameter
+from tisim.effects.impact.heating import Heating
+from tisim.worlds.state import Field
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W/(m^2 K^4), exact in SI to these digits; Z04 uses 5.67e-8."""

@@ -6,11 +6,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from tisim._taichi import ti
-from tisim.effect import Operator, parameter
-from tisim.effects.heating import Heating
-from tisim.effects.impact import Impact, ImpactLaw
-from tisim.state import FULL, Field
+from tisim.backend.taichi import ti
+from tisim.effects.base import Operator, parameter
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import Impact, ImpactLaw
+from tisim.worlds.state import FULL, Field
 
 
 class Fragmentation(ImpactLaw, Operator):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from tisim._taichi import ti
-from tisim.effect import Operator
-from tisim.state import Field
+from tisim.backend.taichi import ti
+from tisim.effects.base import Operator
+from tisim.worlds.state import Field
 
 
 class PeakDisplacement(Operator):

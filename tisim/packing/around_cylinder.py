@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import field_validator
 from scipy.spatial import cKDTree
 
-from tisim.domain import Domain
+from tisim.components.component import Vector, parameter
+from tisim.components.domain import Domain
+from tisim.components.ranges import check_direction, check_resolved
 from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
-from tisim.ranges import check_direction, check_resolved
-from tisim.spec import Vector, parameter
 
 ROUNDS = 200
 """Of as many tries as there are spheres, before the region counts as full."""

@@ -8,12 +8,12 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import model_validator
 
-from tisim.domain import Domain
+from tisim.components.component import Spec, Vector, parameter
+from tisim.components.domain import Domain
+from tisim.components.ranges import PARTICLES, check_resolved
 from tisim.errors import InputError, must
 from tisim.packing import region
-from tisim.packing.sequential import place
-from tisim.ranges import PARTICLES, check_resolved
-from tisim.spec import Spec, Vector, parameter
+from tisim.packing.random_sequential import place
 
 
 class Placement(Spec):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from tisim._taichi import ti
-from tisim.effect import Source, parameter
-from tisim.spec import Vector
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.effects.base import Source, parameter
 
 
 class UniformFlow(Source):

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tisim import runtime
-from tisim._taichi import ti
-from tisim.binding import Table, connect
-from tisim.effect import Effect, Source
+from tisim.backend import runtime
+from tisim.backend.memory import collected
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects.base import Effect, Source
 from tisim.errors import must
-from tisim.memory import collected
-from tisim.taichi_thread import in_taichi_thread
+from tisim.worlds.parameter_table import Table, connect
 
 
 @ti.data_oriented

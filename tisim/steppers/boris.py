@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from typing import ClassVar, Self
 
-from tisim._taichi import ti
-from tisim.effect import Effect, Force
-from tisim.forces import FORCE
-from tisim.program import Item, PerParticle, Phase
-from tisim.state import Field
-from tisim.steppers.controller import Controller, FixedStep
-from tisim.steppers.phases import Arrive, Clock, Listen, Operate, arrive
-from tisim.steppers.solve import solved, summed_jacobian, with_jacobian
-from tisim.steppers.stepper import Parts, Stepper
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Force
+from tisim.interactions.force_sum import FORCE
+from tisim.steppers.base import Parts, Stepper
+from tisim.steppers.common import Arrive, Clock, Listen, Operate, arrive
+from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
+from tisim.steppers.step_control import Controller, FixedStep
+from tisim.worlds.program import Item, PerParticle, Phase
+from tisim.worlds.state import Field
 
 
 class Boris(Stepper):

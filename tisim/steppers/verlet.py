@@ -7,12 +7,12 @@ without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c
 from collections.abc import Sequence
 from typing import Self
 
-from tisim._taichi import ti
-from tisim.effect import Effect, Force, PairEvent
-from tisim.program import Item, PerParticle, Phase
-from tisim.steppers.controller import ApproachTime, Controller, FixedStep
-from tisim.steppers.phases import Clock, advance_clock, arrive
-from tisim.steppers.stepper import Parts, Stepper
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Force, PairEvent
+from tisim.steppers.base import Parts, Stepper
+from tisim.steppers.common import Clock, advance_clock, arrive
+from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
+from tisim.worlds.program import Item, PerParticle, Phase
 
 
 class Verlet(Stepper):

@@ -1,0 +1,41 @@
+"""Where the runs of a search are made: in this process, in others on this machine, or on a Dask cluster."""
+
+from __future__ import annotations
+
+from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.runs import Evaluator as Contract
+from tisim.backend import runtime
+from tisim.errors import must
+
+RULE = "batch, processes:N or dask://HOST:PORT"
+
+
+def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Contract:
+    """The evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
+
+    "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
+    "dask://host:port": the workers of the Dask scheduler there (needs the extra ``dask``), or
+    "dask://tls://host:port" where it speaks another protocol than TCP.
+    threads : CPU threads of this process, or of each worker; 0 for all cores, or a worker's share of them.
+    """
+    kind, _, rest = name.partition(":")
+    must(kind in ("batch", "processes", "dask"), "executor", RULE, name)
+    if kind == "batch":
+        must(name == "batch", "executor", RULE, name)
+        runtime.start(device, precision, threads)
+        return Evaluator()
+    # Imported late: nobody needs the one for the other, and Dask may not be there at all.
+    from optimize.evaluation.executors.remote import Remote
+    from optimize.evaluation.executors.worker import Wanted
+
+    wanted = Wanted(device, precision, threads)
+    if kind == "processes":
+        from optimize.evaluation.executors.processes import Processes
+
+        able = rest.isdecimal() and len(rest) < 5 and int(rest) >= 1
+        must(able, "executor", "processes:N with N >= 1 and of at most 4 digits", name)
+        return Remote(Processes(int(rest)), wanted)
+    from optimize.evaluation.executors.dask_cluster import DaskCluster
+
+    must(rest.startswith("//") and len(rest) > 2, "executor", RULE, name)
+    return Remote(DaskCluster(rest[2:]), wanted)

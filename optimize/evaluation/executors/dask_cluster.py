@@ -1,0 +1,148 @@
+"""Workers of a Dask cluster, on whatever machines they are."""
+
+from __future__ import annotations
+
+import concurrent.futures as cf
+import logging
+import time
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from optimize.evaluation.executors import handshake, worker
+from optimize.evaluation.executors.worker import Answer, Wanted
+from tisim.errors import InputError, RunError, must
+from tisim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+CONNECT_S = 10.0
+"""Time that a scheduler has to answer, seconds."""
+SILENCE_S = 60.0
+"""Time without any worker after which the search gives up, seconds: a cluster may start others."""
+ENCRYPTED = ("tls", "wss")
+SCHEMES = ("tcp", "ws", *ENCRYPTED)
+"""In which a scheduler may be spoken to."""
+LOOK_S = 1.0
+"""Time between looks at whether there are workers, seconds."""
+
+
+class DaskCluster:
+    """The workers of the scheduler at address: host:port, or scheme://host:port with one of SCHEMES.
+
+    Every worker must have this package, the same compiler and Python. Taichi gets as many threads as the
+    worker was given (``dask worker --nthreads``). A unit of work whose worker is lost is given to another one
+    by the scheduler, a few times at most. Certificates, for what is encrypted, are those of Dask's own
+    configuration, ``distributed.comm.tls``. InputError when they are missing, when there is no scheduler, and
+    when it has no workers or one of another program.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._client = _client(address)
+        # A scheduler that is lost is told below; Dask would tell it too, with all of its stacks.
+        for logger in ("distributed", "distributed.client"):
+            logging.getLogger(logger).setLevel(logging.CRITICAL)
+        try:
+            must(self.workers > 0, "Dask cluster", "one with workers", address)
+            for where, theirs in self._client.run(handshake.program, on_error="return").items():
+                who = f"worker {where} of the Dask cluster"
+                if isinstance(theirs, dict):
+                    handshake.agree(handshake.program(), theirs, who)
+                elif not isinstance(theirs, OSError):  # or it has just gone
+                    raise handshake.stranger(theirs, who)
+        except InputError:
+            self._client.close()
+            raise
+        self._executor = self._client.get_executor(pure=False)
+        self._looked = self._answered = time.monotonic()
+        self._told = False
+
+    @property
+    def workers(self) -> int:
+        """How many there are; 0 also when the scheduler does not answer."""
+        try:
+            return len(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S))
+        except (OSError, TimeoutError):
+            return 0
+
+    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
+        self._check()
+        self._answered = time.monotonic()
+        return self._executor.submit(_run, scenes, wanted)
+
+    def outcome(self, future: cf.Future[Answer]) -> Answer:
+        from distributed import KilledWorker
+
+        try:
+            answer = future.exception() or future.result()
+        except cf.CancelledError:
+            raise _scheduler_lost() from None
+        if isinstance(answer, (KilledWorker, OSError)):
+            raise RunError(f"workers of the Dask cluster were lost again and again ({answer})") from answer
+        if isinstance(answer, Answer):
+            return answer
+        # It could not read what it was sent, or is of a version that does not know of answers.
+        raise handshake.stranger(answer, "worker of the Dask cluster")
+
+    def look(self) -> None:
+        """Say so when there is no worker; RunError without one for SILENCE_S, or without a scheduler."""
+        self._check()
+        now = time.monotonic()
+        if now - self._looked < LOOK_S:
+            return
+        self._looked = now
+        if self.workers:
+            self._answered, self._told = now, False
+        elif now - self._answered > SILENCE_S:
+            raise RunError(
+                f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; what had finished is kept"
+            )
+        elif not self._told:
+            self._told = True
+            waiting = f"no worker of the Dask cluster answers; waiting for {SILENCE_S:g} s"
+            warnings.warn(waiting, RuntimeWarning, stacklevel=2)
+
+    def _check(self) -> None:
+        if self._client.status != "running":
+            raise _scheduler_lost()
+
+    def stop(self) -> None:
+        """Cancel what is waiting; what a worker is at, it finishes for nothing."""
+        self._executor.shutdown(wait=False)
+        self._client.close()
+
+
+def _client(address: str) -> Client:
+    """Of the scheduler at the address; nothing is begun that Dask could not end where the address is none."""
+    try:
+        from distributed import Client, Security
+        from distributed.comm import parse_host_port
+    except ImportError as missing:
+        rule = "one that is installed (pip install 'tisim[dask]')"
+        raise InputError(f"executor must be {rule}; received 'dask' ({missing})") from None
+    scheme, _, place = address.rpartition("://")
+    scheme = scheme or "tcp"
+    must(scheme in SCHEMES, "scheme of the Dask scheduler's address", f"one of {', '.join(SCHEMES)}", scheme)
+    try:
+        parse_host_port(place)
+        security = Security() if scheme in ENCRYPTED else None
+        if security is None or security.get_connection_args("client")["ssl_context"] is not None:
+            full = f"{scheme}://{place}"
+            return Client(full, security=security, timeout=CONNECT_S, set_as_default=False)
+        failure = "there are no certificates in Dask's configuration, distributed.comm.tls"
+    except (OSError, TimeoutError, ValueError) as error:
+        failure = str(error)
+    raise InputError(
+        f"executor must be the address of a running Dask scheduler; received {address!r} ({failure})"
+    )
+
+
+def _scheduler_lost() -> RunError:
+    return RunError("Dask scheduler was lost; what had finished is kept")
+
+
+def _run(scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+    from distributed import get_worker
+
+    return worker.run(scenes, wanted, get_worker().state.nthreads)

@@ -1,0 +1,67 @@
+"""That searching process and workers are one program: what of each decides the bits of a result."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from textwrap import shorten
+
+from tisim import __version__
+from tisim.backend import runtime
+from tisim.errors import InputError, must
+from tisim.scene.scene import PHYSICS_VERSION
+
+PACKAGES = ("tisim", "optimize", "cases")
+
+
+def program() -> dict[str, str]:
+    """What decides the bits of a result beside the scene, the precision and the device.
+
+    Starts are drawn by NumPy and SciPy; ``sum`` of Python 3.12 rounds in another way than that of 3.11; other
+    processors have other mathematical functions.
+    """
+    return {
+        "tisim": __version__,
+        "physics": str(PHYSICS_VERSION),
+        "code": source(),
+        "backend": runtime.backend(),
+        "Python": ".".join(platform.python_version_tuple()[:2]),
+        "NumPy": version("numpy"),
+        "SciPy": version("scipy"),
+        "machine": platform.machine(),
+    }
+
+
+@cache
+def source() -> str:
+    """The first 12 digits of a SHA-256 of all source files: a version may have been edited."""
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        spec = find_spec(package)
+        for folder in sorted(spec.submodule_search_locations or ()) if spec else ():
+            for path in sorted(Path(folder).rglob("*.py")):
+                digest.update(path.relative_to(folder).as_posix().encode() + b"\0")
+                digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]
+
+
+def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
+    """InputError that names both sides unless they are the same."""
+    differ = [name for name in {**ours, **theirs} if ours.get(name) != theirs.get(name)]
+    must(not differ, who, f"of {_named(ours, differ)}, as the search is", _named(theirs, differ))
+
+
+def stranger(sent: object, who: str) -> InputError:
+    """The error for a worker that cannot even say what it is: it has sent something else."""
+    ours = program()
+    rule = f"one that knows what the search is made of ({_named(ours, ours)})"
+    return InputError(f"{who} must be {rule}; received {shorten(repr(sent), 200)}")
+
+
+def _named(program: Mapping[str, str], names: Iterable[str]) -> str:
+    return ", ".join(f"{name} {program.get(name, 'unknown')}" for name in names)

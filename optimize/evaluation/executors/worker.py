@@ -1,0 +1,125 @@
+"""What a worker does: it starts Taichi once, and then runs the scenes that it is sent."""
+
+from __future__ import annotations
+
+import concurrent.futures as cf
+import os
+import pickle
+import platform
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+
+from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.executors import handshake
+from tisim.backend import runtime
+from tisim.engine.result import Result
+from tisim.errors import InputError, RunError
+from tisim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """How a worker is to run: see tisim.backend.runtime; threads 0 for its share of the cores."""
+
+    device: str = "cpu"
+    precision: str = "f64"
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        runtime.Runtime(self.device, self.precision, self.threads)
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """As of the in-process evaluator: what a cached result depends on."""
+        return {"precision": self.precision, "device": self.device, "backend": runtime.backend()}
+
+    @property
+    def made_by(self) -> dict[str, str]:
+        """What an answer must say of itself, or its last bits may be others, and the cache would take them
+        for the same.
+        """
+        return {**handshake.program(), "precision": self.precision, "device": self.device}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The results of the scenes, in order, or the error instead; what they were made by, and where."""
+
+    made_by: dict[str, str]
+    results: list[Result]
+    error: BaseException | None = None
+    worker: str = field(default_factory=lambda: f"worker (process {os.getpid()} of {platform.node()})")
+
+
+_work = cf.ThreadPoolExecutor(1)
+"""The thread in which units of work are run, one at a time, while others listen."""
+_evaluator: list[Evaluator] = []
+
+
+def run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
+    """The answer of a worker whose share of the cores that is."""
+    return _answered(_work.submit(_run, scenes, wanted, share))
+
+
+def serve(connection: Connection, share: int) -> None:
+    """Answer pickled (scenes, wanted) until the other end is closed: the whole life of a worker process.
+
+    This thread does nothing but listen. When the searching process is gone, however it went, the system
+    closes its end, and what is being run for it ends here and now.
+    """
+    sent: cf.Future[None] | None = None
+    while True:
+        try:
+            question = connection.recv_bytes()
+        except (EOFError, OSError):
+            break
+        made = _work.submit(_run_pickled, question, share)
+        sent = _work.submit(_send, connection, made)
+        sent.add_done_callback(_end_unless_sent)
+    if sent is not None and not sent.done():
+        os._exit(1)
+
+
+def _run_pickled(question: bytes, share: int) -> Answer:
+    scenes, wanted = pickle.loads(question)
+    return _run(scenes, wanted, share)
+
+
+def _run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
+    before = runtime.generation()
+    runtime.start(wanted.device, wanted.precision, wanted.threads or share)
+    if not _evaluator or runtime.generation() != before:
+        _evaluator[:] = [Evaluator()]
+    results = dict(_evaluator[0].evaluate(scenes))
+    made_by = {**handshake.program(), **runtime.current().settings}
+    return Answer(made_by, [results[index] for index in range(len(scenes))])
+
+
+def _answered(made: cf.Future[Answer]) -> Answer:
+    error = made.exception()
+    return Answer(handshake.program(), [], _portable(error)) if error else made.result()
+
+
+def _send(connection: Connection, made: cf.Future[Answer]) -> None:
+    connection.send(_answered(made))
+
+
+def _end_unless_sent(sent: cf.Future[None]) -> None:
+    """Who waits for the answer would wait for ever; that a process has ended is noticed."""
+    if sent.exception():
+        os._exit(1)
+
+
+def _portable(error: BaseException) -> BaseException:
+    """The error as it can be sent; one that is not for people with where in the worker it was raised."""
+    if isinstance(error, (InputError, RunError)):
+        return error
+    told = "".join(traceback.format_exception(error))
+    try:
+        error = pickle.loads(pickle.dumps(error))
+    except (pickle.PickleError, TypeError, AttributeError):
+        error = RuntimeError(repr(error))
+    error.add_note(f"in a worker:\n{told}")
+    return error

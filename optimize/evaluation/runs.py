@@ -1,0 +1,161 @@
+"""Runs of designs from random starts: each is run once, and every one goes through the cache."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from optimize.problem.problem import Problem
+from optimize.storage.cache import Cache
+from optimize.storage.record import Record, canonical, evaluation_key
+from tisim.errors import InputError, RunError
+
+if TYPE_CHECKING:
+    from tisim.engine.result import Result
+    from tisim.scene.scene import Scene
+
+
+class Evaluator(Protocol):
+    """Runs scenes.
+
+    settings : all about it that may change a fitness (precision, device kind); part of the cache key.
+    """
+
+    settings: dict[str, Any]
+
+    def evaluate(
+        self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield (index into scenes, Result) once for each scene, in any order, as soon as it is finished.
+
+        progress, if given, is called now and then with the finished fraction of this call, 0..1.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give back what it holds; it is not used any more."""
+        ...
+
+
+def start_seed(seed: int, start: int, design: Mapping[str, float] | None = None) -> int:
+    """Seed (0 .. 2^31 - 1) of a start: a function of (seed, start), and of the design if one is given."""
+    entropy = [seed, start]
+    if design is not None:
+        entropy.append(int.from_bytes(hashlib.sha256(canonical(dict(design))).digest()[:8], "little"))
+    return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0] >> 1)
+
+
+@dataclass(eq=False)
+class Sample:
+    """The starts of one design so far.
+
+    costs : of each start, (starts, objectives). used : how many of them, from the first, its estimate
+    stands on. settled : see Estimate. reason : "" or why the design failed. open : more starts are to come.
+    """
+
+    design: Mapping[str, float]
+    costs: list[tuple[float, ...]] = field(default_factory=list)
+    used: int = 0
+    settled: bool = False
+    reason: str = ""
+    open: bool = True
+
+
+class Runs:
+    """Runs what is asked for and not known. evaluations, hits : runs made, and found in the cache instead;
+    together they are the different runs that were asked for, the same for a search that was resumed.
+
+    common : start k is the same for every design.
+    """
+
+    def __init__(
+        self, problem: Problem, evaluator: Evaluator, cache: Cache, seed: int, common: bool = True
+    ) -> None:
+        self.problem, self.evaluator, self.cache = problem, evaluator, cache
+        self.seed, self.common = seed, common
+        self.evaluations = 0
+        self.hits = 0
+        self._asked: set[str] = set()
+
+    def add(
+        self, wanted: Iterable[tuple[Sample, range]], report: Callable[[float], None] = lambda fraction: None
+    ) -> None:
+        """Add to each sample the costs of these starts; all that is not in the cache in one call.
+
+        report is called with the finished fraction. Errors of the evaluator itself and KeyboardInterrupt pass
+        through; what was finished by then is in the cache.
+        """
+        self.cache.refresh()
+        found: list[tuple[Sample, int, int, str]] = []
+        missing: dict[str, tuple[Scene, Sample, int]] = {}
+        for sample, starts in wanted:
+            for start in starts:
+                seed = start_seed(self.seed, start, None if self.common else sample.design)
+                try:
+                    scene = self.problem.scene(sample.design, seed)
+                except InputError as error:
+                    sample.reason = sample.reason or f"infeasible: {error}"
+                    break
+                key = evaluation_key(
+                    scene.digest(), self.evaluator.settings, self.problem.name, self.problem.version
+                )
+                found.append((sample, start, seed, key))
+                if self.cache.get(key) is None:
+                    missing.setdefault(key, (scene, sample, seed))
+                elif key not in self._asked:
+                    self.hits += 1
+                self._asked.add(key)
+        self._run(missing, report)
+        for sample, start, seed, key in found:
+            record = self.cache.get(key)
+            if record is None:
+                raise RunError(
+                    f"evaluator must yield every scene; received none for start {start}, seed {seed}"
+                )
+            if not record.ok and not sample.reason:
+                sample.reason = f"start {start} (seed {seed}): {record.reason}"
+            if record.ok:
+                sample.costs.append(self.problem.costs(record.values))
+
+    def _run(self, missing: Mapping[str, tuple[Scene, Sample, int]], report: Callable[[float], None]) -> None:
+        if not missing:
+            return
+        keys = list(missing)
+        results = self.evaluator.evaluate([missing[key][0] for key in keys], report)
+        for finished, (index, result) in enumerate(results, start=1):
+            _, sample, seed = missing[keys[index]]
+            self.cache.put(self._record(keys[index], sample, seed, result))
+            self.evaluations += 1
+            report(finished / len(keys))
+
+    def _record(self, key: str, sample: Sample, seed: int, result: Result) -> Record:
+        ok, reason = result.status.ok, result.status.reason or "failed without a reason"
+        values = (math.nan,) * len(self.problem.objectives)
+        if ok:
+            values = tuple(float(objective.of(result)) for objective in self.problem.objectives)
+            for objective, value in zip(self.problem.objectives, values, strict=True):
+                if ok and not math.isfinite(value):
+                    ok, reason = (
+                        False,
+                        f"{objective.name if self.problem.several else 'objective'} is {value}",
+                    )
+        first, *others = values if ok else (math.nan,) * len(values)
+        return Record(
+            key=key,
+            problem=self.problem.name,
+            fitness=first,
+            ok=ok,
+            reason="" if ok else reason,
+            seed=seed,
+            design=dict(sample.design),
+            work=dict(result.work),
+            wall_s=float(result.wall_s),
+            created=time.time(),
+            others=tuple(others),
+        )

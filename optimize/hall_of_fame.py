@@ -1,0 +1,45 @@
+"""The best different designs so far: a ranking for one objective, the front for several."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from deap import tools
+
+from optimize.methods.individual import Individual
+
+
+class Hall:
+    """strings : best first; a front from the least first cost on.
+
+    size : most strings of a ranking; a front is kept whole. Failed designs never enter.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.strings: list[Individual] = []
+
+    def update(self, population: Iterable[Individual]) -> bool:
+        """Take in these strings; whether there is a better best, or a design in the front that was not."""
+        before = {tuple(string): string.fitness.values for string in self.strings}
+        leader = self.strings[0].fitness.values if self.strings else ()
+        different: dict[tuple[float, ...], Individual] = {}
+        for string in (*self.strings, *population):
+            if not string.failed:
+                different.setdefault(tuple(string), string)
+        known = list(different.values())
+        if known and len(known[0].fitness.values) > 1:
+            front = tools.sortNondominated(known, len(known), first_front_only=True)[0]
+            self.strings = sorted(front, key=lambda string: string.fitness.values)
+            return any(tuple(string) not in before for string in self.strings)
+        self.strings = sorted(known, key=lambda string: string.fitness.values)[: self.size]
+        return bool(self.strings) and (not leader or self.strings[0].fitness.values < leader)
+
+
+def compromise(front: list[Individual]) -> Individual:
+    """The design of a front nearest to the best of each objective, the front's ranges taken as 1."""
+    costs = np.array([string.fitness.values for string in front])
+    span = np.ptp(costs, axis=0)
+    distance = np.linalg.norm((costs - costs.min(axis=0)) / np.where(span > 0, span, 1.0), axis=1)
+    return front[int(np.argmin(distance))]

@@ -1,0 +1,70 @@
+"""The contract of a search method: a file of optimize/methods. Found by looking; registered nowhere."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from optimize import methods
+from optimize.methods.individual import Individual
+from tisim.components.component import Checked
+from tisim.errors import must
+
+
+class Method(ABC):
+    """Proposes designs and is told what they are worth.
+
+    1. ``ask`` gives the strings of the next generation, in the unit cube. Those whose fitness is not valid
+       are estimated; those whose fitness is (parents that were kept) are not estimated again.
+    2. ``tell`` gets all of them, all with a fitness (of costs, to be minimised; +inf for failed ones), and
+       the hall: the best designs so far, or the front. Strings keep their identity: a fitness may have
+       changed since, because more starts were spent on the design.
+    3. Its random numbers are its own and follow from the seed alone. What it asks is a function of the seed
+       and of what it was told: to resume a search is to run it again from the start with the same cache.
+
+    name : as in ``--method NAME``; several : whether it can search for several objectives at once.
+    Options : its settings, as in ``--set search.options.KEY=VALUE``. followers : by option, the others that
+    follow it where they are not given: a case's own values of those go with its own value of this one.
+    width : mean width of the part of the unit cube that it draws from now. moved : the last ``tell`` has put
+    that part elsewhere.
+    """
+
+    name: ClassVar[str]
+    several: ClassVar[bool] = False
+    Options: ClassVar[type[Checked]]
+    followers: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    width: float = 1.0
+    moved: bool = False
+
+    @abstractmethod
+    def __init__(self, genes: int, objectives: int, options: Any, seed: int) -> None:
+        """InputError for options that cannot work on a genome of so many genes."""
+
+    @abstractmethod
+    def ask(self) -> list[Individual]:
+        """The next generation."""
+
+    @abstractmethod
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        """What the strings of the last ``ask`` are worth."""
+
+
+def every() -> dict[str, type[Method]]:
+    """All methods by name."""
+    found: dict[str, type[Method]] = {}
+    for entry in pkgutil.iter_modules(methods.__path__):
+        module = importlib.import_module(f"{methods.__name__}.{entry.name}")
+        for kind in vars(module).values():
+            if isinstance(kind, type) and issubclass(kind, Method) and kind.__module__ == module.__name__:
+                found[kind.name] = kind
+    return found
+
+
+def find(name: str) -> type[Method]:
+    """A method by name; InputError naming the known ones when there is none."""
+    known = every()
+    must(isinstance(name, str) and name in known, "method", f"one of {', '.join(known)}", name)
+    return known[name]

@@ -1,0 +1,38 @@
+"""Genetic strings as DEAP handles them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+
+from deap import base
+
+from optimize.evaluation.estimate import Estimate
+
+
+@cache
+def minimised(objectives: int) -> type:
+    """The DEAP fitness of so many costs."""
+    return type(f"Minimised{objectives}", (base.Fitness,), {"weights": (-1.0,) * objectives})
+
+
+class Individual(list[float]):
+    """A genetic string: a point of the unit cube, its DEAP fitness (invalid until known) and its Estimates.
+
+    estimates, confirmed : of the cost of each objective, from the search and from fresh starts; else ().
+    """
+
+    def __init__(self, genes: Iterable[float], objectives: int = 1) -> None:
+        super().__init__(float(x) for x in genes)
+        self.fitness = minimised(objectives)()
+        self.estimates: tuple[Estimate, ...] = ()
+        self.confirmed: tuple[Estimate, ...] = ()
+
+    def know(self, estimates: tuple[Estimate, ...]) -> None:
+        """Take these estimates as its fitness."""
+        self.estimates = estimates
+        self.fitness.values = tuple(estimate.mean for estimate in estimates)
+
+    @property
+    def failed(self) -> bool:
+        return not self.estimates or not self.estimates[0].ok

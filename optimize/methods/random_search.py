@@ -1,0 +1,41 @@
+"""Designs at random: what every other method must beat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import Field
+
+from optimize.methods.base import Method
+from optimize.methods.individual import Individual
+from tisim.components.component import Checked
+
+
+class ChanceOptions(Checked):
+    """population : strings per generation."""
+
+    population: int = Field(20, ge=1)
+
+    @classmethod
+    def kind(cls) -> str:
+        """As in ``--set search.options.population=30``."""
+        return "search.options"
+
+
+class Chance(Method):
+    """Uniform over the whole range, whatever it is told."""
+
+    name = "random"
+    several = True
+    Options = ChanceOptions
+
+    def __init__(self, genes: int, objectives: int, options: ChanceOptions, seed: int) -> None:
+        self.shape, self.objectives = (options.population, genes), objectives
+        self.rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
+
+    def ask(self) -> list[Individual]:
+        return [Individual(point, self.objectives) for point in self.rng.random(self.shape)]
+
+    def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
+        """Nothing is learnt."""

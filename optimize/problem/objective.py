@@ -1,0 +1,40 @@
+"""What a design is judged by: a quantity of its run, and whether much or little of it is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tisim.errors import must
+
+if TYPE_CHECKING:
+    from tisim.engine.result import Result
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One quantity to be made small, or large.
+
+    name : heading in tables and plots; unit : of the values, "" if they have none.
+    of : Result -> value in that unit. Called for runs that ended well only; NaN and inf never win.
+    Raises InputError for an empty name.
+    """
+
+    name: str
+    of: Callable[[Result], float]
+    unit: str = ""
+    maximise: bool = False
+
+    def __post_init__(self) -> None:
+        must(bool(self.name.strip()), "objective name", "a non-empty string", self.name)
+
+    @property
+    def sign(self) -> float:
+        """Cost = sign * value. A cost is minimised; the search knows costs only, people see values only."""
+        return -1.0 if self.maximise else 1.0
+
+    @property
+    def label(self) -> str:
+        """Name and unit as a heading."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name

@@ -1,0 +1,76 @@
+"""An inverse problem: which scene a design makes, and how good its result is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from optimize.problem.genome import Genome
+from optimize.problem.objective import Objective
+from tisim.errors import must
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tisim.engine.result import Result
+    from tisim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything the search needs to know of an inverse problem.
+
+    name : short, part of the cache key; title, description : for people.
+    genome : the genes, their units and ranges.
+    scene : (design in physical units, start seed) -> Scene. Cheap and declarative; an InputError raised
+        here marks the design as infeasible, it does not stop the search.
+    objective : Result -> fitness, minimised. Called for runs that ended well only; NaN and inf never win.
+        Or any number of Objectives: a search for two or more finds the front of designs that no other
+        design beats in one without losing in another.
+    version : raise it when objective changes its meaning: fitnesses of the old one are then not reused.
+    symbol : heading of the fitness in tables and plots, where objective is a function.
+    derived : extra report columns computed from the fitness, heading -> function; for one objective only.
+    picture : (Scene, Result) -> figure of a run, for the report.
+    details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
+    Raises InputError for an empty name, and for objectives that are none or not told apart by their names.
+    """
+
+    name: str
+    genome: Genome
+    scene: Callable[[Mapping[str, float], int], Scene]
+    objective: Callable[[Result], float] | Sequence[Objective]
+    title: str = ""
+    description: str = ""
+    version: int = 1
+    symbol: str = "fitness"
+    derived: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    picture: Callable[[Scene, Result], Figure] | None = None
+    details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
+
+    def __post_init__(self) -> None:
+        must(
+            bool(self.name.strip()) and "/" not in self.name,
+            "problem name",
+            "a non-empty string without '/'",
+            self.name,
+        )
+        names = [objective.name for objective in self.objectives]
+        must(bool(names) and len(set(names)) == len(names), "objectives", "one or more, all different", names)
+        must(len(names) == 1 or not self.derived, "derived", "empty for several objectives", [*self.derived])
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """All of them; a bare function is one, minimised."""
+        if callable(self.objective):
+            return (Objective(self.symbol, self.objective),)
+        return tuple(self.objective)
+
+    @property
+    def several(self) -> bool:
+        """More than one objective: there is a front, and not one best."""
+        return len(self.objectives) > 1
+
+    def costs(self, values: Sequence[float]) -> tuple[float, ...]:
+        """The objectives' values with the sign that makes all of them to be minimised, and back again."""
+        return tuple(o.sign * value for o, value in zip(self.objectives, values, strict=True))

@@ -1,0 +1,151 @@
+"""Search methods side by side: the same problem, the same number of runs, several searches of each."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.runs import Evaluator
+from optimize.outcome import Outcome, Progress
+from optimize.problem.problem import Problem
+from optimize.search import search
+from optimize.settings import Settings, fit, proposed
+from optimize.storage.cache import Cache
+from tisim.console import plain_table
+from tisim.errors import RunError, must
+
+FILE, CSV = "compare.h5", "compare.csv"
+NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV)
+FRESH = 10**6
+"""Seed of the starts from which what was found is run again: that of no search."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one search found: its best design's estimate, and that of fresh starts (costs)."""
+
+    method: str
+    repeat: int
+    evaluations: int
+    claimed: Estimate
+    fresh: Estimate
+
+
+def settings_of(
+    problem: Problem, base: Mapping[str, Any], method: str, evaluations: int, repeat: int
+) -> Settings:
+    """Of one search: those of the case with another method, stopped by the number of runs alone."""
+    wish = proposed(problem, base, method)
+    for rule in ("target", "patience", "wall_clock_s"):
+        wish.pop(rule, None)
+    ensemble = {**wish.get("ensemble", {}), "confirm": 0}
+    # every generation asks for a run or more, unless a method has nothing new to propose: then it ends, too
+    stop = {"generations": evaluations, "max_evaluations": evaluations}
+    settings = Settings(**{**wish, "ensemble": ensemble, "seed": repeat, **stop})
+    fit(problem, settings)
+    return settings
+
+
+def compare(
+    problem: Problem,
+    base: Mapping[str, Any],
+    methods: Sequence[str],
+    evaluations: int,
+    repeats: int,
+    fresh: int,
+    evaluator: Evaluator,
+    cache: Cache,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Iterator[Found]:
+    """Yield what each search has found; repeat k of every method has the same random starts.
+
+    base : settings of a search, as of a case. fresh : starts from which each best design is run again, the
+    same for all and used by no search: selection flatters, and the more so the fewer starts a method spends
+    on a design. All is cached: stopped and begun again, it goes on. InputError for several objectives or
+    unknown methods before anything runs; KeyboardInterrupt when a search was stopped.
+    """
+    must(not problem.several, "problem of a comparison", "one with one objective", problem.name)
+    must(len(set(methods)) == len(methods) > 0, "methods", "one or more, all different", list(methods))
+    must(evaluations >= 1, "evaluations", "at least 1", evaluations)
+    must(1 <= repeats <= FRESH, "repeats", f"within 1..{FRESH}", repeats)
+    must(fresh >= 2, "fresh starts", "at least 2", fresh)
+    searches = [
+        (m, k, settings_of(problem, base, m, evaluations, k)) for k in range(repeats) for m in methods
+    ]
+    again = EnsembleSettings(min_starts=fresh, max_starts=fresh, block=fresh)
+    anew = Ensemble(problem, evaluator, cache, again, FRESH)
+    for method, repeat, settings in searches:
+        outcome = search(problem, evaluator, cache, settings, on_progress=on_progress)
+        if outcome.interrupted:
+            raise KeyboardInterrupt
+        yield _found(method, repeat, outcome, anew)
+
+
+def _found(method: str, repeat: int, outcome: Outcome, anew: Ensemble) -> Found:
+    if outcome.best is None:
+        raise RunError(f"{method}, repeat {repeat}: no design has run to its end")
+    (estimates,) = anew.estimate([outcome.problem.genome.decode(outcome.best)])
+    assert estimates is not None  # this ensemble has no budget
+    (claimed,) = outcome.best.estimates
+    return Found(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0])
+
+
+def table(problem: Problem, found: Sequence[Found]) -> Table:
+    """A line for each method, the best median first: the best of its searches from fresh starts, and what the
+    searches themselves held it for.
+    """
+    (objective,) = problem.objectives
+    made = plain_table(
+        "method",
+        "searches",
+        "runs each",
+        f"{objective.label}: median",
+        "lowest",
+        "highest",
+        "claimed",
+        "95 % +-",
+    )
+    by_method = {f.method: [g for g in found if g.method == f.method] for f in found}
+    for method, mine in sorted(
+        by_method.items(), key=lambda item: np.median([f.fresh.mean for f in item[1]])
+    ):
+        values = [objective.sign * f.fresh.mean for f in mine]
+        numbers = (
+            np.median(values), min(values), max(values),
+            np.median([objective.sign * f.claimed.mean for f in mine]),
+            np.median([f.fresh.half_width for f in mine]),
+        )  # fmt: skip
+        runs = sorted({f.evaluations for f in mine})
+        each = str(runs[0]) if len(runs) == 1 else f"{runs[0]}..{runs[-1]}"
+        made.add_row(method, str(len(mine)), each, *(f"{number:.4g}" for number in numbers))
+    return made
+
+
+def as_csv(problem: Problem, found: Sequence[Found]) -> bytes:
+    """A line for each search, all digits."""
+    (objective,) = problem.objectives
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(
+        (
+            "method",
+            "repeat",
+            "runs",
+            f"{objective.label}, fresh starts",
+            "95 % +-",
+            "claimed",
+            "95 % +- claimed",
+        )
+    )
+    for f in found:
+        means = objective.sign * f.fresh.mean, f.fresh.half_width, objective.sign * f.claimed.mean
+        writer.writerow((f.method, f.repeat, f.evaluations, *means, f.claimed.half_width))
+    return text.getvalue().encode()

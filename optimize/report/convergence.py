@@ -1,0 +1,93 @@
+"""How a search went: fitness by generation (Z04 figure 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from optimize.outcome import Outcome
+from optimize.report.generation_log import best_of
+from optimize.report.tables import logbook_columns
+from tisim.plotting.style import empty
+
+_BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
+
+
+def convergence_figure(outcome: Outcome) -> Figure:
+    """Best and mean fitness against generation, and below it the problem's first derived value of the best.
+
+    Dotted lines mark the generations after which the search box was moved. Where the best design has
+    been run again from fresh starts, that stands at the end: the curve is better by the luck of a winner.
+    Of several objectives: the best of each, one below the other.
+    """
+    problem = outcome.problem
+    if problem.several:
+        return _of_several(outcome)
+    log = logbook_columns(problem, outcome.logbook)
+    derived = next(iter(problem.derived), None)
+    panels = 2 if derived else 1
+    figure = empty(5.6, 2.7 * panels)
+    axes = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
+    if log:
+        generation = np.array(log["gen"])
+        best, mean = _plottable(log["best"]), _plottable(log["mean"])
+        axes[0].plot(generation, mean, color=_MEAN, marker="o", ms=2.5, lw=1, label="mean of the population")
+        axes[0].plot(generation, best, color=_BEST, marker="o", ms=3.5, lw=1.6, label="best")
+        if derived:
+            axes[1].plot(generation, _plottable(log[derived]), color=_BEST, marker="o", ms=3.5, lw=1.6)
+        if outcome.best is not None and outcome.best.confirmed:
+            (sure,) = outcome.best.confirmed
+            (mean_again,) = problem.costs([sure.mean])
+            axes[0].errorbar(
+                generation[-1] + 0.4, mean_again, sure.half_width, color=_SURE, marker="s", ms=3.5, lw=1.2,
+                capsize=2, ls="none", label="best, from fresh starts, 95 % CI",
+            )  # fmt: skip
+            if derived:
+                value = problem.derived[derived](mean_again)
+                axes[1].plot(generation[-1] + 0.4, value, color=_SURE, marker="s", ms=3.5)
+        _mark_moves(axes, log)
+        axes[0].legend(framealpha=1, edgecolor="none", fontsize=8)
+    axes[0].set_ylabel(problem.objectives[0].label)
+    if derived:
+        axes[1].set_ylabel(f"{derived} of the best")
+    _finish(axes)
+    return figure
+
+
+def _of_several(outcome: Outcome) -> Figure:
+    labels = [objective.label for objective in outcome.problem.objectives]
+    log = logbook_columns(outcome.problem, outcome.logbook)
+    figure = empty(5.6, 2.2 * len(labels) + 0.5)
+    axes = figure.subplots(len(labels), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, label in zip(axes, labels, strict=True):
+        axis.set_ylabel(f"best {label}")
+        if log:
+            axis.plot(log["gen"], _plottable(log[best_of(label)]), color=_BEST, marker="o", ms=3.5, lw=1.6)
+    _finish(axes)
+    return figure
+
+
+def _mark_moves(axes: NDArray[Any], log: Mapping[str, Any]) -> None:
+    for axis in axes:
+        for count, at in enumerate(np.array(log["gen"])[np.array(log["recentred"], dtype=bool)]):
+            label = "search box moved" if count == 0 else None
+            axis.axvline(at, color=_MARK, ls=":", lw=1.2, zorder=0, label=label)
+
+
+def _finish(axes: NDArray[Any]) -> None:
+    axes[-1].set_xlabel("generation")
+    axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(direction="in")
+
+
+def _plottable(values: list[float]) -> np.ndarray:
+    """Generations without a successful design leave a gap."""
+    array = np.array(values, dtype=float)
+    return np.where(np.isfinite(array), array, np.nan)

@@ -1,0 +1,68 @@
+"""A search as it goes: a bar with the time left, the best design so far, and a line for each generation."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.console import Console
+
+from optimize.outcome import Progress
+from optimize.problem.problem import Problem
+from tisim.console import progress_bar
+
+
+class Display:
+    """Shows the progress of a search of a problem; used as a context manager.
+
+    Pass ``generation`` and ``step`` to ``optimize.search.search`` as on_generation and on_progress.
+    """
+
+    def __init__(self, problem: Problem, generations: int, console: Console) -> None:
+        self.problem, self.console = problem, console
+        self.best: dict[str, float] | None = None
+        self.bar = progress_bar(
+            "generation {task.fields[generation]} of {task.fields[last]}", "{task.fields[best]}", console
+        )
+        self.task = self.bar.add_task("", total=generations + 1, generation=0, last=generations, best="")
+
+    def __enter__(self) -> Display:
+        self.bar.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.bar.__exit__(kind, error, trace)
+
+    def step(self, where: Progress) -> None:
+        """Some more evaluations are done."""
+        done = where.generation + where.fraction
+        self.bar.update(self.task, completed=done, generation=where.generation)
+
+    def generation(self, where: Progress) -> None:
+        """A generation is done."""
+        self.step(where)
+        best = self._best(where)
+        self.bar.update(self.task, best=best.split("  ")[0])
+        ran = f"{where.evaluations} runs" + (f", {where.hits} from the file" if where.hits else "")
+        line = f"generation {where.generation:3d}  {best}  ({ran})"
+        self.console.print(line, highlight=False, markup=False)
+        if where.best_design is not None and where.best_design != self.best:
+            self.best = where.best_design
+            text = f"    {self._design(self.best)}"
+            self.console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
+
+    def _best(self, where: Progress) -> str:
+        if not where.best:
+            return "best none yet"
+        pairs = zip(self.problem.objectives, where.best, strict=True)
+        if self.problem.several:
+            best = "".join(f"  {o.name} {value:.4g} {o.unit}".rstrip() for o, value in pairs)
+            return f"front of {where.designs}  best{best}"
+        objective, fitness = next(pairs)
+        derived = "".join(f"  {name} {of(fitness):.4g}" for name, of in self.problem.derived.items())
+        return f"best {objective.name} {fitness:.4f} {objective.unit}".rstrip() + derived
+
+    def _design(self, design: dict[str, float]) -> str:
+        units = {gene.name: gene.unit for gene in self.problem.genome.genes}
+        return ", ".join(f"{name} {value:.4g} {units[name]}".rstrip() for name, value in design.items())

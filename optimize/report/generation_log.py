@@ -1,0 +1,36 @@
+"""What a generation was like, in a line of the logbook."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from optimize.methods.individual import Individual
+from optimize.problem.problem import Problem
+
+
+def statistics(
+    problem: Problem, population: Sequence[Individual], hall: Sequence[Individual]
+) -> dict[str, Any]:
+    """The columns of Outcome.logbook that tell of fitness; values of the objectives, not costs."""
+    best = [
+        min((s.fitness.values[k] for s in hall), default=math.inf) for k in range(len(problem.objectives))
+    ]
+    values = problem.costs(best)
+    if problem.several:
+        names = [best_of(objective.label) for objective in problem.objectives]
+        return {"front": len(hall), **dict(zip(names, values, strict=True))}
+    good = [problem.costs(string.fitness.values)[0] for string in population if not string.failed]
+    return {
+        "best": values[0],
+        "mean": float(np.mean(good)) if good else math.nan,
+        "std": float(np.std(good)) if good else math.nan,
+    }
+
+
+def best_of(label: str) -> str:
+    """Heading of the best value of one of several objectives."""
+    return f"best {label}"

@@ -1,0 +1,120 @@
+"""What a finished search shows: a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from optimize.outcome import Outcome
+from optimize.report.convergence import convergence_figure
+from optimize.report.front import front_figure
+from optimize.report.tables import best_columns
+from tisim.files.atomic import replace_file
+
+WIDTH = 80
+"""Of the table of the best designs; every terminal has as many columns."""
+
+
+def best_table(outcome: Outcome) -> RenderableType:
+    """The best designs for the terminal: a column per design, genes in their units, fitness with its 95 %
+    interval, derived values. In several tables where they would not fit on WIDTH columns side by side. Of a
+    front as many as the hall of fame has places, spread along it.
+    """
+    columns = best_columns(outcome.problem, outcome.hall)
+    places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
+    shown = _spread(len(outcome.hall), places)
+    headings, *rows = ((heading, *(_text(values[k]) for k in shown)) for heading, values in columns.items())
+    designs = max(1, (WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
+    title = outcome.problem.title or outcome.problem.name
+    part = (
+        f"; {len(shown)} of the {len(outcome.hall)} designs of its front" if outcome.problem.several else ""
+    )
+    blocks: list[RenderableType] = [Text(title + part, "italic")]
+    for first in range(1, max(2, len(headings)), designs):
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+        table.add_column(headings[0], no_wrap=True)
+        for heading in headings[first : first + designs]:
+            table.add_column(heading, justify="right", no_wrap=True)
+        for name, *cells in rows:
+            table.add_row(Text(name), *cells[first - 1 : first - 1 + designs])
+        blocks += ["", table]
+    return Group(*blocks)
+
+
+def _spread(number: int, places: int) -> list[int]:
+    """At most so many places in a row of that number, the first and the last among them."""
+    return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})
+
+
+def details_table(details: Mapping[str, float]) -> RenderableType:
+    """What the run of the best design shows, for the terminal."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, show_header=False)
+    for name, value in details.items():
+        table.add_row(name, _text(value))
+    return Group("", Text("the best design, run once more", "italic"), table)
+
+
+def details_csv(details: Mapping[str, float]) -> bytes:
+    """The same as CSV, all digits."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["quantity", "value"])
+    writer.writerows(details.items())
+    return text.getvalue().encode()
+
+
+def _widest(rows: Sequence[Sequence[str]]) -> int:
+    return max((len(cell) for row in rows for cell in row[1:]), default=0)
+
+
+def best_csv(outcome: Outcome) -> bytes:
+    """The best designs as CSV, all digits, one column per heading of best_columns."""
+    columns = best_columns(outcome.problem, outcome.hall)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue().encode()
+
+
+def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
+    """Write best.csv, convergence and front (of several objectives) as .png and .pdf into a folder (made if
+    missing); name -> path.
+
+    Each file is, at every instant, the old one or the new one. RunError if the disk is full.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    figures = {"convergence": convergence_figure(outcome)}
+    if outcome.problem.several:
+        figures["front"] = front_figure(outcome)
+    contents = {"best.csv": best_csv(outcome)}
+    for name, figure in figures.items():
+        contents |= {f"{name}.png": drawn(figure, "png", dpi=200), f"{name}.pdf": drawn(figure, "pdf")}
+    for name, content in contents.items():
+        replace_file(folder / name, content)
+    return {name: folder / name for name in contents}
+
+
+def drawn(figure: Figure, kind: str, **options: Any) -> bytes:
+    """A figure as the bytes of a file of that kind."""
+    file = io.BytesIO()
+    figure.savefig(file, format=kind, **options)
+    return file.getvalue()
+
+
+def _text(value: Any) -> str:
+    """Four digits; 1.5e8 and not 1.5e+08, which is two columns more."""
+    if not isinstance(value, float):
+        return str(value)
+    digits, power, exponent = f"{value:.4g}".partition("e")
+    return f"{digits}e{int(exponent)}" if power else digits

@@ -1,0 +1,55 @@
+"""Hall of fame and logbook as plain columns: what the report prints and the cache file keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from deap import tools
+
+from optimize.evaluation.estimate import Estimate
+from optimize.methods.individual import Individual
+from optimize.problem.problem import Problem
+
+
+def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
+    """Z04 tables 1 to 3 in one: rank, every gene in its unit, each objective with the half-width of its 95 %
+    confidence interval, the derived columns of the problem, starts, whether their mean has settled; the same
+    from fresh starts where the designs have been confirmed. Heading -> values, best first; of several
+    objectives the front along the first, the best of that first.
+    """
+    estimates = [string.estimates for string in hall]
+    number = "front" if problem.several else "rank"
+    columns: dict[str, list[Any]] = {number: list(range(1, len(estimates) + 1))}
+    designs = [problem.genome.decode(string) for string in hall]
+    for gene in problem.genome.genes:
+        columns[gene.label] = [design[gene.name] for design in designs]
+    columns |= _objectives(problem, estimates, "")
+    columns["starts"] = [of_all[0].starts for of_all in estimates]
+    columns["settled"] = ["yes" if of_all[0].settled else "no" for of_all in estimates]
+    confirmed = [string.confirmed for string in hall if string.confirmed]
+    if confirmed:
+        columns |= _objectives(problem, confirmed, ", fresh starts")
+    return columns
+
+
+def _objectives(
+    problem: Problem, estimates: Sequence[tuple[Estimate, ...]], after: str
+) -> Mapping[str, list[Any]]:
+    columns: dict[str, list[Any]] = {}
+    for k, objective in enumerate(problem.objectives):
+        means = [objective.sign * of_all[k].mean for of_all in estimates]
+        columns[f"{objective.label}{after}"] = means
+        interval = f"{objective.name} 95 % +-" if problem.several else "95 % +-"
+        columns[f"{interval}{after}"] = [of_all[k].half_width for of_all in estimates]
+        for heading, function in problem.derived.items():
+            columns[f"{heading}{after}"] = [float(function(mean)) for mean in means]
+    return columns
+
+
+def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:
+    """The logbook and the derived values of each generation's best. Heading -> values by generation."""
+    columns = {name: list(logbook.select(name)) for name in (logbook[0] if logbook else {})}
+    for heading, function in problem.derived.items() if columns else ():
+        columns[heading] = [float(function(best)) for best in columns["best"]]
+    return columns

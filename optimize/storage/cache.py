@@ -1,0 +1,281 @@
+"""Every finished evaluation, on the disk at once, shared by runs and processes, never lost to a kill.
+
+FILE          HDF5: one row per evaluation, and tables (settings, logbooks, reports). Whole at every instant,
+              because it is only ever replaced by a complete new one.
+FILE.journal  evaluations finished since; folded into FILE at the end of a generation and when it grows large.
+FILE.lock     held by whoever reads or writes either; says how far the journal had been written.
+
+A kill between replacing FILE and emptying the journal leaves evaluations in both: they count once, by key.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from optimize.storage import hdf5_store, salvage
+from optimize.storage.hdf5_store import Table
+from optimize.storage.journal import Journal, Mark
+from optimize.storage.record import Record
+from tisim.errors import must
+from tisim.files.atomic import locked, replace_file
+from tisim.files.framing import Scan
+from tisim.files.ownership import writable
+from tisim.files.regular_file import is_folder, status
+
+FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file
+
+
+class Cache:
+    """The evaluations in a file, kept in memory and in step with other processes that use the same file.
+
+    path : the HDF5 file; made on the first fold if there is none. Its folder is made if missing.
+    Raises InputError if path is cut short, damaged, not a cache's file or none that may be opened: nothing is
+    then written. Warns of single evaluations that are damaged or lost; those are run again.
+    Use as a context manager, or close it, so that the journal is folded in.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path, journal, self._lock = _files(path)
+        self._journal = Journal(journal)
+        self._records: dict[str, Record] = {}
+        self._pending: dict[str, Table] = {}
+        self._version: tuple[int, ...] | None = None
+        self._end = self._frames = 0
+        if status(self.path) is not None:
+            with hdf5_store.opened(self.path):
+                pass  # before a lock file is left beside a file that is not ours
+        if not is_folder(self.path.parent):
+            writable(self.path.parent)
+        self.refresh()
+
+    def __enter__(self) -> Cache:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def records(self) -> list[Record]:
+        """All evaluations, oldest first."""
+        return list(self._records.values())
+
+    def get(self, key: str) -> Record | None:
+        """The evaluation of that key, as of the last refresh, put or fold."""
+        return self._records.get(key)
+
+    def refresh(self) -> None:
+        """Take in what other processes have stored since."""
+        with locked(self._lock, exclusive=False):
+            self._refresh()
+
+    def put(self, record: Record) -> Record:
+        """Store an evaluation; on return it is on the disk. Returns the one that counts: its key's first.
+
+        RunError if the disk is full; everything stored before is then intact.
+        """
+        with locked(self._lock, exclusive=True) as lock:
+            self._refresh()
+            if record.key not in self._records:
+                self._end = self._journal.append(self._end, record.payload())
+                self._frames += 1
+                Mark(self._version, self._end, self._frames).write(lock)
+                self._records[record.key] = record
+                if self._end > FOLD_BYTES:
+                    self._fold()
+            return self._records[record.key]
+
+    def put_table(
+        self, name: str, columns: Mapping[str, Sequence[Any]], attrs: Mapping[str, Any] | None = None
+    ) -> None:
+        """Store a table at the next fold, in place of one of the same name; "a/b" nests.
+
+        InputError if the columns differ in length.
+        """
+        first = name.split("/")[0]
+        must(
+            bool(first) and first != hdf5_store.ROWS,
+            "table name",
+            f"non-empty and not below {hdf5_store.ROWS!r}",
+            name,
+        )
+        self._pending[name] = Table(dict(columns), dict(attrs or {}))
+
+    def table(self, name: str) -> Table:
+        """A stored table. InputError if there is none of that name."""
+        if name in self._pending:
+            return self._pending[name]
+        must(name in self.tables(), "table name", f"one of {self.tables()}", name)
+        with locked(self._lock, exclusive=False), hdf5_store.opened(self.path) as file:
+            return hdf5_store.read_table(file, name)
+
+    def attributes(self) -> dict[str, Mapping[str, Any]]:
+        """The attributes of all tables by name, stored or waiting for the next fold."""
+        found: dict[str, Mapping[str, Any]] = {}
+        with locked(self._lock, exclusive=False):
+            if status(self.path) is not None:
+                with hdf5_store.opened(self.path) as file:
+                    found = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
+        return found | {name: table.attrs for name, table in self._pending.items()}
+
+    def tables(self) -> list[str]:
+        """Names of all tables, stored or waiting for the next fold."""
+        return sorted(self.attributes())
+
+    def fold(self) -> None:
+        """Write journal and waiting tables into the HDF5 file.
+
+        RunError if the disk is full; everything stored before is then intact.
+        """
+        with locked(self._lock, exclusive=True):
+            self._refresh()
+            if self._journal.size() or self._pending:
+                self._fold()
+
+    def compact(self) -> None:
+        """Fold, and leave out what is damaged or double."""
+        with locked(self._lock, exclusive=True):
+            self._refresh()
+            self._fold(damaged=False)
+
+    def close(self) -> None:
+        """Fold."""
+        self.fold()
+
+    def _fold(self, *, damaged: bool = True) -> None:
+        old = None if status(self.path) is None else self.path
+        replace_file(self.path, hdf5_store.image(old, self.records(), self._pending, damaged))
+        self._journal.clear()
+        self._pending, self._version, self._end, self._frames = {}, _version(self.path), 0, 0
+
+    def _refresh(self) -> None:
+        version = _version(self.path)
+        if version != self._version or self._journal.size() < self._end:
+            self._records, self._end, self._frames, self._version = {}, 0, 0, version
+            if version is not None:
+                with hdf5_store.opened(self.path) as file:
+                    self._take(*hdf5_store.read_rows(file))
+        first = self._end == 0
+        found = self._journal.read(self._end)
+        self._take(*_evaluations(found))
+        self._end, self._frames = found.end, self._frames + len(found.payloads)
+        mark = Mark.read(self._lock) if first else None
+        if mark is not None and (cut := mark.cut(version, found)):
+            warnings.warn(f"{self.path}: {cut}; what is lost will be run again", RuntimeWarning, stacklevel=4)
+
+    def _take(self, records: Sequence[Record], damaged: Sequence[str]) -> None:
+        for record in records:
+            self._records.setdefault(record.key, record)
+        if damaged:
+            text = f"{self.path}: {len(damaged)} damaged evaluation(s) are ignored and will be run again"
+            warnings.warn(text, RuntimeWarning, stacklevel=4)
+
+
+def _files(path: str | Path) -> tuple[Path, Path, Path]:
+    """The HDF5 file, its journal and its lock."""
+    path = Path(path)
+    must(bool(path.name), "cache file", "a file", str(path))
+    return path, path.with_name(f"{path.name}.journal"), path.with_name(f"{path.name}.lock")
+
+
+def _version(path: Path) -> tuple[int, ...] | None:
+    """What tells one state of the HDF5 file from another; None where there is none."""
+    there = status(path)
+    return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
+
+
+def _evaluations(found: Scan) -> tuple[list[Record], list[str]]:
+    """The evaluations in a stretch of journal, and a description of each thing in it that is none."""
+    records = []
+    damaged = [f"journal, byte {offset}: not a whole record" for offset in found.damaged]
+    for number, payload in enumerate(found.payloads):
+        try:
+            records.append(Record.parse(payload))
+        except ValueError:
+            damaged.append(f"journal, frame {number}: no evaluation")
+    return records, damaged
+
+
+@dataclass(frozen=True)
+class VerifyReport:
+    """What verify found. rows, journal : whole records in the HDF5 file and in the journal.
+
+    damaged : every row, table or stretch of journal that is not what was written, or has been cut off.
+    torn : bytes of an unfinished record at the journal's end (a killed writer; harmless).
+    duplicates : records stored more than once (a kill during a fold; harmless).
+    conflicts : keys stored with different fitnesses: the evaluation is not reproducible.
+    """
+
+    rows: int
+    journal: int
+    damaged: list[str]
+    torn: int
+    duplicates: int
+    conflicts: list[str]
+
+    @property
+    def ok(self) -> bool:
+        """Nothing damaged and nothing in conflict."""
+        return not self.damaged and not self.conflicts
+
+
+def _existing(path: str | Path) -> tuple[Path, Path, Path]:
+    file, journal, lock = _files(path)
+    there = status(file) or status(journal)
+    must(there is not None, "cache file", "an existing file", str(path))
+    return file, journal, lock
+
+
+def existing(path: str | Path) -> Cache:
+    """The cache of a file that is there already. InputError if there is no such file."""
+    return Cache(_existing(path)[0])
+
+
+def verify(path: str | Path) -> VerifyReport:
+    """Check every row, table and journal frame of an existing cache file; changes nothing.
+
+    InputError if the file does not exist, is cut short or is not a cache's.
+    """
+    path, journal, lock = _existing(path)
+    with locked(lock, exclusive=False):
+        rows: list[Record] = []
+        damaged: list[str] = []
+        version = _version(path)
+        if version is not None:
+            with hdf5_store.opened(path) as file:
+                rows, damaged = hdf5_store.read_rows(file)
+                bad = hdf5_store.damaged_tables(file)
+                damaged += [f"table {name}: its checksum does not fit" for name in bad]
+        found, mark = Journal(journal).read(), Mark.read(lock)
+    frames, none = _evaluations(found)
+    cut = None if mark is None else mark.cut(version, found)
+    damaged += [*none, *([cut] if cut else [])]
+    first: dict[str, Record] = {}
+    for record in (*rows, *frames):
+        first.setdefault(record.key, record)
+    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(first[r.key].values)}
+    return VerifyReport(
+        rows=len(rows),
+        journal=len(frames),
+        damaged=damaged,
+        torn=found.torn,
+        duplicates=len(rows) + len(frames) - len(first),
+        conflicts=sorted(conflicts),
+    )
+
+
+def compact(path: str | Path) -> int:
+    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept.
+
+    A file that is damaged as a whole is kept as FILE.damaged; FILE then has what could be read of it.
+    """
+    file, _, lock = _existing(path)
+    salvage.mend(file, lock)
+    cache = Cache(file)
+    cache.compact()
+    return len(cache)

@@ -1,0 +1,35 @@
+"""What a search leaves of itself in its cache file: settings, versions, logbook and best designs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import deap
+
+from optimize.outcome import Outcome
+from optimize.report.tables import best_columns, logbook_columns
+from optimize.storage.cache import Cache
+from optimize.storage.record import canonical
+from tisim.io.run_folder import versions
+
+
+def store(cache: Cache, outcome: Outcome) -> None:
+    """Put what is known of a search into the file; on return it is on the disk."""
+    about = {
+        "identity": canonical(outcome.identity).decode(),
+        "settings": outcome.settings.model_dump_json(),
+        "versions": json.dumps({**versions(), "deap": deap.__version__}),
+        "stopped": outcome.stopped,
+    }
+    cache.put_table(outcome.name, {}, about)
+    cache.put_table(f"{outcome.name}/hall_of_fame", best_columns(outcome.problem, outcome.hall))
+    cache.put_table(f"{outcome.name}/logbook", logbook_columns(outcome.problem, outcome.logbook))
+    cache.fold()
+
+
+def searches(cache: Cache) -> dict[str, Mapping[str, Any]]:
+    """Name and attributes of each search in the file."""
+    found = cache.attributes()
+    return {name: attributes for name, attributes in found.items() if "identity" in attributes}

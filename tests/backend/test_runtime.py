@@ -1,0 +1,272 @@
+"""The runtime: unknown settings are refused, what an earlier start has made says so when used, any thread may
+call, and the caller's arithmetic stays what it was."""
+
+import subprocess
+import sys
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import tisim
+from tests.scenes import scene
+from tests.throwaway import Trap
+from tisim import Scene, Simulation
+from tisim.backend import memory, runtime
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.engine.batches import Batches, rounded
+from tisim.errors import InputError, RunError
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"device": "tpu"}, "device must be one of cpu, cuda; received 'tpu'"),
+        ({"precision": "f16"}, "precision must be one of f64, f32; received 'f16'"),
+        ({"threads": -1}, r"threads must be at least 1 \(0 for all cores\); received -1"),
+    ],
+)
+def test_unknown_settings_are_refused_before_anything_starts(settings, message):
+    before = runtime.generation()
+    with pytest.raises(InputError, match=f"^{message}$"):
+        runtime.start(**settings)
+    assert runtime.generation() == before
+
+
+def test_starting_again_with_the_same_settings_changes_nothing():
+    now, before = runtime.current(), runtime.generation()
+    assert runtime.start(now.device, now.precision, now.threads) is now or runtime.current() == now
+    assert runtime.generation() == before
+
+
+STALE = """
+import numpy as np
+from tisim import Particles, Scene, Simulation, memory, runtime, run
+from tisim.errors import InputError, RunError
+from tisim.steppers.controller import FixedStep
+from tisim.steppers.verlet import Verlet
+at = np.zeros((1, 3))
+scene = Scene(particles=Particles(position=at, velocity=at + 1, radius=1.0, mass=1.0),
+              stepper=Verlet(control=FixedStep(dt=0.5)), duration=1.0)
+runtime.start(threads=1)
+old = Simulation(scene)
+old.load([scene])
+runtime.start(threads=2)
+uses = (
+    lambda: old.run(), lambda: old.load([scene]), lambda: old.results(), lambda: old.s.read("mass"),
+    lambda: old.s.write("mass", 1.0), lambda: old.fraction(), lambda: next(old.chunks()), lambda: old.ended(),
+)
+for use in uses:
+    try:
+        use()
+    except RunError as refusal:
+        print(refusal)
+result = run(scene)
+assert result.status.ok and (result.state["position"] == 1).all()
+runtime.start(threads=1)
+assert (run(scene).state["position"] == 1).all()
+print("made anew")
+old.close()
+old.close()
+mine = Simulation(scene)
+assert np.float64(5e-324) * 1.0 > 0.0
+try:
+    runtime.start(device="cuda")
+except InputError:
+    runtime.start(threads=2)
+mine.close()
+assert (run(scene).state["position"] == 1).all()
+print("closed")
+del mine
+memory.WORN, before = 1, runtime.generation()
+for number in (9, 20, 45):
+    at = np.zeros((number, 3))
+    more = Particles(position=at, velocity=at + 1, radius=1.0, mass=1.0)
+    assert (run(scene.model_copy(update={"particles": more})).state["position"] == 1).all()
+print(runtime.generation() - before)
+"""
+
+
+@pytest.mark.long
+def test_simulation_of_an_earlier_start_says_so():
+    """Not a segmentation fault; it can be closed, and what is made anew works, also where a start has failed,
+    and when it is Taichi's growth that has it started anew."""
+    done = subprocess.run(
+        [sys.executable, "-c", STALE], capture_output=True, text=True, timeout=3600, check=False
+    )
+    refusal = "a Simulation must be used with the settings it was made under; start it anew"
+    assert done.stdout.splitlines() == [*[refusal] * 8, "made anew", "closed", "3"], done.stderr
+    assert done.returncode == 0
+
+
+def test_absent_device_is_refused():
+    """A machine without a GPU says so; one with a GPU starts it."""
+    code = (
+        "from tisim import runtime, errors\n"
+        "try: print(runtime.start(device='cuda').device)\n"
+        "except errors.InputError as fault: print(fault)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=3600, check=False
+    )
+    line = done.stdout.strip().splitlines()[0]
+    assert line == "cuda" or line.startswith("device must be present on this machine; received 'cuda'"), (
+        done.stderr
+    )
+    assert done.returncode == 0
+
+
+def moving(speed, effects=()):
+    """A grain at this speed, m/s."""
+    return scene([[0.0, 0.0, 0.0]], [[speed, 0.0, 0.0]], effects, dt=0.5, steps=40)
+
+
+def test_four_threads_get_their_own_results():
+    """Scenes of structures that are compiled meanwhile among them: the bits that each gives alone."""
+    scenes = [moving(1.0 + k, (Trap(stiffness=1e-6),) if k % 2 else ()) for k in range(24)]
+    with ThreadPoolExecutor(4) as threads:
+        results = list(threads.map(tisim.run, scenes))
+    for one, result in zip(scenes, results, strict=True):
+        assert result.scene is one
+        assert result.status.ok
+        (alone,) = tisim.run([one])
+        for name, values in alone.state.items():
+            np.testing.assert_array_equal(result.state[name], values)
+    assert len({result.state["position"][0, 0] for result in results}) == len(scenes)
+
+
+def test_a_run_from_within_the_progress_of_another():
+    """Neither takes the other's simulation."""
+    inner = []
+
+    def progress(fraction):
+        if not inner:
+            inner.append(tisim.run(moving(7.0)))
+
+    result = tisim.run(moving(3.0), progress)
+    assert result.state["position"][0, 0] == pytest.approx(60.0)
+    assert inner[0].state["position"][0, 0] == pytest.approx(140.0)
+
+
+def test_the_callers_arithmetic_keeps_subnormal_numbers():
+    """Starting Taichi has its thread take them for 0; a scene of them comes back from text as it was."""
+    tisim.run(moving(1.0))
+    assert np.float64(5e-324) * 1.0 > 0.0
+    for number in (5e-324, 1e-310, 2.2e-308):
+        again = Scene.from_dict(tomllib.loads(moving(number).to_toml()))
+        assert again.particles.arrays(again.domain, 0)["velocity"][0, 0] == number > 0.0
+    with ThreadPoolExecutor(1) as thread:
+        assert thread.submit(lambda: np.float64(5e-324) * 1.0).result() > 0.0
+
+
+def test_a_closed_simulation_says_so():
+    simulation = Simulation(moving(1.0))
+    simulation.load([moving(1.0)])
+    simulation.close()
+    simulation.close()
+    for use in (simulation.run, simulation.results, lambda: simulation.load([moving(1.0)])):
+        with pytest.raises(RunError, match=r"^a Simulation must be used before it is closed; make another$"):
+            use()
+
+
+@in_taichi_thread
+def tree():
+    """A field in memory of its own."""
+    column, builder = ti.field(ti.f64), ti.FieldsBuilder()
+    builder.dense(ti.i, 4).place(column)
+    return column, Tree(builder)
+
+
+def test_trees_that_are_forgotten_are_destroyed():
+    """More than Taichi can have at once, none of them given back by whoever made it."""
+    before = len(memory.in_use())
+    for _ in range(600):
+        column, _ = tree()
+    assert len(memory.in_use()) <= before + 2
+    in_taichi_thread(column.fill)(1.0)
+
+
+def test_too_many_trees_are_refused(monkeypatch):
+    """Before Taichi crashes, at 512."""
+    monkeypatch.setattr(memory, "MOST", len(memory.in_use()) + 3)
+    kept = [tree() for _ in range(3)]
+    with pytest.raises(RunError, match=r"^at most \d+ sets of fields can be in use at once"):
+        tree()
+    in_taichi_thread(kept[0][0].fill)(1.0)
+    kept[1][1].destroy()
+    kept.append(tree())
+    in_taichi_thread(kept[-1][0].fill)(2.0)
+
+
+@in_taichi_thread
+def kernels():
+    """That have been compiled, and not been thrown away."""
+    return ti.lang.impl.get_runtime().get_num_compiled_functions()
+
+
+def test_few_kernels_are_compiled_and_none_again():
+    """Not one for each field and direction; nor all of them because another's fields have been destroyed."""
+    before = kernels()
+    tisim.run(moving(1.0, (Trap(stiffness=2e-6, omega=1.0),)))
+    tree()[1].destroy()
+    Simulation(moving(1.0)).close()
+    made = kernels()
+    assert made - before < 24
+    tisim.run(moving(2.0, (Trap(stiffness=2e-6, omega=1.0),)))
+    assert kernels() == made
+
+
+def grains(number):
+    """Grains side by side, which feel nothing."""
+    at = np.arange(3.0 * number).reshape(number, 3)
+    return scene(at, 0 * at, radius=0.1, mass=1.0, dt=0.5)
+
+
+def test_small_scenes_do_not_go_through_the_memory_of_large_ones():
+    """A kept simulation serves scenes of about its size; sizes are rounded, so that like ones share it."""
+    batches = Batches()
+    for number in (10_000, 3, 5, 9_900, 10_100):
+        ((_, result),) = batches.run([grains(number)])
+        assert result.status.ok
+    sizes = [(each.worlds, each.s.capacity) for each in batches._idle]
+    assert sorted(sizes) == [(1, 3), (1, 5), (1, 10240)]
+    batches.close()
+    assert not batches._idle
+
+
+def test_rounded_sizes():
+    """At least as large, by less than a quarter."""
+    for number in range(1, 5000):
+        assert number <= rounded(number) <= max(number, 1.25 * number)
+    assert len({rounded(number) for number in range(1, 5000)}) < 50
+
+
+def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
+    """A simulation of somebody's goes on, however much has been compiled."""
+    mine, before = Simulation(moving(1.0)), runtime.generation()
+    monkeypatch.setattr(memory, "WORN", 0)
+    assert tisim.run(grains(9)).status.ok
+    assert runtime.generation() == before
+    mine.load([moving(1.0)])
+    mine.close()
+
+
+GROWTH = """
+from tests.benchmarks.changing_structure import soak
+from tisim import memory, runtime
+memory.WORN = 10
+sizes = [size for _, _, size in soak(40, 5)]
+print(runtime.generation(), *sizes)
+"""
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_scenes_of_changing_structure():
+    """Forty of them, nearly all compiled, and Taichi started anew after every fifth."""
+    done = subprocess.run([sys.executable, "-c", GROWTH], capture_output=True, text=True, check=True)
+    starts, *sizes = (float(word) for word in done.stdout.split())
+    assert starts >= 5
+    assert max(sizes[4:]) < sizes[2] + 40.0, sizes

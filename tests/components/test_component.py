@@ -1,0 +1,130 @@
+"""Validated plain data: what a parameter may be, what a message says, what counts as structure."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from tisim.components.component import ROWS, Spec, Vector, parameter, unit_of
+from tisim.errors import InputError, must
+
+
+class SampleSpring(Spec):
+    """A part with one parameter of each sort."""
+
+    stiffness: float = parameter("N/m", gt=0)
+    axis: Vector = parameter("", (0.0, 0.0, 1.0))
+    share: float = parameter("", 0.5, ge=0, le=1)
+    stiff: bool = False
+    order: int = parameter("", 2, ge=1)
+    requires: ClassVar = ()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "sample_spring.stiffness must be given; received nothing"),
+        ({"stiffness": 0}, "sample_spring.stiffness must be greater than 0.0; received 0"),
+        ({"stiffness": -1.5}, "sample_spring.stiffness must be greater than 0.0; received -1.5"),
+        ({"stiffness": float("nan")}, "sample_spring.stiffness must be a finite number; received nan"),
+        ({"stiffness": float("inf")}, "sample_spring.stiffness must be a finite number; received inf"),
+        ({"stiffness": "stiff"}, "sample_spring.stiffness must be a number; received 'stiff'"),
+        ({"stiffness": [1.0]}, "sample_spring.stiffness must be a number; received [1.0]"),
+        ({"stiffness": None}, "sample_spring.stiffness must be a number; received None"),
+        ({"stiffness": 1, "share": 1.5}, "sample_spring.share must be at most 1.0; received 1.5"),
+        ({"stiffness": 1, "share": -0.5}, "sample_spring.share must be at least 0.0; received -0.5"),
+        ({"stiffness": 1, "stifness": 2}, "sample_spring.stifness must be a known key; received 2"),
+        (
+            {"stiffness": 1, "stiff": "perhaps"},
+            "sample_spring.stiff must be true or false; received 'perhaps'",
+        ),
+        ({"stiffness": 1, "order": 1.5}, "sample_spring.order must be a whole number; received 1.5"),
+        ({"stiffness": 1, "order": 0}, "sample_spring.order must be at least 1; received 0"),
+        ({"stiffness": 1, "axis": 3.0}, "sample_spring.axis must be a list; received 3.0"),
+        ({"stiffness": 1, "axis": (0, 1, "z")}, "sample_spring.axis.2 must be a number; received 'z'"),
+        ({"stiffness": 1, "axis": (0, 1)}, "sample_spring.axis.2 must be given; received nothing"),
+    ],
+)
+def test_messages_say_what_it_must_be_and_what_was_received(given, message):
+    with pytest.raises(InputError) as fault:
+        SampleSpring(**given)
+    assert str(fault.value) == message
+
+
+def test_a_list_of_four_is_no_vector():
+    with pytest.raises(InputError, match=r"sample_spring\.axis must be .*; received"):
+        SampleSpring(stiffness=1, axis=(0, 0, 1, 0))
+
+
+def test_every_fault_has_its_line():
+    with pytest.raises(InputError) as fault:
+        SampleSpring(stiffness=-1, share=2, colour="red")
+    lines = str(fault.value).splitlines()
+    assert len(lines) == 3
+    assert all(" must be " in line and "; received " in line for line in lines)
+
+
+def test_frozen_named_and_with_units():
+    part = SampleSpring(stiffness=2)
+    with pytest.raises(Exception, match="frozen"):
+        part.stiffness = 3.0
+    assert SampleSpring.kind() == "sample_spring"
+    assert Spec.named("sample_spring", "part") is SampleSpring
+    with pytest.raises(InputError, match=r"^part must be one of .*sample_spring.*; received 'sample_sprig'$"):
+        Spec.named("sample_sprig", "part")
+    assert unit_of(SampleSpring.model_fields["stiffness"]) == "N/m"
+    assert unit_of(SampleSpring.model_fields["stiff"]) == ""
+
+
+def test_parameters_vary_and_options_are_structure():
+    """Floats and vectors differ per world; every other option is compiled in."""
+    part = SampleSpring(stiffness=2, axis=(1, 2, 3))
+    assert [(name, size) for name, _, size in part.parameters()] == [
+        ("stiffness", 1),
+        ("axis", 3),
+        ("share", 1),
+    ]
+    assert part.values() == [2.0, 1.0, 2.0, 3.0, 0.5]
+    assert part.structure() == SampleSpring(stiffness=9, share=0.1).structure()
+    assert part.structure() != SampleSpring(stiffness=2, stiff=True).structure()
+    assert part.structure() != SampleSpring(stiffness=2, order=3).structure()
+
+
+class SampleRow(Spec):
+    """A row of a list."""
+
+    radius: float = parameter("m", gt=0)
+    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+
+
+class SampleList(Spec):
+    """A part with a list of rows, of which each world may have its own number."""
+
+    scale: float = parameter("", 1.0)
+    rows: tuple[SampleRow, ...]
+
+
+def test_a_list_of_rows_varies_in_number_too():
+    """Rows are no structure, up to the room that there is for them; messages say which row is wrong."""
+    few, many = ([SampleRow(radius=1)] * n for n in (0, ROWS))
+    assert list(SampleList.lists()) == [("rows", SampleRow)]
+    assert [name for name, _, _ in SampleList.parameters()] == ["scale"]
+    assert SampleList(rows=few).structure() == SampleList(rows=many, scale=2).structure()
+    assert SampleList(rows=[*many, *many]).structure() != SampleList(rows=many).structure()
+    with pytest.raises(InputError) as fault:
+        SampleList(rows=[{"radius": 1}, {"radius": -1}])
+    assert str(fault.value) == "sample_list.rows.1.radius must be greater than 0.0; received -1"
+    with pytest.raises(InputError) as fault:
+        SampleList(rows=3)
+    assert str(fault.value) == "sample_list.rows must be a list; received 3"
+
+
+def test_must():
+    must(True, "x", "y", "z")
+    with pytest.raises(InputError, match=r"^x must be above 3; received 2$"):
+        must(False, "x", "above 3", 2)
+    assert issubclass(InputError, ValueError)
+
+
+def test_numpy_numbers_are_numbers():
+    assert SampleSpring(stiffness=np.float64(2.5), axis=np.arange(3.0).tolist()).values()[0] == 2.5

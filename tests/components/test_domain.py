@@ -1,0 +1,110 @@
+"""The box: what leaves through one face comes back through the other, and meets what is there."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import HEAT_CAPACITY, by_id, check_sums, scene, simulate
+from tisim import Box
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import Impact
+from tisim.errors import InputError
+from tisim.steppers.step_control import ApproachTime
+from tisim.steppers.verlet import Verlet
+
+
+def run(scenes):
+    return simulate(scenes, worlds=64, capacity=64)
+
+
+BOX = Box(low=(-1.0, -2.0, -3.0), high=(1.0, 2.0, 4.0), images=False)
+
+
+def drift(position, velocity, steps=1, domain=None):
+    return scene(position, velocity, (), dt=1.0, steps=steps, domain=domain or BOX)
+
+
+def test_comes_back_through_the_opposite_face_with_the_same_velocity(rng):
+    """Position is that of the straight line, modulo the sides; velocity to the bit."""
+    low, high = (np.asarray(x) for x in (BOX.low, BOX.high))
+    r = rng.uniform(low, high, (60, 3))
+    v = rng.normal(size=(60, 3)) * 10.0 ** rng.uniform(-1, 2, (60, 1))
+    (result,) = run([drift(r, v)])
+    state = by_id(result)
+    np.testing.assert_array_equal(state["velocity"], v)
+    expected = low + np.mod(r + v - low, high - low)
+    np.testing.assert_allclose(state["position"], expected, rtol=0, atol=1e-13)
+    assert (np.abs(r + v).max(axis=1) > 20).any(), "some must leave by several boxes"
+
+
+def test_faces_belong_to_one_side():
+    """Always low <= r < high: on the far face, just below the near one, at the last number inside."""
+    low, high = (np.asarray(x) for x in (BOX.low, BOX.high))
+    inside = np.nextafter(high, low)
+    r = np.array([low, inside, low, low])
+    v = np.array([high - low, np.zeros(3), [-1e-300] * 3, np.nextafter(0, -1) * np.ones(3)])
+    (result,) = run([drift(r, v)])
+    place = by_id(result)["position"]
+    assert (place >= low).all()
+    assert (place < high).all()
+    np.testing.assert_array_equal(place[0], low)
+    np.testing.assert_array_equal(place[1], inside)
+
+
+def test_a_rounding_below_the_near_face_is_the_near_face():
+    """1 - 1e-300 rounds to 1, which is outside: the far face is the near one."""
+    unit = Box(low=(0.0,) * 3, high=(1.0,) * 3, images=False)
+    (result,) = run([drift(np.zeros((1, 3)), [[-1e-300, -1e-18, -1e-17]], domain=unit)])
+    np.testing.assert_array_equal(result.state["position"], np.zeros((1, 3)))
+
+
+def test_a_start_outside_the_box_is_refused():
+    with pytest.raises(InputError, match=r"particles.position must be inside the domain; received"):
+        run([drift([[5.0, 0, 0]], [[0.0, 0, 0]])])
+
+
+@pytest.mark.long
+def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
+    """A joined box with images has contacts across its faces; Z04's control volume has not."""
+    place, speed = [[-0.9995, 0, 0], [0.9995, 0, 0]], [[-1.0, 0, 0], [1.0, 0, 0]]
+    seen = []
+    for images in (True, False):
+        box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
+        (result,) = run([scene(place, speed, (Impact(hardness=1e9),), domain=box)])
+        seen.append(result.work["impacts"])
+    assert seen == [1, 0]
+
+
+@pytest.mark.slow
+def test_two_leave_the_box_in_one_step_and_meet_inside_it():
+    """Both cross the face, one of them twice over; wrapped, they overlap, and collide once there."""
+    box = Box(low=(0.0,) * 3, high=(1.0,) * 3, images=False)
+    place = [[0.9, 0.5, 0.5], [0.95, 0.5, 0.5]]
+    # After one second: 0.1 + 2 and 0.1005 + 1; the first is faster, and behind.
+    speed = [[1.2, 0, 0], [0.1515, 0, 0]]
+    made = scene(
+        place,
+        speed,
+        (Impact(hardness=1e12), Heating(heat_capacity=HEAT_CAPACITY)),
+        domain=box,
+        stepper=Verlet(control=ApproachTime(shortest=1.0, longest=1.0)),
+        duration=1.0,
+        quantities={"temperature": 300.0},
+    )
+    (result,) = run([made])
+    check_sums(result)
+    assert result.work["impacts"] == 1
+    np.testing.assert_allclose(by_id(result)["position"][:, 0], [0.1, 0.1015], atol=1e-12)
+    assert by_id(result)["velocity"][0, 0] < by_id(result)["velocity"][1, 0]
+
+
+@pytest.mark.parametrize("images", [False, True])
+def test_a_step_that_loses_the_place_in_the_box_is_a_clear_failure(images):
+    """1e12 boxes in a step leave three digits of the place; 1e14 leave one, and 1e300 none at all."""
+    box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
+    far, *lost = run([drift([[0.1, 0.2, 0.3]], [[v, 0, 0]], domain=box) for v in (1e12, 1e14, -1e14, 1e300)])
+    assert far.status.ok
+    np.testing.assert_allclose(far.state["position"], [[0.1, 0.2, 0.3]], atol=1e-3)
+    for result in lost:
+        assert not result.status.ok
+        assert "rounding loses the place in the box, at particle 0" in result.status.reason
+        np.testing.assert_array_equal(result.state["position"], result.start["position"])

@@ -1,0 +1,149 @@
+"""Drag against its NumPy twin, in all branches of Chow's law; and its derivative by velocity."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.loads import WORLDS, close, cloud, jacobians, loads, vector
+from tests.scenes import scene
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.effects.base import Source, parameter
+from tisim.effects.external.drag import ChowDrag, ConstantDrag, StokesDrag
+from tisim.errors import InputError
+
+
+class Shear(Source):
+    """v_f = v_0 + G r, for the drags."""
+
+    quantity = "flow_velocity"
+    mean: Vector = parameter("m/s")
+    rate: Vector = parameter("1/s")
+
+    @ti.func
+    def value(self, w, r, t):
+        return self.mean(w) + self.rate(w) * r.yzx
+
+    @staticmethod
+    def twin(source, r):
+        return np.array(source.mean) + np.array(source.rate) * r[:, [1, 2, 0]]
+
+
+REYNOLDS = np.array([1e-3, 0.5, 1.5, 50.0, 399.0, 401.0, 1e5, 2.9e5, 3.1e5, 1e6, 2.1e6, 1e9])
+"""Two or more in each of Chow's five pieces."""
+
+
+def chow_coefficient(re):
+    """Z16 section 4.2, as printed."""
+    bounds = [re <= 1, re <= 400, re <= 3e5, re <= 2e6]
+    return np.select(bounds, [24 / re, 24 / re**0.646, 0.5, 0.000366 * re**0.4275], 0.18)
+
+
+def drag_twin(law, state, flow=0.0):
+    u = flow - state["velocity"]
+    speed, radius = np.linalg.norm(u, axis=1), state["radius"]
+    if isinstance(law, StokesDrag):
+        return 6 * np.pi * law.viscosity * radius[:, None] * u
+    if isinstance(law, ChowDrag):
+        coefficient = chow_coefficient(2 * radius * law.density * speed / law.viscosity)
+    else:
+        coefficient = law.coefficient
+    return (0.5 * law.density * coefficient * speed * np.pi * radius**2)[:, None] * u
+
+
+def drags(rng, kind):
+    """One of each world."""
+    options = {
+        "density": rng.uniform(1, 2),
+        "viscosity": rng.uniform(0.01, 0.02),
+        "coefficient": rng.uniform(),
+    }
+    return kind(**{name: options[name] for name in kind.model_fields})
+
+
+def at_reynolds(rng, law, n=12):
+    """Particles at rest, in the fluid's frame or not, whose Re are REYNOLDS; each radius its own."""
+    made = cloud(rng, (law,), n=n)
+    start = made.particles.arrays(made.domain, 0)
+    speed = REYNOLDS * law.viscosity / (2 * start["radius"] * law.density)
+    unit = start["velocity"] / np.linalg.norm(start["velocity"], axis=1, keepdims=True)
+    return scene(start["position"], unit * speed[:, None], (law,), radius=start["radius"], mass=start["mass"])
+
+
+@pytest.mark.parametrize("kind", [ConstantDrag, ChowDrag, StokesDrag])
+def test_drag_in_a_fluid_at_rest(kind, rng):
+    made = [at_reynolds(rng, drags(rng, ChowDrag)) for _ in range(WORLDS)]
+    if kind is not ChowDrag:
+        made = [cloud(rng, (drags(rng, kind),)) for _ in range(WORLDS)]
+    for one, state in zip(made, loads(made), strict=True):
+        expected = drag_twin(one.effects[0], state)
+        np.testing.assert_allclose(state["force"], expected, rtol=1e-12)
+        assert ((state["force"] * state["velocity"]).sum(axis=1) < 0).all()
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(ConstantDrag, marks=pytest.mark.slow),
+        ChowDrag,
+        pytest.param(StokesDrag, marks=pytest.mark.slow),
+    ],
+)
+def test_drag_in_a_flow(kind, rng):
+    """Relative to the flow at the place of each particle."""
+    made = [cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)]
+    for one, state in zip(made, loads(made), strict=True):
+        flow, law = one.effects
+        np.testing.assert_allclose(
+            state["force"], drag_twin(law, state, Shear.twin(flow, state["position"])), rtol=1e-12
+        )
+
+
+def test_chow_meets_stokes_at_small_reynolds_numbers(rng):
+    made = at_reynolds(rng, ChowDrag(density=1.2, viscosity=1.8e-5))
+    (state,) = loads([made])
+    slow = REYNOLDS <= 1
+    assert slow.sum() == 2
+    stokes = drag_twin(StokesDrag(viscosity=1.8e-5), state)
+    np.testing.assert_allclose(state["force"][slow], stokes[slow], rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [ConstantDrag, ChowDrag, StokesDrag])
+def test_nothing_drags_at_rest(kind, rng):
+    """No force, and no NaN; the derivative is that of Stokes or zero."""
+    law = drags(rng, kind)
+    made = scene(np.zeros((1, 3)), np.zeros((1, 3)), (law,), radius=0.3)
+    np.testing.assert_array_equal(loads([made])[0]["force"], 0)
+    ((claimed,),) = (jacobians([made], 1e-6)[0],)
+    expected = 0.0 if kind is ConstantDrag else -6 * np.pi * law.viscosity * 0.3
+    np.testing.assert_allclose(claimed[0], expected * np.eye(3), rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("kind", [ConstantDrag, StokesDrag])
+def test_velocity_jacobians_are_the_derivatives(kind, rng):
+    """Against a central difference of the force, in a flow."""
+    made = [cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)]
+    for claimed, found in zip(*jacobians(made, 1e-4), strict=True):
+        close(claimed, found, 1e-7)
+
+
+def test_velocity_jacobian_of_chow_in_each_of_its_pieces(rng):
+    """Steps that are small for the slowest particles of a range, and not all rounding for the fastest."""
+    made = [at_reynolds(rng, drags(rng, ChowDrag)) for _ in range(WORLDS)]
+    for which, step in ((slice(0, 3), 1e-7), (slice(3, 8), 1e-4), (slice(8, 12), 1.0)):
+        for claimed, found in zip(*jacobians(made, step), strict=True):
+            for a, b in zip(claimed[which], found[which], strict=True):
+                close(a, b, 2e-6)
+
+
+WRONG = {
+    "chow_drag.density must be greater than 0.0; received 0": lambda: ChowDrag(density=0, viscosity=1),
+    "stokes_drag.viscosity must be greater than 0.0; received -1": lambda: StokesDrag(viscosity=-1),
+    "constant_drag.coefficient must be given; received nothing": lambda: ConstantDrag(density=1),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_wrong_is_named(message):
+    with pytest.raises(InputError) as fault:
+        WRONG[message]()
+    assert str(fault.value) == message

@@ -1,0 +1,129 @@
+"""Grains that forces press together are in contact, not colliding: one impact, whatever the step."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import HEAT_CAPACITY, energy, fixed, momentum, scene, simulate
+from tisim.effects.impact.friction import Friction
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.reaction import Reaction
+from tisim.effects.pair.near_field import NearField
+from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.step_control import IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers.step_control import ApproachTime
+from tisim.steppers.verlet import Verlet
+
+RADIUS, MASS, DURATION = 1e-3, 1e-5, 1e-4
+ALPHA, FRICTION = 10.0, 0.1
+"""m, kg, s; heat of the reaction, J/m^2; coefficient of friction."""
+ONCE = 2 * ALPHA * np.pi * RADIUS**2
+"""Heat of the reaction of one impact that bonds, J."""
+
+
+def row(number=2, steps=100, gap=-1e-9, speed=1.0, slip=0.0, pull=1e-6, hardness=1e-3, stepper=None):
+    """Grains in a row that attract each other by ``pull`` over distance, ``gap`` diameters apart."""
+    x = (np.arange(number) - (number - 1) / 2) * 2 * RADIUS * (1 + gap)
+    zero = np.zeros(number)
+    return scene(
+        np.stack([x, zero, zero], axis=1),
+        np.stack([-speed * np.sign(x), slip * np.sign(x), zero], axis=1),
+        (
+            Impact(hardness=hardness, initial_area=0.3),
+            Friction(coefficient=FRICTION),
+            Heating(heat_capacity=HEAT_CAPACITY),
+            Reaction(energy_density=ALPHA),
+            NearField(alpha1=pull),
+        ),
+        radius=RADIUS,
+        mass=MASS,
+        duration=DURATION,
+        stepper=stepper or fixed(DURATION / steps),
+        quantities={"temperature": 300.0},
+    )
+
+
+def ran(rows):
+    results = simulate(rows, worlds=16, capacity=4)
+    for result in results:
+        assert result.status.ok, result.status.reason
+        assert np.abs(momentum(result.state)).max() <= 1e-14 * MASS
+    return results
+
+
+def heat(result):
+    """Heat of the reaction, over that of one impact."""
+    return result.state["reaction_heat"].sum() / ONCE
+
+
+def total(state, pull=1e-6):
+    """Energy of a pair, with that of the attraction, J."""
+    apart = np.linalg.norm(state["position"][1] - state["position"][0])
+    return energy(state) + pull * np.log(apart / (2 * RADIUS))
+
+
+def test_a_pressed_pair_collides_once_whatever_the_step():
+    results = ran([row(steps=steps, pull=pull) for steps in (10, 100, 1000) for pull in (1e-9, 1e-6, 1e-4)])
+    for result in results:
+        assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
+        assert result.work["contacts"] >= result.work["steps"] - 2
+        assert heat(result) == pytest.approx(1, rel=1e-13)
+        assert np.ptp(result.state["velocity"], axis=0).max() <= 1e-15
+
+
+def test_its_energy_is_kept_and_its_heat_that_of_the_impact():
+    for result in ran([row(steps=steps) for steps in (100, 1000)]):
+        kinetic = MASS
+        assert total(result.state) == pytest.approx(total(result.start), abs=1e-7 * kinetic)
+        given = HEAT_CAPACITY * MASS * (result.state["temperature"] - 300).sum()
+        assert given == pytest.approx(kinetic + ONCE, rel=1e-3)
+
+
+def test_a_pair_that_attraction_brings_together_collides_once():
+    gaps = (1e-9, 1e-6, 1e-4)
+    rows = [row(steps=s, gap=gap, speed=0.0, pull=1e-4, hardness=1e-12) for s in (100, 1000) for gap in gaps]
+    for result in ran(rows):
+        assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
+        assert heat(result) == pytest.approx(1, rel=1e-13)
+
+
+def test_a_pair_that_starts_at_rest_in_contact_never_collides():
+    for result in ran([row(steps=steps, speed=0.0) for steps in (100, 1000)]):
+        assert (result.work["impacts"], heat(result)) == (0, 0)
+
+
+def test_a_row_comes_to_rest_whatever_the_step():
+    few, many = ran([row(number=3, steps=steps) for steps in (1000, 10000)])
+    assert 2 <= few.work["impacts"] < 30
+    assert heat(many) == pytest.approx(heat(few), rel=0.05)
+
+
+def test_a_pressed_pair_slides_as_friction_lets_it():
+    pull, slip = 1e-4, 0.08
+    slowing = 2 * FRICTION * pull / (2 * RADIUS) / MASS * DURATION
+    assert 0.5 < slowing / (2 * slip) < 0.8
+    for result in ran([row(steps=s, speed=0.0, slip=slip, pull=pull) for s in (100, 1000)]):
+        assert result.work["impacts"] == 0
+        left = np.ptp(result.state["velocity"], axis=0)[1]
+        assert left == pytest.approx(2 * slip - slowing, rel=0.02)
+        assert total(result.state, pull) == pytest.approx(
+            total(result.start, pull), abs=1e-3 * MASS * slip**2
+        )
+
+
+STEPPERS = {
+    "approach time": lambda dt: Verlet(control=ApproachTime(shortest=dt, longest=dt)),
+    "trapezoid": lambda dt: Trapezoid(control=IterationControl(first=dt, longest=dt, shortest=dt / 1e3)),
+    "collocation": lambda dt: Collocation(control=StageControl(first=dt, longest=dt, shortest=dt / 1e3)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stepper", STEPPERS)
+def test_so_it_is_with_other_steppers(stepper):
+    for result in ran([row(stepper=STEPPERS[stepper](DURATION / steps)) for steps in (100, 1000)]):
+        assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
+        assert result.work["contacts"] >= 90
+        assert heat(result) == pytest.approx(1, rel=1e-13)

@@ -1,0 +1,233 @@
+"""Forces between dipoles against NumPy: twins, the gradient of their energy, closed forms of induced ones."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, vector
+from tests.effects.magnetic.magnets import K_B, MU_0, Quadrupole, dipole_field, flux_density
+from tests.scenes import scene
+from tisim import Box
+from tisim.effects.magnetic.dipole_dipole import DipoleDipole, TruncatedDipoleDipole
+from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
+from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment
+from tisim.effects.magnetic.mutual_moment import MutualInducedMoment, MutualLangevinMoment
+from tisim.errors import InputError
+from tisim.sources.uniform import MagneticField
+
+SIDE = 3.0
+
+
+def magnets(rng, law, n=12, spread=SIDE, sizes=(0.05, 0.2)):
+    """Moments in any direction, in a periodic box."""
+    return scene(
+        rng.uniform(0, spread, (n, 3)),
+        np.zeros((n, 3)),
+        (law,),
+        radius=rng.uniform(*sizes, n),
+        mass=1.0,
+        domain=Box(low=(0, 0, 0), high=(SIDE,) * 3),
+        quantities={"moment": 1e3 * rng.normal(size=(n, 3))},
+    )
+
+
+def separations(r):
+    d = r[None] - r[:, None]
+    d -= SIDE * np.round(d / SIDE)
+    distance = np.linalg.norm(d, axis=2) + np.eye(len(r))
+    return d / distance[..., None], distance
+
+
+def pair_forces(state):
+    """[i, j] the force on i by j: L21 (4.6), written with its sign."""
+    n, d = separations(state["position"])
+    m = state["moment"]
+    i, j = np.einsum("ic,ijc->ij", m, n), np.einsum("jc,ijc->ij", m, n)
+    total = i[..., None] * m[None] + j[..., None] * m[:, None] + ((m @ m.T) - 5 * i * j)[..., None] * n
+    return -3 * MU_0 / (4 * np.pi) * ((1 - np.eye(len(m))) / d**4)[..., None] * total
+
+
+def energy(r, m):
+    """B16 (6.21), each pair once. J."""
+    field = np.einsum("ijab,jb->ia", dipole_field(r, SIDE), m)
+    return -0.5 * (m * field).sum()
+
+
+def test_forces_are_those_of_the_twin_and_add_up_to_nothing(rng):
+    """Nearest images in a periodic box."""
+    made = [magnets(rng, DipoleDipole()) for _ in range(WORLDS)]
+    states = loads(made)
+    for state in states:
+        forces = pair_forces(state)
+        close(state["force"], forces.sum(axis=1))
+        np.testing.assert_allclose(
+            state["force"].sum(axis=0), 0, atol=1e-14 * np.linalg.norm(forces, axis=2).sum()
+        )
+
+
+def test_the_force_is_the_gradient_of_the_energy(rng):
+    """Central difference of B16 (6.21) with moments held fixed."""
+    (state,) = loads([magnets(rng, DipoleDipole(), n=5)])
+    r, m, h, expected = state["position"], state["moment"], 1e-5, np.zeros((5, 3))
+    for i, a in np.ndindex(5, 3):
+        step = np.zeros((5, 3))
+        step[i, a] = h
+        expected[i, a] = -(energy(r + step, m) - energy(r - step, m)) / (2 * h)
+    close(state["force"], expected, 1e-8)
+
+
+def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
+    """sum r x F + sum m x B = 0, with all of them in less than half the box, so that no image acts."""
+    (state,) = loads([magnets(rng, DipoleDipole(), spread=0.49 * SIDE)])
+    r, m = state["position"], state["moment"]
+    turning = np.cross(m, np.einsum("ijab,jb->ia", dipole_field(r), m))
+    assert np.abs(turning.sum(axis=0)).max() > 0
+    balanced({**state, "torque": turning})
+
+
+def test_near_pairs_only(rng):
+    """Up to so many radii; also over the pair list, where sizes are unlike."""
+    few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 10)))) for _ in range(WORLDS - 1)]
+    made = [*few, magnets(rng, TruncatedDipoleDipole(cutoff=4.0), n=400, sizes=(0.02, 0.1))]
+    for one, state in zip(made, loads(made, capacity=400), strict=True):
+        forces, radius = pair_forces(state), state["radius"]
+        near = 2 * separations(state["position"])[1] <= one.effects[0].cutoff * (radius[:, None] + radius)
+        close(state["force"], (near[..., None] * forces).sum(axis=1))
+        assert np.abs(state["force"] - forces.sum(axis=1)).max() > 1e-6 * np.abs(state["force"]).max()
+
+
+def test_head_to_tail_attracts_and_side_by_side_repels():
+    """F = 6 mu_0 m^2 / (4 pi d^4) together, half of it apart; B16 6.2.4."""
+    unit = 3 * MU_0 / (4 * np.pi) * 4.0 / 0.5**4
+    for moment, expected in (((2, 0, 0), 2 * unit), ((0, 2, 0), -unit)):
+        made = scene(
+            [[1, 1, 1], [1.5, 1, 1]],
+            np.zeros((2, 3)),
+            (DipoleDipole(),),
+            mass=1.0,
+            domain=Box(low=(0, 0, 0), high=(SIDE,) * 3),
+            quantities={"moment": [moment, moment]},
+        )
+        force = loads([made])[0]["force"]
+        np.testing.assert_allclose(force, [[expected, 0, 0], [-expected, 0, 0]], rtol=1e-12)
+
+
+def induced(place, b, law=None, radius=1.0, domain=None, **more):
+    """Spheres in a uniform field, or an uneven one; with all forces."""
+    field = Quadrupole(constant=(0, 0, 0), scale=more.pop("scale", (0, 0, 0)))
+    effects = (
+        field,
+        MagneticField(constant=tuple(b)),
+        law or MutualInducedMoment(susceptibility=1e12, tolerance=1e-14),
+        Magnetophoresis(),
+        DipoleDipole(),
+    )
+    return scene(place, np.zeros((len(place), 3)), effects, radius=radius, mass=1.0, **more)
+
+
+def solved(one, r, radius):
+    """Induced moments by one linear solve, and the energy -1/2 sum m.B of the applied field."""
+    chi = one.effects[2].susceptibility
+    gain = 4 * np.pi / MU_0 * chi / (3 + chi) * radius**3
+    b, n = flux_density(one.effects, r), len(r)
+    matrix = np.eye(3 * n) - np.repeat(gain, 3)[:, None] * dipole_field(r).transpose(0, 2, 1, 3).reshape(
+        3 * n, 3 * n
+    )
+    m = np.linalg.solve(matrix, (gain[:, None] * b).ravel()).reshape(n, 3)
+    return m, -0.5 * (m * b).sum()
+
+
+def test_two_touching_spheres():
+    """mu_r -> infinity: attraction in line is 16/9 of that of fixed moments, repulsion side by side 64/81
+    (L21 section 4.2); in general moments are 1/(1 - 2a) and 1/(1 + a) times as large as alone."""
+    pair = np.array([[0, 0, 0], [0, 0, 2.0]])
+    alone = 4 * np.pi / MU_0
+    unit = 3 * MU_0 / (4 * np.pi) * alone**2 / 2**4
+    along, across = loads([induced(pair, b) for b in ((0, 0, 1), (1, 0, 0))])
+    np.testing.assert_allclose(along["moment"], [[0, 0, 4 / 3 * alone]] * 2, rtol=1e-11)
+    np.testing.assert_allclose(across["moment"], [[8 / 9 * alone, 0, 0]] * 2, rtol=1e-11)
+    np.testing.assert_allclose(along["force"][:, 2], [16 / 9 * 2 * unit, -16 / 9 * 2 * unit], rtol=1e-11)
+    np.testing.assert_allclose(across["force"][:, 2], [-64 / 81 * unit, 64 / 81 * unit], rtol=1e-11)
+    laws = [
+        MutualInducedMoment(susceptibility=chi, tolerance=1e-14, relaxation=relaxation)
+        for chi, relaxation in ((0.5, 1.0), (-0.9, 1.0), (20.0, 0.7))
+    ]
+    made = [induced(3.0 * pair, b, law, radius=2.5) for law in laws for b in ((0, 0, 1), (1, 0, 0))]
+    for one, state in zip(made, loads(made), strict=True):
+        law, b = one.effects[2], np.array(one.effects[1].constant)
+        a = law.susceptibility / (3 + law.susceptibility) * 2.5**3 / 6**3
+        factor = 1 / (1 - 2 * a) if b[2] else 1 / (1 + a)
+        expected = 4 * np.pi / MU_0 * a * 6**3 * factor * b
+        np.testing.assert_allclose(state["moment"], [expected, expected], rtol=1e-11, atol=1e-14)
+
+
+def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_their_energy(rng):
+    """A chain of three, bent, and clouds of five; in an uneven field, of which no force is left out.
+
+    The energy of linear spheres is -1/2 sum m.B_0. Its gradient is the whole force: of the field on the
+    moments and of the moments on each other, though none of the two is it alone.
+    """
+    chain = np.array([[0, 0, 0], [1.9, 0.7, 0], [3.5, 1.9, 0.3]])
+    places = [chain, *(3 * np.mgrid[:5, :1, :1].reshape(3, -1).T + rng.normal(size=(5, 3)) for _ in range(3))]
+    made = []
+    for place in places:
+        law = MutualInducedMoment(susceptibility=float(rng.uniform(1, 100)), tolerance=1e-14)
+        radius = rng.uniform(0.8, 1.0, len(place))
+        made.append(induced(place, vector(rng), law, radius=radius, scale=(0.4, 0.4, 0.7)))
+    for one, state in zip(made, loads(made), strict=True):
+        r, radius, h = state["position"], state["radius"], 1e-5
+        m, _ = solved(one, r, radius)
+        close(state["moment"], m, 1e-11)
+        expected = np.zeros_like(r)
+        for i, a in np.ndindex(*r.shape):
+            step = np.zeros_like(r)
+            step[i, a] = h
+            expected[i, a] = -(solved(one, r + step, radius)[1] - solved(one, r - step, radius)[1]) / (2 * h)
+        close(state["force"], expected, 1e-7)
+
+
+def test_langevin_moments_in_each_others_field(rng):
+    """Each has the moment that the field at its place gives it, that of the others included; where the field
+    is weak it is not that of the sources alone."""
+    unit = K_B * 300.0
+    made = []
+    for strength in (0.1, 1.0, 30.0):
+        law = MutualLangevinMoment(temperature=300.0, tolerance=1e-14)
+        place = 2.2 * np.mgrid[:3, :2, :1].reshape(3, -1).T + 0.1 * rng.normal(size=(6, 3))
+        quantities = {"saturation_moment": 5e7 * rng.uniform(0.5, 1, 6), "domain_moment": unit}
+        made.append(induced(place, strength * np.array([0.6, 0.0, 0.8]), law, quantities=quantities))
+    ratios = []
+    for one, state in zip(made, loads(made), strict=True):
+        m = state["moment"]
+        own = flux_density(one.effects, state["position"])
+        b = own + np.einsum("ijab,jb->ia", dipole_field(state["position"]), m)
+        x = np.linalg.norm(b, axis=1)
+        expected = (state["saturation_moment"] * (1 / np.tanh(x) - 1 / x) / x)[:, None] * b
+        close(m, expected, 1e-11)
+        ratios.append(np.abs(b - own).max() / np.abs(own).max())
+    assert ratios[0] > 0.3 > 0.05 > ratios[2] > 0
+
+
+def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
+    """Coarsest first: each alone in the field of the sources, then one sweep a step; and cut-offs."""
+    law = MutualLangevinMoment(temperature=300.0, sweeps=50)
+    alone, once = law.approximations(1.0)
+    assert alone == LangevinMoment(temperature=300.0)
+    assert once == law.model_copy(update={"sweeps": 0})
+    chi = MutualInducedMoment(susceptibility=2.0).approximations(1.0)
+    assert [type(a) for a in chi] == [InducedMoment, MutualInducedMoment]
+    cuts = DipoleDipole().approximations(1.0)
+    assert [type(cut) for cut in cuts] == [TruncatedDipoleDipole] * len(cuts)
+    assert 30.0 in [cut.cutoff for cut in cuts]
+    assert TruncatedDipoleDipole().cutoff == 30.0
+    assert TruncatedDipoleDipole().approximations(1.0) == ()
+
+
+def test_only_what_is_needed_is_allocated():
+    made = scene([[0, 0, 0]], [[0, 0, 0]], (DipoleDipole(),))
+    assert fields_beside_the_core(made) == {"moment", "force"}
+
+
+def test_what_is_wrong_is_named():
+    with pytest.raises(InputError) as fault:
+        TruncatedDipoleDipole(cutoff=2)
+    assert str(fault.value) == "truncated_dipole_dipole.cutoff must be greater than 2.0; received 2"

@@ -1,0 +1,145 @@
+"""The core takes effects it has never heard of: those of tests/throwaway.py."""
+
+import time
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.scenes import fixed, scene
+from tests.throwaway import K_E, WORLDS, Coulomb, RandomKicks, Trap, charges, run
+from tisim import Scene, Simulation
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.impact import Impact
+from tisim.errors import InputError
+
+
+def test_forces_are_their_numpy_twin(rng):
+    """Random charges in a trap: the force on each, at the start and after a step."""
+    scenes = []
+    for _ in range(10):
+        n = 20
+        trap = {
+            "stiffness": rng.uniform(0, 5),
+            "centre": tuple(rng.normal(size=3)),
+            "shake": (1.0, 2.0, 3.0),
+            "omega": 4.0,
+        }
+        scenes.append(
+            charges(
+                rng.normal(size=(n, 3)),
+                rng.normal(size=(n, 3)),
+                rng.normal(size=n) * 1e-5,
+                trap,
+                mass=rng.uniform(1, 2, n),
+                dt=1e-3,
+            )
+        )
+    for made, result in zip(scenes, run(scenes), strict=True):
+        state, trap = result.state, made.effects[1]
+        r, q = state["position"], state["charge"]
+        gap = r[None] - r[:, None]
+        distance = np.linalg.norm(gap, axis=2) + np.eye(len(r))
+        expected = -(K_E * q[:, None] * q / distance**3)[..., None] * gap
+        expected = expected.sum(axis=1) - trap.stiffness * (r - np.array(trap.centre))
+        expected += state["mass"][:, None] * np.array(trap.shake) * np.cos(trap.omega * result.time)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(state["force"], expected, rtol=1e-13, atol=1e-13 * scale)
+
+
+def kicked(sigma=2.0, seed=5, steps=200, n=30):
+    effects = (RandomKicks(sigma=sigma),)
+    return scene(
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        effects,
+        dt=0.01,
+        steps=steps,
+        quantities={"kicked": np.zeros((n, 3))},
+        seed=seed,
+    )
+
+
+def test_an_operator_with_noise_a_field_and_a_counter():
+    """Velocities are normal with variance sigma^2 t; the field adds up the kicks; each is counted."""
+    results = run([kicked(seed=seed) for seed in range(WORLDS)])
+    v = np.concatenate([result.state["velocity"] for result in results])
+    assert stats.kstest(v.ravel() / (2.0 * np.sqrt(2.0)), "norm").pvalue > 0.01
+    assert v.var() == pytest.approx(8.0, rel=4 * np.sqrt(2 / v.size))
+    for result in results:
+        np.testing.assert_array_equal(result.state["kicked"], result.state["velocity"])
+        assert result.work["kicks"] == 30 * 200
+    again = run([kicked(seed=seed) for seed in range(WORLDS)])
+    for a, b in zip(results, again, strict=True):
+        np.testing.assert_array_equal(a.state["velocity"], b.state["velocity"])
+
+
+def test_every_parameter_may_differ_per_world():
+    """Two designs in one batch each get their own numbers, vectors among them, as if alone."""
+    one = charges([[1, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 1.0, "centre": (0, 1, 0)}, dt=0.1, steps=5)
+    two = charges([[1, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 9.0, "centre": (0, 0, 2)}, dt=0.05, steps=20)
+    together, alone = run([one, two, one]), [run([one])[0], run([two])[0]]
+    for a, b in zip(together, [*alone, alone[0]], strict=True):
+        assert a.work == b.work
+        for name in a.state:
+            np.testing.assert_array_equal(a.state[name], b.state[name])
+    assert np.abs(together[0].state["position"] - together[1].state["position"]).max() > 0.1
+
+
+@pytest.mark.long
+def test_what_no_effect_needs_is_not_allocated():
+    """A scene pays for the fields, the bytes, the counters and the phases of its own effects only."""
+    core = {"position", "velocity", "mass", "radius", "id"}
+    bare = Simulation(scene([[0, 0, 0]], [[0, 0, 0]]), worlds=3, capacity=7)
+    assert {f.name for f in bare.s.fields} == core
+    assert sum(bare.s.bytes().values()) == 3 * 7 * (8 * (3 + 3 + 1 + 1) + 4)
+    assert set(bare.s.counters) == {"steps", "particle_steps"}
+    assert not any(
+        word in name for name in bare.program.names() for word in ("Force", "Kick", "Survey", "Bid")
+    )
+    extra = {
+        (Trap(stiffness=1),): {"force"},
+        (Coulomb(),): {"charge", "force"},
+        (RandomKicks(sigma=1),): {"kicked"},
+        (Impact(hardness=1),): set(),
+        (Impact(hardness=1), Agglomeration()): set(),
+    }
+    for effects, more in extra.items():
+        made = Simulation(scene([[0, 0, 0]], [[0, 0, 0]], effects), worlds=3, capacity=7)
+        assert {f.name for f in made.s.fields} == core | more
+        assert ("kicks" in made.s.counters) == isinstance(effects[0], RandomKicks)
+        made.close()
+    bare.close()
+
+
+def test_other_designs_compile_nothing():
+    """Loading and running a second design takes a small part of what the first took."""
+    first = scene([[1, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), dt=0.1, steps=3)
+    second = scene([[2, 0, 0], [3, 0, 0]], np.zeros((2, 3)), (Trap(stiffness=7.0),), dt=0.2, steps=3)
+    simulation = Simulation(first, worlds=2, capacity=2)
+    taken = []
+    for made in (first, second):
+        began = time.process_time()
+        simulation.load([made])
+        simulation.run()
+        taken.append(time.process_time() - began)
+        assert simulation.results()[0].status.ok
+    assert taken[1] < taken[0] / 5
+    assert len(simulation.results()[0].state["mass"]) == 2
+    simulation.close()
+
+
+def test_a_scene_of_another_structure_is_refused():
+    simulation = Simulation(scene([[0, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),)))
+    with pytest.raises(InputError, match="scene must be of the structure compiled; received"):
+        simulation.load([scene([[0, 0, 0]], [[0, 0, 0]])])
+    simulation.close()
+
+
+def test_a_scene_finds_them_by_name():
+    """No registry: a class that exists can be written in a file."""
+    made = charges([[0, 0, 0]], [[0, 0, 0]], [1.0], {"stiffness": 2.0})
+    again = Scene.from_dict(made.to_dict())
+    assert again.digest() == made.digest()
+    assert [type(e) for e in again.effects] == [Coulomb, Trap]
+    assert again.stepper == fixed(1e-9)

@@ -1,0 +1,96 @@
+"""What explain says is what is compiled: nothing more is allocated, nothing less is listed."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from cases.agglomeration import BEST
+from cases.agglomeration import scene as agglomeration
+from cases.vibration import scene as vibration
+from tisim import Simulation
+from tisim.engine.explain import explain, known_effects, render
+
+
+def text(scene):
+    stream = io.StringIO()
+    Console(file=stream, width=150).print(render(explain(scene)))
+    return stream.getvalue()
+
+
+def test_whole_flow_leaves_nothing_out():
+    flow = agglomeration(BEST, 1, grains=60)
+    found = explain(flow)
+    assert [part.name for part in found.effects] == [effect.kind() for effect in flow.effects]
+    assert all(part.summary and part.source for part in found.effects)
+    names = {part.name for part in found.effects}
+    assert {part.name for part in found.absent_effects} == {k.kind() for k in known_effects()} - names
+    assert (found.particles, found.capacity) == (60, 60)
+    assert found.steps == pytest.approx(flow.duration / flow.stepper.control.longest)
+
+
+def test_absent_effects_and_fields():
+    whole = agglomeration(BEST, 1, grains=60)
+    found = explain(
+        whole.without(*(e.kind() for e in whole.effects if e.kind() not in ("impact", "friction")))
+    )
+    absent = {part.name for part in found.absent_effects}
+    assert {"heating", "cooling", "reaction", "fragmentation", "agglomeration"} <= absent
+    assert not absent & {"impact", "friction", "impact_law", "operator", "force"}
+    fields = dict(found.absent_fields)
+    assert "reaction" in fields["temperature"]
+    assert "fragmentation" in fields["pieces"]
+    assert not {item.name for item in found.memory} & set(fields)
+
+
+def test_without_any_effect_nothing_of_effects_is_compiled():
+    whole = agglomeration(BEST, 1, grains=60)
+    found = explain(whole.without(*(effect.kind() for effect in whole.effects)))
+    assert found.effects == ()
+    assert {
+        item.why for item in found.memory if item.bytes and not item.name.endswith(("table", "list"))
+    } == {"every scene"}
+    assert not {"Open*", "Bid*", "Resolve*", "Rearrange", "SumForces"} & set(found.phases)
+
+
+@pytest.mark.slow
+def test_memory_is_what_is_allocated():
+    flow = agglomeration(BEST, 1, grains=60)
+    simulation = Simulation(flow)
+    sizes = {item.name: item.bytes for item in explain(flow).memory}
+    assert {name: sizes[name] for name in simulation.s.bytes()} == simulation.s.bytes()
+    assert sizes["position"] == 3 * sizes["radius"]
+    assert explain(flow).phases == tuple(simulation.program.names())
+    simulation.close()
+
+
+def test_parameters_have_units_and_sources():
+    shown = text(agglomeration(BEST, 1, grains=60))
+    assert "hardness = 265480 Pa" in shown
+    assert "heat_capacity = 1796.3 J/(kg K)" in shown
+    assert "Z04 Eq. (6.9)" in shown
+    assert "Rounds" not in shown
+    assert "Resolve*" in shown
+
+
+@pytest.mark.long
+def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
+    """Z13: forces on charges, and nothing else; no fields, lists or phases of anything more."""
+    found = explain(vibration(sites=2))
+    named = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
+    assert {part.name for part in found.effects} == named
+    absent = {part.name for part in found.absent_effects}
+    assert absent == {kind.kind() for kind in known_effects()} - named
+    assert {"contact", "contact_friction", "impact", "heating", "cooling", "agglomeration"} <= absent
+    core = {"position", "velocity", "mass", "radius", "id"}
+    before = {"position_before", "velocity_before", "force_before", "iterate_change"}
+    more = {"parameter table", "sums of the iteration"}
+    assert {item.name for item in found.memory} == core | before | more | {"charge", "anchor", "force"}
+    fields = dict(found.absent_fields)
+    assert "heating" in fields["temperature"]
+    forbidden = ("list", "contact", "touch", "spin", "torque", "temperature", "heat")
+    allocated = " ".join(item.name for item in found.memory)
+    assert not [word for word in forbidden if word in allocated]
+    iteration = ["SumTrialForces**", "Correct**", "Judge**"]
+    step = ["Begin", "Keep", "Try*", "Predict*", *iteration, "GiveUp*", "Decide*", "Arrive", "Finish"]
+    assert list(found.phases) == step

@@ -1,0 +1,105 @@
+"""The same scene gives the same bits: on both schedules, one thread or two, alone or in a batch."""
+
+import numpy as np
+import pytest
+
+from tests.effects.test_contract import kicked
+from tests.scenes import GRAIN, compiled, flow, simulate
+from tisim import Simulation
+from tisim.errors import InputError
+
+WORLDS = [
+    flow(seed=1, grains=150),
+    flow(seed=2, grains=150, hardness=1e7, sizes=3.0),
+    flow(seed=3, grains=60, surface_energy=30.0, grain_mass=GRAIN / 8, sizes=4.0),
+    flow(seed=4, grains=20),
+]
+"""Most of their grains merge; few merge; agglomerates break; small enough to need no lists."""
+
+
+BATCH = 240
+
+
+def crowd():
+    """The four in the midst of others: the last of all, and three anywhere."""
+    scenes = [flow(seed=100 + k, grains=20 + k % 7, hardness=10.0 ** (4 + k % 5)) for k in range(BATCH)]
+    for at, scene in zip((BATCH - 1, 0, 97, 120), WORLDS, strict=True):
+        scenes[at] = scene
+    return scenes
+
+
+def pick(results):
+    """Those of the four."""
+    return [results[at] for at in (BATCH - 1, 0, 97, 120)]
+
+
+@pytest.fixture(scope="module")
+def usual():
+    """The four among 236 others, a thread to a world."""
+    batch = simulate(crowd(), worlds=BATCH, capacity=200, schedule="world")
+    results = pick(batch)
+    assert all(result.status.ok for result in batch)
+    assert len({result.work["steps"] for result in batch}) > 10
+    assert sum(result.work["merges"] for result in results) > 50
+    assert sum(result.work["fractures"] for result in results) > 10
+    assert sum(result.work["impacts"] for result in results) > 200
+    return results
+
+
+def same(a, b):
+    """To the last bit, counts of work included."""
+    assert b.status.ok
+    assert a.work == b.work
+    assert a.time == b.time
+    assert a.state.keys() == b.state.keys()
+    for name, values in a.state.items():
+        np.testing.assert_array_equal(values, b.state[name], err_msg=name)
+
+
+def test_two_runs_the_second_in_portions(usual):
+    """Three steps at a time: where a run is interrupted does not matter."""
+    simulation = compiled(WORLDS[0], BATCH, 200, "world")
+    simulation.load(crowd())
+    for _ in range(100):
+        simulation.run(steps=3)
+    simulation.run()
+    for a, b in zip(usual, pick(simulation.results()), strict=True):
+        same(a, b)
+
+
+def test_both_schedules(usual):
+    """A launch per phase over all particles, against a thread that takes a world through all phases."""
+    launched = simulate(WORLDS, worlds=len(WORLDS), capacity=200, schedule="particle")
+    for a, b in zip(usual, launched, strict=True):
+        same(a, b)
+
+
+@pytest.mark.slow
+def test_alone_and_in_a_batch_of_240(usual):
+    """A batch of one, with no more room than each needs."""
+    capacity = max(scene.capacity() for scene in WORLDS)
+    for a, scene in zip(usual, WORLDS, strict=True):
+        (alone,) = simulate([scene], worlds=1, capacity=capacity)
+        same(a, alone)
+
+
+@pytest.mark.long
+def test_one_thread_and_two(usual, elsewhere):
+    for w, result in enumerate(usual):
+        for name, values in result.state.items():
+            np.testing.assert_array_equal(values, elsewhere[f"one thread/{w}/{name}"], err_msg=f"{w} {name}")
+        work = [result.work[key] for key in sorted(result.work)]
+        assert elsewhere[f"one thread/{w}/work"].tolist() == work
+
+
+@pytest.mark.long
+def test_noise_with_one_thread_and_two(elsewhere):
+    """Counter-based noise does not know which thread draws it: each particle a launch of its own here."""
+    (result,) = simulate([kicked()], worlds=1, capacity=32, schedule="particle")
+    for name, values in result.state.items():
+        np.testing.assert_array_equal(values, elsewhere[f"one thread/kicked/{name}"], err_msg=name)
+
+
+def test_unknown_schedule_is_refused():
+    with pytest.raises(InputError, match=r"^schedule must be world or particle; received 'galaxy'$"):
+        Simulation(WORLDS[3], schedule="galaxy")

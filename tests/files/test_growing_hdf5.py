@@ -1,0 +1,322 @@
+"""Trajectories are whole after every single write, whatever ends the writing: a kill, a full disk."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import resource
+import signal
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.scenes import scene
+from tisim.errors import InputError, RunError
+from tisim.files import atomic
+from tisim.files.growing_hdf5 import Growing
+from tisim.files.shared_hdf5 import Reading
+from tisim.files.superblock import SIZE, lookup3, sound, superblock
+from tisim.io.reader import Frame, frames
+from tisim.io.trajectory import LIBRARY, Recording, Trajectory
+
+GRAINS = 300
+STILL = scene([(0, 0, 0)] * GRAINS, [(0.0, 0, 0)] * GRAINS)
+"""Nothing is run here: frames are made by hand."""
+
+
+def frame(k):
+    """A frame whose numbers, which do not compress, say which one it is; it has fewer grains than room."""
+    draw, n = np.random.Generator(np.random.Philox(k)), GRAINS - k % 7
+    arrays = dict(
+        position=draw.random((n, 3)), velocity=draw.random((n, 3)), mass=draw.random(n),
+        radius=draw.random(n), id=np.arange(n),
+    )  # fmt: skip
+    return Frame(1e-3 * (k + 1), 10 * k, arrays)
+
+
+def same(found, k):
+    expected = frame(k)
+    assert (found.time, found.step) == (expected.time, expected.step)
+    assert found.arrays.keys() == expected.arrays.keys()
+    for name, values in expected.arrays.items():
+        np.testing.assert_array_equal(found.arrays[name], values)
+
+
+def whole_frames(path, acknowledged):
+    """How many frames there are in the file, each as it was written, and none missing that was."""
+    with frames(path) as found:
+        assert acknowledged <= len(found) <= acknowledged + 1
+        for k, one in enumerate(found):
+            same(one, k)
+        return len(found)
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    """While this lasts, a write beyond so many bytes fails as on a full disk: the system's own limit."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("rows", [4, pytest.param(12, marks=pytest.mark.slow)])
+def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
+    """So at whatever write the writer is killed. HDF5 opens it as any other file, and finds all frames."""
+    path, left = tmp_path / "t.h5", []
+
+    def note(self, at, piece, put=Growing._put):
+        put(self, at, piece)
+        left.append((path.read_bytes(), written))
+
+    monkeypatch.setattr(Growing, "_put", note)
+    written = 0
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        for written in range(rows):
+            trajectory.write(0, frame(written))
+    assert len(left) > 8 * rows
+    for content, acknowledged in left:
+        path.write_bytes(content)
+        whole_frames(path, acknowledged)
+        with h5py.File(io.BytesIO(content)) as plain:
+            assert len(plain["particles/all/position/value"]) >= acknowledged
+
+
+def test_it_can_be_read_while_it_is_written(tmp_path):
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        for k in range(5):
+            trajectory.write(0, frame(k))
+            assert whole_frames(path, k + 1) == k + 1
+            with h5py.File(path, "r") as plain:
+                assert plain["particles/all/position/step"][:].tolist() == [10 * j for j in range(k + 1)]
+
+
+def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
+    """HDF5 itself would refuse them: they lie behind the end of the file that it has found."""
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory, frames(path) as found:
+        for k in range(5):
+            trajectory.write(0, frame(k))
+        assert len(found) == 5
+        for k in range(5):
+            same(found[k], k)
+
+
+def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
+    """At whatever block of the file that is: HDF5 alone would call it damaged."""
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        trajectory.write(0, frame(0))
+    calls, at = 0, 0
+
+    def torn(self, size, settled=Reading._settled):
+        nonlocal calls
+        calls += 1
+        found = settled(self, size)
+        return bytes(len(found) // 2) + found[len(found) // 2 :] if calls == at else found
+
+    monkeypatch.setattr(Reading, "_settled", torn)
+    while calls >= at:
+        calls, at = 0, at + 1
+        assert whole_frames(path, 1) == 1
+    assert at > 10
+
+
+def test_a_trajectory_that_is_cut_short_is_refused(tmp_path):
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        trajectory.write(0, frame(0))
+    os.truncate(path, path.stat().st_size - 1)
+    with pytest.raises(InputError, match="file must be whole; received"), frames(path):
+        pass
+
+
+@pytest.mark.parametrize(
+    "part",
+    [0.1, 0.5, 0.7, 0.98, *(pytest.param(p, marks=pytest.mark.slow) for p in np.linspace(0.02, 0.96, 16))],
+)
+def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, part):
+    path, written = tmp_path / "t.h5", 0
+
+    def write():
+        nonlocal written
+        with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+            for written in range(10):
+                trajectory.write(0, frame(written))
+
+    write()
+    size = int(path.stat().st_size * part)
+    path.unlink()
+    written = 0
+    message = (
+        "t.h5 could not be written: File too large; (frames before are|everything stored before is) intact"
+    )
+    with files_of_at_most(size), pytest.raises(RunError, match=message):
+        write()
+    if path.exists():
+        assert whole_frames(path, written) == written
+        assert path.stat().st_size <= size
+    assert [file.name for file in tmp_path.iterdir()] in ([], ["t.h5"])
+
+
+@pytest.mark.parametrize("kept", [3, 9])
+def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, kept):
+    path = tmp_path / "t.h5"
+    recording = Recording(path, frames=99)
+    with Trajectory(recording, [STILL]) as trajectory:
+        for k in range(10):
+            trajectory.write(0, frame(k))
+    content = path.read_bytes()
+    with files_of_at_most(len(content) // 4), pytest.raises(RunError, match="could not be written"):
+        Trajectory.going_on(recording, STILL, frame(kept).time)
+    assert path.read_bytes() == content
+    assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
+    with Trajectory.going_on(recording, STILL, frame(kept).time):
+        assert whole_frames(path, kept + 1) == kept + 1
+
+
+def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_path):
+    path = tmp_path / "t.h5"
+    recording = Recording(path, frames=99)
+    trajectory = Trajectory(recording, [STILL])
+    assert whole_frames(path, 0) == 0
+    trajectory.close()
+    with Trajectory.going_on(recording, STILL, 1.0) as trajectory:
+        trajectory.write(0, frame(0))
+    assert whole_frames(path, 1) == 1
+
+
+def test_killed_while_it_is_made_it_is_not_there(tmp_path, monkeypatch):
+    class Killed(BaseException):
+        pass
+
+    def killed(handle):
+        raise Killed
+
+    monkeypatch.setattr("tisim.files.atomic.os.fsync", killed)
+    with pytest.raises(Killed):
+        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+    assert not (tmp_path / "t.h5").exists()
+
+
+def test_a_folder_that_takes_no_file_is_told_before_anything_runs(tmp_path):
+    (tmp_path / "t.h5").mkdir()
+    with pytest.raises(InputError, match="trajectory must be a file that can be written; received"):
+        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+
+
+def interrupted(monkeypatch, owner, name, act, stride):
+    """Have act done again and again, with a Ctrl-C at one call of a method of owner after another, at so many
+    calls from each other, until there are no more; how many there were."""
+    method, calls, at = getattr(owner, name), 0, 1 - stride
+
+    def called(self, *arguments):
+        nonlocal calls
+        calls += 1
+        if calls == at:
+            signal.raise_signal(signal.SIGINT)
+        return method(self, *arguments)
+
+    monkeypatch.setattr(owner, name, called)
+    while calls >= at:
+        calls, at = 0, at + stride
+        try:
+            act()
+        except KeyboardInterrupt:
+            assert calls >= at
+        else:
+            assert calls < at, "the Ctrl-C was lost"
+    return calls
+
+
+@pytest.mark.parametrize("name", ["write", "readinto", "truncate"])
+def test_ctrl_c_while_hdf5_writes_waits_for_the_frame(tmp_path, monkeypatch, name):
+    path = tmp_path / "t.h5"
+
+    def write():
+        written = 0
+        try:
+            with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+                for k in range(2):
+                    trajectory.write(0, frame(k))
+                    written = k + 1
+        finally:
+            whole_frames(path, written)
+
+    stride, least = {"write": (4, 50), "readinto": (7, 2), "truncate": (1, 0)}[name]
+    assert interrupted(monkeypatch, Growing, name, write, stride) > least
+
+
+@pytest.mark.parametrize("name", ["readinto", "seek"])
+def test_ctrl_c_while_hdf5_reads_waits_for_the_frame(tmp_path, monkeypatch, name):
+    path = tmp_path / "t.h5"
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
+        for k in range(2):
+            trajectory.write(0, frame(k))
+    assert interrupted(monkeypatch, Reading, name, lambda: whole_frames(path, 2), 3) > 1
+
+
+def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypatch):
+    path = tmp_path / "t.h5"
+    recording = Recording(path, frames=99)
+    with Trajectory(recording, [STILL]) as trajectory:
+        for k in range(3):
+            trajectory.write(0, frame(k))
+
+    def go_on():
+        try:
+            Trajectory.going_on(recording, STILL, 1.0).close()
+        finally:
+            whole_frames(path, 3)
+            assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
+
+    assert interrupted(monkeypatch, Growing, "write", go_on, 17) > 50
+
+
+def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):
+    monkeypatch.setattr(atomic, "PATIENCE", 0.01)
+    with (
+        atomic.locked(tmp_path / "t.h5.new", exclusive=True),
+        pytest.raises(RunError, match=r"t\.h5\.new has been locked by another process for 0\.01 s$"),
+    ):
+        Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])
+
+
+@pytest.mark.parametrize("size", [0, 1, 1000])
+def test_the_superblock_is_the_one_that_hdf5_writes(size):
+    image = io.BytesIO()
+    with h5py.File(image, "w", libver=LIBRARY) as file:
+        file["x"] = np.zeros(size)
+    block = image.getvalue()[:SIZE]
+    assert sound(block)
+    assert superblock(block, len(image.getvalue())) == block
+    assert not any(sound(block[:k] + bytes([block[k] ^ 1]) + block[k + 1 :]) for k in range(SIZE))
+    assert not sound(block[:-1])
+
+
+def test_lookup3_is_that_of_its_author():
+    """A value in the comments of lookup3.c."""
+    assert lookup3(b"Four score and seven years ago") == 0x17770551
+
+
+def test_what_could_not_be_written_is_read_back(tmp_path):
+    """HDF5 may read again what it has written, and must find it, or it ends the process."""
+    path = tmp_path / "f"
+    with h5py.File(path, "w", libver=LIBRARY) as file:
+        file["x"] = np.zeros(10)
+    content = path.read_bytes()
+    with Growing(path) as growing, files_of_at_most(len(content) + 5):
+        growing.seek(0, os.SEEK_END)
+        growing.write(b"0123456789")
+        assert growing.failure.strerror == "File too large"
+        growing.seek(len(content) - 4)
+        growing.write(b"abcdef")
+        assert growing.seek(0, os.SEEK_END) == len(content) + 10
+        growing.seek(len(content) - 6)
+        assert growing.read(20) == content[-6:-4] + b"abcdef" + b"23456789" + bytes(4)
+    assert path.read_bytes() == content

@@ -1,0 +1,138 @@
+"""Whose files are whose: the marker of a folder, and folders of before there was one."""
+
+import multiprocessing
+
+import h5py
+import pytest
+
+from tisim.errors import InputError
+from tisim.files import ownership
+from tisim.files.framing import MAGIC
+from tisim.files.ownership import MARKER, Leavings, check, check_all, take
+
+
+@pytest.fixture(autouse=True)
+def before(monkeypatch):
+    """What a version without markers is said to have left."""
+    left = (Leavings(("all.h5",), ("all.csv",)), Leavings(("more.h5",), ("more.csv",)))
+    monkeypatch.setattr(ownership, "BEFORE", left)
+
+
+def written(folder, name, text="theirs"):
+    (folder / name).write_text(text)
+
+
+def test_what_was_taken_may_be_replaced_and_nothing_else(tmp_path):
+    folder = tmp_path / "new" / "below"
+    check(folder, ["a", "b"])
+    assert not folder.exists()
+    take(folder, ["a", "b"])
+    written(folder, "a")
+    written(folder, "a.new")
+    written(folder, "c")
+    take(folder, ["a", "b"])
+    for names, found in ((["a", "c"], "c"), (["c", "d"], "c")):
+        with pytest.raises(InputError, match=rf"\(or give --more\); received '.*/below' with {found}$"):
+            take(folder, names, how="--more")
+    take(folder, ["c"], overwrite=True)
+    take(folder, ["c"])
+    assert (folder / MARKER).read_text() == "a\nb\nc\n"
+
+
+def test_many_files_are_not_all_spelled_out(tmp_path):
+    names = [f"f{k}" for k in range(9)]
+    for name in names:
+        written(tmp_path, name)
+    with pytest.raises(InputError, match=r"with f0, f1, f2, f3, f4 and 4 more$"):
+        check(tmp_path, names)
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_links_and_folders_are_refused_even_where_all_may_be_replaced(tmp_path, overwrite):
+    take(tmp_path, ["a", "b"])
+    (tmp_path / "a").symlink_to("elsewhere")
+    (tmp_path / "b.new").mkdir()
+    for name, what in (("a", "a symbolic link"), ("b", "a folder")):
+        with pytest.raises(InputError, match=rf"must be a regular file of its own .* received {what}"):
+            take(tmp_path, [name], overwrite)
+
+
+def hdf5(path, creator):
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = f"{creator} something 1"
+        file["values"] = range(10)
+
+
+@pytest.mark.parametrize(
+    ("make", "ours"),
+    [
+        (lambda path: hdf5(path, "tisim"), True),
+        (lambda path: hdf5(path, "another"), False),
+        (lambda path: path.write_bytes(MAGIC + b"..."), True),
+        (lambda path: path.write_text("tisim"), False),
+        (lambda path: None, False),
+    ],
+)
+def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_path, make, ours):
+    make(tmp_path / "all.h5")
+    written(tmp_path, "all.csv")
+    written(tmp_path, "other.csv")
+    if ours:
+        take(tmp_path, ["new.csv"])
+        assert (tmp_path / MARKER).read_text() == ".tisim.lock\nall.csv\nall.h5\nnew.csv\n"
+        take(tmp_path, ["all.csv"])
+    else:
+        with pytest.raises(InputError, match=r"with all\.csv"):
+            take(tmp_path, ["all.csv"])
+        assert not (tmp_path / MARKER).exists()
+    with pytest.raises(InputError, match=r"with other\.csv"):
+        check(tmp_path, ["other.csv"])
+
+
+def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
+    check_all(tmp_path / "none")
+    check_all(tmp_path)
+    take(tmp_path, ["a"])
+    written(tmp_path, "a")
+    written(tmp_path, "a.new")
+    check_all(tmp_path)
+    (tmp_path / "theirs").mkdir()
+    with pytest.raises(InputError, match=r"has not written and might replace .* with theirs"):
+        check_all(tmp_path)
+    check_all(tmp_path, overwrite=True)
+
+
+def test_a_name_that_a_killed_process_has_not_finished_is_nobodys(tmp_path):
+    take(tmp_path, ["first"])
+    (tmp_path / MARKER).write_text("first\nsec")
+    take(tmp_path, ["third"])
+    assert (tmp_path / MARKER).read_text() == "first\nsec\nthird\n"
+
+
+def _take(folder, worker):
+    for k in range(20):
+        take(folder, [f"{worker}-{k}", "shared"])
+
+
+def test_processes_that_take_one_folder_lose_no_name(tmp_path):
+    context = multiprocessing.get_context("spawn")
+    workers = [context.Process(target=_take, args=(tmp_path, worker)) for worker in range(2)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(300)
+        assert worker.exitcode == 0
+    names = (tmp_path / MARKER).read_text().splitlines()
+    assert sorted(names) == sorted(["shared", *(f"{w}-{k}" for w in range(2) for k in range(20))])
+
+
+def test_nothing_is_taken_for_granted(tmp_path):
+    """Of what such a version has not left there, nothing is ours."""
+    hdf5(tmp_path / "all.h5", "tisim")
+    hdf5(tmp_path / "another.h5", "tisim")
+    written(tmp_path, "more.csv")
+    for name in ("another.h5", "more.csv"):
+        with pytest.raises(InputError, match=f"with {name}"):
+            check(tmp_path, [name])
+    with pytest.raises(InputError, match=r"with another\.h5, more\.csv"):
+        check_all(tmp_path)

@@ -1,0 +1,189 @@
+"""Pair forces over the list: what contact laws need of the core. Grip is defined here only."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import by_id, compiled, scene, simulate
+from tests.throwaway import SoftShell, SoftShellOfAll
+from tisim import Box, Simulation
+from tisim.backend.taichi import ti
+from tisim.effects.base import PairForce, parameter
+from tisim.io import checkpoint
+
+
+def shells(kind, rng, images):
+    """Polydisperse grains in a box, one of them with more neighbours than a list holds."""
+    radius = np.concatenate([[0.2], rng.uniform(0.005, 0.05, 299)])
+    return scene(
+        rng.uniform(0.0, 1.0, (300, 3)),
+        rng.normal(size=(300, 3)),
+        (kind(stiffness=500.0, width=0.04),),
+        radius=radius,
+        dt=1e-3,
+        steps=60,
+        domain=Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), images=images),
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("schedule", "images"), [("world", True), pytest.param("particle", False, marks=pytest.mark.slow)]
+)
+def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, schedule):
+    """Through many lists made anew: same trajectories to rounding, and momentum conserved to rounding."""
+    results = []
+    for kind in (SoftShell, SoftShellOfAll):
+        wanted = shells(kind, np.random.default_rng(3), images)
+        simulation = Simulation(wanted, schedule=schedule)
+        simulation.load([wanted])
+        simulation.run()
+        results += simulation.results()
+        simulation.close()
+    listed, everyone = results
+    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-9)
+    for result in results:
+        assert np.abs(result.state["velocity"] - result.start["velocity"]).max() > 0.1
+        before = (result.start["mass"][:, None] * result.start["velocity"]).sum(axis=0)
+        after = (result.state["mass"][:, None] * result.state["velocity"]).sum(axis=0)
+        np.testing.assert_allclose(after, before, rtol=0, atol=1e-12 * result.state["mass"].sum())
+
+
+class Grip(PairForce):
+    """A contact as in the discrete element method: normal spring, tangential spring that remembers how far
+    the surfaces have slid, both linear; torques about the centres. The spring follows the pair as it turns.
+    """
+
+    needs = ("spin",)
+    short_ranged = True
+    memory = 3
+    stiffness: float = parameter("N/m", gt=0)
+    grip: float = parameter("N/m", ge=0)
+
+    @ti.func
+    def slid(self, s, w, i, j, separation, distance, past, dt):
+        n = separation / distance
+        slip = s.velocity[w, j] - s.velocity[w, i]
+        slip -= (s.radius[w, i] * s.spin[w, i] + s.radius[w, j] * s.spin[w, j]).cross(n)
+        new = past + dt * slip
+        return new - new.dot(n) * n
+
+    @ti.func
+    def remember(self, s, w, i, j, separation, distance, past, dt):
+        return self.slid(s, w, i, j, separation, distance, past, dt)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        depth = s.radius[w, i] + s.radius[w, j] - distance
+        total = 0.0 * separation
+        if depth >= 0.0:
+            past = self.past.sign(s, w, i, j) * self.past.recall(s, w, i, j)
+            total = -self.stiffness(w) * depth / distance * separation + self.grip(w) * past
+        return total
+
+    @ti.func
+    def pair_torque(self, s, w, i, j, separation, distance, t):
+        force = self.pair_force(s, w, i, j, separation, distance, t)
+        return s.radius[w, i] / distance * separation.cross(force)
+
+
+SIDE, STEP = 1.0, 2e-3
+
+
+def grains(seed=5, n=160, steps=150, grip=300.0):
+    """Rubbing grains of three sizes, overlapping at the start, in a periodic box."""
+    rng = np.random.default_rng(seed)
+    return scene(
+        rng.uniform(0.0, SIDE, (n, 3)),
+        rng.normal(size=(n, 3)),
+        (Grip(stiffness=500.0, grip=grip),),
+        radius=rng.choice([0.05, 0.07, 0.1], n),
+        mass=1.0,
+        dt=STEP,
+        steps=steps,
+        domain=Box(low=(0.0, 0.0, 0.0), high=(SIDE, SIDE, SIDE)),
+    )
+
+
+def twin(start, steps, stiffness, grip):
+    """The same in NumPy: all pairs, what they remember in a matrix, velocity Verlet."""
+    r, v, m, radius = (start[name].copy() for name in ("position", "velocity", "mass", "radius"))
+    spin, n = np.zeros_like(v), len(m)
+    inertia = 0.4 * m * radius**2
+    reach = radius[:, None] + radius
+    past = np.zeros((n, n, 3))
+
+    def separation():
+        d = r[None] - r[:, None]
+        return d - SIDE * np.round(d / SIDE)
+
+    def pairs():
+        d = separation()
+        distance = np.linalg.norm(d, axis=2) + np.eye(n)
+        return d / distance[..., None], distance, (distance <= reach) & ~np.eye(n, dtype=bool)
+
+    def loads():
+        normal, distance, touch = pairs()
+        force = (-stiffness * (reach - distance)[..., None] * normal + grip * past) * touch[..., None]
+        torque = (radius[:, None, None] * np.cross(normal, force)).sum(axis=1)
+        return force.sum(axis=1), torque
+
+    force, torque = loads()
+    for _ in range(steps):
+        v += 0.5 * STEP * force / m[:, None]
+        spin += 0.5 * STEP * torque / inertia[:, None]
+        r = (r + STEP * v) % SIDE
+        normal, _, touch = pairs()
+        turning = radius[:, None] * spin
+        slip = v[None] - v[:, None] - np.cross(turning[:, None] + turning[None], normal)
+        new = past + STEP * slip
+        past = (new - (new * normal).sum(axis=2, keepdims=True) * normal) * touch[..., None]
+        force, torque = loads()
+        v += 0.5 * STEP * force / m[:, None]
+        spin += 0.5 * STEP * torque / inertia[:, None]
+    return v, spin
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["world", "particle"])
+def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
+    """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
+    made = grains()
+    simulation = compiled(made, capacity=160, schedule=schedule)
+    simulation.load([made])
+    simulation.run(steps=70)
+    checkpoint.save(simulation, tmp_path / "half")
+    simulation.run()
+    (result,) = simulation.results()
+    v, spin = twin(result.start, 150, 500.0, 300.0)
+    state = by_id(result)
+    np.testing.assert_allclose(state["velocity"], v, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(state["spin"], spin, rtol=0, atol=1e-8)
+    momentum = (state["mass"][:, None] * (state["velocity"] - result.start["velocity"])).sum(axis=0)
+    np.testing.assert_allclose(momentum, 0, atol=1e-12 * len(v))
+    # It is the memory that is tested: without it the grains do something else.
+    assert np.abs(twin(result.start, 150, 500.0, 0.0)[0] - v).max() > 0.1
+    assert np.abs(spin).max() > 1
+
+    simulation.load([made])
+    checkpoint.restore(simulation, tmp_path / "half")
+    simulation.run()
+    (again,) = simulation.results()
+    for name in ("position", "velocity", "spin"):
+        np.testing.assert_array_equal(again.state[name], result.state[name])
+
+
+@pytest.mark.long
+def test_what_is_remembered_is_bounded_and_forgotten():
+    """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
+    made = grains()
+    (result,) = simulate([made], capacity=160, schedule="world")
+    state = by_id(result)
+    d = state["position"][None] - state["position"][:, None]
+    d -= SIDE * np.round(d / SIDE)
+    radius = state["radius"]
+    touch = (np.linalg.norm(d, axis=2) <= radius[:, None] + radius) & ~np.eye(len(radius), dtype=bool)
+    kept = [(i, int(j)) for i, row in enumerate(state["grip_partners"]) for j in row if j >= 0]
+    assert len(kept) > 50
+    assert {tuple(sorted(pair)) for pair in kept} == {tuple(pair) for pair in np.argwhere(np.triu(touch))}
+    assert len(kept) == touch.sum() / 2
+    assert all(radius[i] <= radius[j] for i, j in kept)

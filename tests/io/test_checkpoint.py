@@ -1,0 +1,111 @@
+"""Checkpoints: to the same bits, whole or refused."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import Agglomeration, Cooling, Heating, Impact
+from tisim import Box, Cloud, Scene, Simulation
+from tisim.errors import InputError, RunError
+from tisim.io.checkpoint import restore, save
+
+
+def flow(seed=3, number=100, heat_capacity=500.0):
+    return Scene(
+        particles=Cloud(number=number, radius=4e-4, density=3000.0, deviation=(60.0, 60.0, 60.0)),
+        effects=(Impact(hardness=2e5), Heating(heat_capacity=heat_capacity), Agglomeration(), Cooling()),
+        domain=Box(low=(-5e-3,) * 3, high=(5e-3,) * 3, images=False),
+        duration=4e-4,
+        seed=seed,
+    )
+
+
+@pytest.fixture(scope="module", params=["world", pytest.param("particle", marks=pytest.mark.slow)])
+def simulation(request):
+    made = Simulation(flow(), worlds=2, schedule=request.param)
+    yield made
+    made.close()
+
+
+def ends(simulation):
+    return [(r.state, r.work, r.time, r.status) for r in simulation.results()]
+
+
+@pytest.mark.long
+def test_goes_on_to_the_same_bits(simulation, tmp_path):
+    scenes = [flow(3), flow(4)]
+    simulation.load(scenes)
+    simulation.run()
+    whole = ends(simulation)
+    assert whole[0][1]["merges"] > 10
+    assert whole[0][1]["steps"] > 40
+
+    simulation.load(scenes)
+    simulation.run(steps=17)
+    save(simulation, tmp_path / "c.h5")
+    assert [path.name for path in tmp_path.iterdir()] == ["c.h5"]
+    simulation.run(steps=5)  # away from what was saved
+    simulation.load(scenes)
+    restore(simulation, tmp_path / "c.h5")
+    assert simulation.results()[0].work["steps"] == 17
+    simulation.run()
+    for (state, *rest), (expected, *others) in zip(ends(simulation), whole, strict=True):
+        assert rest == others
+        assert state.keys() == expected.keys()
+        for name, values in state.items():
+            np.testing.assert_array_equal(values, expected[name], err_msg=name)
+
+
+@pytest.fixture
+def saved(simulation, tmp_path):
+    simulation.load([flow()])
+    simulation.run(steps=9)
+    save(simulation, tmp_path / "c.h5")
+    return tmp_path / "c.h5"
+
+
+@pytest.mark.parametrize("other", [flow(seed=4), flow(number=99), flow(heat_capacity=501.0)])
+def test_refuses_another_scene(simulation, saved, other):
+    simulation.load([other])
+    with pytest.raises(InputError, match="checkpoint must be of the same scenes"):
+        restore(simulation, saved)
+    assert simulation.results()[0].work["steps"] == 0
+
+
+@pytest.mark.slow
+def test_refuses_another_capacity(simulation, saved):
+    larger = Simulation(flow(), worlds=2, capacity=120)
+    larger.load([flow()])
+    with pytest.raises(InputError, match=r"checkpoint's capacity must be 120; received .*100"):
+        restore(larger, saved)
+    larger.close()
+
+
+def test_refuses_a_file_cut_short_damaged_or_none(simulation, saved, tmp_path):
+    content, velocity = saved.read_bytes(), simulation.s.read("velocity").tobytes()[:200]
+    simulation.load([flow()])
+    for size in (0, 10, len(content) // 2, len(content) - 1):
+        saved.write_bytes(content[:size])
+        with pytest.raises(
+            InputError, match="checkpoint must be a file of tisim, whole and with its checksum"
+        ):
+            restore(simulation, saved)
+    at = content.index(velocity) + 100
+    saved.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+    with pytest.raises(InputError, match="checkpoint must be a file of tisim, whole and with its checksum"):
+        restore(simulation, saved)
+    with pytest.raises(InputError, match="checkpoint must be an existing file"):
+        restore(simulation, tmp_path / "none.h5")
+    assert simulation.results()[0].work["steps"] == 0
+
+
+def test_full_disk_keeps_the_checkpoint_before(simulation, saved, monkeypatch):
+    before = saved.read_bytes()
+
+    def full(handle):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tisim.files.atomic.os.fsync", full)
+    with pytest.raises(RunError, match="No space left on device; everything stored before is intact"):
+        save(simulation, saved)
+    assert saved.read_bytes() == before
+    assert [path.name for path in saved.parent.iterdir()] == ["c.h5"]

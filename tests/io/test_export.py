@@ -1,0 +1,133 @@
+"""Frames for other programs, read back by readers that are not ours."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import ase.io
+import h5py
+import meshio
+import numpy as np
+import pytest
+
+import tisim
+from tests.scenes import flow, scene
+from tisim import Recording
+from tisim.errors import InputError
+from tisim.io.export import export
+from tisim.io.reader import frames
+from tisim.io.run_folder import Folder, write
+from tisim.plotting.movie import movie
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """A trajectory in a box, in which grains merge."""
+    path = tmp_path_factory.mktemp("export") / "flow.h5"
+    tisim.run(flow(0, images=True), record=Recording(path, frames=4))
+    return path
+
+
+def every_frame(path, world=0):
+    with frames(path, world) as found:
+        return list(found)
+
+
+def drawn(file, folder):
+    with frames(file) as found:
+        movie(found, folder / "flow.gif")
+
+
+@pytest.mark.parametrize(
+    ("write", "name"),
+    [
+        (lambda file, folder: export(file, "xyz", folder), "flow.xyz.new"),
+        (lambda file, folder: export(file, "vtk", folder), "flow_00000.vtu.new"),
+        (lambda file, folder: export(file, "h5md", folder), "flow_copy.h5.new"),
+        (drawn, "flow.new.gif"),
+    ],
+)
+def test_planted_links_are_refused_and_not_followed(file, tmp_path, write, name):
+    victim, link = tmp_path / "victim", tmp_path / name
+    victim.write_text("the user's own")
+    link.symlink_to(victim)
+    with pytest.raises(InputError, match=rf"{name} must be a regular file .*; received a symbolic link"):
+        write(file, tmp_path)
+    assert (victim.read_text(), link.is_symlink()) == ("the user's own", True)
+    assert {path.name for path in tmp_path.iterdir()} == {"victim", name}
+
+
+@pytest.mark.slow
+def test_meshio_reads_what_paraview_would(file, tmp_path):
+    opened = export(file, "vtk", tmp_path)
+    assert opened == tmp_path / "flow.pvd"
+    listed = ElementTree.parse(opened).findall("Collection/DataSet")
+    for entry, frame in zip(listed, every_frame(file), strict=True):
+        assert float(entry.get("timestep")) == frame.time
+        mesh = meshio.read(tmp_path / entry.get("file"))
+        np.testing.assert_array_equal(mesh.points, frame.arrays["position"])
+        assert mesh.point_data.keys() == frame.arrays.keys() - {"position"}
+        for name, values in mesh.point_data.items():
+            np.testing.assert_array_equal(values, frame.arrays[name])
+            assert values.dtype == frame.arrays[name].dtype
+        (cells,) = mesh.cells
+        assert cells.type == "vertex"
+        np.testing.assert_array_equal(cells.data[:, 0], np.arange(len(mesh.points)))
+
+
+@pytest.mark.long
+def test_ase_reads_the_extended_xyz(file, tmp_path):
+    read = ase.io.read(export(file, "xyz", tmp_path), index=":", format="extxyz")
+    for atoms, frame in zip(read, every_frame(file), strict=True):
+        np.testing.assert_array_equal(atoms.positions, frame.arrays["position"])
+        np.testing.assert_array_equal(atoms.arrays["velo"], frame.arrays["velocity"])
+        for name in frame.arrays.keys() - {"position", "velocity"}:
+            np.testing.assert_array_equal(atoms.arrays[name], frame.arrays[name])
+        np.testing.assert_array_equal(atoms.cell.lengths(), [0.02] * 3)
+        assert atoms.pbc.all()
+        np.testing.assert_array_equal(atoms.info["Origin"], [-0.01] * 3)
+        assert (atoms.info["Time"], atoms.info["Step"]) == (frame.time, frame.step)
+
+
+def test_open_space_has_no_lattice(tmp_path):
+    path = tmp_path / "t.h5"
+    tisim.run(scene([(1.0, 2.0, 3.0)], [(0, 0, 0)]), record=Recording(path, frames=1))
+    (first, _) = ase.io.read(export(path, "xyz", tmp_path), index=":", format="extxyz")
+    assert not first.pbc.any()
+    np.testing.assert_array_equal(first.positions, [[1.0, 2.0, 3.0]])
+
+
+def test_a_copy_has_the_same_frames_and_opens_everywhere(file, tmp_path):
+    copy = export(file, "h5md", tmp_path)
+    with h5py.File(copy) as plain:
+        assert plain["particles/all/position/value"].shape[0] == 5
+    for frame, other in zip(every_frame(file), every_frame(copy), strict=True):
+        assert (frame.time, frame.step) == (other.time, other.step)
+        for name, values in frame.arrays.items():
+            np.testing.assert_array_equal(values, other.arrays[name])
+
+
+def test_each_world_has_its_own_files(tmp_path):
+    path = tmp_path / "t.h5"
+    two = [scene([(k * 1.0, 0, 0)], [(0, 0, 0)]) for k in range(2)]
+    tisim.run(two, record=Recording(path, frames=1))
+    done = []
+    export(path, "vtk", tmp_path, done.append)
+    assert done == [0.25, 0.5, 0.75, 1.0]
+    for k in range(2):
+        assert meshio.read(tmp_path / f"t_{k}_00001.vtu").points.tolist() == [[k, 0, 0]]
+
+
+def test_a_result_has_its_start_and_end(tmp_path):
+    result = tisim.run(scene([(0, 0, 0)], [(3.0, 0, 0)], dt=1e-3))
+    write(result, Folder(tmp_path))
+    read = ase.io.read(export(tmp_path / "result.h5", "xyz", tmp_path), index=":", format="extxyz")
+    assert [atoms.positions[0, 0] for atoms in read] == [0.0, pytest.approx(3e-3)]
+    with pytest.raises(InputError, match=r"file must be a trajectory.h5 for format h5md"):
+        export(tmp_path / "result.h5", "h5md", tmp_path)
+
+
+def test_other_formats_are_refused(file, tmp_path):
+    with pytest.raises(InputError, match="format must be one of vtk, xyz, h5md; received 'dcd'"):
+        export(file, "dcd", tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,133 @@
+"""The folder of a run, its picture, and that nothing is overwritten."""
+
+import json
+import tomllib
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.scenes import scene, simulate
+from tisim import Scene
+from tisim.errors import InputError, RunError
+from tisim.files.ownership import writable
+from tisim.io.run_folder import Folder, write
+from tisim.plotting.cloud import PIXELS, _draw, cloud
+
+ONE = [(0.0, 0.0, 0.0)]
+
+
+@pytest.fixture(scope="module")
+def result():
+    return simulate([scene([(0, 0, 0), (5e-3, 0, 0)], [(1, 0, 0), (0, 0, 0)], dt=1e-6, steps=5)])[0]
+
+
+def test_whole_run_is_in_the_folder(result, tmp_path):
+    folder = Folder(tmp_path)
+    folder.checkpoint.write_bytes(b"of before")
+    paths = write(result, folder)
+    names = {"result.h5", "scene.toml", "versions.json", "cloud.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in paths} == names
+    with h5py.File(folder.result) as file:
+        assert (file.attrs["ok"], file.attrs["time"]) == (True, result.time)
+        assert json.loads(file.attrs["settings"]) == result.settings
+        assert dict(file["work"].attrs) == result.work
+        assert file["end/velocity"].attrs["unit"] == "m/s"
+        assert file["start/position"].shape == (2, 3)
+        for name, values in result.state.items():
+            np.testing.assert_array_equal(file["end"][name], values)
+        assert Scene.from_dict(tomllib.loads(file.attrs["scene"])) == result.scene
+    assert Scene.from_toml(tmp_path / "scene.toml").digest() == result.scene.digest()
+    versions = json.loads((tmp_path / "versions.json").read_text())
+    assert {"tisim", "backend", "numpy", "h5py", "python", "platform"} == set(versions)
+
+
+def test_folder_that_holds_a_run_is_refused(tmp_path):
+    folder = Folder(tmp_path / "out")
+    folder.check()
+    assert not folder.path.exists()
+    with pytest.raises(InputError, match="one that an interrupted run has left"):
+        folder.check(resume=True)
+    writable(folder.path)
+    folder.checkpoint.touch()
+    with pytest.raises(InputError, match="without an interrupted run"):
+        folder.check()
+    folder.check(resume=True)
+    folder.check(overwrite=True)
+    folder.checkpoint.unlink()
+    folder.trajectory.touch()
+    with pytest.raises(InputError, match=r"\(or give --overwrite; there is no checkpoint to go on from\)"):
+        folder.check()
+    folder.trajectory.unlink()
+    folder.result.touch()
+    with pytest.raises(InputError, match="without a finished run"):
+        folder.check()
+    folder.check(overwrite=True)
+
+
+def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
+    folder = Folder(tmp_path / "out")
+    with folder.taken():
+        folder.checkpoint.touch()
+        for call in (folder.check, lambda: folder.taken(overwrite=True).__enter__()):
+            with pytest.raises(InputError, match="must be without a command that is still at work there"):
+                call()
+    folder.check(resume=True)
+
+
+def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
+    Folder(tmp_path).check()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
+    folder = Folder(tmp_path)
+    folder.check()
+    with folder.taken():
+        folder.result.touch()
+    with pytest.raises(InputError, match="without a finished run"), folder.taken():
+        pass
+    folder.result.unlink()
+    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.taken(resume=True):
+        pass
+
+
+def test_unwritable_folder_is_an_input_error(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="output folder must be writable; received"):
+        writable(tmp_path / "file" / "below")
+
+
+def test_full_disk_leaves_no_result(result, tmp_path, monkeypatch):
+    def full(handle):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tisim.files.atomic.os.fsync", full)
+    with pytest.raises(RunError, match="No space left on device"):
+        write(result, Folder(tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_spheres_have_their_true_size():
+    side, radius = 2.0, 0.3
+    image = _draw(np.array([[1.0, 1.0, 0.0]]), np.array([radius]), np.array([[1.0, 0.0, 0.0]]), side)
+    assert image.shape == (PIXELS // 2, PIXELS // 2, 4)
+    assert image[..., 3].mean() * side**2 == pytest.approx(np.pi * radius**2, rel=2e-3)
+    middle = image[PIXELS // 4, PIXELS // 4]
+    assert middle[0] > 0.5 > middle[1]
+
+
+def test_nearer_sphere_hides_the_farther():
+    place = np.array([[1.0, 1.0, 0.5], [1.0, 1.0, -0.5]])
+    colours = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    for order in ([0, 1], [1, 0]):
+        image = _draw(place[order], np.array([0.2, 0.3])[order], colours[order], 2.0)
+        inside, rim = image[PIXELS // 4, PIXELS // 4], image[PIXELS // 4, PIXELS // 4 + PIXELS // 16]
+        assert inside[1] > inside[0]
+        assert rim[0] > rim[1]
+
+
+def test_one_grain_can_be_drawn():
+    alone = simulate([scene(ONE, ONE)])[0]
+    figure = cloud(alone)
+    assert [axis.get_title().split(":")[0] for axis in figure.axes] == ["start, t = 0 s", "end, t = 1 ns"]

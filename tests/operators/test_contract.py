@@ -1,0 +1,222 @@
+"""What the core promises operators: rules 8 and 12 of tisim/effects/base.py."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.scenes import by_id, scene
+from tests.throwaway import SoftShell, SoftShellOfAll
+from tisim import Box, Simulation, run
+from tisim.backend.taichi import ti
+from tisim.effects.base import Operator
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.impact import Impact
+from tisim.steppers.step_control import ApproachTime
+from tisim.steppers.verlet import Verlet
+from tisim.worlds.state import Field
+
+
+class Census(Operator):
+    """Counts its calls; a world has no pair events to wait for."""
+
+    counts = ("censuses",)
+
+    @ti.func
+    def world(self, s, w):
+        s.censuses[w] += 1
+
+
+class Stepping(Operator):
+    """Moves particles by itself, as Brownian displacement does."""
+
+    needs = (Field("leap", "m", 3, "keep"),)
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        s.position[w, i] += s.leap[w, i]
+
+
+class Growing(Operator):
+    """Radii grow, each at a rate of its own."""
+
+    needs = ("radius", Field("growth", "m/s", 1, "keep"))
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        s.radius[w, i] += s.growth[w, i] * dt
+
+
+class Poison(Operator):
+    """Makes one component of one particle NaN after some steps."""
+
+    axis: int = 0
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        if s.steps[w] == 20 and i == 7:
+            s.position[w, i][self.axis] = ti.sqrt(-s.mass[w, i])
+
+
+@pytest.mark.parametrize("wrong", [{"slots": 3}, {"integer": True}, {"components": 3, "slots": 3}])
+def test_a_field_that_could_not_be_merged_is_refused(wrong):
+    """Not when two particles merge, where the compiler would stop or a fraction be lost."""
+    with pytest.raises(TypeError, match="field tag"):
+        Field("tag", "", **wrong)
+
+
+def test_an_operator_sees_every_world_once_a_step():
+    result = run(scene([[0, 0, 0]], [[0, 0, 0]], (Census(),), dt=0.1, steps=10))
+    assert result.work["censuses"] == 10
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", [SoftShell, pytest.param(SoftShellOfAll, marks=pytest.mark.slow)])
+def test_lists_follow_particles_that_operators_move(kind):
+    """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
+    grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    position = np.concatenate([[[-2.0, 2.0, 2.5]], grid])
+    leap = np.zeros_like(position)
+    leap[0, 0] = 0.05
+    wanted = scene(
+        position,
+        np.zeros_like(position),
+        (kind(stiffness=1.0, width=0.3), Stepping()),
+        radius=0.2,
+        mass=1.0,
+        dt=1e-3,
+        steps=160,
+        quantities={"leap": leap},
+    )
+    velocity = np.zeros_like(position)
+    for _ in range(160):
+        position = position + 1e-3 * velocity + leap
+        d = position[None] - position[:, None]
+        distance = np.linalg.norm(d, axis=2) + np.eye(126)
+        push = -np.maximum(0.3 - (distance - 0.4), 0.0) * (1 - np.eye(126)) / distance
+        velocity = velocity + 1e-3 * (push[..., None] * d).sum(axis=1)
+    # The twin kicks once a step, the engine half before and half after: equal to first order in dt.
+    np.testing.assert_allclose(run(wanted).state["velocity"], velocity, rtol=0, atol=0.02 * velocity.max())
+    assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
+
+
+@pytest.mark.slow
+def test_lists_follow_particles_that_grow(rng):
+    """Grains at rest, out of each other's reach, that grow until they push each other apart."""
+    grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    position, growth = grid + rng.uniform(-0.1, 0.1, grid.shape), rng.uniform(0.5, 2.0, len(grid))
+    listed, everyone = (
+        run(
+            scene(
+                position,
+                0 * position,
+                (kind(stiffness=1.0, width=0.02), Growing()),
+                radius=0.04,
+                mass=1.0,
+                dt=1e-3,
+                steps=300,
+                quantities={"growth": growth},
+            )
+        )
+        for kind in (SoftShell, SoftShellOfAll)
+    )
+    assert np.abs(everyone.state["velocity"]).max() > 1e-3
+    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("schedule", "axis", "images"),
+    [("world", 0, True), pytest.param("particle", 2, False, marks=pytest.mark.slow)],
+)
+def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
+    """More particles than look at all pairs; the bad one belongs to no cell."""
+    wanted = scene(
+        rng.uniform(0, 1, (300, 3)),
+        rng.normal(size=(300, 3)),
+        (SoftShell(stiffness=1.0, width=0.05), Poison(axis=axis)),
+        radius=0.01,
+        dt=1e-4,
+        steps=40,
+        domain=Box(low=(0, 0, 0), high=(1, 1, 1), images=images),
+    )
+    simulation = Simulation(wanted, schedule=schedule)
+    simulation.load([wanted])
+    simulation.run()
+    (result,) = simulation.results()
+    simulation.close()
+    assert not result.status.ok
+    assert "not finite" in result.status.reason
+    assert all(np.isfinite(values).all() for values in result.state.values())
+
+
+@pytest.mark.slow
+def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
+    """Two grains bond in the last step, one just outside the other's side of the box."""
+    wanted = scene(
+        [[0.9993, 0.5, 0.5], [0.0011, 0.5, 0.5]],
+        [[10.0, 0, 0], [-10.0, 0, 0]],
+        (Impact(hardness=1.0), Agglomeration()),
+        radius=1e-3,
+        dt=1e-6,
+        steps=1,
+        domain=Box(low=(0, 0, 0), high=(1, 1, 1)),
+    )
+    state = run(wanted).state
+    assert len(state["mass"]) == 1
+    assert ((state["position"] >= 0) & (state["position"] < 1)).all()
+
+
+class Teleport(Operator):
+    """Every tenth step, throws the first grain of a world across the box, and out of it."""
+
+    @ti.func
+    def world(self, s, w):
+        if s.steps[w] % 10 == 0:
+            s.position[w, 0] += ti.Vector([0.7, 0.9, 1.3])
+            s.disturb(w)
+
+
+@pytest.mark.slow
+def test_lists_follow_what_operators_do_to_the_world(rng):
+    """A grain that is thrown about meets, wherever it lands, those who are there; and lands in the box."""
+    results = []
+    position, velocity = rng.uniform(0.0, 1.0, (200, 3)), rng.normal(size=(200, 3))
+    for kind in (SoftShell, SoftShellOfAll):
+        made = scene(
+            position,
+            velocity,
+            (kind(stiffness=1.0, width=0.05), Teleport()),
+            radius=0.03,
+            dt=1e-3,
+            steps=45,
+            domain=Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0)),
+        )
+        results.append(run(made))
+    listed, everyone = (by_id(result) for result in results)
+    assert ((listed["position"] >= 0) & (listed["position"] < 1)).all()
+    np.testing.assert_allclose(listed["position"], everyone["position"], rtol=0, atol=1e-9)
+
+
+class Leave(Operator):
+    """Removes the last particle in the first step."""
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        if s.id[w, i] == 2 and s.steps[w] == 1:
+            s.remove(w, i)
+
+
+@pytest.mark.long
+def test_step_control_sees_the_pairs_that_a_removal_leaves():
+    """Gap 0.8 m at 1 m/s: 0.5 s, the longest step, and then the 0.3 s that are left until surfaces meet."""
+    wanted = scene(
+        [[0, 0, 0], [1, 0, 0], [0, 9, 0]], [[1, 0, 0], [0, 0, 0], [0, 0, 0]], (Leave(),),
+        radius=0.1, dt=1, steps=2,
+    ).model_copy(update={"stepper": Verlet(control=ApproachTime(longest=0.5))})  # fmt: skip
+    simulation = Simulation(wanted)
+    simulation.load([wanted])
+    simulation.run(steps=2)
+    (result,) = simulation.results()
+    assert len(result.state["mass"]) == 2
+    assert result.time == pytest.approx(0.8, rel=1e-5)

@@ -1,0 +1,205 @@
+"""What every search method must do, and what each does by itself."""
+
+import numpy as np
+import pytest
+from fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+
+from optimize.evaluation.ensemble import EnsembleSettings
+from optimize.evaluation.estimate import Estimate
+from optimize.methods.base import every, find
+from optimize.methods.cma_es import reflected
+from optimize.methods.individual import Individual
+from optimize.search import search
+from optimize.settings import Settings
+from optimize.storage.cache import Cache
+from tisim.errors import InputError
+
+ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
+METHODS = sorted(every())
+
+
+def run(cache, function, evaluator=None, genes=5, **settings):
+    wish = Settings(**{"seed": 1, "generations": 1000, "ensemble": ONE, **settings})
+    return search(fake_problem(genes), evaluator or FakeEvaluator(function), cache, wish)
+
+
+def quiet(design, seed):
+    return bowl(design, seed, noise=0.0)
+
+
+def rosenbrock(design, seed):
+    """A bent valley along which genes depend on each other; its minimum 0 at 1/2 in the unit cube."""
+    x = 4 * np.array(list(design.values())) - 1
+    return float(np.sum(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2))
+
+
+def made(name, genes=5, seed=3, **options):
+    kind = find(name)
+    return kind(genes, 1, kind.Options(**options), seed)
+
+
+def worth(strings, function=quiet):
+    """Tell strings their costs; best first."""
+    for string in strings:
+        cost = function(dict(enumerate(string)), 0)
+        reason = "" if np.isfinite(cost) else "failed"
+        string.know((Estimate(cost, 0.0, 0.0, 1, True, reason),))
+    return sorted((s for s in strings if not s.failed), key=lambda s: s.fitness.values)
+
+
+def test_methods_are_found_by_looking():
+    assert METHODS == ["cma-es", "genetic", "nsga2", "random", "restart"]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_asks_within_the_unit_cube_and_by_its_seed_alone(name):
+    twins = [made(name), made(name), made(name, seed=4)]
+    for _ in range(12):
+        asked = [method.ask() for method in twins]
+        assert [list(s) for s in asked[0]] == [list(s) for s in asked[1]]
+        assert [list(s) for s in asked[0]] != [list(s) for s in asked[2]]
+        for strings, method in zip(asked, twins, strict=True):
+            assert all(isinstance(string, Individual) for string in strings)
+            assert np.all((np.array(strings) >= 0) & (np.array(strings) <= 1))
+            assert 0 < method.width <= 1
+            method.tell(strings, worth(strings))
+            np.random.default_rng().random()
+
+
+def driven(name, function, evaluations, genes, seed=3):
+    """The least cost that a method finds by itself, without a cache and all that."""
+    method, hall, asked = made(name, genes=genes, seed=seed), [], 0
+    while asked < evaluations:
+        strings = method.ask()
+        asked += sum(not string.fitness.valid for string in strings)
+        hall = sorted([*worth(strings, function), *hall], key=lambda s: s.fitness.values)[:6]
+        method.tell(strings, hall)
+    return hall[0].fitness.values[0]
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if name != "random"])
+def test_beats_chance_at_equal_evaluations(name):
+    found, chance = [], []
+    for seed in range(5):
+        found.append(driven(name, quiet, 300, genes=8, seed=seed) - 0.5)
+        chance.append(np.sum((np.random.default_rng(seed).random((340, 8)) - 0.3) ** 2, axis=1).min())
+    assert np.median(found) < np.median(chance) / 2
+    assert max(found) < min(chance)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_budget_is_spent_and_not_exceeded(name):
+    outcome = run(FakeCache(), quiet, method=name, max_evaluations=75)
+    assert (outcome.stopped, outcome.evaluations) == ("evaluations", 75)
+    starts = {"min_starts": 3, "max_starts": 9, "block": 3, "tolerance": 1e-3, "race": 6}
+    outcome = run(FakeCache(), bowl, method=name, max_evaluations=100, ensemble=starts)
+    assert outcome.stopped == "evaluations"
+    assert 97 < outcome.evaluations <= 100
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("after", [1, 200])
+def test_resumed_after_interrupt_it_is_the_same(path, name, after):
+    settings = {
+        "method": name, "generations": 9,
+        "ensemble": EnsembleSettings(tolerance=3e-3, min_starts=2, block=2, max_starts=8, race=12),
+    }  # fmt: skip
+    settings["options"] = {"population": 8, **({"parents": 2} if name in ("genetic", "restart") else {})}
+
+    def found(outcome):
+        return repr(list(outcome.logbook)), [(list(s), repr(s.estimates)) for s in outcome.hall]
+
+    whole = run(FakeCache(), bowl, **settings)
+    with Cache(path) as cache:
+        part = run(cache, bowl, FakeEvaluator(interrupt_after=after), **settings)
+    assert (part.stopped, part.evaluations) == ("interrupted", after)
+    with Cache(path) as cache:
+        again = run(cache, bowl, **settings)
+    assert found(again) == found(whole)
+    assert again.evaluations == whole.evaluations - after
+    assert whole.evaluations > 200
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_failures_and_nothing_but_failures(name):
+    def half(design, seed):
+        return quiet(design, seed) if design["x0"] > 0.5 else "lost"
+
+    outcome = run(FakeCache(), half, method=name, generations=12)
+    assert max(outcome.logbook.select("failed")) > 0
+    assert outcome.best[0] > 0.5
+    assert outcome.best.estimates[0].mean < 0.7
+    outcome = run(FakeCache(), lambda design, seed: "lost", method=name, generations=3)
+    assert outcome.best is None
+    assert len(outcome.logbook) == 4
+
+
+def test_cma_es_follows_a_valley_that_the_genetic_algorithm_does_not():
+    best = {name: driven(name, rosenbrock, 1500, genes=4) for name in ("cma-es", "genetic")}
+    assert best["cma-es"] < 1e-6
+    assert best["cma-es"] < best["genetic"] / 100
+
+
+def test_cma_es_finds_a_corner():
+    """Reflection at the bounds lets it come as near to them as to anything else."""
+    method = made("cma-es", genes=4)
+    for _ in range(40):
+        strings = method.ask()
+        hall = worth(strings, lambda design, seed: float(sum(design.values())))
+        method.tell(strings, hall)
+    assert hall[0].fitness.values[0] < 0.01
+
+
+def test_reflection():
+    points = np.array([[-0.25, 1.25, 0.5, 2.25, -1.25, 0.0, 1.0, 3.0]])
+    np.testing.assert_allclose(reflected(points), [[0.25, 0.75, 0.5, 0.25, 0.75, 0.0, 1.0, 1.0]])
+
+
+def test_cma_es_begins_again_with_twice_the_strings_when_it_has_converged():
+    method = made("cma-es", genes=2, smallest=1e-2)
+    sizes, moved = [], []
+    for _ in range(60):
+        strings = method.ask()
+        sizes.append(len(strings))
+        method.tell(strings, worth(strings))
+        moved.append(method.moved)
+    assert sizes[0] == 6
+    first = moved.index(True)
+    assert set(sizes[: first + 1]) == {6}
+    assert sizes[first + 1] == 12
+    assert method.width > 0
+
+
+def test_restart_draws_anew_around_the_best_when_it_has_stalled():
+    method = made("restart", genes=3, stalled=2, smallest=0.2)
+    widths, best = [], None
+    for generation in range(14):
+        strings = method.ask()
+        assert len(strings) == 20
+        if generation and method.moved:
+            assert [s.fitness.valid for s in strings] == [True] + [False] * 19, "only the best stays"
+            assert strings[0] is best
+            assert np.all(np.abs(np.array(strings) - best).max(axis=0) <= method.width)
+            widths.append(method.width)
+        if best is None:
+            best = worth(strings)[0]
+        for string in strings:
+            if string is not best:
+                string.know((Estimate(9.0, 0.0, 0.0, 1, True),))  # never better than the first
+        method.tell(strings, [best])
+    assert widths == [0.5, 0.25, 1.0, 0.5, 0.25, 1.0]
+
+
+def test_options_are_those_of_the_method():
+    assert Settings(method="cma-es", options={"sigma": 0.2}).options.sigma == 0.2
+    for name, options, message in (
+        ("cma-es", {"parents": 3}, r"search\.options\.parents must be a known key; received 3"),
+        ("genetic", {"sigma": 0.2}, r"search\.options\.sigma must be a known key; received 0\.2"),
+        ("cma-es", {"sigma": 0}, r"search\.options\.sigma must be greater than 0\.0; received 0"),
+        ("restart", {"recentre_every": 4}, r"search\.options\.recentre_every must be at most 0; received 4"),
+        ("nsga2", 5, r"search\.options must be settings of the method, by name; received 5"),
+    ):
+        with pytest.raises(InputError, match=message):
+            Settings(method=name, options=options)
+    again = Settings.model_validate_json(Settings(method="nsga2", options={"eta": 5}).model_dump_json())
+    assert again.options.eta == 5

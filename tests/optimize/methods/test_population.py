@@ -1,0 +1,128 @@
+"""Numbers of a generation that were not given follow those that were, whatever the method and the case."""
+
+import numpy as np
+import pytest
+from fake_runs import fake_problem
+
+from cases import case as catalogue
+from optimize.methods.base import every, find
+from optimize.methods.breeding import Breeding
+from optimize.settings import Settings, followed, proposed
+from tisim.cli.scene_arguments import nested
+from tisim.errors import InputError
+
+GENES = 3
+POPULATIONS = range(2, 101)
+REFUSED = {
+    "cma-es": (lambda n: n < 4, "search.options.population must be at least 4; received {}"),
+    "nsga2": (lambda n: n < 4 or n % 4, None),
+}
+"""For a real reason: adaptation of a covariance from fewer, and tournaments of four."""
+USUAL = {
+    "of no case": {},
+    "vibration": {"options": {"population": 24, "parents": 8}},
+    "agglomeration": {"options": {"population": 10, "parents": 4}},
+    "capture": {"method": "cma-es", "options": {"population": 16}},
+}
+
+
+def generations(settings):
+    """How many strings the first two generations have, and how many of the second are new."""
+    method = find(settings.method)(GENES, 1, settings.options, seed=1)
+    first = method.ask()
+    for rank, string in enumerate(first):
+        string.fitness.values = (float(rank),)
+    method.tell(first, first[:1])
+    second = method.ask()
+    return len(first), len(second), sum(not string.fitness.valid for string in second)
+
+
+def settings_of(usual, method, given):
+    """As the command line makes them: --method, --population or --set, on a case."""
+    wishes = {f"options.{name}": value for name, value in given.items()}
+    return Settings(**nested(followed(proposed(fake_problem(GENES), usual, method), wishes), wishes))
+
+
+def test_the_table_is_of_the_cases_there_are():
+    known = [case.sizes["default"].search for case in catalogue.every().values() if case.problem]
+    options = [search["options"] for search in known if "options" in search]
+    assert all(any(usual.get("options") == own for usual in USUAL.values()) for own in options)
+
+
+@pytest.mark.parametrize("case", USUAL)
+@pytest.mark.parametrize("method", every())
+def test_every_population_is_taken_or_refused_for_a_real_reason(case, method):
+    unfit, message = REFUSED.get(method, (lambda n: False, None))
+    for population in POPULATIONS:
+        if unfit(population):
+            with pytest.raises(InputError) as refused:
+                settings_of(USUAL[case], method, {"population": population})
+            assert len(str(refused.value).splitlines()) == 1
+            expected = message or "population"
+            assert expected.format(population) in str(refused.value)
+            continue
+        settings = settings_of(USUAL[case], method, {"population": population})
+        alone = Settings(method=method, options={"population": population})
+        assert settings.options == alone.options, "the same from Python"
+        first, second, new = generations(settings)
+        assert first == second == population
+        assert new > 0
+
+
+def test_proportions_are_the_published_ones():
+    assert (Breeding().population, Breeding().parents, Breeding().bred) == (20, 6, 6)
+    for population in POPULATIONS:
+        made = Breeding(population=population)
+        assert made.bred in (made.parents, made.parents - 1)
+        assert abs(made.parents - 0.3 * population) <= 1.0 or population < 4
+    for usual in USUAL.values():
+        options = usual.get("options", {})
+        if "parents" in options:
+            assert Breeding(population=options["population"]).parents == options["parents"]
+
+
+@pytest.mark.parametrize(
+    ("given", "population", "parents", "bred"),
+    [
+        ({"parents": 2}, 20, 2, 2),
+        ({"parents": 10}, 20, 10, 10),
+        ({"parents": 12}, 40, 12, 12),
+        ({"parents": 5}, 20, 5, 4),
+        ({"offspring": 4}, 20, 6, 4),
+        ({"offspring": 12}, 40, 12, 12),
+        ({"population": 8, "parents": 6}, 8, 6, 2),
+        ({"population": 8, "offspring": 4}, 8, 4, 4),
+        ({"population": 100, "offspring": 0}, 100, 30, 0),
+        ({"population": np.int64(8)}, 8, 2, 2),
+        ({"parents": 6, "offspring": 30, "breeding": "deap"}, 60, 6, 30),
+        ({"offspring": 12, "breeding": "deap"}, 20, 6, 12),
+    ],
+)
+def test_what_is_given_stays_and_the_rest_follows(given, population, parents, bred):
+    made = Breeding(**given)
+    assert (made.population, made.parents, made.bred) == (population, parents, bred)
+
+
+def test_parents_alone_leave_the_population_of_the_case():
+    settings = settings_of(USUAL["vibration"], None, {"parents": 4})
+    assert (settings.options.population, settings.options.parents) == (24, 4)
+
+
+def test_what_is_no_number_is_told_as_such():
+    for wrong in ("many", [8], None, 2.5):
+        with pytest.raises(InputError, match=r"search\.options\.population must be a whole number; received"):
+            Breeding(population=wrong)
+    with pytest.raises(InputError, match="method must be one of"):
+        Settings(method=["genetic"])
+
+
+@pytest.mark.parametrize("same", [float, str, np.int64, np.float64])
+@pytest.mark.parametrize("given", [{"population": 5}, {"parents": 12}, {"offspring": 12}])
+def test_a_number_is_followed_however_it_is_written(given, same):
+    """As ``--set search.options.population=5.0``, which a file may also say as text."""
+    assert Breeding(**{name: same(number) for name, number in given.items()}) == Breeding(**given)
+
+
+def test_what_is_no_number_is_refused_as_such():
+    with pytest.raises(InputError, match=r"population must be .*; received 5\.5"):
+        Breeding(population=5.5)

@@ -1,0 +1,128 @@
+"""Methods compared: equal runs, fresh starts that no search has used, and a table that ranks them."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from drift_case import CASE
+from fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from rich.console import Console
+from test_several import OBJECTIVES
+
+from cases import case as catalogue
+from optimize.evaluation.runs import start_seed
+from optimize.problem.objective import Objective
+from optimize.report import comparison
+from optimize.report.comparison import FRESH, compare, settings_of
+from tisim.cli.main import main
+from tisim.errors import InputError
+
+BASE = {
+    "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,
+    "ensemble": {"min_starts": 2, "block": 2, "max_starts": 4, "tolerance": 0.05, "confirm": 9},
+}  # fmt: skip
+
+
+def noisy(design, seed):
+    return bowl(design, seed + int(1e9 * design["x0"]), noise=0.1)
+
+
+def found(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache=None, problem=None):
+    arguments = (BASE, methods, evaluations, repeats, fresh)
+    cache = FakeCache() if cache is None else cache
+    return list(compare(problem or fake_problem(6), *arguments, evaluator or FakeEvaluator(noisy), cache))
+
+
+def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
+    evaluator, cache = FakeEvaluator(noisy), FakeCache()
+    made = found(["random", "genetic", "cma-es"], evaluator=evaluator, cache=cache)
+    assert [(f.method, f.repeat) for f in made] == [
+        (method, repeat) for repeat in range(3) for method in ("random", "genetic", "cma-es")
+    ]
+    assert {f.evaluations for f in made} <= {119, 120}
+    fresh = [start_seed(FRESH, k) for k in range(8)]
+    searched = {start_seed(seed, k) for seed in range(3) for k in range(13)}
+    assert not searched & set(fresh)
+    assert len(evaluator.ran) == len(set(evaluator.ran)) == sum(f.evaluations for f in made) + 9 * 8
+    seen = {}
+    for record in cache.known.values():
+        if record.seed in fresh:
+            seen.setdefault(tuple(record.design.values()), []).append(record.fitness)
+    assert sorted(np.mean(values) for values in seen.values()) == pytest.approx(
+        sorted(f.fresh.mean for f in made), rel=1e-12
+    )
+    again = FakeEvaluator(noisy)
+    assert found(["random", "genetic", "cma-es"], evaluator=again, cache=cache) == made
+    assert again.ran == []
+
+
+def rows(problem, made):
+    console = Console(width=120, record=True, file=io.StringIO())
+    console.print(comparison.table(problem, made))
+    return [line.split() for line in console.export_text().splitlines()]
+
+
+def test_table_ranks_by_the_median_from_fresh_starts():
+    made = found(["random", "genetic"], repeats=5)
+    heading, *lines = rows(fake_problem(6), made)
+    medians = {}
+    for name, searches, _, *numbers in lines:
+        mine = [f for f in made if f.method == name]
+        assert int(searches) == len(mine) == 5
+        values = [f.fresh.mean for f in mine]
+        claimed = np.median([f.claimed.mean for f in mine])
+        expected = [np.median(values), min(values), max(values), claimed]
+        assert [float(number) for number in numbers[:4]] == pytest.approx(expected, rel=1e-3)
+        medians[name] = np.median(values)
+    assert medians["genetic"] < medians["random"]
+    assert [line[0] for line in lines] == ["genetic", "random"]
+    assert "median" in heading
+    large = fake_problem(6, objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
+    turned = found(["random", "genetic"], repeats=5, problem=large)
+    assert [line[0] for line in rows(large, turned)[1:]] == ["genetic", "random"]
+    numbers = list(csv.reader(comparison.as_csv(large, turned).decode().splitlines()))
+    assert [float(row[3]) for row in numbers[1:]] == [-f.fresh.mean for f in made]
+
+
+def test_stopping_rules_and_options_of_the_case():
+    wish = settings_of(fake_problem(), BASE, "genetic", 50, 3)
+    assert (wish.target, wish.patience, wish.max_evaluations, wish.seed) == (None, None, 50, 3)
+    assert (wish.options.population, wish.ensemble.confirm, wish.ensemble.block) == (10, 0, 2)
+    assert settings_of(fake_problem(), BASE, "restart", 50, 3).options.parents == 4
+    assert settings_of(fake_problem(), BASE, "cma-es", 50, 3).options.population is None
+
+
+def test_what_cannot_be_compared_is_refused():
+    for arguments, message in (
+        ({"methods": ["genetic", "genetic"]}, "methods must be one or more, all different"),
+        ({"methods": []}, "methods must be one or more"),
+        ({"methods": ["genetic"], "repeats": 0}, "repeats must be within"),
+        ({"methods": ["genetic"], "fresh": 1}, "fresh starts must be at least 2; received 1"),
+        ({"methods": ["genetic"], "evaluations": 0}, "evaluations must be at least 1"),
+        ({"methods": ["genetic", "simplex"]}, "method must be one of .*; received 'simplex'"),
+        ({"methods": ["random"], "problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
+    ):
+        evaluator = FakeEvaluator(noisy)
+        with pytest.raises(InputError, match=message):
+            found(**arguments, evaluator=evaluator)
+        assert evaluator.ran == []
+
+
+@pytest.mark.long
+def test_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
+    command = ["compare", "drift", "--methods", "random, cma-es", "--evaluations", "60", "--repeats", "2"]
+    with pytest.raises(SystemExit) as exit_:
+        main([*command, "--set", "search.ensemble.max_starts=4", "--fresh-starts", "4"])
+    assert exit_.value.code == 0
+    out, err = capsys.readouterr()
+    assert {line.split()[0] for line in out.splitlines()[-3:-1]} == {"random", "cma-es"}
+    assert "cma-es, search 2 of 2: 60 runs" in err
+    with (tmp_path / "out" / "compare-drift" / "compare.csv").open() as file:
+        assert len(list(csv.reader(file))) == 5
+    with pytest.raises(SystemExit) as exit_:
+        main(["compare", "drift", "--methods", "simplex"])
+    assert exit_.value.code == 2
+    assert "received 'simplex'" in capsys.readouterr().err

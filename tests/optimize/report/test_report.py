@@ -1,0 +1,147 @@
+import csv
+import io
+
+import pytest
+from fake_runs import FakeEvaluator, bowl, fake_problem
+from matplotlib.image import imread
+from rich.console import Console
+
+from cases import agglomeration
+from optimize.evaluation.estimate import Estimate
+from optimize.methods.individual import Individual
+from optimize.outcome import Outcome
+from optimize.report import report
+from optimize.report.tables import best_columns
+from optimize.search import search
+from optimize.settings import Settings
+from optimize.storage.cache import Cache
+from tisim.errors import RunError
+
+N = 1000
+DERIVED = {
+    "b_f/b_0": lambda fitness: N ** (1 / 3) * (1 - fitness),
+    "n_f": lambda fitness: N * (1 - fitness) ** 3,
+}
+
+
+def outcome_of(tmp_path, function=bowl, **settings):
+    problem = fake_problem(symbol="Pi", title="Bowl", derived=DERIVED)
+    with Cache(tmp_path / "cache.h5") as cache:
+        return search(
+            problem, FakeEvaluator(function), cache, Settings(**{"generations": 9, "seed": 1, **settings})
+        )
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    return outcome_of(tmp_path_factory.mktemp("search"))
+
+
+def test_csv_holds_all_digits(outcome, tmp_path):
+    paths = report.write(outcome, tmp_path / "out")
+    with paths["best.csv"].open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == (
+        [
+            "rank",
+            "x0 (m)",
+            "x1 (m)",
+            "x2 (m)",
+            "x3 (m)",
+            "Pi",
+            "95 % +-",
+            "b_f/b_0",
+            "n_f",
+            "starts",
+            "settled",
+        ]
+    )
+    assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
+    for row, string in zip(rows, outcome.hall, strict=True):
+        assert [float(row[f"x{i} (m)"]) for i in range(4)] == list(string)
+        assert float(row["Pi"]) == string.estimates[0].mean
+        assert float(row["95 % +-"]) == string.estimates[0].half_width
+        assert float(row["n_f"]) == pytest.approx(float(row["b_f/b_0"]) ** 3)
+
+
+def test_a_full_disk_is_told_and_keeps_the_old_files(outcome, tmp_path, monkeypatch):
+    old = {name: path.read_bytes() for name, path in report.write(outcome, tmp_path).items()}
+
+    def full(handle, data, offset):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tisim.files.atomic.os.pwrite", full)
+    with pytest.raises(RunError, match=r"best\.csv could not be written: No space left on device"):
+        report.write(outcome, tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == old
+
+
+def test_derived_columns_reproduce_z04_table_3():
+    assert DERIVED["b_f/b_0"](0.67708) == pytest.approx(3.2292, abs=1e-4)
+    assert DERIVED["n_f"](0.67708) == pytest.approx(33.6732, abs=2e-3)
+
+
+def printed(outcome, width=80):
+    """Lines of the table of the best designs, headings to last row."""
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(report.best_table(outcome))
+    lines = console.export_text().splitlines()
+    assert max(map(len, lines)) <= width
+    return lines[lines.index("") + 1 :]
+
+
+def test_terminal_table_shows_the_best_designs(outcome):
+    rows = printed(outcome)
+    assert [row[:6].split(" ")[0] for row in rows] == [
+        *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "settle",
+    ]  # fmt: skip
+    assert rows[0].split() == ["rank", *"123456"]
+    assert rows[5].split() == ["Pi", *(f"{string.estimates[0].mean:.4g}" for string in outcome.hall)]
+
+
+def agglomerations(number):
+    """Designs of Z04's ten genes; values such as 1.234e15 among them."""
+    made = Outcome(agglomeration.problem("paper"), Settings(), {"problem": "agglomeration"})
+    for k in range(number):
+        string = Individual([0.851234 + k / 200] * 10)
+        string.estimates = (Estimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)
+        string.confirmed = string.estimates
+        made.hall.append(string)
+    return made
+
+
+@pytest.mark.parametrize("number", [1, 6, 20])
+def test_no_row_wraps_on_80_columns(number):
+    made = agglomerations(number)
+    headings = list(best_columns(made.problem, made.hall))
+    rows = [line for line in printed(made) if line]
+    blocks = -(-number // 6)
+    assert len(rows) == blocks * len(headings)
+    for k, row in enumerate(rows):
+        heading = headings[k % len(headings)]
+        assert row.startswith(heading)
+        shown = min(6, number - 6 * (k // len(headings)))
+        assert len(row.removeprefix(heading).split()) == shown, "the name and all values on one line"
+
+
+def test_convergence_figure_shows_the_logbook(outcome, tmp_path):
+    figure = report.convergence_figure(outcome)
+    top, bottom = figure.axes
+    curves = {line.get_label(): list(line.get_ydata()) for line in top.get_lines()}
+    assert curves["best"] == outcome.logbook.select("best")
+    assert curves["mean of the population"] == outcome.logbook.select("mean")
+    assert list(bottom.get_lines()[0].get_ydata()) == [DERIVED["b_f/b_0"](x) for x in curves["best"]]
+    marked = [line.get_xdata()[0] for line in top.get_lines() if line.get_linestyle() == ":"]
+    assert marked == [4, 8]
+    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pi", "b_f/b_0 of the best")
+    paths = report.write(outcome, tmp_path / "out")
+    assert imread(paths["convergence.png"]).std() > 0.01
+    assert paths["convergence.pdf"].read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("settings", [{"generations": 0}, {"wall_clock_s": 1e-9}])
+def test_report_of_failures_and_of_nothing(tmp_path, settings):
+    outcome = outcome_of(tmp_path, lambda design, seed: "broken", **settings)
+    paths = report.write(outcome, tmp_path / "out")
+    assert len(paths["best.csv"].read_text().splitlines()) == 1
+    assert printed(outcome)[0].strip() == "rank"

@@ -1,0 +1,106 @@
+import errno
+import os
+import threading
+
+import h5py
+import pytest
+from cache_files import journal_of, payloads
+from fake_runs import fake_record
+
+from optimize.storage.cache import Cache, verify
+from optimize.storage.hdf5_store import image
+from tisim.errors import RunError
+from tisim.files import atomic
+from tisim.files.atomic import replace_file
+
+
+@pytest.mark.parametrize("kept", [0, 1, 40])
+def test_disk_full_while_appending(path, monkeypatch, kept):
+    cache = Cache(path)
+    cache.put(fake_record(0))
+    cache.fold()
+    cache.put(fake_record(1))
+    write = os.pwrite
+    end = journal_of(path).stat().st_size
+
+    def full(handle, data, offset):
+        """A disk with room for `kept` more bytes."""
+        room = end + kept - offset
+        if room <= 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(handle, bytes(data[:room]), offset)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(atomic.os, "pwrite", full)
+        with pytest.raises(
+            RunError, match=r"cache\.h5\.journal could not be written: No space left on device; every"
+        ):
+            cache.put(fake_record(2))
+    assert cache.get(fake_record(2).key) is None
+    assert payloads(Cache(path).records()) == payloads([fake_record(0), fake_record(1)])
+    assert verify(path).torn == 0
+    cache.put(fake_record(2))
+    assert len(Cache(path)) == 3
+
+
+def test_disk_full_while_folding(path, monkeypatch):
+    cache = Cache(path)
+    cache.put(fake_record(0))
+    cache.fold()
+    cache.put(fake_record(1))
+    cache.put_table("log", {"gen": [1]})
+    before = path.read_bytes()
+
+    def full(handle, data, offset):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(atomic.os, "pwrite", full)
+        with pytest.raises(RunError, match=r"cache\.h5 could not be written: No space left"):
+            cache.fold()
+    assert path.read_bytes() == before
+    assert sorted(p.name for p in path.parent.iterdir()) == ["cache.h5", "cache.h5.journal", "cache.h5.lock"]
+    assert len(Cache(path)) == 2
+    cache.fold()
+    assert Cache(path).tables() == ["log"]
+
+
+def test_killed_fold_leaves_no_trace(path):
+    with Cache(path) as cache:
+        cache.put(fake_record(0))
+    path.with_name("cache.h5.new").write_bytes(b"half a file")
+    with Cache(path) as cache:
+        cache.put(fake_record(1))
+    assert verify(path).rows == 2
+    assert not path.with_name("cache.h5.new").exists()
+
+
+def test_replace_file_is_all_or_nothing(tmp_path):
+    target = tmp_path / "file"
+    replace_file(target, b"old")
+    replace_file(target, image(None, [fake_record(1)], {}))
+    with h5py.File(target) as file:
+        assert len(file["evaluations/key"]) == 1
+
+
+def test_writers_without_a_lock_of_their_own_take_turns(tmp_path):
+    """Some write much and some little, to one path: it is always one of the contents, whole."""
+    target = tmp_path / "file"
+    contents = [bytes([65 + k]) * (1 + 300_000 * (k % 2)) for k in range(4)]
+    replace_file(target, contents[0])
+    failures = []
+
+    def write(content):
+        try:
+            for _ in range(40):
+                replace_file(target, content)
+        except BaseException as failure:
+            failures.append(failure)
+
+    threads = [threading.Thread(target=write, args=(content,)) for content in contents]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        assert target.read_bytes() in contents
+    assert failures == []
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

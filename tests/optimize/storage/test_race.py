@@ -1,0 +1,122 @@
+"""More starts for the designs that compete: fewer are lost to bad luck, and no more is spent than allowed."""
+
+import numpy as np
+import pytest
+from fake_runs import FakeCache, FakeEvaluator, fake_problem
+from scipy import stats
+
+from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
+from optimize.evaluation.runs import start_seed
+from optimize.problem.objective import Objective
+from optimize.search import search
+from optimize.settings import Settings
+
+DESIGNS = [{"x0": x} for x in (0.10, 0.12, 0.5, 0.9)]
+
+
+def noisy(design, seed, noise=0.1):
+    """Own noise of every design, whatever the start."""
+    rng = np.random.default_rng([seed, int(1e6 * design["x0"])])
+    return design["x0"] + noise * float(rng.normal())
+
+
+def ensemble(function=noisy, problem=None, budget=None, **settings):
+    wish = EnsembleSettings(**{"min_starts": 4, "block": 4, "max_starts": 60, "tolerance": 0.9, **settings})
+    return Ensemble(problem or fake_problem(1), FakeEvaluator(function), FakeCache(), wish, 2, budget)
+
+
+def twin(first, second):
+    """The paired t test of SciPy: whether first is surely lower, two-sided 95 %."""
+    found = stats.ttest_rel(second, first)
+    return found.statistic > 0 and found.pvalue < 0.05
+
+
+def test_starts_go_to_those_that_compete():
+    run = ensemble(race=60)
+    assert [e.starts for (e,) in run.estimate(DESIGNS)] == [4] * 4
+    raced = [e for (e,) in run.race(DESIGNS)]
+    assert run.asked <= 16 + 60
+    assert raced[0].starts == raced[1].starts > 16
+    assert raced[3].starts == 4, "beaten before the first round"
+    for design, estimate in zip(DESIGNS, raced, strict=True):
+        values = [noisy(design, start_seed(2, k)) for k in range(estimate.starts)]
+        assert estimate.mean == pytest.approx(np.mean(values), rel=1e-12)
+    again = run.estimate(DESIGNS)
+    assert [e for (e,) in again] == raced, "what is known of a design is not forgotten"
+
+
+def test_who_is_out_is_who_loses_the_paired_test():
+    costs = {design["x0"]: [noisy(design, start_seed(2, k), 0.3) for k in range(60)] for design in DESIGNS}
+    run = ensemble(lambda design, seed: noisy(design, seed, 0.3), race=1000)
+    run.estimate(DESIGNS)
+    racing, used = list(costs), dict.fromkeys(costs, 4)
+    while True:
+        known = {x: costs[x][: used[x]] for x in racing}
+        racing = [x for x in known if not any(twin(known[y], known[x]) for y in known if y != x)]
+        if len(racing) < 2 or used[racing[0]] == 60:
+            break
+        for x in racing:
+            used[x] = min(used[x] + 4, 60)
+    assert [e.starts for (e,) in run.race(DESIGNS)] == list(used.values())
+    assert len(set(used.values())) > 1
+
+
+def test_race_ends_with_its_purse_with_the_budget_and_with_max_starts():
+    run = ensemble(race=20)
+    run.estimate(DESIGNS[:2])
+    run.race(DESIGNS[:2])
+    assert run.asked == 8 + 16, "a third round of 8 would cost more than 20"
+    run = ensemble(race=1000, budget=30)
+    run.estimate(DESIGNS[:2])
+    run.race(DESIGNS[:2])
+    assert run.asked == 24
+    run = ensemble(race=1000, max_starts=10)
+    run.estimate(DESIGNS[:2])
+    assert [e.starts for (e,) in run.race(DESIGNS[:2])] == [10, 10]
+
+
+def test_failure_in_a_race_fails_the_design():
+    late = start_seed(2, 9)
+
+    def function(design, seed):
+        return "burst" if seed == late and design["x0"] == 0.10 else noisy(design, seed)
+
+    run = ensemble(function, race=60)
+    run.estimate(DESIGNS)
+    (first,), (second,), *_ = run.race(DESIGNS)
+    assert first.reason == f"start 9 (seed {late}): burst"
+    assert second.ok
+
+
+def test_a_design_is_out_only_when_beaten_in_every_objective():
+    def two(design, seed):
+        return noisy(design, seed, 0.02), -noisy(design, seed, 0.02), design["x0"] > 0.8
+
+    both = tuple(Objective(f"f{k}", lambda r, k=k: r.value[k]) for k in (0, 1))
+    run = ensemble(two, fake_problem(1, objective=both), race=32)
+    run.estimate(DESIGNS)
+    assert [of_all[0].starts for of_all in run.race(DESIGNS)] == [12] * 4, "a front: none beats another"
+
+
+def noisy_bowl(design, seed):
+    """Noise as large as what designs differ by in the end, and every design its own."""
+    x = np.array(list(design.values()))
+    own = np.random.default_rng([seed, *(x * 2**32).astype(np.int64).tolist()])
+    return float(np.sum((x - 0.3) ** 2) + 0.3 * own.normal())
+
+
+def test_search_with_races_finds_better_designs_at_equal_evaluations():
+    """True costs of the best of 12 searches of 400 runs; and what is claimed of the best is less wrong."""
+    true, claimed = {}, {}
+    for race in (0, 16):
+        starts = EnsembleSettings(min_starts=2, block=2, max_starts=40, tolerance=0.9, race=race)
+        best = []
+        for seed in range(12):
+            wish = Settings(seed=seed, generations=99, max_evaluations=400, ensemble=starts)
+            outcome = search(fake_problem(3), FakeEvaluator(noisy_bowl), FakeCache(), wish)
+            assert 398 <= outcome.evaluations <= 400
+            best.append(outcome.best)
+        true[race] = np.sum((np.array(best) - 0.3) ** 2, axis=1)
+        claimed[race] = np.mean([string.estimates[0].mean for string in best])
+    assert np.mean(true[16]) < 0.7 * np.mean(true[0])
+    assert abs(claimed[16]) < 0.8 * abs(claimed[0])

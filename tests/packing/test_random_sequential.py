@@ -1,0 +1,99 @@
+"""Random sequential addition: spheres that do not overlap, the same for the same seed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from tisim.errors import InputError
+from tisim.packing.random_sequential import SATURATION, sequential_addition
+from tisim.packing.region import box
+from tisim.packing.saturation import fill
+
+LOW, HIGH = np.array([-1.0, 0.0, 2.0]), np.array([1.0, 1.0, 3.5])
+RADIUS = 0.05
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
+    for seed in range(5):
+        centres = sequential_addition(1200, RADIUS, LOW, HIGH, seed, periodic)
+        assert ((centres >= LOW) & (centres < HIGH)).all()
+        tree = cKDTree(centres - LOW, boxsize=HIGH - LOW if periodic else None)
+        assert not tree.query_pairs(2 * RADIUS * (1 - 1e-12))
+    if not periodic:
+        # What the periodic option is for: without it spheres do overlap across the faces.
+        assert cKDTree(centres - LOW, boxsize=HIGH - LOW).query_pairs(2 * RADIUS * (1 - 1e-12))
+
+
+def test_the_seed_decides():
+    first, again, other = (sequential_addition(200, RADIUS, LOW, HIGH, seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0.1
+
+
+def test_places_are_uniform():
+    centres = np.concatenate([sequential_addition(50, 1e-3, LOW, HIGH, seed) for seed in range(200)])
+    u = (centres - LOW) / (HIGH - LOW)
+    assert np.abs(u.mean(axis=0) - 0.5).max() < 4 / np.sqrt(12 * len(u))
+    assert np.abs(u.var(axis=0) - 1 / 12).max() < 4 * np.sqrt(1 / 180 / len(u))
+
+
+def test_what_cannot_be_reached_is_refused():
+    with pytest.raises(InputError, match=r"volume fraction must be at most 0.384.*; received 0\.8727"):
+        sequential_addition(5000, RADIUS, LOW, HIGH, 0)
+
+
+def test_what_is_just_beyond_reach_says_what_was_reached():
+    with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as refused:
+        sequential_addition(2280, RADIUS, LOW, HIGH, 0, periodic=True)
+    reached = float(str(refused.value).split("at most ")[1][:6])
+    # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
+    assert reached == pytest.approx(SATURATION, abs=0.006)
+
+
+def saturated(region, radius, seed=0):
+    """Centres of a packing that has no more room, started from none."""
+    generator = np.random.Generator(np.random.Philox(seed))
+    return fill(np.empty((0, 3)), 10**6, 2 * radius, region, generator)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_saturated_packing_has_no_room_left(rng, periodic):
+    region = box(LOW, HIGH, periodic)
+    centres = saturated(region, RADIUS)
+    tree = cKDTree((centres - LOW) % (HIGH - LOW), boxsize=HIGH - LOW if periodic else None)
+    assert not tree.query_pairs(2 * RADIUS * (1 - 1e-12))
+    places = rng.uniform(0, 1, (200_000, 3)) * (HIGH - LOW)
+    assert tree.query(places)[0].max() < 2 * RADIUS
+
+
+@pytest.mark.slow
+def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
+    """0.38413; for 700 spheres a single packing is off by about 0.002."""
+    region = box(np.zeros(3), np.ones(3), periodic=True)
+    radius = (3 * SATURATION / (4 * np.pi * 700)) ** (1 / 3)
+    sphere = 4 / 3 * np.pi * radius**3
+    fractions = [len(saturated(region, radius, seed)) * sphere for seed in range(12)]
+    assert np.mean(fractions) == pytest.approx(SATURATION, abs=0.002)
+
+
+@pytest.mark.slow
+def test_filling_voids_is_the_same_process_as_trying_everywhere():
+    """Mean number of neighbours within 1.1 diameters at the same volume fraction, by either way."""
+    region = box(np.zeros(3), np.ones(3), periodic=True)
+    number, radius = 900, (3 * 0.3 / (4 * np.pi * 900)) ** (1 / 3)
+
+    def neighbours(centres):
+        return 2 * len(cKDTree(centres % 1, boxsize=1).query_pairs(2.2 * radius)) / number
+
+    tried, filled = [], []
+    for seed in range(8):
+        tried.append(neighbours(sequential_addition(number, radius, region.low, region.high, seed, True)))
+        generator = np.random.Generator(np.random.Philox(100 + seed))
+        filled.append(neighbours(fill(np.empty((0, 3)), number, 2 * radius, region, generator)))
+    spread = np.hypot(np.std(tried), np.std(filled)) / np.sqrt(7)
+    assert abs(np.mean(tried) - np.mean(filled)) < 4 * spread
+    # Tight enough to tell a process that favours narrow voids from one that does not.
+    assert spread < 0.03 * np.mean(tried)

@@ -1,0 +1,140 @@
+"""Standard pictures and movies of a run's file."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from PIL import Image
+
+import tisim
+from tests.scenes import scene
+from tisim import Box, Recording
+from tisim.errors import InputError
+from tisim.io.reader import Frames, frames
+from tisim.io.trajectory import Trajectory
+from tisim.plotting.movie import movie
+from tisim.plotting.time_series import clouds, courses, history, mark_missing
+
+MOVING = dict(
+    position=[(0, 0, 0), (0.01, 0, 0)],
+    velocity=[(1.0, 2.0, 0), (3.0, 2.0, 0)],
+    mass=[1.0, 3.0],
+    dt=1e-3,
+    steps=4,
+)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("plots") / "t.h5"
+    tisim.run(scene(**MOVING), record=Recording(path, frames=4))
+    return path
+
+
+def test_history_is_that_of_two_grains_in_straight_flight(file):
+    with frames(file) as found:
+        seen = history(found)
+    np.testing.assert_allclose(seen.time, np.arange(5) * 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(seen.kinetic_energy, 0.5 * (1 + 4) + 1.5 * (9 + 4), rtol=1e-12)
+    np.testing.assert_allclose(seen.drift, [[2.5, 2.0, 0]] * 5, rtol=1e-12)
+    np.testing.assert_allclose(seen.shift, seen.time[:, None] * [2.5, 2.0, 0], rtol=1e-9, atol=1e-15)
+    assert seen.number.tolist() == [2] * 5
+
+
+def test_courses_draw_the_history(file):
+    with frames(file) as found:
+        figure, seen = courses(found), history(found)
+    energy, centre, number = figure.axes
+    np.testing.assert_array_equal(energy.lines[0].get_ydata(), seen.kinetic_energy)
+    for k, line in enumerate(centre.lines):
+        np.testing.assert_array_equal(line.get_ydata(), seen.shift[:, k])
+    np.testing.assert_array_equal(number.lines[0].get_ydata(), seen.number)
+    assert energy.get_ylim()[0] == 0
+    assert "shift" in centre.get_ylabel()
+
+
+def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
+    box = Box(low=(-0.02,) * 3, high=(0.02,) * 3)
+    tisim.run(scene(**MOVING, domain=box), record=Recording(tmp_path / "t.h5", frames=4))
+    with frames(tmp_path / "t.h5") as found:
+        centre = courses(found).axes[1]
+    assert "velocity" in centre.get_ylabel()
+    np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.5)
+
+
+def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
+    """The same frames of a run that was to last twice as long."""
+    longer = scene(**{**MOVING, "steps": 8})
+    with frames(file) as found, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
+        assert mark_missing(courses(found), found).get_supxlabel() == ""
+        for frame in found:
+            begun.write(0, frame)
+    with frames(tmp_path / "t.h5") as found:
+        figures = [mark_missing(draw(found), found) for draw in (clouds, courses)]
+    for figure in figures:
+        told = "the run has come to t = 0.004 s of 0.008 s; what follows is missing"
+        assert figure.get_supxlabel() == told
+    assert [axis.get_title().split(",")[0] for axis in figures[0].axes] == ["start", "last frame"]
+
+
+def test_clouds_are_of_the_first_and_last_frame(file):
+    with frames(file) as found:
+        titles = [axis.get_title().split(":")[0] for axis in clouds(found).axes]
+    assert titles == ["start, t = 0 s", "end, t = 4 ms"]
+
+
+def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
+    done = []
+    with frames(file) as found:
+        movie(found, tmp_path / "t.gif", 10, done.append)
+    assert done[-1] == 1.0
+    assert [path.name for path in tmp_path.iterdir()] == ["t.gif"]
+    with Image.open(tmp_path / "t.gif") as read:
+        assert read.n_frames == 5
+        assert read.info["duration"] == 100
+        pictures = []
+        for k in range(5):
+            read.seek(k)
+            pictures.append(np.asarray(read.convert("RGB")).astype(int))
+    assert all(np.abs(a - b).max() > 100 for a, b in itertools.pairwise(pictures))
+
+
+def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path, monkeypatch):
+    """In the narrowest picture, with numbers of all digits."""
+    seen = []
+
+    def grab(writer, **more):
+        figure = writer.fig
+        figure.draw_without_rendering()
+        seen.append([(part, part.get_window_extent()) for part in (*figure.texts, *figure.axes)])
+
+    monkeypatch.setattr(PillowWriter, "grab_frame", grab)
+    monkeypatch.setattr(PillowWriter, "finish", lambda writer: None)
+    told = "the run has come to t = 1.83413e-06 s of 1.23457e-05 s; what follows is missing"
+    monkeypatch.setattr(Frames, "missing", told)
+    with frames(file) as found:
+        movie(found, tmp_path / "t.gif")
+    assert len(seen) == 5
+    for parts in seen:
+        ((note, place),) = [pair for pair in parts if getattr(pair[0], "get_text", str)() == told]
+        whole = note.figure.bbox
+        assert whole.x0 < place.x0 < place.x1 < whole.x1
+        others = [other for part, other in parts if part is not note]
+        assert len(others) == 2, "caption, grains"
+        assert not any(place.overlaps(other) for other in others)
+
+
+def test_movies_that_cannot_be_made_are_refused(file, tmp_path, monkeypatch):
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with frames(file) as found:
+        for name, rate, message in (
+            ("t.mp4", 20, r"movie must be a .gif where ffmpeg is not installed; received 't.mp4'"),
+            ("t.avi", 20, r"movie must be a .gif or .mp4 file; received 't.avi'"),
+            ("t.gif", 0, "frames a second must be 1 to 100; received 0"),
+        ):
+            with pytest.raises(InputError, match=message):
+                movie(found, tmp_path / name, rate)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,236 @@
+"""Scenes as plain data: TOML and back, changes by dotted key, and a digest of all that decides a result."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import flow, scene
+from tisim import Box, Cloud, Particles, Scene
+from tisim.effects.base import Operator
+from tisim.effects.impact.agglomeration import Agglomeration
+from tisim.effects.impact.friction import Friction
+from tisim.effects.impact.heating import DeformationWork, Heating
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.softening import Softening
+from tisim.errors import InputError
+from tisim.operators.cooling import Cooling
+from tisim.steppers.step_control import ApproachTime, FixedStep
+from tisim.steppers.verlet import Verlet
+
+
+def cloud(**changes):
+    settings = {
+        "name": "a cloud",
+        "particles": Cloud(
+            number=7, radius=1e-3, density=2e3, mean_velocity=(1, 2, 3), deviation=(4, 5, 6), temperature=400
+        ),
+        "effects": (Impact(hardness=1e5), Friction(coefficient=0.3), Heating(heat_capacity=5e2), Cooling()),
+        "domain": Box(low=(-1, -1, -1), high=(1, 1, 2), images=False),
+        "stepper": Verlet(control=ApproachTime(shortest=1e-7)),
+        "duration": 0.5,
+        "seed": 2**62 + 1,
+    }
+    return Scene(**{**settings, **changes})
+
+
+SCENES = {
+    "cloud": cloud,
+    "flow": lambda: flow(grains=5),
+    "one by one": lambda: scene(
+        np.random.default_rng(1).normal(size=(3, 3)),
+        np.full((3, 3), 1 / 3),
+        radius=[0.1, 1 / 7, 1e-90],
+        mass=0.1,
+    ),
+    "bare": lambda: Scene(particles=Cloud(number=1, radius=1, density=1), duration=1),
+    "named oddly": lambda: cloud(name='a "quoted" \\ name\nof two lines, größer'),
+}
+
+
+@pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
+def test_toml_gives_the_scene_back_to_the_last_bit(make, tmp_path):
+    before = make()
+    file = tmp_path / "scene.toml"
+    file.write_text(before.to_toml(), encoding="utf-8")
+    after = Scene.from_toml(file)
+    assert after.to_dict() == before.to_dict()
+    assert after.digest() == before.digest()
+    assert after.structure() == before.structure()
+    assert after.to_toml() == before.to_toml()
+
+
+def leaves(table, path=()):
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from leaves(value, (*path, key))
+        else:
+            yield (*path, key), value
+
+
+def other(key, value):
+    """Another valid value of the same kind."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return value + 1
+    if isinstance(value, float):
+        return value * 0.999 if value else 1e-3
+    if isinstance(value, str):
+        return value + "x"
+    return [other(key, part) for part in value]
+
+
+def test_digest_changes_with_every_number_in_the_scene():
+    """Each leaf of the data, changed alone, changes the digest; and nothing else does."""
+    base = flow(grains=3)
+    seen = {base.digest()}
+    changed = 0
+    for path, value in leaves(base.to_dict()):
+        if path[-1] in ("kind", "name"):
+            continue
+        new = other(path[-1], value)
+        seen.add(base.replace({".".join(path): new}).digest())
+        changed += 1
+    assert changed > 25
+    assert len(seen) == changed + 1
+    assert base.digest() == flow(grains=3).digest()
+
+
+def test_digest_changes_with_each_quantity_and_effect():
+    base = cloud()
+    fewer = cloud(effects=(Impact(hardness=1e5), Friction(coefficient=0.3), Heating(heat_capacity=5e2)))
+    order = cloud(
+        effects=(Friction(coefficient=0.3), Impact(hardness=1e5), Heating(heat_capacity=5e2), Cooling())
+    )
+    warm, warmer = (
+        scene([[0, 0, 0]], [[0, 0, 0]], quantities={"temperature": t})
+        for t in (300.0, np.nextafter(300, 301))
+    )
+    digests = [s.digest() for s in (base, fewer, order, warm, warmer)]
+    assert len(set(digests)) == 5, "the order of effects is the order in which they act"
+
+
+class TestReplace:
+    def test_changes_what_is_named_and_nothing_else(self):
+        after = cloud().replace({"effects.impact.hardness": 3e5, "duration": 0.25, "particles.number": 9})
+        assert after.effects[0].hardness == 3e5
+        assert (after.duration, after.particles.number) == (0.25, 9)
+        back = after.replace({"effects.impact.hardness": 1e5, "duration": 0.5, "particles.number": 7})
+        assert back.digest() == cloud().digest()
+
+    @pytest.mark.parametrize(
+        ("key", "value", "message"),
+        [
+            ("effects.impact.hardness", -1, "impact.hardness must be greater than 0.0; received -1"),
+            ("effects.impact.hardnes", 1, "impact.hardnes must be a known key; received 1"),
+            (
+                "effects.impcat.hardness",
+                1,
+                "effects.impcat.hardness must be a setting of this scene; received 'impcat'",
+            ),
+            ("duration.long", 1, "duration.long must be a setting of this scene; received 'long'"),
+            ("duration", 0, "scene.duration must be greater than 0.0; received 0"),
+            ("stepper.control.shortest", "soon", "approach_time.shortest must be a number; received 'soon'"),
+            ("nonsense", 1, "scene.nonsense must be a known key; received 1"),
+        ],
+    )
+    def test_says_what_is_wrong(self, key, value, message):
+        with pytest.raises(InputError) as fault:
+            cloud().replace({key: value})
+        assert str(fault.value) == message
+
+
+class TestWithout:
+    def test_leaves_out_what_is_named_and_nothing_else(self):
+        assert cloud().without("cooling").effects == cloud().effects[:-1]
+        assert cloud().without("cooling", "heating").effects == cloud().effects[:-2]
+        assert cloud().without().digest() == cloud().digest()
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            (
+                "warp",
+                "effect to leave out must be one of impact, friction, heating, cooling; received 'warp'",
+            ),
+            ("heating", "effects.cooling must be used together with effects.heating; received 'impact, "),
+        ],
+    )
+    def test_says_what_is_wrong(self, name, message):
+        with pytest.raises(InputError) as fault:
+            cloud().without(name)
+        assert str(fault.value).startswith(message)
+
+
+class TestRequires:
+    @pytest.mark.parametrize(
+        ("effects", "message"),
+        [
+            ((Friction(coefficient=0.1),), "effects.friction must be used together with effects.impact"),
+            (
+                (Impact(hardness=1), DeformationWork()),
+                "effects.deformation_work must be used together with effects.heating",
+            ),
+            ((Agglomeration(),), "effects.agglomeration must be used together with effects.impact"),
+            (
+                (Impact(hardness=1), Softening(activation_energy=1)),
+                "effects.softening must be used together with effects.heating",
+            ),
+            ((Impact(hardness=1), Impact(hardness=2)), "effects.impact must be given once; received 2"),
+        ],
+    )
+    def test_an_effect_without_what_it_needs_is_refused(self, effects, message):
+        with pytest.raises(InputError) as fault:
+            cloud(effects=effects)
+        assert str(fault.value).startswith(message)
+        assert "; received " in str(fault.value)
+
+    def test_a_contract_that_nobody_has_met_yet_is_named(self):
+        class Unmet(Operator):
+            contract = True
+
+        class Lonely(Operator):
+            requires = (Unmet,)
+
+        with pytest.raises(InputError, match=r"^effects\.lonely must be used together with unmet; received"):
+            cloud(effects=(Lonely(),))
+
+    def test_quantities_that_effects_need_must_be_given(self):
+        from tisim import Simulation
+
+        start = scene([[0, 0, 0]], [[0, 0, 0]], (Impact(hardness=1), Heating(heat_capacity=1)))
+        with pytest.raises(InputError, match=r"^particles must be given temperature, .*; received none$"):
+            Simulation(start).load([start])
+
+
+def test_equal_structures_share_a_batch_and_others_do_not():
+    base = cloud()
+    assert (
+        base.structure()
+        == cloud(
+            seed=3,
+            duration=9,
+            effects=(
+                Impact(hardness=9),
+                Friction(coefficient=0),
+                Heating(heat_capacity=1),
+                Cooling(emissivity=1),
+            ),
+        ).structure()
+    )
+    for changes in (
+        {"effects": ()},
+        {"domain": Box(low=(-1, -1, -1), high=(1, 1, 1), images=True)},
+        {"stepper": Verlet(control=FixedStep(dt=1))},
+        {"effects": (Impact(hardness=1e5, max_iterations=3), *base.effects[1:])},
+    ):
+        assert cloud(**changes).structure() != base.structure()
+
+
+def test_a_scene_is_a_value():
+    """Frozen, its arrays included; what it was made from can change without changing it."""
+    place = np.zeros((2, 3))
+    particles = Particles(position=place, velocity=place, radius=1.0, mass=1.0)
+    place += 1
+    assert particles.position == ((0, 0, 0), (0, 0, 0))
+    with pytest.raises(Exception, match="frozen"):
+        cloud().duration = 2.0

@@ -1,0 +1,89 @@
+"""Scenes of Brownian particles, and what they are made of that only tests need."""
+
+import numpy as np
+
+from tests.scenes import simulate
+from tests.throwaway import SoftShellOfAll, Trap
+from tisim import Particles, Scene
+from tisim.backend.taichi import ti
+from tisim.components.component import parameter
+from tisim.effects.base import Operator, Source
+from tisim.effects.external.gravity import Gravity
+from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.worlds.state import Field
+
+RADIUS, TEMPERATURE, VISCOSITY = 1e-7, 298.0, 1e-3
+HEAT = 1.380649e-23 * TEMPERATURE
+"""kT, J."""
+MOBILITY = 1 / (6 * np.pi * VISCOSITY * RADIUS)
+"""s/kg."""
+DIFFUSIVITY = HEAT * MOBILITY
+"""m^2/s."""
+FREELY = 1e6
+"""Radii: a limit of drift that limits nothing."""
+SIGMAS = 5.0
+"""Confidence of every statistical bound: one in two million fails by chance, and seeds are fixed."""
+
+
+class Shear(Source):
+    """u = (rate y, 0, 0)."""
+
+    quantity = "flow_velocity"
+    rate: float = parameter("1/s")
+
+    @ti.func
+    def value(self, w, r, t):
+        return ti.Vector([self.rate(w) * r[1], 0.0 * r[1], 0.0 * r[1]])
+
+
+class Stop(Operator):
+    """Fixes what has got beyond a place along x, and notes when."""
+
+    needs = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
+    counts = ("stops",)
+    place: float = parameter("m")
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        if s.position[w, i][0] > self.place(w) and s.fixed[w, i] == 0:
+            s.fixed[w, i] = 1
+            s.stopped_at[w, i] = ti.cast(t, s.real)
+            s.velocity[w, i] = 0.0 * s.velocity[w, i]
+            ti.atomic_add(s.stops[w], 1)
+
+
+def colloids(position, together=False, trap=0.0, shear=0.0, fall=0.0, extra=(), dt=1e-4, steps=1, **more):
+    """Spheres in water of room temperature, for a number of longest steps.
+
+    together : whether there is a (weak) repulsion between pairs, for which they take common steps. trap :
+    rate (1/s) at which a sphere of RADIUS relaxes in a spring to the origin; shear : of the flow, 1/s; fall :
+    along -y, m/s^2. They are effects of every scene, so that most have the same structure.
+    """
+    springs = (Trap(stiffness=trap / MOBILITY), Shear(rate=shear), Gravity(acceleration=(0.0, -fall, 0.0)))
+    shell = (SoftShellOfAll(stiffness=more.pop("stiffness", 1e-6), width=1e-12),) if together else ()
+    control = DriftLimit(
+        longest=dt, drift=more.pop("drift", FREELY), shortest=more.pop("shortest", 1e-6 * dt)
+    )
+    options = {name: more.pop(name) for name in ("hydrodynamics", "noise") if name in more}
+    temperature = more.pop("temperature", TEMPERATURE)
+    position = np.asarray(position, float)
+    return Scene(
+        particles=Particles(
+            position=position,
+            velocity=np.zeros_like(position),
+            radius=more.pop("radius", RADIUS),
+            density=1000.0,
+            quantities=more.pop("quantities", {}),
+        ),
+        effects=(*shell, *springs, *extra),
+        stepper=Brownian(temperature=temperature, viscosity=VISCOSITY, control=control, **options),
+        duration=dt * steps,
+        **more,
+    )
+
+
+def run(scenes):
+    """Results of scenes of one structure, in a simulation that tests share."""
+    together = isinstance(scenes[0].effects[0], SoftShellOfAll)
+    return simulate(scenes, worlds=5, capacity=600 if together else 10_000)

@@ -1,0 +1,117 @@
+"""Particles that do not feel each other: steps of their own, in launches of any length."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, scene
+from tests.steppers.charged import accurate, charged
+from tisim.backend.taichi import ti
+from tisim.components.component import parameter
+from tisim.effects.base import Force
+from tisim.io.checkpoint import restore, save
+from tisim.steppers.implicit.step_control import IterationControl
+from tisim.steppers.implicit.trapezoid import Trapezoid
+
+DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}
+
+
+class Cliff(Force):
+    """Nothing, and beyond a place along x a spring that is far too stiff."""
+
+    place: float = parameter("m")
+
+    @ti.func
+    def force(self, s, w, i, t):
+        beyond = ti.max(s.position[w, i][0] - self.place(w), 0.0)
+        return ti.Vector([-1e13 * beyond, 0.0 * beyond, 0.0 * beyond])
+
+
+@pytest.mark.parametrize("chunks", [[], [1, 1, 5]])
+def test_who_gets_stuck_first_is_named_with_the_time_and_the_force(chunks):
+    """Particles fall off the cliff at 0.5 and 0.3 s: the second one first, whatever a launch takes them
+    through; other particles and other worlds do not matter, and what is kept is sound."""
+    control = IterationControl(first=1e-4, longest=1e-4, shortest=1e-5, tolerance=1e-6)
+    start = ([[0.0, 0, 0], [0.2, 1, 0], [0.0, 2, 0]], [[1.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]])
+    falling, free = (
+        scene(*start, (Cliff(place=place),), mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
+        for place in (0.5, 5.0)
+    )
+    simulation = compiled(falling, worlds=2, capacity=3)
+    simulation.load([falling, free])
+    for steps in chunks:
+        simulation.run(steps=steps)
+    assert simulation.results()[0].work["steps"] == sum(chunks)
+    simulation.run()
+    stuck, fine = simulation.results()
+    assert fine.status.ok
+    assert "at particle 1" in stuck.status.reason
+    assert "by effects.cliff" in stuck.status.reason
+    found = float(stuck.status.reason.split("t = ")[1].split(" s")[0])
+    assert found == pytest.approx(0.3, abs=2e-4)
+    kept = float(stuck.status.reason.rsplit("t = ", 1)[1].split(" s")[0])
+    assert kept <= found
+    assert np.isfinite(stuck.state["position"]).all()
+
+
+def test_a_step_that_time_does_not_tell_is_not_taken():
+    """On the cliff, which needs steps of 3e-7 s, when the time at the end is rounded to 1e-6 s: it stops and
+    says so, where steps of 1e-20 s would never get there."""
+    control = IterationControl(first=1e-20, longest=1e-3, shortest=1e-25)
+    stepper, start = Trapezoid(control=control), ([[0.0, 0, 0]], [[1.0, 0, 0]])
+    made = scene(*start, (Cliff(place=0.0),), mass=1.0, stepper=stepper, duration=1e10)
+    simulation = compiled(made, worlds=2, capacity=3)
+    simulation.load([made])
+    simulation.run(steps=1)
+    (result,) = simulation.results()
+    assert "cannot be solved even at the shortest step, by effects.cliff" in result.status.reason
+    assert result.time == 0.0
+
+
+def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
+    """10000 windows of 1e-4 s, of which two are asked for, and later a thousand."""
+    control = IterationControl(first=1e-4, longest=1e-4, shortest=1e-5, tolerance=1e-6)
+    start = ([[0.0, 0, 0]], [[1.0, 0, 0]])
+    made = scene(*start, (Cliff(place=5.0),), mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
+    simulation = compiled(made, worlds=2, capacity=3)
+    simulation.load([made])
+    for steps, ahead in ((2, 9998), (1000, 8998)):
+        simulation.run(steps=steps)
+        assert simulation.ahead() == pytest.approx(ahead, abs=1)
+
+
+@pytest.mark.slow
+def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bits(tmp_path):
+    """A step of the world is a window; in one launch, in small ones, and from a checkpoint: the same bits."""
+    made = charged(accurate(1e-5, longest=1e-2), 2.0, **DRIVEN)
+    simulation = compiled(made, capacity=1)
+
+    def run(*portions):
+        simulation.load([made])
+        for steps in portions:
+            simulation.run(steps=steps)
+        taken = simulation.results()[0].work["steps"]
+        assert taken == sum(portions)
+        return taken
+
+    def end():
+        simulation.run()
+        (result,) = simulation.results()
+        return result.state, result.work, result.time
+
+    run()
+    whole, work, time = end()
+    assert work["steps"] == 200
+    assert work["particle_steps"] > 500
+    assert time == 2.0
+    ends = []
+    run(1, 2, 70)
+    save(simulation, tmp_path / "c.h5")
+    ends.append(end())
+    simulation.load([made])
+    restore(simulation, tmp_path / "c.h5")
+    ends.append(end())
+    for state, counts, when in ends:
+        assert counts == work
+        assert when == time
+        for name, values in state.items():
+            np.testing.assert_array_equal(values, whole[name], err_msg=name)

@@ -1,0 +1,171 @@
+"""A stepper that the core has never heard of: implicit, with an iteration around lists and forces."""
+
+import numpy as np
+import pytest
+
+from tests.interactions.test_self_consistent import cloud
+from tests.interactions.test_short_ranged import shells
+from tests.scenes import scene, simulate
+from tests.throwaway import SoftShell, SoftShellOfAll, Trap
+from tisim import Scene
+from tisim.backend.taichi import ti
+from tisim.effects.base import parameter
+from tisim.steppers.base import Stepper
+from tisim.steppers.step_control import Controller
+from tisim.worlds.program import PerParticle, Phase, Repeat
+from tisim.worlds.state import Field
+
+
+class Begin(Phase):
+    """A step of the controller's length, cut at the end."""
+
+    def __init__(self, parts) -> None:
+        self.s, self.control = parts.s, parts.control
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.dt[w] = ti.min(self.control.next(s, w, 0.0), s.end[w] - s.time[w])
+        s.time[w] += s.dt[w]
+        s.steps[w] += 1
+        s.unsolved[w] = 1.0
+
+
+class Keep(PerParticle):
+    """Where the step began."""
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        s.position_before[w, i], s.velocity_before[w, i] = s.position[w, i], s.velocity[w, i]
+        s.force_before[w, i] = s.force[w, i]
+
+
+class Correct(PerParticle):
+    """v' = v + dt/m (F + F')/2, r' = r + dt (v + v')/2. Lists and forces want places inside the domain."""
+
+    def __init__(self, parts) -> None:
+        super().__init__(parts.s)
+        self.domain = parts.domain
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        dt = ti.cast(s.dt[w], s.real)
+        v = s.velocity_before[w, i] + 0.5 * dt / s.mass[w, i] * (s.force_before[w, i] + s.force[w, i])
+        r = s.position_before[w, i] + 0.5 * dt * (s.velocity_before[w, i] + v)
+        r = self.domain.wrap(w, r)
+        change = self.domain.nearest(w, s.position[w, i], r).norm()
+        ti.atomic_max(s.largest_change[w], ti.cast(change, ti.f64))
+        s.velocity[w, i], s.position[w, i] = v, r
+
+
+class Judge(Phase):
+    """Once more while anything moves; a list of pairs is made anew every time."""
+
+    def __init__(self, parts, tolerance) -> None:
+        self.s, self.near, self.lists, self.tolerance = parts.s, parts.near, bool(parts.lists), tolerance
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.corrections[w] += 1
+        s.unsolved[w] = ti.select(s.largest_change[w] > self.tolerance(w), 1.0, 0.0)
+        s.largest_change[w] = 0.0
+        if ti.static(self.lists):
+            self.near.stale[w] = 1
+
+
+class Iteration(Repeat):
+    def __init__(self, s, items) -> None:
+        super().__init__(items)
+        self.s = s
+
+    @ti.func
+    def pending(self, w):
+        return ti.cast(self.s.unsolved[w], ti.i32)
+
+
+class Implicit(Stepper):
+    """Trapezoidal rule by fixed-point iteration."""
+
+    counts = ("corrections",)
+    keeps = ("unsolved", "largest_change")
+    control: Controller
+    tolerance: float = parameter("m", 1e-14, gt=0)
+
+    def needs(self, turning, independent):
+        return (
+            Field("position_before", "m", 3, "keep"),
+            Field("velocity_before", "m/s", 3, "keep"),
+            Field("force_before", "N", 3, "keep"),
+        )
+
+    def step(self, parts):
+        s, judge = parts.s, Judge(parts, self.tolerance)
+        return (Begin(parts), Keep(s), Iteration(s, (*parts.lists, *parts.forces, Correct(parts), judge)))
+
+
+def implicit(made: Scene, **more) -> Scene:
+    return made.model_copy(update={"stepper": Implicit(control=made.stepper.control, **more)})
+
+
+def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
+    """The trapezoidal rule is exact in energy for a linear spring, whatever the step."""
+    stiffness, end = 4.0, 3.0
+    steps = 2 ** np.arange(6, 11)
+    made = [
+        implicit(
+            scene(
+                [[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=stiffness),), mass=1.0, dt=end / n, steps=int(n)
+            )
+        )
+        for n in steps
+    ]
+    results = simulate(made, worlds=len(made))
+    angle = np.sqrt(stiffness) * end
+    errors = [abs(r.state["position"][0, 0] - np.cos(angle)) for r in results]
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.02)
+    for result, n in zip(results, steps, strict=True):
+        state = result.state
+        energy = 0.5 * (state["velocity"] ** 2).sum() + 0.5 * stiffness * (state["position"] ** 2).sum()
+        assert energy == pytest.approx(0.5 + 0.5 * stiffness, rel=1e-12)
+        assert result.work["steps"] == n
+        assert result.work["corrections"] > 3 * n
+
+
+def test_its_parameters_may_differ_per_world_and_are_written_to_files():
+    made = scene([[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=4.0),), mass=1.0, dt=0.1, steps=30)
+    loose, tight = implicit(made, tolerance=1e-4), implicit(made, tolerance=1e-12)
+    assert loose.structure() == tight.structure()
+    assert Scene.from_dict(tight.to_dict()).digest() == tight.digest()
+    assert "tolerance = 1e-12" in tight.to_toml()
+    a, b = simulate([loose, tight], worlds=5)
+    assert a.work["corrections"] < b.work["corrections"] / 2
+
+
+@pytest.mark.slow
+def test_lists_and_forces_in_an_iteration():
+    """Short-ranged forces over lists that are made anew within it, and the same over all pairs."""
+    results = []
+    for kind in (SoftShell, SoftShellOfAll):
+        made = implicit(shells(kind, np.random.default_rng(3), True), tolerance=1e-13)
+        results += simulate([made], capacity=300, schedule="particle")
+    listed, everyone = results
+    assert listed.status.ok
+    assert np.abs(listed.state["velocity"] - listed.start["velocity"]).max() > 0.1
+    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_what_settles_in_an_iteration_is_an_iteration_in_an_iteration():
+    """Induced dipoles, in every correction of every step: the same bits on both schedules, worlds at odds."""
+    made = [implicit(cloud(1), tolerance=1e-13), implicit(cloud(2, chi=5.0), tolerance=1e-12)]
+    results = [simulate(made, worlds=2, schedule=schedule) for schedule in ("world", "particle")]
+    for a, b in zip(*results, strict=True):
+        assert a.work == b.work
+        assert a.work["mutual_sweeps"] > a.work["corrections"] > 20
+        for name in ("position", "velocity", "dipole"):
+            np.testing.assert_array_equal(a.state[name], b.state[name])
+    explicit = simulate([cloud(1)], worlds=2)[0]
+    np.testing.assert_allclose(results[0][0].state["position"], explicit.state["position"], rtol=0, atol=1e-4)

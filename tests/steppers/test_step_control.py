@@ -1,0 +1,68 @@
+"""How long a step is: fixed, cut to end on time, at its floor, at its ceiling."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import HEAT_CAPACITY, RADIUS, by_id, check_sums, compiled, fixed, scene, simulate
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import Impact
+from tisim.steppers.verlet import Verlet
+
+
+def run(scenes):
+    return simulate(scenes, worlds=8, capacity=16)
+
+
+def test_fixed_steps_end_exactly_on_time():
+    """A duration that is no multiple of the step: the last step is cut, and time is exact."""
+    results = run(
+        [
+            scene([[0, 0, 0]], [[1.0, 2, 3]], (), stepper=fixed(dt), duration=1.0)
+            for dt in (0.3, 1 / 3, 0.1, 7.0, 1e-4)
+        ]
+    )
+    for result, steps in zip(results, (4, 3, 10, 1, 10_000), strict=True):
+        assert result.time == 1.0
+        assert result.work["steps"] == steps
+        np.testing.assert_allclose(result.state["position"], [[1, 2, 3]], rtol=1e-12)
+
+
+def row():
+    """Hard grains in a row, all but touching, each moving at 50 m/s against the next."""
+    grains = 12
+    return scene(
+        np.arange(grains)[:, None] * [2 * RADIUS * (1 + 1e-9), 0, 0],
+        np.where(np.arange(grains) % 2, -50.0, 50.0)[:, None] * [1.0, 0, 0],
+        (Impact(hardness=1e9), Heating(heat_capacity=HEAT_CAPACITY)),
+        stepper=Verlet(),
+        duration=2e-4,
+        quantities={"temperature": 300.0},
+    )
+
+
+@pytest.mark.slow
+def test_step_control_at_its_floor():
+    """Gaps far smaller than v times the shortest step: the step rests on its floor, the run ends."""
+    simulation = compiled(row(), 8, 16)
+    simulation.load([row()])
+    simulation.run(steps=1)
+    (first,) = simulation.results()
+    assert first.time == 1e-6, "gap over speed would be 2e-14 s"
+    (result,) = run([row()])
+    check_sums(result)
+    assert result.time == 2e-4
+    assert result.work["steps"] <= 201, "never shorter than the floor of 1e-6 s"
+    grains = len(result.start["mass"])
+    assert result.work["impacts"] >= grains - 1
+    order = np.argsort(by_id(result)["position"][:, 0])
+    np.testing.assert_array_equal(order, np.arange(grains), "none has passed through another")
+
+
+@pytest.mark.long
+def test_a_grain_alone_takes_the_longest_step():
+    """Nothing near anything: the step is its ceiling, and a grain alone crosses its time in few steps."""
+    alone = scene([[0, 0, 0]], [[100.0, 0, 0]], row().effects, stepper=Verlet(), duration=0.01,
+                  quantities={"temperature": 300.0})  # fmt: skip
+    (result,) = run([alone])
+    assert result.status.ok
+    assert result.work["steps"] == 10

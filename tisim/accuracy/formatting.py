@@ -1,0 +1,64 @@
+"""Settings in words: as Python, and as options of ``tisim run``."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from typing import Any
+
+from tisim.components import serialization
+from tisim.components.component import Spec
+from tisim.scene.scene import Scene
+
+
+def given(part: Spec) -> dict[str, Any]:
+    """The settings of a part that are not at their defaults, by name."""
+    return {
+        name: getattr(part, name)
+        for name, info in type(part).model_fields.items()
+        if info.is_required() or getattr(part, name) != info.get_default()
+    }
+
+
+def expression(part: Spec) -> str:
+    """A part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
+    arguments = (
+        f"{name}={expression(value) if isinstance(value, Spec) else repr(value)}"
+        for name, value in given(part).items()
+    )
+    return f"{type(part).__name__}({', '.join(arguments)})"
+
+
+def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
+    """Words that make ``tisim run`` run ``changed`` where it would have run ``scene``."""
+    old, new = ({effect.kind(): effect for effect in s.effects} for s in (scene, changed))
+    words = [word for kind in old if kind not in new for word in ("--without", kind)]
+    settings = list(_differences(scene.stepper, changed.stepper, "stepper"))
+    for kind, effect in new.items():
+        settings += _differences(old.get(kind), effect, f"effects.{kind}")
+    for key, value in settings:
+        words += ["--set", f"{key}={value}"]
+    return words + (["--precision", precision] if precision != "f64" else [])
+
+
+def pasted(words: list[str]) -> str:
+    """Words as a shell takes them."""
+    return shlex.join(words)
+
+
+def _differences(old: Spec | None, new: Spec, path: str) -> Iterator[tuple[str, str]]:
+    """Dotted key and TOML of all that is new; a part of another kind as a whole."""
+    if type(old) is not type(new):
+        yield path, serialization.inline(_table(new, named=not path.startswith("effects.")))
+        return
+    for name in type(new).model_fields:
+        before, value = getattr(old, name), getattr(new, name)
+        if before != value and isinstance(value, Spec):
+            yield from _differences(before, value, f"{path}.{name}")
+        elif before != value:
+            yield f"{path}.{name}", serialization.inline(value)
+
+
+def _table(part: Spec, named: bool = True) -> dict[str, Any]:
+    table = {name: _table(v) if isinstance(v, Spec) else v for name, v in given(part).items()}
+    return {"kind": part.kind(), **table} if named else table

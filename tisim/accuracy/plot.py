@@ -1,0 +1,123 @@
+"""Error against time, a line for each method."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from textwrap import fill
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
+
+from tisim.accuracy.row import Row, decades
+from tisim.accuracy.study import Study
+from tisim.files.atomic import replace_file
+from tisim.plotting.style import empty, plain
+
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
+"""P. Tol's bright set, and one of his light one."""
+MARKERS = "osD^vP<>X"
+WIDTH = 80
+"""Characters of a line in the legend, which a panel has room for."""
+
+
+def save(study: Study, path: Path) -> Path:
+    """The picture as a PNG file, in place of any before. RunError on a full disk."""
+    image = io.BytesIO()
+    picture(study).savefig(image, dpi=150, format="png")
+    replace_file(path, image.getvalue())
+    return path
+
+
+def picture(study: Study) -> Figure:
+    """A panel for each quantity: wall seconds across, error up, both logarithmic.
+
+    An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
+    larger. Rings are the cheapest setting for each power of ten of the error, dotted ones others that timings
+    do not tell from it. Below the shaded edge, the error of the reference itself, nothing can be told.
+    """
+    wide = len(study.quantities)
+    lines = list(dict.fromkeys(row.method for row in study.rows))
+    figure = empty(5.6 * wide + 0.4, 4.6 + 0.24 * (len(lines) + 1))
+    axes = figure.subplots(1, wide, squeeze=False)[0]
+    for k, axis in enumerate(axes):
+        _panel(axis, study, lines, k)
+    axes[0].set_ylabel("relative error")
+    if any(row.errors and not row.trusted(k) for row in study.rows for k in range(wide)):
+        axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: no more than this")
+    # Lines are in every panel, rings not.
+    named = {name: h for axis in axes for h, name in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend(
+        named.values(), named.keys(), loc="outside lower center", ncols=1 if wide == 1 else 2, frameon=False,
+        fontsize=8.5,
+    )  # fmt: skip
+    return figure
+
+
+def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
+    for at, method in enumerate(lines):
+        rows = [row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same]
+        colour, marker = COLOURS[at % len(COLOURS)], MARKERS[at % len(MARKERS)]
+        style = "-" if all(row.precision == "f64" for row in rows) else "--"
+        times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
+        axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
+        label = fill(_label(study, method), WIDTH)
+        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=label)
+        for row in rows:
+            _mark(axis, row, k, colour, marker)
+    found = list(decades(study.rows, k).values())
+    best = {row.key: row for row, *_ in found}
+    others = {row.key: row for _, *rows in found for row in rows if row.key not in best}
+    _ring(axis, list(best.values()), k, "-", "cheapest for a power of ten of the error")
+    _ring(axis, list(others.values()), k, ":", "as cheap, as far as timings tell, with more work")
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    low, high = axis.get_ylim()
+    own = study.truths[k].error if k < len(study.truths) else 0.0
+    if own > 0:
+        low = min(low, own / 4)
+        axis.axhspan(low, own, color="0.9", zorder=0)
+        axis.annotate(
+            "error of the reference", (0.99, own), (0, -3), xycoords=("axes fraction", "data"),
+            textcoords="offset points", ha="right", va="top", fontsize=8,
+        )  # fmt: skip
+    # Room for a ring on the topmost; what is far off where others are not is left out.
+    axis.set_ylim(low, min(1.2 * high, max(30.0, 30.0 * low)))
+    quantity = study.quantities[k]
+    axis.set_title(f"{quantity.name}, relative to {quantity.relative_to}", fontsize=10.5)
+    left, right = axis.get_xlim()
+    narrow = right < 300 * left
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
+    axis.xaxis.set_major_formatter(EngFormatter("s"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel(f"wall time{' of all starts' if study.random else ''}")
+    plain(axis)
+
+
+def _label(study: Study, method: str) -> str:
+    """A method, and how many of its settings have failed and why."""
+    rows = study.line(method)
+    failed = [row.failed for row in rows if row.failed]
+    if not failed:
+        return method
+    many = "" if len(failed) == len(rows) else f"{len(failed)} of {len(rows)} "
+    return f"{method}; {many}failed: {failed[0]}"
+
+
+def _ring(axis: Axes, rows: list[Row], k: int, style: str, label: str) -> None:
+    if rows:
+        axis.scatter(
+            [row.median for row in rows], [row.at_most(k) for row in rows], s=130, facecolors="none",
+            edgecolors="black", linewidths=1.1, linestyles=style, zorder=4, label=label,
+        )  # fmt: skip
+
+
+def _mark(axis: Axes, row: Row, k: int, colour: str, marker: str) -> None:
+    face = colour if row.trusted(k) else "white"
+    spread = np.array([[row.median - min(row.seconds)], [max(row.seconds) - row.median]])
+    axis.errorbar(
+        [row.median], [row.at_most(k)], xerr=spread, fmt=marker, ms=5, mfc=face, mec=colour, color=colour,
+        lw=1, zorder=3,
+    )  # fmt: skip

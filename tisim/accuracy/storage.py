@@ -1,0 +1,142 @@
+"""What a study leaves in its folder: cost.csv, cost.h5 and cost.png. Written anew as rows become known.
+
+cost.h5: group ``rows`` has one array per column, in the order of cost.csv, with ``errors`` and
+``uncertainties`` of shape (rows, quantities) and ``seconds`` (rows, repeats), NaN where there was none; group
+``truths`` has the true value of each quantity, with its own uncertainty, where it is from, and the size that
+errors are relative to. The attributes hold the scene as TOML, the settings and the versions, as in a run's
+result.h5.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tisim.accuracy.quantity import Estimate
+from tisim.accuracy.reference import Truth
+from tisim.accuracy.row import Row
+from tisim.accuracy.study import Study
+from tisim.backend import runtime
+from tisim.errors import must
+from tisim.files import checksum, lock, regular_file
+from tisim.files.atomic import replace_file
+from tisim.files.ownership import writable
+from tisim.io.run_folder import versions
+
+FORMAT = "tisim cost 2"
+CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
+NAMES = (CSV, HDF5, PICTURE, lock.LOCK)
+_TEXTS = ("method", "setting", "python", "options", "precision", "failed")
+_NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
+
+
+def write(study: Study, folder: Path) -> list[Path]:
+    """Write cost.csv and cost.h5, in place of any before; returns their paths. RunError on a full disk."""
+    writable(folder)
+    replace_file(folder / CSV, table(study).encode())
+    _write_rows(study, folder / HDF5)
+    return [folder / CSV, folder / HDF5]
+
+
+def table(study: Study) -> str:
+    """All rows as CSV, all digits."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    names = [q.name for q in study.quantities]
+    errors = [f"{what} of {name}" for name in names for what in ("error", "uncertainty")]
+    writer.writerow([*_TEXTS, *_NUMBERS, "seconds", "least seconds", "most seconds", "repeats", *errors])
+    for row in study.rows:
+        times = [row.median, min(row.seconds), max(row.seconds)] if row.seconds else [math.nan] * 3
+        found = [x for pair in row.errors for x in pair] or [math.nan] * len(errors)
+        values = [getattr(row, name) for name in (*_TEXTS, *_NUMBERS)]
+        writer.writerow([*values, *times, len(row.seconds), *found])
+    return text.getvalue()
+
+
+def _write_rows(study: Study, path: Path) -> None:
+    with checksum.created(path) as file:
+        file.attrs.update({
+            "format": FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
+            "settings": json.dumps(_settings(study)), "versions": json.dumps(versions()),
+            "complete": json.dumps(study.asked() if study.complete else None),
+        })  # fmt: skip
+        rows = file.create_group("rows")
+        for name in _TEXTS:
+            rows[name] = np.array([getattr(row, name) for row in study.rows], dtype=h5py.string_dtype())
+        for name, kind in _NUMBERS.items():
+            rows[name] = np.array([getattr(row, name) for row in study.rows], dtype=kind)
+        rows["seconds"] = _padded([row.seconds for row in study.rows])
+        quantities = len(study.quantities)
+        pairs = np.full((len(study.rows), quantities, 2), np.nan)
+        for k, row in enumerate(study.rows):
+            if row.errors:
+                pairs[k] = row.errors
+        rows["errors"], rows["uncertainties"] = pairs[..., 0], pairs[..., 1]
+        truths = file.create_group("truths")
+        for quantity, truth in zip(study.quantities, study.truths, strict=False):
+            value = truths.create_dataset(quantity.name, data=truth.estimate.value)
+            value.attrs.update({
+                "uncertainty": truth.estimate.uncertainty, "source": truth.source, "size": truth.size,
+                "errors are relative to": quantity.relative_to,
+            })  # fmt: skip
+
+
+def _settings(study: Study) -> dict[str, Any]:
+    where = runtime.current()
+    return {"device": where.device, "threads": where.threads, "precisions": list(study.precisions)}
+
+
+def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
+    values = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
+    for k, row in enumerate(rows):
+        values[k, : len(row)] = row
+    return values
+
+
+def resume(study: Study, folder: Path) -> None:
+    """Give a study the rows and truths that an earlier one of the same scene has left in a folder.
+
+    InputError when what is there is of another one; nothing happens where nothing is.
+    """
+    path = folder / HDF5
+    if not regular_file.exists(path):
+        return
+    with checksum.opened(path, f"output folder's {HDF5}", FORMAT) as file:
+        same = json.loads(file.attrs["identity"]) == study.identity()
+        rule = "without the study of another scene, version, machine or depth (or give --overwrite)"
+        must(same, "output folder", rule, str(folder))
+        study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
+        study.complete = file.attrs["complete"] == json.dumps(study.asked())
+
+
+def _rows(group: Any) -> list[Row]:
+    columns: dict[str, list[Any]] = {name: list(group[name].asstr()) for name in _TEXTS}
+    columns |= {name: [kind(value) for value in group[name]] for name, kind in _NUMBERS.items()}
+    columns["seconds"] = [tuple(map(float, times[~np.isnan(times)])) for times in group["seconds"][:]]
+    columns["errors"] = [
+        () if np.isnan(error).all() else tuple(zip(map(float, error), map(float, off), strict=True))
+        for error, off in zip(group["errors"][:], group["uncertainties"][:], strict=True)
+    ]
+    make: Callable[..., Row] = Row
+    return [make(**dict(zip(columns, values, strict=True))) for values in zip(*columns.values(), strict=True)]
+
+
+def _truths(group: Any, study: Study) -> tuple[Truth, ...]:
+    if not len(group):
+        return ()
+    return tuple(
+        Truth(
+            Estimate(group[q.name][()], float(group[q.name].attrs["uncertainty"])),
+            str(group[q.name].attrs["source"]),
+            float(group[q.name].attrs["size"]),
+        )
+        for q in study.quantities
+    )

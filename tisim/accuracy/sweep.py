@@ -1,0 +1,209 @@
+"""Every way to run a scene that trades accuracy for time: found from what its parts say of themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tisim import steppers
+from tisim.accuracy.formatting import given
+from tisim.components import serialization
+from tisim.components.accuracy_parameter import Knob
+from tisim.components.component import Spec, unit_of
+from tisim.errors import InputError
+from tisim.scene.scene import Scene
+from tisim.steppers.base import Stepper
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to run a scene: the scene with it, in words, precision, and number of random starts."""
+
+    scene: Scene
+    words: str
+    precision: str = "f64"
+    starts: int = 1
+
+
+@dataclass(frozen=True)
+class Method:
+    """A line in the picture: settings of one kind, the cheapest first.
+
+    weights : guesses of how their times go. knob : the one that is turned, of the part at ``path``; None for
+    a list of laws or of numbers of starts. exact : method and setting that such laws differ from in the law
+    only; None for all else.
+    """
+
+    name: str
+    settings: tuple[Setting, ...]
+    weights: tuple[float, ...]
+    base: Scene
+    path: str = ""
+    knob: Knob | None = None
+    exact: tuple[str, str] | None = None
+
+    @property
+    def converges(self) -> bool:
+        """Whether the error of the stepper vanishes along this line."""
+        return self.knob is not None and self.knob.converges and self.path.startswith("stepper")
+
+    def at(self, decades: float) -> Scene:
+        """The scene with the knob turned to an error so many decades larger than at its base."""
+        assert self.knob is not None
+        return turned(self.base, self.path, self.knob, decades)
+
+
+def parts(scene: Scene) -> Iterator[tuple[str, Spec]]:
+    """Every part of a scene with its dotted place, as in its TOML file."""
+    for effect in scene.effects:
+        yield from _within(f"effects.{effect.kind()}", effect)
+    for name in ("particles", "domain", "stepper"):
+        yield from _within(name, getattr(scene, name))
+
+
+def _within(path: str, part: Spec) -> Iterator[tuple[str, Spec]]:
+    yield path, part
+    for name in type(part).model_fields:
+        if isinstance(inner := getattr(part, name), Spec):
+            yield from _within(f"{path}.{name}", inner)
+
+
+def exchanged(scene: Scene, path: str, part: Spec) -> Scene:
+    """A copy of a scene with another part in this place."""
+    first, *rest = path.split(".")
+    if first == "effects":
+        own = next(effect for effect in scene.effects if effect.kind() == rest[0])
+        new = _put(own, rest[1:], part)
+        listed = tuple(new if effect is own else effect for effect in scene.effects)
+        return scene.model_copy(update={"effects": listed})
+    return scene.model_copy(update={first: _put(getattr(scene, first), rest, part)})
+
+
+def _put(part: Any, path: Sequence[str], new: Spec) -> Any:
+    if not path:
+        return new
+    return part.model_copy(update={path[0]: _put(getattr(part, path[0]), path[1:], new)})
+
+
+def turned(scene: Scene, path: str, knob: Knob, decades: float) -> Scene:
+    """A copy with a knob of the part at ``path`` turned; InputError where the part refuses."""
+    return exchanged(scene, path, knob.turned(dict(parts(scene))[path], decades))
+
+
+def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
+    """A copy whose steps are at most this long (s). Settings of a step control in s are lengths of steps."""
+    control = scene.stepper.control
+    lengths = [name for name, info in type(control).model_fields.items() if unit_of(info) == "s"]
+    shorter = {name: min(getattr(control, name), longest) for name in lengths}
+    return exchanged(scene, "stepper.control", control.model_copy(update=shorter))
+
+
+def finest(scene: Scene, decades: float) -> Scene:
+    """A copy with every knob of its effects turned, so that they cannot hide the error of the stepper."""
+    for path, part in list(parts(scene)):
+        for knob in part.knobs:
+            if knob.converges and not path.startswith("stepper"):
+                scene = turned(scene, path, knob, decades)
+    return scene
+
+
+def methods(
+    scene: Scene, dt: float, extent: float, levels: Sequence[float], precisions: Sequence[str], starts: int
+) -> list[Method]:
+    """All methods for a scene with steps of about dt (s) and particles up to ``extent`` (m) apart.
+
+    levels : decades of error, relative to what the scene asks for, at which knobs are turned to. The first
+    method is the scene's own stepper. starts : random starts of each run.
+    """
+    found = []
+    own = sorted(parts(scene), key=lambda item: not item[0].startswith("stepper"))
+    for path, part in own:
+        found += [_turning(scene, path, knob, levels, "f64", starts) for knob in part.knobs]
+    if found:
+        first = found[0]
+        for precision in precisions:
+            if precision != "f64" and first.knob:
+                found.append(_turning(scene, first.path, first.knob, levels, precision, starts))
+    for effect in scene.effects:
+        laws = effect.approximations(extent)
+        if laws:
+            # As accurate otherwise as anything here, so that what is seen is the error of the law.
+            accurate = found[0].settings[-1] if found else Setting(scene, "")
+            exact = (found[0].name, accurate.words) if found else None
+            found.append(_laws(accurate.scene, effect.kind(), laws, starts, exact))
+    for stepper in _steppers(scene, dt):
+        other = exchanged(scene, "stepper", stepper)
+        for path, part in _within("stepper", stepper):
+            found += [_turning(other, path, k, levels, "f64", starts) for k in part.knobs if k.converges]
+    return [method for method in found if method.settings]
+
+
+def ensembles(scene: Scene, sizes: Sequence[int]) -> Method:
+    """The scene as it is, from more and more random starts."""
+    settings = tuple(Setting(scene, f"{n} starts", starts=n) for n in sizes)
+    return Method("random starts", settings, tuple(n / sizes[0] for n in sizes), scene)
+
+
+def _steppers(scene: Scene, dt: float) -> list[Stepper]:
+    """Steppers that suit the scene, other than its own."""
+    serialization.load(steppers)
+    asked = {_kind(scene.stepper)}
+    found = []
+    for stepper in scene.stepper.rivals(scene.effects, dt):
+        if type(stepper.control) is type(scene.stepper.control):
+            stepper = stepper.model_copy(update={"control": scene.stepper.control})
+        if _kind(stepper) not in asked:
+            asked.add(_kind(stepper))
+            found.append(stepper)
+    return found
+
+
+def _kind(stepper: Stepper) -> tuple[Any, ...]:
+    """What makes it another method, whatever its step control is set to."""
+    return type(stepper), type(stepper.control), stepper.structure(), tuple(stepper.values())
+
+
+def _turning(
+    scene: Scene, path: str, knob: Knob, levels: Sequence[float], precision: str, starts: int
+) -> Method:
+    settings, weights = [], []
+    for decades in levels:
+        try:
+            changed = turned(scene, path, knob, decades)
+        except InputError:
+            continue  # The part cannot be set so: a shortest step above the longest, for one.
+        part = dict(parts(changed))[path]
+        words = ", ".join(f"{name}={getattr(part, name):.3g}" for name in knob.orders)
+        settings.append(Setting(changed, words, precision, starts))
+        weights.append(10.0 ** (-decades / scene.stepper.order) if path.startswith("stepper") else 1.0)
+    name = f"{_title(scene, path)}: {', '.join(knob.orders)}"
+    name += "" if precision == "f64" else f", {precision}"
+    return Method(name, tuple(settings), tuple(weights), scene, path, knob)
+
+
+def _laws(
+    scene: Scene, kind: str, laws: Sequence[Spec], starts: int, exact: tuple[str, str] | None
+) -> Method:
+    own = next(effect for effect in scene.effects if effect.kind() == kind)
+    settings = []
+    for law in laws:
+        differ = [
+            f"{name}={getattr(law, name)}"
+            for name in type(law).model_fields
+            if getattr(own, name, None) != getattr(law, name)
+        ]
+        words = ", ".join(differ) or type(law).__name__
+        settings.append(Setting(exchanged(scene, f"effects.{kind}", law), words, starts=starts))
+    name = type(laws[0]).__name__
+    return Method(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
+
+
+def _title(scene: Scene, path: str) -> str:
+    if not path.startswith("stepper"):
+        return path.removeprefix("effects.")
+    # What any such stepper must be told, such as what fluid it is in, is no matter of method.
+    stepper, told = scene.stepper, type(scene.stepper).model_fields
+    chosen = [f"{k}={v!r}" for k, v in given(stepper).items() if k != "control" and not told[k].is_required()]
+    name = type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else "")
+    return f"{name}, {type(stepper.control).__name__}"

@@ -1,0 +1,146 @@
+"""Runs that are timed: compiled first, and again and again without."""
+
+from __future__ import annotations
+
+import math
+import time
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tisim.backend import memory
+from tisim.engine.batches import Progress
+from tisim.engine.result import Result
+from tisim.engine.simulation import Simulation
+from tisim.errors import RunError
+from tisim.scene.scene import Scene
+
+Look = Callable[[Result], None]
+LOOKS = 127
+"""Looks at a run on its way. A prime number: of a motion of any whole number of periods, but for multiples of
+it, no two looks are at the same part of the period."""
+ROOM = 40
+"""Trees of fields that must be free before a simulation is made, which takes two to some ten."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Results of a run of one or more starts, and the wall seconds of all, without set-up and compilation."""
+
+    results: list[Result]
+    seconds: float
+
+    @property
+    def work(self) -> tuple[float, float, float]:
+        """Steps, sums of forces and rejections, per particle and start."""
+        steps, sums, rejections = 0.0, 0.0, 0.0
+        for result in self.results:
+            n, stepper = len(result.start["mass"]), result.scene.stepper
+            alone, evaluations = stepper.independent(result.scene.effects), stepper.evaluations
+            steps += result.work["particle_steps"] / n
+            sums += evaluations(result.work, n, alone)
+            # A rejection is of those that a sum of forces is of: of one particle, or of all.
+            rejections += evaluations(dict.fromkeys(result.work, result.work.get("rejections", 0)), n, alone)
+        starts = len(self.results)
+        return steps / starts, sums / starts, rejections / starts
+
+
+def watched(simulation: Simulation, look: Look) -> None:
+    """Let the first world wait ``LOOKS`` times on its way, and look at its state there."""
+    times = np.append(simulation.scenes[0].duration / LOOKS * np.arange(LOOKS + 1), np.inf)
+    due = 0.0
+
+    def arrived() -> None:
+        nonlocal due
+        (result,) = simulation.results([0])
+        if result.time >= due:
+            look(result)
+            # Later than now by all means: a world that waits for what has been would wait for ever.
+            due = float(times[np.searchsorted(times, result.time, side="right")])
+            hold = simulation.s.read("hold")
+            hold[0] = due
+            simulation.s.write("hold", hold)
+
+    simulation.look = arrived
+    arrived()
+
+
+class Bench:
+    """Compiled simulations, one for each structure and number of worlds: idle worlds would be timed too.
+
+    They are kept for as long as there is room for another. Those that were not used for longest go first.
+    """
+
+    def __init__(self) -> None:
+        self.made: dict[Any, Simulation] = {}
+        self.warm: weakref.WeakSet[Simulation] = weakref.WeakSet()
+
+    def ready(self, scene: Scene, worlds: int) -> Simulation:
+        """Compiled for a scene of this structure and size."""
+        key = scene.structure(), worlds, scene.capacity()
+        found = self.made.pop(key, None)
+        if found is None:
+            while self.made and len(memory.in_use()) > memory.MOST - ROOM:
+                self.made.pop(next(iter(self.made))).close()
+            found = Simulation(scene, worlds)
+        self.made[key] = found
+        return found
+
+    def run(
+        self, scenes: Sequence[Scene], progress: Progress | None = None, look: Look | None = None
+    ) -> Timed:
+        """RunError, with the reason, when one of them fails.
+
+        progress : called about four times a second, first when all is compiled and the run begins. look :
+        given the first scene's state about ``LOOKS`` times, evenly in its simulated time.
+        """
+        simulation = self.ready(scenes[0], len(scenes))
+        simulation.load(scenes)
+        if simulation not in self.warm:
+            # What is only compiled when it is first used: steps, and all that looks at them.
+            simulation.run(steps=1)
+            simulation.results()
+            simulation.load(scenes)
+            self.warm.add(simulation)
+        if progress:
+            progress(0.0)
+        if look:
+            watched(simulation, look)
+        simulation.run(progress)
+        results = simulation.results()
+        for result in results:
+            if not result.status.ok:
+                raise RunError(result.status.reason)
+        return Timed(results, simulation.wall_s)
+
+    def close(self) -> None:
+        """Give the memory back."""
+        for simulation in self.made.values():
+            simulation.close()
+        self.made.clear()
+        self.warm.clear()
+
+
+class OutOfTime(Exception):
+    """A run was stopped because it took too long."""
+
+
+class Limit:
+    """Progress that stops a run with OutOfTime, so many seconds after it has first been called."""
+
+    def __init__(self, seconds: float, then: Progress) -> None:
+        self.seconds, self.then, self.began = seconds, then, math.inf
+
+    def __call__(self, fraction: float) -> None:
+        self.began = min(self.began, time.monotonic())
+        if fraction < 1.0 and self.spent > self.seconds:
+            raise OutOfTime
+        self.then(fraction)
+
+    @property
+    def spent(self) -> float:
+        """Seconds since the first call; 0 before."""
+        return max(0.0, time.monotonic() - self.began)

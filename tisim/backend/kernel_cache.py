@@ -1,0 +1,77 @@
+"""The compiled kernels that Taichi keeps on disk for the next process.
+
+Taichi 1.7.4 and Quadrants 1.3.3 read them with the first that they compile, and write them when they stop: at
+the end of a process, not when it is killed. Meanwhile they lock them by a file. Another process waits a
+quarter of a second for it, then warns, and compiles all or keeps nothing; a process that is killed meanwhile
+leaves the file behind. Processes of tisim wait for each other here instead.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+from tisim.backend.taichi import BACKEND, ti
+from tisim.errors import InputError, RunError
+from tisim.files.atomic import locked
+
+STALE = 60.0
+"""s, longer than any process holds a lock."""
+LOCKS = {
+    "taichi": ("TI_OFFLINE_CACHE_FILE_PATH", "ticache.lock"),
+    "quadrants": ("QD_OFFLINE_CACHE_FILE_PATH", "kernel_compilation_manager/qdcache.lock"),
+}
+"""The variable that names another folder, and the lock in it."""
+QUEUE = "tisim.files.lock"
+"""The file that processes of tisim queue at, in the same folder: the system frees it when one dies."""
+
+
+def lock() -> Path:
+    """Where Taichi's lock is, when it is held."""
+    variable, name = LOCKS[BACKEND]
+    return Path(os.environ.get(variable) or ti.lang.impl.default_cfg().offline_cache_file_path) / name
+
+
+def options() -> dict[str, str]:
+    """What the compiler is to be told of the folder for kernels: nothing, or another one.
+
+    It stops where it may not look into its folder. A process that may not gets one of its own, which goes
+    with it.
+    """
+    folder = lock().parent
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+            return {}
+    return {"offline_cache_file_path": _own().name}
+
+
+@cache
+def _own() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="tisim-kernels-")
+
+
+def unlock() -> None:
+    """Remove a lock that has been left behind. No error where that is not allowed: kernels are compiled."""
+    with suppress(OSError):
+        if time.time() - lock().stat().st_mtime > STALE:
+            lock().unlink()
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """While this lasts, no other process of tisim reads or writes the kernels on disk.
+
+    Where the folder cannot be written, or the system has no locks, there is no waiting.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError, InputError, RunError):
+            lock().parent.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(locked(lock().with_name(QUEUE), exclusive=True))
+        unlock()
+        yield

@@ -1,0 +1,115 @@
+"""Device memory: fields that are made together, and go together."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections import Counter, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.errors import RunError
+
+MOST = 480
+"""Trees of fields that may be in use at once; with more than 512, Taichi 1.7.4 and Quadrants 1.3.3 crash."""
+
+WORN = 300
+"""Trees that may be made before Taichi is started anew: it never gives back the memory of compiled kernels,
+some hundred kB to each tree, and takes longer to compile the more there are."""
+
+_made: Counter[int] = Counter()
+"""Trees that have been made, by the start of Taichi."""
+_collecting: list[list[Tree]] = []
+_live: weakref.WeakSet[Tree] = weakref.WeakSet()
+_lost: deque[tuple[Any, int]] = deque()
+"""Trees whose owner has been forgotten without ``destroy``, each with the start of Taichi it belongs to. A
+list, as the garbage collector may come at any time and in any thread."""
+
+
+class Tree:
+    """Fields that have been placed in one builder, in device memory from now on.
+
+    RunError where too many are in use.
+    """
+
+    @in_taichi_thread
+    def __init__(self, builder: Any) -> None:
+        # Whatever comes next: a builder that has not been finalised is a fault of every later kernel.
+        tree = builder.finalize()
+        self.generation = runtime.generation()
+        self._forget = weakref.finalize(self, _lost.append, (tree, self.generation))
+        self._forget.atexit = False
+        _live.add(self)
+        for trees in _collecting:
+            trees.append(self)
+        _made[self.generation] += 1
+        _release_lost()
+        if len(in_use()) > MOST:
+            self.destroy()
+            raise RunError(f"at most {MOST} sets of fields can be in use at once; close a Simulation first")
+
+    @property
+    def alive(self) -> bool:
+        """Whether the memory is there: not destroyed, nor gone with a Taichi that has been started anew."""
+        return self._forget.alive and self.generation == runtime.generation()
+
+    @in_taichi_thread
+    def destroy(self) -> None:
+        """Give the memory back. Nothing is done where it has gone already."""
+        self._forget()
+        _release_lost()
+
+
+def in_use() -> set[Tree]:
+    """All trees whose memory is there."""
+    return {tree for tree in _live if tree.alive}
+
+
+@contextmanager
+def collected() -> Iterator[list[Tree]]:
+    """The trees that are made meanwhile, in a list; where anything is raised, they are gone."""
+    trees: list[Tree] = []
+    _collecting.append(trees)
+    try:
+        yield trees
+    except BaseException:
+        for tree in trees:
+            tree.destroy()
+        raise
+    finally:
+        _collecting.pop()
+
+
+def made() -> int:
+    """Trees that have been made in this process."""
+    return _made.total()
+
+
+def worn() -> bool:
+    """Whether so many trees have been made that Taichi should be started anew."""
+    return _made[runtime.generation()] >= WORN
+
+
+@in_taichi_thread
+def renew() -> None:
+    """Start Taichi anew, unless a tree is in use."""
+    if not in_use():
+        # What has been forgotten, but not yet collected, would keep alive all that this is to give back.
+        gc.collect()
+        runtime.restart()
+
+
+def _release_lost() -> None:
+    """Destroy what has been forgotten."""
+    while _lost:
+        tree, generation = _lost.popleft()
+        if generation == runtime.generation():
+            # Taichi must have seen fields that no kernel has used before they go, or it stumbles over them.
+            ti.sync()
+            # Not tree.destroy(), which has every kernel of all other trees compiled again, too.
+            tree.ptr.destroy_snode_tree(tree.prog)
+            tree.destroyed = True

@@ -1,0 +1,148 @@
+"""The one place that starts Taichi: device, precision and threads. Nothing starts it at import."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import io
+import os
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+from tisim.backend import kernel_cache
+from tisim.backend.taichi import BACKEND, check_backend, ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.errors import InputError, must
+
+DEVICES = ("cpu", "cuda")
+PRECISIONS = ("f64", "f32")
+THREADS = 1024
+"""The most threads that Taichi is asked for; it makes them all, whether there are cores for them or not."""
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """Where and how kernels run.
+
+    device : "cpu" or "cuda".
+    precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
+        Time is f64 whatever the precision.
+    threads : CPU threads, >= 1.
+
+    Floating point is strict (no fast-math): a NaN stays visible, and the same scene gives the same bits.
+    """
+
+    device: str = "cpu"
+    precision: str = "f64"
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        check_backend()
+        must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
+        must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
+        must(self.threads >= 0, "threads", "at least 1 (0 for all cores)", self.threads)
+        must(self.threads <= THREADS, "threads", f"at most {THREADS}", self.threads)
+
+    @property
+    def real(self) -> Any:
+        """The Taichi type of a particle quantity."""
+        return ti.f64 if self.precision == "f64" else ti.f32
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """What decides the last bits of a result beside the scene: precision and kind of device."""
+        return {"precision": self.precision, "device": self.device}
+
+
+turn = threading.RLock()
+"""Held while scenes are run by ``tisim.run``, and while settings change: calls of several threads take turns,
+and one that is made from within another, such as from its progress, goes ahead."""
+
+_current: Runtime | None = None
+_generation = 0
+
+
+def cores() -> int:
+    """CPU cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def memory() -> int:
+    """Memory of this machine, bytes."""
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
+def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
+    """Start Taichi with these settings, or keep it as it is when they have not changed.
+
+    threads : CPU threads; 0 for all cores.
+    Raises InputError when a setting is unknown or the device is absent. A change of settings
+    invalidates every Simulation made before; those say so when used.
+    """
+    wanted = Runtime(device, precision, threads or cores())
+    if wanted == _current:
+        return wanted
+    with turn:
+        _start(wanted)
+    return wanted
+
+
+@in_taichi_thread
+def _start(wanted: Runtime) -> None:
+    global _current, _generation
+    if not _generation:
+        atexit.register(_stop)
+    # Whether it starts or not, what ran before has stopped.
+    _current, _generation = None, _generation + 1
+    try:
+        # Taichi announces the device on standard output, where results go.
+        with kernel_cache.alone(), contextlib.redirect_stdout(io.StringIO()):
+            ti.init(
+                arch=ti.cuda if wanted.device == "cuda" else ti.cpu,
+                default_fp=wanted.real,
+                cpu_max_num_threads=wanted.threads,
+                fast_math=False,
+                enable_fallback=False,
+                # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
+                # times as long to compile; LLVM optimises the same code afterwards.
+                cfg_optimization=False,
+                **kernel_cache.options(),
+            )
+            _compile_first()
+    except RuntimeError as failure:
+        raise InputError(
+            f"device must be present on this machine; received {wanted.device!r} ({failure})"
+        ) from failure
+    _current = wanted
+
+
+@ti.kernel
+def _compile_first():
+    """Nothing: with the first kernel that it compiles, Taichi reads those on the disk."""
+
+
+def _stop() -> None:
+    """Stop Taichi at the end of the process, which has it write down what it has compiled."""
+    with kernel_cache.alone():
+        ti.reset()
+
+
+def restart() -> None:
+    """Start Taichi anew with the same settings: whatever was compiled or stored is gone, and its memory."""
+    _start(current())
+
+
+def current() -> Runtime:
+    """The running settings; starts the defaults (cpu, f64, all cores) on first use."""
+    return _current or start()
+
+
+def generation() -> int:
+    """Counts the starts: compiled objects of an earlier generation must not be touched."""
+    return _generation
+
+
+def backend() -> str:
+    """Name and version of the kernel compiler."""
+    return f"{BACKEND} {'.'.join(str(part) for part in ti.__version__[:3])}"

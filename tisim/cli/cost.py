@@ -1,0 +1,144 @@
+"""The command ``tisim cost``: what accuracy costs in time."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tisim.backend import runtime
+from tisim.cli import scene_arguments
+from tisim.cli.options import Changes, Device, Out, Overwrite, Seed, Size, Target, Threads
+from tisim.console import err, out, progress_bar, stopping
+from tisim.errors import must
+from tisim.files import lock, ownership
+from tisim.interrupt import Interrupt
+
+if TYPE_CHECKING:
+    from tisim.accuracy import Quantity, Study
+    from tisim.scene.scene import Scene
+
+Absent = Annotated[
+    list[str] | None, typer.Option("--without", metavar="EFFECT", help="Leave an effect out. Repeatable.")
+]
+
+
+def cost(
+    target: Target,
+    error: Annotated[
+        float | None, typer.Option(help="Print the cheapest settings with an error of at most this.")
+    ] = None,
+    quantity: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="What --error is of; first of the table by default."),
+    ] = None,
+    size: Size = None,
+    seed: Seed = None,
+    absent: Absent = None,
+    changes: Changes = None,
+    folder: Out = None,
+    coarser: Annotated[
+        int | None,
+        typer.Option(
+            min=-16, max=16, help="Decades of error to go above what the scene asks for; 3 by default."
+        ),
+    ] = None,
+    finer: Annotated[
+        int | None, typer.Option(min=-16, max=16, help="Decades of error to go below it; 0 by default.")
+    ] = None,
+    repeats: Annotated[int | None, typer.Option(max=1000, help="Of every timing; 3 by default.")] = None,
+    starts: Annotated[
+        str | None, typer.Option(metavar="N,N,...", help="Numbers of random starts to try: 8,32,128.")
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A look: stop a decade above what the scene asks for, time once.")
+    ] = False,
+    budget: Annotated[
+        float, typer.Option(metavar="MINUTES", help="Leave out what would run longer; compiling is free.")
+    ] = math.inf,
+    single: Annotated[bool, typer.Option("--f32/--no-f32", help="Also run in single precision.")] = True,
+    device: Device = "cpu",
+    threads: Threads = 0,
+    overwrite: Overwrite = False,
+) -> None:
+    """Measure error against time for every setting of a scene; write cost.csv, cost.h5 and cost.png.
+
+    Giving the same command again goes on with what an earlier one has left, and answers --error from it.
+    """
+    from tisim.accuracy import Study, storage, table
+    from tisim.accuracy.plot import save
+
+    must(error is None or error > 0, "--error", "greater than 0", error)
+    runtime.start(device, "f64", threads)
+    name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
+    study = Study(
+        scene,
+        _quantities(target, scene),
+        coarser=3 if coarser is None else coarser,
+        finer=(-1 if quick else 0) if finer is None else finer,
+        repeats=(1 if quick else 3) if repeats is None else repeats,
+        precisions=("f64", "f32") if single else ("f64",),
+        starts=((4, 16, 64) if quick else (8, 32, 128)) if starts is None else _numbers(starts),
+        budget=60 * budget,
+    )
+    which = study.index(quantity)
+    place = folder or Path("out") / f"{name}-cost"
+    ownership.take(place, storage.NAMES, overwrite)
+    with lock.held(place):
+        if not overwrite:
+            storage.resume(study, place)
+        done = _measure(study, place)
+        if study.truths and study.rows:
+            out().print(table.table(study))
+            written = [*storage.write(study, place), save(study, place / storage.PICTURE)]
+            out().print("\n".join([*table.sources(study), *map(str, written)]))
+    if not done:
+        err().print(
+            f"stopped; {place / storage.HDF5} has what is done. To go on, give the same command again."
+        )
+        raise typer.Exit(130)
+    if error is not None:
+        row = study.cheapest(error, quantity)
+        words = f"{target} --size {size}" if size else target
+        print(f"cheapest with an error of at most {error:g}:\n{table.recipe(row, words, which)}")
+
+
+def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:
+    """What the case compares; nothing for a file."""
+    from cases.case import every
+
+    case = every().get(target)
+    return case.quantities(scene) if case and case.quantities else ()
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    must(
+        all(part.isdecimal() and len(part) < 10 for part in parts),
+        "--starts",
+        "whole numbers with commas between",
+        text,
+    )
+    return tuple(map(int, parts))
+
+
+def _measure(study: Study, place: Path) -> bool:
+    """Run behind a bar, with rows on the disk as they come; False when Ctrl-C has stopped it."""
+    from tisim.accuracy import storage
+
+    with progress_bar("", "{task.description}") as bar, Interrupt(stopping) as ctrl_c:
+        task = bar.add_task("", total=1.0)
+
+        def progress(fraction: float, what: str) -> None:
+            bar.update(task, completed=fraction, description=what[:48])
+            ctrl_c.check()
+
+        try:
+            study.run(progress, lambda: storage.write(study, place))
+        except KeyboardInterrupt:
+            if ctrl_c.forced:
+                raise
+            return False
+    return True

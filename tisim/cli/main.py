@@ -1,0 +1,267 @@
+"""The command line. Thin: a command calls what a script would call, and prints it."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from tisim import __version__
+from tisim.backend import runtime
+from tisim.backend.taichi import check_backend
+from tisim.cli import cost, inspect, scene_arguments, search
+from tisim.cli.options import (
+    CaseName,
+    Changes,
+    Device,
+    Every,
+    Frames,
+    Out,
+    Overwrite,
+    Precision,
+    Resume,
+    Seed,
+    Size,
+    Target,
+    Threads,
+)
+from tisim.console import err, out, plain_table, progress_bar, stopping
+from tisim.engine.result import Result
+from tisim.engine.simulation import Simulation
+from tisim.errors import InputError, RunError
+from tisim.files import regular_file
+from tisim.interrupt import Interrupt, exit_code, handled, stop
+
+UsageError: Any = typer.BadParameter.__base__
+"""What typer raises for words that no command knows."""
+
+Absent = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="EFFECT", help="Leave an effect out: cooling. Repeatable."),
+]
+
+app = typer.Typer(
+    help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
+    no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None,
+)  # fmt: skip
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Exit codes: 0 done; 1 a run or check failed; 2 wrong input, nothing was run; 130, 143, 129 stopped by
+    Ctrl-C, SIGTERM, SIGHUP.
+    """
+    code = 0
+    with handled(stop):
+        try:
+            check_backend()
+            code = app(arguments, prog_name="tisim", standalone_mode=False)
+            # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
+            code = exit_code() if code == 130 else code
+        except UsageError as error:
+            # Of one line; but where no command was named, this is the help.
+            print(error.format_message(), file=sys.stderr)
+            code = 2
+        except InputError as error:
+            print(error, file=sys.stderr)
+            code = 2
+        except RunError as error:
+            print(error, file=sys.stderr)
+            code = 1
+        except KeyboardInterrupt:
+            code = exit_code()
+    sys.exit(code or 0)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"tisim {__version__} ({runtime.backend()})")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def run(
+    target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
+    seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
+    threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
+    frames: Frames = None, every: Every = None,
+) -> None:  # fmt: skip
+    """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
+    from tisim.io import checkpoint, run_folder
+    from tisim.io.trajectory import asked, recorded
+
+    scene_arguments.checkpoint_seconds()
+    runtime.start(device, precision, threads)
+    name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
+    place = run_folder.Folder(folder or Path("out") / name)
+    place.check(overwrite, resume)
+    recording = asked(place.trajectory, frames, every, resume)
+    with err().status("compiling"):
+        simulation = Simulation(scene)
+        simulation.load([scene])
+    with place.taken(overwrite, resume):
+        if resume:
+            checkpoint.restore(simulation, place.checkpoint)
+        try:
+            with recorded(recording, place.trajectory, simulation, resume):
+                done = _advance(simulation, name, place.checkpoint)
+            paths = run_folder.write(simulation.results()[0], place) if done else []
+        except RunError as error:
+            raise RunError(f"{error}. {_rescued(simulation, place.checkpoint)}") from error
+        if not done:
+            checkpoint.save(simulation, place.checkpoint)
+            err().print(
+                f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
+                "To go on, give the same command with --resume."
+            )
+            raise typer.Exit(130)
+    result = simulation.results()[0]
+    paths += [place.trajectory] if recording else []
+    out().print(_summary(result, simulation.setup_s, paths))
+    if not result.status.ok:
+        raise RunError(f"run failed {result.status.reason}")
+
+
+def _advance(simulation: Simulation, name: str, path: Path) -> bool:
+    """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps.
+
+    A long run saves a checkpoint now and then, so that one that is killed can go on from the last.
+    """
+    from tisim.io import checkpoint
+
+    saved, between = time.monotonic(), scene_arguments.checkpoint_seconds()
+    with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
+        task = bar.add_task(name, total=1.0)
+
+        def progress(fraction: float) -> None:
+            nonlocal saved
+            ahead = f"{name}, {simulation.ahead():.3g} steps ahead"
+            bar.update(task, completed=fraction, description=ahead)
+            ctrl_c.check()
+            if time.monotonic() - saved > between:
+                checkpoint.save(simulation, path)
+                saved = time.monotonic()
+
+        try:
+            simulation.run(progress)
+        except KeyboardInterrupt:
+            if ctrl_c.forced:
+                raise
+            return False
+    return True
+
+
+def _rescued(simulation: Simulation, path: Path) -> str:
+    """What there is to go on from, once something could not be written: a checkpoint, where it finds room."""
+    from tisim.io import checkpoint
+
+    try:
+        checkpoint.save(simulation, path)
+    except RunError:
+        return "No checkpoint could be written either" + "; that of before is intact." * regular_file.exists(
+            path
+        )
+    return f"{path} is written. To go on, make room and give the same command with --resume."
+
+
+def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
+    counts = len(result.start["mass"]), len(result.state["mass"])
+    table = plain_table()
+    table.add_row("status", "ok" if result.status.ok else "failed")
+    table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s")
+    table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
+    for name, n in result.work.items():
+        table.add_row(name.replace("_", " "), str(n))
+    for name, value in result.measures.items():
+        table.add_row(name.replace("_", " "), f"{value:.6g}")
+    table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
+    table.add_row("written", "\n".join(map(str, paths)))
+    return table
+
+
+@app.command()
+def cases() -> None:
+    """List the cases."""
+    from cases.case import every
+
+    for case in every().values():
+        out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))
+        table = plain_table()
+        for name, size in case.sizes.items():
+            table.add_row(f"    --size {name}", size.summary)
+        if case.problem is not None:
+            for variant in case.variants:
+                problem = case.problem("default", variant)
+                table.add_row(f"    --variant {variant}", f"of tisim optimize: {problem.description}")
+        out().print(table)
+
+
+@app.command()
+def explain(
+    target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
+    size: Size = None, device: Device = "cpu", precision: Precision = "f64",
+) -> None:  # fmt: skip
+    """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
+    from tisim.engine.explain import explain, render
+
+    runtime.start(device, precision)
+    _, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
+    with err().status("compiling"):
+        explanation = explain(scene)
+    out().print(render(explanation))
+
+
+@app.command()
+def check(case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0) -> None:
+    """Run a case's own checks; exit code 1 when one fails."""
+    from cases.case import find
+
+    checks = find(case).check()
+    runtime.start(device, precision, threads)
+    table = plain_table("check", "measured", "expected", "off by", "allowed", "")
+    failed = 0
+    with err().status("checking") as status:
+        for item in checks:
+            failed += not item.ok
+            verdict = Text("pass", "green") if item.ok else Text("FAIL", "bold red")
+            table.add_row(item.name, *item.cells, verdict)
+            status.update(f"checked: {item.name}")
+    out().print(table)
+    if failed:
+        raise RunError(f"{failed} of {table.row_count} checks failed")
+
+
+@app.command()
+def doctor() -> None:
+    """Say what this machine is to tisim, and what the other backend would give."""
+    from tisim.backend.diagnostics import findings
+
+    table = plain_table()
+    with err().status("measuring"):
+        for finding in findings():
+            table.add_row(finding.name, finding.value, finding.note)
+    out().print(table)
+
+
+app.command()(cost.cost)
+app.command()(search.optimize)
+app.command()(search.compare)
+app.command()(search.cache)
+app.command()(inspect.plot)
+app.command()(inspect.figures)
+app.command()(inspect.movie)
+app.command()(inspect.export)

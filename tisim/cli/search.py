@@ -1,0 +1,170 @@
+"""The commands of inverse design: ``tisim optimize``, ``tisim compare`` and ``tisim cache``."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tisim.cli import scene_arguments
+from tisim.cli.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads, nameable
+from tisim.console import err, out, stopping
+from tisim.errors import RunError, must
+from tisim.files import ownership
+from tisim.files.atomic import replace_file
+from tisim.interrupt import Interrupt
+
+Executor = Annotated[
+    str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
+]
+SearchChanges = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
+]
+
+
+def optimize(
+    case: CaseName,
+    size: Size = None,
+    folder: Out = None,
+    seed: Seed = None,
+    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(help="genetic, restart, cma-es, nsga2 or random; for several objectives the last two."),
+    ] = None,
+    generations: Annotated[int | None, typer.Option(help="After the random start.")] = None,
+    population: Annotated[int | None, typer.Option(help="Designs per generation.")] = None,
+    target: Annotated[
+        float | None, typer.Option(help="Stop at a best value as good as this; for one objective.")
+    ] = None,
+    budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
+    budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
+    changes: SearchChanges = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh/--resume", help="Begin anew; otherwise go on with the folder's search.")
+    ] = False,
+    overwrite: Overwrite = False,
+    device: Device = "cpu",
+    precision: Precision = "f64",
+    threads: Threads = 0,
+    executor: Executor = "batch",
+) -> None:
+    """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
+    from cases.case import inverse
+    from optimize.evaluation.executors import made
+    from optimize.session import session
+    from optimize.settings import Settings, fit, followed, proposed
+    from optimize.storage.folder import FILE, clear
+
+    must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
+    problem, usual = inverse(case, size or "default", variant)
+    wishes = {
+        "seed": seed,
+        "generations": generations,
+        "options.population": population,
+        "target": target,
+        "max_evaluations": budget_evaluations,
+        "wall_clock_s": None if budget_minutes is None else 60 * budget_minutes,
+        **scene_arguments.below("search", scene_arguments.assignments(changes or ())),
+    }
+    given = {key: value for key, value in wishes.items() if value is not None}
+    settings = Settings(**scene_arguments.nested(followed(proposed(problem, usual, method), given), given))
+    fit(problem, settings)
+    place = folder or Path("out") / problem.name
+    with closing(made(executor, device, precision, threads)) as evaluator:
+        if fresh:
+            clear(place, overwrite)
+        outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
+    if outcome.interrupted:
+        err().print(f"stopped; {place / FILE} has all that is done. To go on, give the same command again.")
+        raise typer.Exit(130)
+    if not outcome.logbook:
+        raise RunError("the time was over before the first generation; to go on, give the same command again")
+    if outcome.best is None:
+        raise RunError(f"no design has run to its end; 'tisim cache {place / FILE}' says why")
+
+
+def compare(
+    case: CaseName,
+    methods: Annotated[
+        str, typer.Option(help="Names with commas between.")
+    ] = "random,genetic,restart,cma-es",
+    evaluations: Annotated[int, typer.Option(help="Runs that every search may spend.")] = 400,
+    repeats: Annotated[int, typer.Option(help="Searches of each method.")] = 5,
+    fresh_starts: Annotated[int, typer.Option(help="Starts from which each best is run again.")] = 24,
+    size: Size = None,
+    folder: Out = None,
+    variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    changes: SearchChanges = None,
+    overwrite: Overwrite = False,
+    device: Device = "cpu",
+    precision: Precision = "f64",
+    threads: Threads = 0,
+    executor: Executor = "batch",
+) -> None:
+    """Compare search methods on a case at equal numbers of runs. Given again, it goes on."""
+    from cases.case import inverse
+    from optimize.evaluation.executors import made
+    from optimize.report import comparison
+    from optimize.settings import followed
+    from optimize.storage.cache import Cache
+
+    problem, usual = inverse(case, size or "default", variant)
+    given = scene_arguments.below("search", scene_arguments.assignments(changes or ()))
+    base = scene_arguments.nested(followed(usual, given), given)
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    place = folder or Path("out") / f"compare-{problem.name}"
+    ownership.take(place, comparison.NAMES, overwrite)
+    found = []
+    with (
+        closing(made(executor, device, precision, threads)) as evaluator,
+        Cache(place / comparison.FILE) as store,
+        Interrupt(stopping) as ctrl_c,
+    ):
+        searches = comparison.compare(
+            problem, base, names, evaluations, repeats, fresh_starts, evaluator, store,
+            lambda _: ctrl_c.check(),
+        )  # fmt: skip
+        try:
+            for one in searches:
+                found.append(one)
+                line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
+                err().print(line, highlight=False, markup=False)
+        except KeyboardInterrupt:
+            done = f"stopped; {place / 'compare.h5'} has all that is done."
+            err().print(f"{done} To go on, give the same command again.")
+            raise
+    out().print(comparison.table(problem, found))
+    replace_file(place / comparison.CSV, comparison.as_csv(problem, found))
+    out().print(f"written  {place / comparison.CSV}", highlight=False, markup=False)
+
+
+def cache(
+    file: Annotated[Path, typer.Argument(help="The search.h5 of a search.", callback=nameable)],
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Check every record; exit code 1 for damage.")
+    ] = False,
+    compact: Annotated[bool, typer.Option("--compact", help="Drop what is damaged or double.")] = False,
+) -> None:
+    """List the evaluations in a search's file; verify or compact it."""
+    from optimize.storage import cache as store
+    from optimize.storage.summary import listing
+
+    if compact:
+        print(f"{store.compact(file)} evaluations kept")
+    if verify:
+        found = store.verify(file)
+        print(
+            f"{found.rows} evaluations and {found.journal} in the journal; {len(found.damaged)} damaged, "
+            f"{len(found.conflicts)} in conflict, {found.duplicates} double, {found.torn} bytes unfinished"
+        )
+        for fault in (*found.damaged, *(f"in conflict: {key}" for key in found.conflicts)):
+            print(fault, file=sys.stderr)
+        if not found.ok:
+            raise typer.Exit(1)
+    if not (compact or verify):
+        out().print(listing(file))

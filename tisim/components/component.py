@@ -1,0 +1,241 @@
+"""Validated plain data: the parts of a scene, their units, and their names in files.
+
+A ``Spec`` is a frozen pydantic model. Its name in a file is its class name in snake_case
+(``StokesDrag`` is ``stokes_drag``), found by walking subclasses: nothing is registered anywhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
+
+from tisim.backend.taichi import DEVICE_FUNCTION
+from tisim.components.accuracy_parameter import Knob
+from tisim.components.ranges import WHOLE, check_magnitude
+from tisim.errors import InputError, must, named, shown
+
+Vector = tuple[float, float, float]
+"""Three Cartesian components."""
+
+
+def _encodable(text: str) -> str:
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise PydanticCustomError("surrogate", "text that UTF-8 can hold")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_encodable)]
+"""Text that a file can hold: without halves of surrogate pairs."""
+ROWS = 32
+"""Rows that there is room for in every list."""
+
+
+class Checked(BaseModel):
+    """Plain data that is right or refused (InputError): frozen, no unknown keys, no NaN, no infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    # ``self`` by position alone: a file can have a key of that name.
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as invalid:
+            raise InputError(explain_invalid(invalid, self.kind())) from None
+
+    @classmethod
+    def kind(cls) -> str:
+        """The name of this class in files and messages: snake_case."""
+        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+
+
+class Spec(Checked):
+    """A part of a scene."""
+
+    model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
+
+    @model_validator(mode="after")
+    def _in_range(self) -> Self:
+        """Refuse magnitudes with which the arithmetic does not hold (see ranges.py)."""
+        varying = {name for name, _, _ in self.parameters()}
+        for name, info in type(self).model_fields.items():
+            value, where = getattr(self, name), f"{self.kind()}.{name}"
+            if name in varying and value is not None:
+                check_magnitude(where, unit_of(info), value)
+            elif info.annotation in (int, int | None, int | float) and not _bounded(info):
+                must(value is None or abs(value) < WHOLE, where, f"less than {WHOLE}", value)
+        return self
+
+    @classmethod
+    def named(cls, kind: Any, where: str) -> type[Self]:
+        """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
+        known = cls.known()
+        must(isinstance(kind, str) and kind in known, where, f"one of {', '.join(sorted(known))}", kind)
+        return known[kind]
+
+    @classmethod
+    def known(cls) -> dict[str, type[Self]]:
+        """Every part made after this contract that has been imported, by name; itself too if it is none."""
+        return {kind.kind(): kind for kind in (cls, *_descendants(cls)) if not kind.__dict__.get("contract")}
+
+    @classmethod
+    def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
+        """Name, declaration and number of components of each parameter that may differ per world."""
+        for name, info in cls.model_fields.items():
+            if info.annotation in (float, float | None):
+                yield name, info, 1
+            elif info.annotation == Vector:
+                yield name, info, 3
+
+    @classmethod
+    def lists(cls) -> Iterator[tuple[str, type[Spec]]]:
+        """Name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a world may
+        have any number of them."""
+        for name, info in cls.model_fields.items():
+            row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
+            if rest == [...] and isinstance(row, type) and issubclass(row, Spec):
+                yield name, row
+
+    @classmethod
+    def columns(cls) -> Iterator[tuple[str, int]]:
+        """Name and number of components of what kernels read of each world: the parameters, and what a part
+        makes of them besides."""
+        for name, _, size in cls.parameters():
+            yield name, size
+
+    def values(self) -> list[float]:
+        """The numbers of ``columns()`` in order, vectors spread out; SI units."""
+        spread: list[float] = []
+        for name, _, size in self.parameters():
+            value = getattr(self, name)
+            spread.extend(value if size == 3 else (value,))
+        return spread
+
+    def structure(self) -> tuple[Any, ...]:
+        """What is compiled in: class, every option that is not a per-world parameter, room for lists."""
+        varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
+        fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
+        return (type(self), *fixed, *((name, room(len(getattr(self, name)))) for name, _ in self.lists()))
+
+    def lookups(self) -> dict[str, np.ndarray]:
+        """Numbers that a kernel looks up, the same in every world, ``self.NAME[i, j]``; made for what is
+        compiled, so of the options that are no parameters. By name, of shape (rows, columns)."""
+        return {}
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        """Attributes to set on the bound copy, chosen among the bound effects of the scene."""
+        return {}
+
+    contract: ClassVar[bool] = False
+    """Set by a class that is no part of a scene itself, only what parts are made after."""
+    requires: ClassVar[tuple[type[Spec], ...]] = ()
+    """Effects without which this one means nothing."""
+    excludes: ClassVar[tuple[type[Spec], ...]] = ()
+    """Effects that cannot be in a scene with this one."""
+    unfit: ClassVar[tuple[type[Spec], ...]] = ()
+    """Step controls that do not see what this effect needs them to."""
+    knobs: ClassVar[tuple[Knob, ...]] = ()
+    """Settings that trade accuracy for time."""
+
+
+def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
+    for sub in cls.__subclasses__():
+        yield sub
+        yield from _descendants(sub)
+
+
+def parameter(unit: str, default: Any = ..., **rules: Any) -> Any:
+    """Declare a physical parameter: its unit, and pydantic rules such as ``gt=0``.
+
+    A float or ``Vector`` parameter may differ in every world of a batch. A kernel reads it as
+    ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile. A list of
+    parts, ``tuple[Row, ...]`` with Row a Spec of such parameters, is one bound Row there. Its parameters are
+    functions of the world and the row: ``self.rows.name(w, k)``, k below ``self.rows.size(w)``.
+    """
+    return Field(default, json_schema_extra={"unit": unit}, **rules)
+
+
+def _bounded(info: FieldInfo) -> bool:
+    """Whether the rules of a number say how large it may be."""
+    return any(hasattr(rule, "le") or hasattr(rule, "lt") for rule in info.metadata)
+
+
+def room(rows: int) -> int:
+    """Rows that a world's table has room for, so that scenes with lists of like lengths run as one batch."""
+    return max(ROWS, 1 << (rows - 1).bit_length())
+
+
+def unit_of(info: FieldInfo) -> str:
+    """The unit declared by ``parameter``, or an empty string."""
+    extra = info.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+_RULES = {
+    "greater_than": "greater than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "finite_number": "a finite number",
+    "float_parsing": "a number",
+    "float_type": "a number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number that is not so large",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "bool_parsing": "true or false",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "missing": "given",
+    "extra_forbidden": "a known key",
+    "literal_error": "{expected}",
+    "tuple_type": "a list",
+    "too_short": "a list of {min_length}",
+    "too_long": "a list of {max_length}",
+}
+
+
+FAULTS = 10
+"""Faults that a message lists, a line for each."""
+_CHOICE = re.compile(r"int|float|tuple\[.*\]")
+"""What pydantic adds to the place of a fault, for each type that would have done."""
+
+
+def explain_invalid(invalid: ValidationError, where: str) -> str:
+    """One line per fault of a pydantic report: "X must be Y; received Z"."""
+    lines: dict[str, list[str]] = {}
+    received: dict[str, str] = {}
+    for fault in invalid.errors(include_url=False):
+        loc = tuple(itertools.takewhile(lambda part: not _is_choice(part), fault["loc"]))
+        name = named(".".join([where, *map(str, loc)]))
+        context: Mapping[str, Any] = fault.get("ctx", {})
+        if isinstance(context.get("error"), InputError):
+            for line in _named_within(name, loc, str(context["error"])):
+                lines.setdefault(line, [])
+            continue
+        known = _RULES.get(fault["type"])
+        rule = known.format(**context) if known else fault["msg"].removeprefix("Input should be ")
+        lines.setdefault(name, []).append(rule)
+        received.setdefault(name, "nothing" if fault["type"] == "missing" else shown(fault["input"]))
+    text = [
+        f"{name} must be {' or '.join(dict.fromkeys(rules))}; received {received[name]}" if rules else name
+        for name, rules in lines.items()
+    ]
+    rest = f" (and {len(text) - FAULTS} faults more)" if len(text) > FAULTS else ""
+    return "\n".join(text[:FAULTS]) + rest
+
+
+def _is_choice(part: int | str) -> bool:
+    return isinstance(part, str) and _CHOICE.fullmatch(part) is not None
+
+
+def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:
+    """What a part says of itself; a row of a list, which row it is."""
+    row = bool(loc) and isinstance(loc[-1], int)
+    return [f"{name}.{line.partition('.')[2]}" if row else line for line in text.splitlines()]

@@ -1,0 +1,125 @@
+"""Parts of a scene to and from plain data, each by the name of its kind."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import pkgutil
+import re
+import tomllib
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any, TypeVar, get_args
+
+from tisim.components.component import Spec
+from tisim.errors import InputError, must, named, shown
+
+Part = TypeVar("Part", bound=Spec)
+
+
+def load(package: ModuleType) -> None:
+    """Import every module of a package, so that its effects can be found by name."""
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{package.__name__}.{module.name}")
+
+
+def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
+    """A copy of a table whose keys are text; InputError naming ``where`` for anything else."""
+    must(isinstance(data, Mapping), where, what, data)
+    for key in data:
+        must(isinstance(key, str), f"a key of {where}", "text", key)
+    return dict(data)
+
+
+def from_dict(base: type[Part], data: Any, where: str) -> Part:
+    """The part that ``data["kind"]`` names; its other keys are its parameters."""
+    values = table(data, where)
+    must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
+    kind = base.named(values.pop("kind"), f"{where}.kind")
+    listed = dict(kind.lists())
+    for name, info in kind.model_fields.items():
+        # Rows of a list are all of one kind, and need no name of it.
+        inner = None if name in listed else _part(info.annotation)
+        if name in values and inner is not None:
+            values[name] = from_dict(inner, values[name], f"{where}.{name}")
+    for name in listed.keys() & values.keys():
+        if isinstance(values[name], list | tuple):
+            values[name] = [table(row, f"{where}.{name}.{k}") for k, row in enumerate(values[name])]
+    return kind(**values)
+
+
+def _part(annotation: Any) -> type[Spec] | None:
+    """The kind of part that a field holds, also where it may hold none."""
+    kinds = [
+        t for t in (get_args(annotation) or (annotation,)) if isinstance(t, type) and issubclass(t, Spec)
+    ]
+    return kinds[0] if kinds else None
+
+
+def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:
+    """Kind and parameters of a part and of those that it is made of, without what is left at None."""
+    values = {key: value for key, value in part.model_dump(mode="json").items() if value is not None}
+    for key in values:
+        if isinstance(inner := getattr(part, key), Spec):
+            values[key] = to_dict(inner)
+    for key, _ in part.lists():
+        values[key] = [to_dict(row, named=False) for row in getattr(part, key)]
+    return {"kind": part.kind(), **values} if named else values
+
+
+def toml(data: Mapping[str, Any], path: str = "") -> str:
+    """TOML text of nested tables of numbers, text, flags and lists."""
+    tables = {key for key, value in data.items() if isinstance(value, Mapping) or _tables(value)}
+    lines = [f"{_key(key)} = {inline(value)}" for key, value in data.items() if key not in tables]
+    text = "\n".join(lines) + "\n" if lines else ""
+    for key, value in data.items():
+        name = f"{path}.{_key(key)}" if path else _key(key)
+        if isinstance(value, Mapping):
+            text += f"\n[{name}]\n{toml(value, name).lstrip()}"
+        elif key in tables:
+            text += "".join(f"\n[[{name}]]\n{toml(row, name).lstrip()}" for row in value)
+    return text
+
+
+def _tables(value: Any) -> bool:
+    """Whether it is a list of tables."""
+    return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
+
+
+def inline(value: Any) -> str:
+    """A value as TOML on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(key)} = {inline(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(inline(item) for item in value) + "]"
+    # TOML has the strings of JSON, but no pairs of surrogates, and DEL must be escaped too.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    """A key of a table: in quotes unless all of it is letters of ASCII, digits, - and _."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else inline(name)
+
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_DEEP = re.compile(rf"""(?<![\w."'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{64}}""")
+"""A dotted key of more parts than any scene has."""
+
+
+def parse(text: str) -> dict[str, Any]:
+    """The table that TOML text holds; ValueError or RecursionError where it cannot be read."""
+    # tomllib takes a time that grows as the square of the parts of a key: minutes for some ten thousand.
+    if _DEEP.search(text):
+        raise RecursionError("a key of too many parts")
+    return tomllib.loads(text)
+
+
+def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
+    """The table that TOML text holds; InputError naming ``what`` and ``source`` where it is not TOML."""
+    try:
+        return parse(text)
+    except RecursionError:
+        raise InputError(f"{what} must be less deeply nested; received {shown(source)}") from None
+    except ValueError as fault:
+        # Not of the format, or a number of more digits than Python reads.
+        raise InputError(f"{what} must be TOML; received {shown(source)} ({named(str(fault))})") from None

@@ -1,0 +1,33 @@
+"""Loss in contact along the line of centres (Z16 Eq. 7.10)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import PairForce, parameter
+from tisim.effects.contact.normal import NormalContact, area
+
+
+class ContactDissipation(PairForce):
+    """F_i = c_cd (v_jn - v_in) A: a dashpot along n_ij, by the contact area.
+
+    damping : c_cd. As in the paper it also holds back grains that part: the sum of contact and dissipation
+    can pull just before they separate.
+    Source: Z16 Eq. (7.10).
+    """
+
+    short_ranged: ClassVar[bool] = True
+    needs = ("radius", "velocity")
+    requires: ClassVar = (NormalContact,)
+
+    damping: float = parameter("N s/m^3", ge=0)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        total = 0.0 * separation
+        if distance <= s.radius[w, i] + s.radius[w, j]:
+            n = separation / distance
+            opening = (s.velocity[w, j] - s.velocity[w, i]).dot(n)
+            total = self.damping(w) * opening * area(s, w, i, j, distance) * n
+        return total

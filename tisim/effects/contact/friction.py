@@ -1,0 +1,53 @@
+"""Regularised friction of touching grains that spin (Z16 section 7.4)."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import parameter
+from tisim.effects.contact.normal import NormalContact, area, slip
+from tisim.effects.contact.surface import SurfaceContact
+from tisim.errors import must
+
+
+class ContactFriction(SurfaceContact):
+    """Stick, F_i = K_f A dt u, while that is below mu_s |F_n|; else slip, F_i = mu_d |F_n| u / |u|.
+
+    stiffness : K_f. static, dynamic : mu_s and mu_d <= mu_s.
+
+    u is the velocity of the surface of j past that of i at their point of contact, spin included; |F_n| is
+    how hard contact presses, without dissipation (the paper has con,n here, con,c in 7.5, con,d in 7.10).
+
+    Stick carries the time step dt: it is a viscous regularisation, the spring K_f A of what has slid in one
+    step, without memory of the steps before. As dt -> 0 it does not converge to sticking but vanishes, and
+    grains creep past each other. The forces of the start, before any step, have dt = 0 and no stick.
+
+    Source: Z16 Eqs (7.11)-(7.15).
+    """
+
+    stiffness: float = parameter("N/m^3", ge=0)
+    static: float = parameter("", ge=0)
+    dynamic: float = parameter("", ge=0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        must(self.dynamic <= self.static, "contact_friction.dynamic", "at most static", self.dynamic)
+        return self
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {"normal": tuple(peer for peer in peers if isinstance(peer, NormalContact))}
+
+    @ti.func
+    def surface_force(self, s, w, i, j, separation, distance):
+        pressed = 0.0 * distance
+        for contact in ti.static(self.normal):
+            pressed += contact.compression(s, w, i, j, distance)
+        u = slip(s, w, i, j, separation, distance)
+        speed, dt = u.norm(), ti.cast(s.dt[w], s.real)
+        viscosity = self.stiffness(w) * area(s, w, i, j, distance) * dt
+        if viscosity * speed > self.static(w) * pressed:
+            viscosity = self.dynamic(w) * pressed / speed
+        return viscosity * u

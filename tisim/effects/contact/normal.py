@@ -1,0 +1,82 @@
+"""What laws of contact between overlapping spheres share: the geometry of the overlap, and a contract.
+
+Two spheres touch when d <= R_i + R_j. Their surfaces meet in a circle of radius a (Z16 B.1-B.6):
+
+    delta = R_i + R_j - d                       overlap (7.4)
+    E = delta / (R_i + R_j)                     overlap strain (7.6)
+    L_i = (d - (R_j^2 - R_i^2) / d) / 2         from the centre of i to the plane of the circle (B.6)
+    A = pi a^2,  a^2 = R_i^2 - L_i^2            contact area (B.5)
+      = (2 R_i + 2 R_j - delta) delta (d^2 - (R_i - R_j)^2) / (4 d^2)
+
+The last form is the same without its cancellation at light contact. A sphere inside another meets it in no
+circle; its area, and with it every force here, is zero.
+
+The point of contact is the centre of the circle, for both. So L_i + L_j = d, the torques L_i n x F and
+L_j n x F of a force F and its reaction balance the moment of the two, and angular momentum is conserved.
+(With the radii in place of L it would not be: they add up to more than d.)
+"""
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import PairForce
+from tisim.steppers.step_control import ApproachTime
+
+
+@ti.func
+def overlap(s, w, i, j, distance):
+    """delta, m; negative when they do not touch."""
+    return s.radius[w, i] + s.radius[w, j] - distance
+
+
+@ti.func
+def strain(s, w, i, j, distance):
+    """E, where they touch."""
+    return overlap(s, w, i, j, distance) / (s.radius[w, i] + s.radius[w, j])
+
+
+@ti.func
+def area(s, w, i, j, distance):
+    """A, m^2, where they touch."""
+    delta, step = overlap(s, w, i, j, distance), s.radius[w, i] - s.radius[w, j]
+    around = (distance + s.radius[w, i] + s.radius[w, j]) * delta
+    apart = ti.max(distance * distance - step * step, 0.0)
+    return 0.25 * ti.math.pi * around * apart / (distance * distance)
+
+
+@ti.func
+def arm(s, w, i, j, distance):
+    """L_i, m."""
+    a, b = s.radius[w, i], s.radius[w, j]
+    return 0.5 * (distance + (a - b) * (a + b) / distance)
+
+
+@ti.func
+def slip(s, w, i, j, separation, distance):
+    """Velocity of the surface of j past that of i at the point of contact, spin included (7.9, 7.14). m/s."""
+    n = separation / distance
+    turn = arm(s, w, i, j, distance) * s.spin[w, i] + arm(s, w, j, i, distance) * s.spin[w, j]
+    past = s.velocity[w, j] - s.velocity[w, i] - turn.cross(n)
+    return past - past.dot(n) * n
+
+
+class NormalContact(PairForce):
+    """Spheres that touch push each other apart along the line of centres: the contract of such a law."""
+
+    contract: ClassVar[bool] = True
+    short_ranged: ClassVar[bool] = True
+    # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
+    unfit: ClassVar = (ApproachTime,)
+    needs = ("radius",)
+
+    @ti.func
+    def compression(self, s, w, i, j, distance):
+        """How hard they push where they touch, >= 0. N."""
+        return 0.0 * distance
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        total = 0.0 * separation
+        if distance <= s.radius[w, i] + s.radius[w, j]:
+            total = -self.compression(s, w, i, j, distance) / distance * separation
+        return total

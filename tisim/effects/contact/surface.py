@@ -1,0 +1,33 @@
+"""What forces at the surfaces of touching spheres share: they turn both."""
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import PairForce
+from tisim.effects.contact.normal import NormalContact, arm
+
+
+class SurfaceContact(PairForce):
+    """A force between touching spheres that acts at their point of contact, and its torque: the contract."""
+
+    contract: ClassVar[bool] = True
+    short_ranged: ClassVar[bool] = True
+    needs = ("radius", "velocity", "spin")
+    requires: ClassVar = (NormalContact,)
+
+    @ti.func
+    def surface_force(self, s, w, i, j, separation, distance):
+        """On i by j, where they touch. N."""
+        return 0.0 * separation
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        total = 0.0 * separation
+        if distance <= s.radius[w, i] + s.radius[w, j]:
+            total = self.surface_force(s, w, i, j, separation, distance)
+        return total
+
+    @ti.func
+    def pair_torque(self, s, w, i, j, separation, distance, t):
+        force = self.pair_force(s, w, i, j, separation, distance, t)
+        return arm(s, w, i, j, distance) / distance * separation.cross(force)

@@ -1,0 +1,120 @@
+"""Drag of a surrounding fluid on spheres (Z16 Eqs 3.6, 4.13 and section 4.2).
+
+All are F = g u with u = v_f - v, the velocity of the fluid as the sphere sees it: v_f is the sum of all
+sources of a flow velocity, zero without any. The fluid does not feel the spheres.
+
+The law of Chow is in pieces of the Reynolds number Re = 2 R rho_a |u| / mu:
+
+    C_D = 24 / Re               0 < Re <= 1           which is Stokes's law
+          24 / Re^0.646         1 < Re <= 400
+          0.5                   400 < Re <= 3e5
+          0.000366 Re^0.4275    3e5 < Re <= 2e6
+          0.18                  2e6 < Re
+
+It jumps at 3e5 from 0.5 to 0.080, as Z16 says, and also a little at 400 (0.5003 to 0.5) and 2e6 (0.1808 to
+0.18). Z16 prints the unit of viscosity as Pa/s; it is Pa s.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Force, parameter, sources
+
+LEAST_SPEED = 1e-30
+"""m/s. Stands for a speed of zero where a direction is needed that then has no effect."""
+
+
+class Drag(Force):
+    """F = g u, where g is a multiple of a power of |u|."""
+
+    contract: ClassVar[bool] = True
+    needs = ("radius",)
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {"flow": sources(peers, "flow_velocity")}
+
+    @ti.func
+    def resistance(self, s, w, i, speed):
+        """g (N s/m) at this |u| (m/s), and the power of |u| that it goes with."""
+        return 0.0 * speed, 0.0 * speed
+
+    @ti.func
+    def approach(self, s, w, i, t):
+        """u = v_f - v. m/s."""
+        u = -s.velocity[w, i]
+        for source in ti.static(self.flow):
+            u += source.value(w, s.position[w, i], t)
+        return u
+
+    @ti.func
+    def force(self, s, w, i, t):
+        u = self.approach(s, w, i, t)
+        g, _power = self.resistance(s, w, i, u.norm())
+        return g * u
+
+    @ti.func
+    def velocity_jacobian(self, s, w, i, t):
+        """dF/dv = -g (I + p u u^T / u^2) for g that goes with |u|^p."""
+        u = self.approach(s, w, i, t)
+        speed = u.norm()
+        g, power = self.resistance(s, w, i, speed)
+        along = (1.0 / ti.max(speed, LEAST_SPEED)) * u
+        return -g * (ti.Matrix.identity(s.real, 3) + power * along.outer_product(along))
+
+
+class ConstantDrag(Drag):
+    """F = 1/2 rho_a C_D |u| u pi R^2, u = v_f - v.
+
+    density : rho_a, of the fluid. coefficient : C_D. Source: Z16 Eq. (3.6).
+    """
+
+    density: float = parameter("kg/m^3", gt=0)
+    coefficient: float = parameter("", ge=0)
+
+    @ti.func
+    def resistance(self, s, w, i, speed):
+        area = ti.math.pi * s.radius[w, i] ** 2
+        return 0.5 * self.density(w) * self.coefficient(w) * area * speed, 1.0
+
+
+class ChowDrag(Drag):
+    """F = 1/2 rho_a C_D(Re) |u| u pi R^2, C_D of Chow in five pieces of Re.
+
+    density : rho_a; viscosity : mu, dynamic; of the fluid. Re = 2 R rho_a |u| / mu.
+    Source: Z16 section 4.2, after Chow (1979).
+    """
+
+    density: float = parameter("kg/m^3", gt=0)
+    viscosity: float = parameter("Pa s", gt=0)
+
+    @ti.func
+    def resistance(self, s, w, i, speed):
+        radius = s.radius[w, i]
+        reynolds = 2.0 * radius * self.density(w) / self.viscosity(w) * speed
+        # C_D Re and its power of |u|: C_D alone is infinite at rest.
+        drag, power = 24.0 + 0.0 * reynolds, 0.0 * reynolds
+        if reynolds > 2e6:
+            drag, power = 0.18 * reynolds, 1.0
+        elif reynolds > 3e5:
+            drag, power = 0.000366 * ti.pow(reynolds, 1.4275), 1.4275
+        elif reynolds > 400.0:
+            drag, power = 0.5 * reynolds, 1.0
+        elif reynolds > 1.0:
+            drag, power = 24.0 * ti.pow(reynolds, 0.354), 0.354
+        # 1/2 rho_a C_D |u| pi R^2 = pi/4 mu R (C_D Re).
+        return 0.25 * ti.math.pi * self.viscosity(w) * radius * drag, power
+
+
+class StokesDrag(Drag):
+    """F = 6 pi mu R u, u = v_f - v; of a sphere at Re << 1.
+
+    viscosity : mu, dynamic, of the fluid. Source: Z16 Eq. (4.13).
+    """
+
+    viscosity: float = parameter("Pa s", gt=0)
+
+    @ti.func
+    def resistance(self, s, w, i, speed):
+        return 6.0 * ti.math.pi * self.viscosity(w) * s.radius[w, i], 0.0

@@ -1,0 +1,23 @@
+"""Uniform gravity (L21 section 2.3)."""
+
+from __future__ import annotations
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.effects.base import Force, parameter
+
+STANDARD = 9.80665
+"""Standard acceleration of free fall, m/s^2, exact by definition."""
+
+
+class Gravity(Force):
+    """Weight F = m g.
+
+    acceleration : g, a vector; standard gravity along -z by default. Source: L21 section 2.3.
+    """
+
+    acceleration: Vector = parameter("m/s^2", (0.0, 0.0, -STANDARD))
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return s.mass[w, i] * self.acceleration(w)

@@ -1,0 +1,43 @@
+"""The Lorentz force on charged particles (Z13 Eqs 1-5, Z16 Eq. 2.1)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Force, sources
+
+
+class Lorentz(Force):
+    """F = q (E + v x B) in the external fields of all sources of E and of B.
+
+    Charges, a field of the particles (C), do not act on each other here: that is a near field. Fields that
+    moving particles make are left out (Z16 section 7.7: far below the speed of light).
+    Source: Z13 Eqs (1)-(5).
+    """
+
+    needs = ("charge",)
+    feels = ("electric_field", "magnetic_flux_density")
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {name: sources(peers, name) for name in self.feels}
+
+    @ti.func
+    def flux_density(self, s, w, i, t):
+        b = 0.0 * s.velocity[w, i]
+        for source in ti.static(self.magnetic_flux_density):
+            b += source.value(w, s.position[w, i], t)
+        return b
+
+    @ti.func
+    def force(self, s, w, i, t):
+        field = s.velocity[w, i].cross(self.flux_density(s, w, i, t))
+        for source in ti.static(self.electric_field):
+            field += source.value(w, s.position[w, i], t)
+        return s.charge[w, i] * field
+
+    @ti.func
+    def velocity_jacobian(self, s, w, i, t):
+        """d(q v x B)/dv = -q [B]x, [B]x v = B x v."""
+        b = self.flux_density(s, w, i, t)
+        return s.charge[w, i] * ti.Matrix([[0.0, b[2], -b[1]], [-b[2], 0.0, b[0]], [b[1], -b[0], 0.0]])

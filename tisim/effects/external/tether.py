@@ -1,0 +1,29 @@
+"""A binder that holds each particle at the place where it began (Z13 Eqs 11 and 34)."""
+
+from __future__ import annotations
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.effects.base import Force, parameter
+from tisim.worlds.state import Field
+
+
+class Tether(Force):
+    """F = -k (r - r(0)), each component by itself.
+
+    stiffness : k. A stiffness of 0 leaves that direction free, as in Z13 (11).
+
+    r(0) is the field ``anchor`` (m): the position at the start, or what the start gives for it. In a box with
+    joined faces the distance is still that of open space: a particle that leaves through a face is pulled
+    back across the box, so tethered particles must stay clear of the faces.
+
+    Source: Z13 Eqs (11), (34). The minus sign is missing in (34) as printed; (11) has it.
+    """
+
+    needs = (Field("anchor", "m", 3, "mean", default="position"),)
+
+    stiffness: Vector = parameter("N/m")
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return -self.stiffness(w) * (s.position[w, i] - s.anchor[w, i])

@@ -1,0 +1,31 @@
+"""Agglomeration: two bonded grains become one sphere (Z04 remark 2.1)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.impact.impact import Impact, ImpactLaw
+
+
+class Agglomeration(ImpactLaw):
+    """Bonded grains merge into a sphere of their mass, momentum, volume and heat, at their centre of mass.
+
+    Each quantity follows its own rule (state.Field.merge): sums add, means are weighted by mass, the
+    radius follows from the volume, b = (b_i^3 + b_j^3)^(1/3). Source: Z04 remark 2.1.
+    """
+
+    counts = ("merges",)
+    requires: ClassVar = (Impact,)
+
+    @ti.func
+    def bond(self, s, w, i, j, separation):
+        share = s.mass[w, j] / (s.mass[w, i] + s.mass[w, j])
+        s.position[w, i] += share * separation
+        for field in ti.static(s.means):
+            field[w, i] += share * (field[w, j] - field[w, i])
+        s.radius[w, i] = ti.pow(s.radius[w, i] ** 3 + s.radius[w, j] ** 3, 1.0 / 3.0)
+        for field in ti.static(s.sums):
+            field[w, i] += field[w, j]
+        s.remove(w, j)
+        ti.atomic_add(s.merges[w], 1)

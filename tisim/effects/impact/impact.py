@@ -1,0 +1,296 @@
+"""Impact of two grains with a restitution that depends on pressure and temperature (Z04 sections 2-4).
+
+Along the line of centres, with momentum conserved and restitution e (Z04 Eqs 2.1-2.5):
+
+    m I = m_i m_j / (m_i + m_j) * v_n (1 + e)      the impulse, v_n the approach speed
+    dtau = dtau_1 (1 + e),  dtau_1 = 2 b* / v_n     its duration, b* = beta min(b_i, b_j)   (4.10)
+    |I_n| = impulse / dtau = m_ij v_n^2 / (2 b*)    the mean force, which does not depend on e
+    a = (a_0 + (a_f - a_0)(1 - e)) pi min(b)^2      the contact area                        (4.12)
+    e = max(1 - |I_n| / (2 a min(H_i, H_j)), 0)                                             (3.1)
+
+The paper iterates (3.1) from e = 0. With its own a_0 = 0, a_f = 1 that map is x -> p/x for x = 1 - e, which
+oscillates for ever. But with H given, (3.1) with (4.12) is a quadratic in x,
+
+    (a_f - a_0) x^2 + a_0 x = p,   p = |I_n| / (2 pi min(b)^2 min(H)),
+
+so x is solved for exactly, and only the coupling to temperature is iterated: heat depends on e, hardness on
+temperature. More bonding heats more and softens more, so that map rises with x and, started from e = 0 as
+in the paper, falls monotonically to its largest fixed point: it cannot flip between bond and rebound.
+Friction can make heat fall slightly with x; iterations are therefore bounded, and counted when the bound
+is met. x >= 1 means that the pair bonds.
+
+Kinetic energies lost are those in the frame of the pair's centre of mass. The paper writes each particle's
+own 1/2 m v^2 (5.1, 6.10), whose split between the two depends on who is watching and can cool a grain below
+absolute zero; the sum, which is what heat and energy books need, is the same.
+
+A pair at rest relative to each other is in contact, not colliding. So what bonds leaves with one velocity, to
+the last bit, and an approach is one only above what rounding makes of rest. With u the unit roundoff, each
+velocity is known to u of itself, their difference is rounded once, and a product of three components thrice
+(N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, Eq. 3.5): together that is
+5 u (|v_i| + |v_j|) . |r_ij|, by components. Closer than the rounding of its own way no such pair comes.
+Nor is it a collision when forces press a pair that is in contact already: see resting.py.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+from pydantic import Field, model_validator
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Force, PairEvent, PairForce, parameter
+from tisim.effects.impact.resting import press, rests, rounding
+from tisim.errors import must
+
+
+class ImpactLaw(Effect):
+    """What an effect may contribute to an impact; each does nothing unless overridden."""
+
+    contract: ClassVar[bool] = True
+
+    @ti.func
+    def hardness_factor(self, w, temperature):
+        """Factor on the hardness at this temperature (K)."""
+        return 1.0
+
+    @ti.func
+    def limit(self, w, impulse):
+        """Largest tangential impulse (N s) that goes with this normal impulse."""
+        return 0.0 * impulse
+
+    @ti.func
+    def supply(self, w, area, work):
+        """Energy (J) given to each grain: ``area`` of contact (m^2), ``work`` of deformation (J)."""
+        return 0.0 * area
+
+    @ti.func
+    def book(self, s, w, i, energy):
+        """Enter in the books of grain i what ``supply`` has given it. J."""
+
+    @ti.func
+    def temperature(self, s, w, i, energy):
+        """Temperature (K) of grain i with this much energy (J) more."""
+        return s.mass[w, i] * energy
+
+    @ti.func
+    def fracture(self, s, w, i, absorbed):
+        """Whether grain i breaks, having absorbed this much kinetic energy (J); spends what it takes."""
+        return 0
+
+    @ti.func
+    def bond(self, s, w, i, j, separation):
+        """Join two grains that have bonded and have not broken."""
+
+
+HOOKS = ("hardness_factor", "limit", "supply", "temperature", "fracture", "bond")
+
+
+class Impact(PairEvent):
+    """Impact of spheres with pressure-dependent restitution; bonds when pressure reaches twice hardness.
+
+    hardness : H_0, Vickers hardness at high temperature, Pa.
+    deformation_length : beta, deformation over the smaller radius (Z04 4.10).
+    initial_area, final_area : a_0 and a_f, contact area over pi min(b)^2 at e = 1 and e = 0 (Z04 4.12).
+    tolerance : change of e at which the coupling to temperature has settled.
+
+    ``impacts`` counts collisions, ``contacts`` the steps in which forces have pressed a pair in contact.
+
+    Source: Z04 Eqs (2.1)-(2.5), (3.1), (4.10), (4.12), (4.17), staggering scheme of section 6b.
+    """
+
+    hard: ClassVar[bool] = True
+    needs = ("radius", "mass", "velocity")
+    counts = ("impacts", "contacts", "bonds", "iterations", "unsettled")
+    forced: ClassVar[bool] = False
+
+    hardness: float = parameter("Pa", gt=0)
+    deformation_length: float = parameter("", 1.0, gt=0)
+    initial_area: float = parameter("", 0.0, ge=0)
+    final_area: float = parameter("", 1.0, gt=0)
+    tolerance: float = parameter("", 1e-9, gt=0)
+    max_iterations: int = Field(200, ge=1)
+
+    @model_validator(mode="after")
+    def _areas(self) -> Self:
+        must(
+            self.final_area >= self.initial_area,
+            "impact.final_area",
+            "at least initial_area",
+            self.final_area,
+        )
+        return self
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        laws = [peer for peer in peers if isinstance(peer, ImpactLaw)]
+        offered = {hook: tuple(law for law in laws if type(law).offers(hook)) for hook in HOOKS}
+        return {**offered, "forced": any(isinstance(peer, Force | PairForce) for peer in peers)}
+
+    @ti.func
+    def contact(self, s, w, i, j, separation):
+        """Time since the surfaces met (s): overlap over approach speed; negative unless both are positive."""
+        closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
+        reach = s.radius[w, i] + s.radius[w, j]
+        due = ti.cast(-1.0, s.real)
+        if closing > 0.0 and separation.norm_sqr() <= reach * reach:
+            rest = rounding(s, w, i, j, separation)
+            if closing > rest:
+                distance = separation.norm()
+                due = (reach - distance) * distance / closing
+        return due
+
+    @ti.func
+    def hardness_at(self, w, temperature):
+        h = self.hardness(w)
+        for law in ti.static(self.hardness_factor):
+            h *= law.hardness_factor(w, temperature)
+        return h
+
+    @ti.func
+    def bonding(self, w, pressure, hardness):
+        """x = 1 - e from the force over 2 pi min(b)^2 (Pa): the quadratic above, in a form without loss."""
+        a0, d = self.initial_area(w), self.final_area(w) - self.initial_area(w)
+        p = pressure / hardness
+        x = 0.0 * p
+        # Not so for a NaN, which must not bond, nor for what is too small to be seen.
+        if p > 0.0:
+            x = ti.min(1.0, 2.0 * p / (a0 + ti.sqrt(a0 * a0 + 4.0 * d * p)))
+        return x
+
+    @ti.func
+    def tangential(self, w, reduced, v_n, v_t, x):
+        """Tangential impulse (N s): all of the slip when bonded, else what friction gives, never more."""
+        stop = reduced * v_t
+        impulse = stop
+        if x < 1.0:
+            impulse = 0.0 * stop
+            for law in ti.static(self.limit):
+                impulse += law.limit(w, reduced * v_n * (2.0 - x))
+        return ti.min(impulse, stop)
+
+    @ti.func
+    def lost(self, w, reduced, v_n, v_t, x):
+        """Kinetic energy lost by the pair, J."""
+        e, slip = 1.0 - x, v_t - self.tangential(w, reduced, v_n, v_t, x) / reduced
+        return 0.5 * reduced * ((1.0 - e * e) * v_n * v_n + v_t * v_t - slip * slip)
+
+    @ti.func
+    def supplied(self, w, reduced, v_n, smaller, x):
+        """Energy that the impact laws give each grain, J."""
+        energy = 0.0 * x
+        for law in ti.static(self.supply):
+            energy += law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
+        return energy
+
+    @ti.func
+    def work(self, reduced, v_n, x):
+        """Work of deformation (Z04 4.7-4.9; see heating.py), J."""
+        e = 1.0 - x
+        return reduced * v_n * v_n * (1.0 - e * e) / 3.0
+
+    @ti.func
+    def area(self, w, smaller, x):
+        a0 = self.initial_area(w)
+        return (a0 + (self.final_area(w) - a0) * x) * ti.math.pi * smaller * smaller
+
+    @ti.func
+    def settle(self, s, w, i, j, reduced, v_n, v_t, smaller):
+        """x = 1 - e at which hardness, heat and restitution agree."""
+        pressure = reduced * v_n * v_n / (4.0 * ti.math.pi * self.deformation_length(w) * smaller**3)
+        x = ti.cast(1.0, s.real)
+        if ti.static(len(self.hardness_factor) == 0):
+            x = self.bonding(w, pressure, self.hardness(w))
+        else:
+            share_i = s.mass[w, j] / (s.mass[w, i] + s.mass[w, j])
+            change, k = ti.cast(1.0, s.real), 0
+            while change > self.tolerance(w) and k < self.max_iterations:
+                energy = self.supplied(w, reduced, v_n, smaller, x)
+                lost = self.lost(w, reduced, v_n, v_t, x)
+                softest = ti.cast(ti.math.inf, s.real)
+                for law in ti.static(self.temperature):
+                    t_i = law.temperature(s, w, i, energy + share_i * lost)
+                    t_j = law.temperature(s, w, j, energy + (1.0 - share_i) * lost)
+                    softest = ti.min(self.hardness_at(w, t_i), self.hardness_at(w, t_j))
+                new = self.bonding(w, pressure, softest)
+                change, x, k = ti.abs(new - x), new, k + 1
+            ti.atomic_add(s.iterations[w], k)
+            if change > self.tolerance(w):
+                ti.atomic_add(s.unsettled[w], 1)
+        return x
+
+    @ti.func
+    def resolve(self, s, w, i, j, separation):
+        if ti.static(self.forced):
+            if rests(s, w, i, j, separation):
+                self.support(s, w, i, j, separation)
+            else:
+                self.collide(s, w, i, j, separation)
+        else:
+            self.collide(s, w, i, j, separation)
+
+    @ti.func
+    def support(self, s, w, i, j, separation):
+        """What forces press together stays together, and slides as friction lets it; what that takes of its
+        kinetic energy is heat, and nothing else happens."""
+        m_i, m_j = s.mass[w, i], s.mass[w, j]
+        reduced = m_i * m_j / (m_i + m_j)
+        n = separation.normalized()
+        slip = s.velocity[w, i] - s.velocity[w, j]
+        v_n = slip.dot(n)
+        slip -= v_n * n
+        v_t = slip.norm()
+        impulse, most = reduced * v_n * n, 0.0 * v_n
+        for law in ti.static(self.limit):
+            most += law.limit(w, reduced * v_n)
+        slid = v_t
+        if v_t > 0.0:
+            stopped = ti.min(v_t, most / reduced)
+            impulse += reduced * stopped / v_t * slip
+            slid -= stopped
+        press(s, w, i, -impulse)
+        press(s, w, j, impulse)
+        lost = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
+        for law in ti.static(self.temperature):
+            s.temperature[w, i] = law.temperature(s, w, i, lost * m_j / (m_i + m_j))
+            s.temperature[w, j] = law.temperature(s, w, j, lost * m_i / (m_i + m_j))
+        ti.atomic_add(s.contacts[w], 1)
+
+    @ti.func
+    def collide(self, s, w, i, j, separation):
+        m_i, m_j = s.mass[w, i], s.mass[w, j]
+        reduced = m_i * m_j / (m_i + m_j)
+        smaller = ti.min(s.radius[w, i], s.radius[w, j])
+        n = separation.normalized()
+        slip = s.velocity[w, i] - s.velocity[w, j]
+        v_n = slip.dot(n)
+        slip -= v_n * n
+        v_t = slip.norm()
+
+        x = self.settle(s, w, i, j, reduced, v_n, v_t, smaller)
+        impulse = reduced * v_n * (2.0 - x) * n
+        if v_t > 0.0:
+            impulse += self.tangential(w, reduced, v_n, v_t, x) * slip / v_t
+        s.velocity[w, i] -= impulse / m_i
+        s.velocity[w, j] += impulse / m_j
+        if x >= 1.0:
+            common = s.velocity[w, i] + m_j / (m_i + m_j) * (s.velocity[w, j] - s.velocity[w, i])
+            s.velocity[w, i], s.velocity[w, j] = common, common
+        ti.atomic_add(s.impacts[w], 1)
+
+        lost = self.lost(w, reduced, v_n, v_t, x)
+        lost_i, lost_j = lost * m_j / (m_i + m_j), lost * m_i / (m_i + m_j)
+        energy = self.supplied(w, reduced, v_n, smaller, x)
+        for law in ti.static(self.temperature):
+            s.temperature[w, i] = law.temperature(s, w, i, energy + lost_i)
+            s.temperature[w, j] = law.temperature(s, w, j, energy + lost_j)
+        for law in ti.static(self.supply):
+            given = law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
+            law.book(s, w, i, given)
+            law.book(s, w, j, given)
+        broken = 0
+        for law in ti.static(self.fracture):
+            broken += law.fracture(s, w, i, lost_i)
+            broken += law.fracture(s, w, j, lost_j)
+        if x >= 1.0 and broken == 0:
+            ti.atomic_add(s.bonds[w], 1)
+            for law in ti.static(self.bond):
+                law.bond(s, w, i, j, separation)

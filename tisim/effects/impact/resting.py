@@ -1,0 +1,51 @@
+"""Which pairs of hard spheres rest on each other: what forces press together is in contact, not colliding.
+
+Collisions are told from contacts by whether the approach was there before the forces of the step (E.
+Guendelman, R. Bridson, R. Fedkiw, Nonconvex rigid bodies with stacking, ACM Trans. Graph. 22 (2003) 871).
+So a pair rests that overlapped when the step began, and whose approach is what the forces of the step give.
+Both are found from the forces at its end: with d = r_j - r_i, u = v_i - v_j and a = F_i/m_i - F_j/m_j,
+
+    d_0 = d + dt u - dt^2/2 a        the separation at the beginning, by Taylor's formula
+    u . d <= SHARE dt a . d          the approach is that of the forces
+
+The forces are those of contacts too, once these are known: what presses a grain presses the next one. SHARE
+is above 1 since forces change within a step, and since contacts are settled one after another: the later ones
+leave some approach to the earlier ones, that many times dt a in a row of some four grains. Whatever it is, a
+pair that meets in this step collides, and what SHARE takes for rest goes to zero with dt.
+"""
+
+from tisim.backend.taichi import ti
+
+ROUNDOFF = {ti.f64: 2.0**-53, ti.f32: 2.0**-24}
+"""u: a number is known to this part of itself."""
+
+SHARE = 16.0
+"""How much faster than forces make it in a step a pair in contact may approach, and still not collide."""
+
+
+@ti.func
+def rounding(s, w, i, j, separation):
+    """What rounding may make of (v_i - v_j) . (r_j - r_i) of a pair at rest. m^2/s."""
+    speeds = ti.abs(s.velocity[w, i]) + ti.abs(s.velocity[w, j])
+    return 5.0 * ROUNDOFF[s.real] * speeds.dot(ti.abs(separation))
+
+
+@ti.func
+def rests(s, w, i, j, separation):
+    """Whether an overlapping pair was in contact when the step began, and only forces have pressed it."""
+    dt = ti.cast(s.dt[w], s.real)
+    slip = s.velocity[w, i] - s.velocity[w, j]
+    gained = dt * (s.force[w, i] / s.mass[w, i] - s.force[w, j] / s.mass[w, j])
+    before = separation + dt * (slip - 0.5 * gained)
+    # Places and sizes are known to u of themselves: closer than that no pair is known to be apart.
+    places = s.position[w, i].norm() + s.position[w, j].norm() + s.radius[w, i] + s.radius[w, j]
+    reach = s.radius[w, i] + s.radius[w, j] + 4.0 * ROUNDOFF[s.real] * places
+    given = SHARE * gained.dot(separation) + rounding(s, w, i, j, separation)
+    return before.norm_sqr() <= reach * reach and slip.dot(separation) <= given
+
+
+@ti.func
+def press(s, w, i, impulse):
+    """Give grain i the impulse of a contact (N s), and count it among the forces of the step."""
+    s.velocity[w, i] += impulse / s.mass[w, i]
+    s.force[w, i] += impulse / ti.cast(s.dt[w], s.real)

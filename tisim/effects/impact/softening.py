@@ -1,0 +1,33 @@
+"""Thermal softening: hardness falls with temperature (Z04 section 6)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import parameter
+from tisim.effects.impact.heating import Heating
+from tisim.effects.impact.impact import ImpactLaw
+
+GAS_CONSTANT = 8.31446261815324
+"""J/(mol K), exact in SI."""
+LARGEST_EXPONENT = 50.0
+"""Hardness is then 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a solid."""
+
+
+class Softening(ImpactLaw):
+    """Hardness H = H_0 exp(Q / (R T)).
+
+    activation_energy : Q. Source: Z04 section 6, text after Eq. (6.2). H_0 is the limit at high
+    temperature (the paper calls it the hardness at absolute zero, where its formula is infinite).
+    """
+
+    needs = ("temperature",)
+    requires: ClassVar = (Heating,)
+
+    activation_energy: float = parameter("J/mol", ge=0)
+
+    @ti.func
+    def hardness_factor(self, w, temperature):
+        coldest = self.activation_energy(w) / (GAS_CONSTANT * LARGEST_EXPONENT) + 1e-30
+        return ti.exp(self.activation_energy(w) / (GAS_CONSTANT * ti.max(temperature, coldest)))

@@ -1,0 +1,34 @@
+"""The pull of an uneven magnetic field on magnetic particles (Z16 Eq. 7.24)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Force, parameter, sources
+
+
+class MagneticBodyForce(Force):
+    """F = grad(gamma B.B) = 2 gamma (grad B)^T B, B the sum of all sources.
+
+    gamma : of each particle, whatever its size; positive is drawn to the stronger field. For a sphere of
+    volume V and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert none.
+    Source: Z16 Eq. (7.24).
+    """
+
+    feels = ("magnetic_flux_density",)
+
+    gamma: float = parameter("J/T^2")
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {"applied": sources(peers, "magnetic_flux_density")}
+
+    @ti.func
+    def force(self, s, w, i, t):
+        r = s.position[w, i]
+        b, gradient = 0.0 * r, ti.Matrix.zero(s.real, 3, 3)
+        for source in ti.static(self.applied):
+            value, slope = source.value_and_gradient(w, r, t)
+            b += value
+            gradient += slope
+        return 2.0 * self.gamma(w) * (gradient.transpose() @ b)

@@ -1,0 +1,96 @@
+"""Magnetic moments of soft particles, along the field where they are (B16 sections 6.2.4, 7.2.3).
+
+The field is that of all sources of a magnetic flux density at the centre of the particle, B = mu_0 H outside
+of magnets. A moment follows it at once, inside the particle, so that the particle feels no torque. What else
+makes moments is in mutual_moment.py; who feels them finds them in ``moment``, whoever has set them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from scipy.constants import Boltzmann, mu_0
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Settled, parameter, sources
+from tisim.numerics.langevin import langevin_ratio
+from tisim.worlds.state import Field
+
+MOMENT = Field("moment", "A m^2", 3, "sum")
+SATURATION = Field("saturation_moment", "A m^2", 1, "sum", default=None, minimum=0.0)
+DOMAIN = Field("domain_moment", "A m^2", 1, "mean", default="saturation_moment", minimum=0.0)
+
+
+class Moment(Settled):
+    """m = law(B)."""
+
+    contract: ClassVar[bool] = True
+    quantity = "moment"
+    feels = ("magnetic_flux_density",)
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {"applied": sources(peers, "magnetic_flux_density")}
+
+    @ti.func
+    def law(self, s, w, i, b):
+        """The moment of i in a field of b (T). A m^2."""
+        return 0.0 * b
+
+    @ti.func
+    def response(self, s, w, i, total, t):
+        """In the field of the sources and, where particles act on each other, of theirs: ``total``, T."""
+        b = total
+        for source in ti.static(self.applied):
+            b += source.value(w, s.position[w, i], t)
+        return self.law(s, w, i, b)
+
+
+class FixedMoment(Moment):
+    """m = m_s B/|B|: a moment of fixed magnitude along the field; 0 where there is no field.
+
+    m_s : of each particle, ``saturation_moment`` of the start. Without a field no direction is preferred, and
+    the mean over all of them is 0. Source: B16 section 6.2.4, table 6.1.
+    """
+
+    needs = (MOMENT, SATURATION)
+
+    @ti.func
+    def law(self, s, w, i, b):
+        size = b.norm()
+        return s.saturation_moment[w, i] / ti.select(size > 0.0, size, 1.0) * b
+
+
+class LangevinMoment(Moment):
+    """m = m_s L(x) B/|B|, L(x) = coth x - 1/x, x = mu_d |B| / (k T): superparamagnetic, without hysteresis.
+
+    temperature : T. m_s : ``saturation_moment`` of each particle, M_sat times its volume. mu_d : its
+    ``domain_moment``, that of a single domain in it; unless the start says, the particle is one domain.
+    For x << 1 it is the linear m_s mu_d B / (3 k T) (B16 7.7). Source: B16 Eqs (6.22), (7.5).
+    """
+
+    needs = (MOMENT, SATURATION, DOMAIN)
+
+    temperature: float = parameter("K", gt=0)
+
+    @ti.func
+    def law(self, s, w, i, b):
+        scale = s.domain_moment[w, i] / (Boltzmann * self.temperature(w))
+        return s.saturation_moment[w, i] * scale * langevin_ratio(scale * b.norm()) * b
+
+
+class InducedMoment(Moment):
+    """m = V 3 chi / (3 + chi) B / mu_0: of a sphere of volume V and linear susceptibility chi.
+
+    susceptibility : chi = mu_r - 1, of the material; the field that the sphere makes in itself,
+    -M/3, is taken into account. -1 excludes all field. Source: L21 Eq. (2.4).
+    """
+
+    needs = (MOMENT, "radius")
+
+    susceptibility: float = parameter("", ge=-1)
+
+    @ti.func
+    def law(self, s, w, i, b):
+        chi, radius = self.susceptibility(w), s.radius[w, i]
+        # 4/3 pi R^3 3 chi / (3 + chi), which stays finite however large chi is.
+        return 4.0 * ti.math.pi / mu_0 * (chi / (3.0 + chi)) * radius * radius * radius * b

@@ -1,0 +1,55 @@
+"""Magnetic moments in the field of the sources and of each other (L21 Eqs 2.6 and 4.12)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from scipy.constants import mu_0
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Mutual
+from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment, Moment
+
+
+class MutualMoment(Mutual, Moment):
+    """m_i = law(B(r_i) + sum_j B_j(r_i)), B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j), a dipole's field.
+
+    A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,
+    matter as well. In a periodic box only the nearest image of a particle acts.
+    """
+
+    contract: ClassVar[bool] = True
+    alone: ClassVar[type[Moment]]
+    """The same law without the others."""
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        options = {name: getattr(self, name) for name in self.alone.model_fields}
+        return (self.alone(**options), *super().approximations(extent))
+
+    @ti.func
+    def influence(self, s, w, i, j, separation, distance, t):
+        """Field of j at i. T."""
+        inverse = 1.0 / distance
+        n = inverse * separation
+        # Cube first: in f32 a moment of 1e-17 A m^2 squared is nothing.
+        m = inverse * inverse * inverse * s.moment[w, j]
+        return mu_0 / (4.0 * ti.math.pi) * (3.0 * m.dot(n) * n - m)
+
+
+class MutualInducedMoment(MutualMoment, InducedMoment):
+    """m_i = V_i 3 chi / (3 + chi) (B + sum_j B_j) / mu_0: linear spheres that magnetise each other.
+
+    Two at a distance d, with a = chi / (3 + chi) R^3 / d^3: 1 / (1 - 2 a) times the moment of one alone along
+    the line between them, 1 / (1 + a) across it. Source: L21 Eqs (2.6), (4.12).
+    """
+
+    alone = InducedMoment
+
+
+class MutualLangevinMoment(MutualMoment, LangevinMoment):
+    """m_i = m_s L(x) B/|B|, x = mu_d |B| / (k T), in B of the sources and of all the other moments.
+
+    Left out by B16, as it matters for weak fields only (section 6.2.4). Source: B16 Eq. (6.22), L21 (2.6).
+    """
+
+    alone = LangevinMoment

@@ -1,0 +1,66 @@
+"""Mie's potential: repulsion and attraction of spheres by powers of distance (B16 Eqs 6.18, 6.19)."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from pydantic import Field as Option
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import PairForce, parameter
+from tisim.errors import must
+from tisim.numerics.powers import Exponent, power
+
+
+class Mie(PairForce):
+    """F_i = -grad_i U, U = C eps [(sigma/d)^n - (sigma/d)^m] + const within a cut-off, 0 beyond.
+
+    C = n/(n - m) (n/m)^(m/(n - m)) makes eps the depth of the well, at d = sigma (n/m)^(1/(n - m)), and sigma
+    is R_i + R_j. U is shifted to vanish at the cut-off, which changes no force.
+
+    epsilon : eps. n, m : n > m; compiled in, so that whole ones cost products, no pow. 30 and 15 stand for
+    hard spheres in B16 (section 6.3), with eps = 100 k T and repulsion alone; 12 and 6 are Lennard-Jones's.
+    cutoff : in sigma; left out, at the bottom of the well: repulsion alone, which ends smoothly there.
+    Elsewhere the force jumps at the cut-off.
+
+    Source: B16 Eqs (6.18), (6.19), after Mie (1903).
+    """
+
+    needs = ("radius",)
+    short_ranged = True
+
+    epsilon: float = parameter("J", gt=0)
+    n: Exponent = Option(30, gt=0)
+    m: Exponent = Option(15, gt=0)
+    cutoff: float | None = parameter("", None, gt=0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        must(self.n > self.m, "mie.n", f"greater than m, {self.m}", self.n)
+        return self
+
+    @property
+    def prefactor(self) -> float:
+        """C."""
+        return self.n / (self.n - self.m) * (self.n / self.m) ** (self.m / (self.n - self.m))
+
+    def at_start(self, masses: np.ndarray) -> Self:
+        bottom = (self.n / self.m) ** (1 / (self.n - self.m))
+        return self if self.cutoff else self.model_copy(update={"cutoff": bottom})
+
+    @ti.func
+    def reach(self, s, w, i):
+        # Between surfaces, of two as large as i.
+        return 2.0 * ti.max(self.cutoff(w) - 1.0, 0.0) * s.radius[w, i]
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        total, sigma = 0.0 * separation, s.radius[w, i] + s.radius[w, j]
+        if distance < self.cutoff(w) * sigma:
+            inverse = 1.0 / distance
+            q = sigma * inverse
+            slope = self.n * power(q, self.n) - self.m * power(q, self.m)
+            total = -self.prefactor * self.epsilon(w) * slope * inverse * (inverse * separation)
+        return total

@@ -1,0 +1,109 @@
+"""Near field: attraction and repulsion by powers of distance (Z16 Eq. 7.23, Z13 Eq. 24).
+
+    F_i = sum_j (alpha_1 d^-beta_1 - alpha_2 d^-beta_2) n_ij,   n_ij from i to j
+
+so alpha_1 attracts and alpha_2 repels. The coefficients are plain numbers (Z13), or go with how strong the
+two particles are (Z16, text after 7.23): alpha = abar s_i s_j c_i c_j, with s the mass, the surface area, the
+volume or the charge, and c = +1 or -1 a positive or negative identifier. As printed, c_i c_j multiplies both
+terms: between unlike particles the first repels and the second attracts. (Z16 section 9 calls its abar "per
+unit mass"; by this formula it is per unit mass squared.)
+
+With strengths of charge, beta_2 = 2 and abar_2 = 1/(4 pi epsilon) alone this is Coulomb's law. (Z13 Eq. 22
+lacks the minus sign that its n_ij, from i to j, asks for: like charges repel.)
+"""
+
+from typing import Literal
+
+from pydantic import Field as Option
+
+from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import three_digits
+from tisim.effects.base import Effect, PairForce, parameter
+from tisim.numerics.powers import Exponent, power
+from tisim.worlds.state import Field
+
+CUTS = (0.1, 0.2, 0.5, 1.0)
+"""Cut-offs worth a try, as parts of the largest distance."""
+
+
+class NearField(PairForce):
+    """F_i = sum_j (alpha_1 d^-beta_1 - alpha_2 d^-beta_2) n_ij over all pairs: attraction and repulsion.
+
+    alpha1, alpha2 : the coefficients, or abar of ``strength``: N m^beta, per product of the two strengths.
+    beta1, beta2 : the same in all worlds of a batch: compiled in, so that whole ones cost products, no pow.
+    strength : "plain" (s = 1), "mass" (kg), "area" (4 pi R^2), "volume" (4/3 pi R^3) or "charge" (C, signed).
+    signed : whether particles carry c, the field ``polarity``, +1 or -1. Without it all are alike.
+
+    In a periodic box only the nearest image of a particle acts. Source: Z16 Eq. (7.23), Z13 Eq. (24).
+    """
+
+    needs = ("charge", Field("polarity", "", 1, "keep", integer=True, default=None))
+
+    alpha1: float = parameter("N m^beta1", 0.0, ge=0)
+    beta1: Exponent = Option(1, ge=0)
+    alpha2: float = parameter("N m^beta2", 0.0, ge=0)
+    beta2: Exponent = Option(2, ge=0)
+    strength: Literal["plain", "mass", "area", "volume", "charge"] = "plain"
+    signed: bool = False
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        own = {name: getattr(self, name) for name in NearField.model_fields}
+        return tuple(TruncatedNearField(**own, cutoff=three_digits(part * extent)) for part in CUTS)
+
+    def needed(self) -> tuple[str | Field, ...]:
+        charge, polarity = self.needs
+        return (charge,) * (self.strength == "charge") + (polarity,) * self.signed
+
+    @ti.func
+    def own(self, s, w, i):
+        """c_i s_i."""
+        size = ti.cast(1.0, s.real)
+        if ti.static(self.strength == "mass"):
+            size = s.mass[w, i]
+        elif ti.static(self.strength == "area"):
+            size = 4.0 * ti.math.pi * s.radius[w, i] ** 2
+        elif ti.static(self.strength == "volume"):
+            size = 4.0 / 3.0 * ti.math.pi * s.radius[w, i] ** 3
+        elif ti.static(self.strength == "charge"):
+            size = s.charge[w, i]
+        if ti.static(self.signed):
+            size *= s.polarity[w, i]
+        return size
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        return self.between(s, w, i, j, separation, distance)
+
+    @ti.func
+    def between(self, s, w, i, j, separation, distance):
+        """Force on i by j. N."""
+        # Each over d once more, for n_ij = separation / d; one division serves both whole powers.
+        attraction = self.alpha1(w) * power(distance, -1 - self.beta1)
+        repulsion = self.alpha2(w) * power(distance, -1 - self.beta2)
+        return self.own(s, w, i) * self.own(s, w, j) * (attraction - repulsion) * separation
+
+
+class TruncatedNearField(NearField):
+    """The near field of pairs within a distance, found with the pair list; no force beyond.
+
+    cutoff : between centres. The force is not shifted: it jumps there. Z13 and Z16 cut nothing off.
+    """
+
+    short_ranged = True
+
+    cutoff: float = parameter("m", gt=0)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        return ()
+
+    @ti.func
+    def reach(self, s, w, i):
+        # Pairs are listed by the gap between their surfaces, which is less than the distance of the centres.
+        return self.cutoff(w)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        total = 0.0 * separation
+        if distance <= self.cutoff(w):
+            total = self.between(s, w, i, j, separation, distance)
+        return total

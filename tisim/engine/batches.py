@@ -1,0 +1,169 @@
+"""Many scenes, a batch of worlds at a time, on compiled simulations that are kept for the next ones."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from tisim.backend import memory, runtime
+from tisim.engine.result import Result, Status
+from tisim.engine.simulation import Simulation
+from tisim.errors import InputError, must
+from tisim.io.trajectory import Trajectory
+from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
+
+SLOTS = 300_000
+"""Particles of all worlds of a batch together; keeps its memory to some hundred MB."""
+KEPT = 8
+"""Compiled simulations kept for later calls."""
+SPARE, WASTE = 4096, 8
+"""A kept simulation serves where it has room for at most so many particles, or so many times what is needed:
+all of its room is loaded and looked at."""
+
+Progress = Callable[[float], None]
+
+
+def share(progress: Progress, done: int, parts: int) -> Progress:
+    """For one of several parts of equal length, ``done`` of which are over: reports of it as of the whole."""
+    return lambda fraction: progress((done + fraction) / parts)
+
+
+class Batches:
+    """Scenes to results. Scenes of one structure (effects, options, domain, stepper) run side by side.
+
+    limit : most worlds of a batch. A world is yielded when it has ended, while others go on, so that whoever
+    keeps results loses little when stopped.
+    """
+
+    def __init__(self, limit: int = 256) -> None:
+        must(limit >= 1, "batch", "at least 1", limit)
+        self.limit = limit
+        self._idle: list[Simulation] = []
+        _all.add(self)
+
+    def run(
+        self,
+        scenes: Sequence[Scene],
+        progress: Progress | None = None,
+        strict: bool = True,
+        trajectory: Trajectory | None = None,
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield (index into scenes, Result) as worlds end.
+
+        progress : called with the finished fraction of this call, 0..1. strict : raise the InputError of a
+        start that cannot be made; otherwise it becomes a failed Result. trajectory : made for these scenes;
+        records them.
+        """
+        starts: dict[int, Arrays] = {}
+        groups: dict[Any, list[int]] = {}
+        for index, scene in enumerate(scenes):
+            try:
+                starts[index] = scene.particles.arrays(scene.domain, scene.seed)
+            except InputError as error:
+                if strict:
+                    raise
+                failed = Status(False, str(error))
+                yield index, Result(scene, {}, {}, 0.0, {}, failed, 0.0, runtime.current().settings)
+                continue
+            groups.setdefault(scene.structure(), []).append(index)
+        done = len(scenes) - len(starts)
+        for members in groups.values():
+            with self._simulation([scenes[k] for k in members]) as simulation:
+                for begin in range(0, len(members), simulation.worlds):
+                    batch = members[begin : begin + simulation.worlds]
+                    simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
+                    if trajectory:
+                        trajectory.record(simulation, batch)
+                    chunks = simulation.chunks()
+                    given: set[int] = set()
+                    while len(given) < len(batch):
+                        new = [w for w in simulation.ended() if w not in given]
+                        yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
+                        given.update(new)
+                        next(chunks, None)
+                        if progress:
+                            progress((done + len(batch) * simulation.fraction()) / len(scenes))
+                    done += len(batch)
+
+    @contextmanager
+    def _simulation(self, scenes: Sequence[Scene]) -> Iterator[Simulation]:
+        """A compiled simulation for scenes of one structure, which is nobody else's meanwhile."""
+        capacity = max(scene.capacity() for scene in scenes)
+        worlds = max(1, min(len(scenes), self.limit, SLOTS // capacity))
+        simulation = self._kept(scenes[0].structure(), worlds, capacity)
+        if simulation is None:
+            _renew()
+            capacity = rounded(capacity)
+            worlds = max(1, min(rounded(worlds), self.limit, SLOTS // capacity))
+            simulation = Simulation(scenes[0], worlds, capacity)
+        try:
+            yield simulation
+        finally:
+            with _lock:
+                self._idle.append(simulation)
+                old, self._idle = self._idle[:-KEPT], self._idle[-KEPT:]
+            for each in old:
+                each.close()
+
+    def _kept(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
+        """The smallest kept simulation that serves, taken out of those kept; None where there is none."""
+        most = max(SPARE, WASTE * worlds * capacity)
+        with _lock:
+            self._idle = [each for each in self._idle if each.s.alive]
+            serve = [
+                each
+                for each in self._idle
+                if each.structure == structure
+                and each.worlds >= worlds
+                and each.s.capacity >= capacity
+                and each.worlds * each.s.capacity <= most
+            ]
+            if not serve:
+                return None
+            best = min(serve, key=lambda each: each.worlds * each.s.capacity)
+            self._idle.remove(best)
+            return best
+
+    def close(self) -> None:
+        """Give the device memory back, of all that does not run."""
+        with _lock:
+            old, self._idle = self._idle, []
+        for each in old:
+            each.close()
+
+
+_lock = threading.Lock()
+"""Held while a simulation changes hands."""
+_all: weakref.WeakSet[Batches] = weakref.WeakSet()
+
+
+def rounded(number: int) -> int:
+    """The next number up whose binary digits are all 0 after the first three.
+
+    A size is compiled in: so scenes of like sizes share what is compiled, in this process and in those that
+    find it on the disk.
+    """
+    unit = 1 << max(0, number.bit_length() - 3)
+    return -(-number // unit) * unit
+
+
+def _renew() -> None:
+    """Start Taichi anew where it has grown, and nothing would be lost but simulations that are kept idle."""
+    if memory.worn():
+        _give_up()
+        memory.renew()
+
+
+def _give_up() -> None:
+    """Forget what all Batches keep idle, unless something else is in use."""
+    with _lock:
+        idle = [each for batches in _all for each in batches._idle]
+        if memory.in_use() <= {tree for each in idle for tree in each.trees}:
+            for batches in _all:
+                batches._idle = []
+            for each in idle:
+                each.close()

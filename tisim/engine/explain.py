@@ -1,0 +1,230 @@
+"""What a scene is made of once compiled - effects, memory, phases of a step - and what it leaves out."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from tisim import effects, operators, sources
+from tisim.components import serialization
+from tisim.components.component import Spec, unit_of
+from tisim.effects.base import Effect
+from tisim.engine.assembly import needed_fields
+from tisim.engine.simulation import Simulation
+from tisim.scene.scene import Scene
+from tisim.worlds.state import CORE
+
+SHOWN = 3
+"""Rows of a list that are shown."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """An effect, the domain or the step control of a scene.
+
+    name : in files. summary : one line. source : where the law is from. parameters : (name, value, unit).
+    """
+
+    name: str
+    summary: str
+    source: str
+    parameters: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Something allocated for one world of the scene. bytes : its size. why : which parts need it."""
+
+    name: str
+    bytes: int
+    why: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A scene, as one world of it is compiled.
+
+    particles, capacity : at the start, and room for. steps : that a run takes at least. memory : every
+    allocation, fields first. phases : of a step, in order; those with * are repeated until nothing waits.
+    absent_effects : known, and left out.
+    absent_fields : (field, effects that would need it), not allocated.
+    """
+
+    name: str
+    particles: int
+    capacity: int
+    steps: float
+    schedule: str
+    precision: str
+    effects: tuple[Part, ...]
+    others: tuple[Part, ...]
+    memory: tuple[Memory, ...]
+    phases: tuple[str, ...]
+    absent_effects: tuple[Part, ...]
+    absent_fields: tuple[tuple[str, str], ...]
+
+    @property
+    def bytes(self) -> int:
+        return sum(item.bytes for item in self.memory)
+
+
+def explain(scene: Scene) -> Explanation:
+    """Compose the scene under the running settings, look at it, and give its memory back. Runs nothing."""
+    simulation = Simulation(scene)
+    try:
+        memory = tuple(_memory(simulation, scene))
+        phases = tuple(simulation.program.names())
+        present = {field.name for field in simulation.s.fields}
+        capacity, schedule = simulation.s.capacity, simulation.schedule
+        precision = simulation.runtime.precision
+    finally:
+        # Taichi checks the shapes of vectors at the next launch, and of these it would find none.
+        simulation.s.read("count")
+        simulation.close()
+    absent = [kind for kind in known_effects() if kind not in {type(e) for e in scene.effects}]
+    return Explanation(
+        name=scene.name,
+        particles=len(scene.particles.masses()),
+        capacity=capacity,
+        steps=scene.stepper.fewest(scene.effects, scene.duration),
+        schedule=schedule,
+        precision=precision,
+        effects=tuple(_part(effect) for effect in scene.acting()),
+        others=(_part(scene.domain), _part(scene.stepper), _part(scene.stepper.control)),
+        memory=memory,
+        phases=phases,
+        absent_effects=tuple(Part(kind.kind(), _summary(kind), _source(kind), ()) for kind in absent),
+        absent_fields=tuple(_absent_fields(absent, present)),
+    )
+
+
+def known_effects() -> list[type[Effect]]:
+    """Every effect of the package, by name."""
+    packages = (effects, operators, sources)
+    for package in packages:
+        serialization.load(package)
+    homes = tuple(package.__name__ for package in packages)
+    return [kind for _, kind in sorted(Effect.known().items()) if kind.__module__.startswith(homes)]
+
+
+def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
+    users = {
+        need if isinstance(need, str) else need.name: why
+        for need, why in needed_fields(scene.effects, scene.stepper).items()
+    }
+    core = {field.name for field in CORE}
+    for name, size in simulation.s.bytes().items():
+        yield Memory(name, size, "every scene" if name in core else users[name])
+    real = 8 if simulation.runtime.precision == "f64" else 4
+    yield Memory("parameter table", simulation.worlds * simulation.table.slots * real, "effects' parameters")
+    if simulation.table.array_bytes:
+        yield Memory("tables, of all worlds", simulation.table.array_bytes, "effects that look numbers up")
+    for part, name, why in simulation.made.memory:
+        yield Memory(name, part.bytes(), why)
+
+
+def _needs(kind: type[Effect]) -> list[str]:
+    return [need if isinstance(need, str) else need.name for need in kind.needs]
+
+
+def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tuple[str, str]]:
+    lacking: dict[str, list[str]] = {}
+    for kind in absent:
+        for name in _needs(kind):
+            if name not in present:
+                lacking.setdefault(name, []).append(kind.kind())
+    for name, kinds_ in lacking.items():
+        yield name, ", ".join(kinds_)
+
+
+def _part(spec: Spec) -> Part:
+    return Part(spec.kind(), _summary(type(spec)), _source(type(spec)), tuple(_values(spec)))
+
+
+def _values(spec: Spec, within: str = "") -> Iterator[tuple[str, str, str]]:
+    """(name, value, unit) of each parameter; of a long list, of its first rows."""
+    lists = dict(spec.lists())
+    for name, info in type(spec).model_fields.items():
+        value = getattr(spec, name)
+        if name in lists:
+            for k, row in enumerate(value[:SHOWN]):
+                yield from _values(row, f"{within}{name}.{k}.")
+            if not 0 < len(value) <= SHOWN:
+                yield f"{within}{name}", f"{len(value)} in all", ""
+        elif not isinstance(value, Spec):
+            yield f"{within}{name}", _text(value), unit_of(info)
+
+
+def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return "(" + ", ".join(_text(item) for item in value) + ")"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _summary(kind: type) -> str:
+    """The first sentence of the docstring, without its source."""
+    return re.split(r"\s*\((?=[A-Z]\d\d)|\.\s|\.$", _paragraphs(kind)[0])[0]
+
+
+def _source(kind: type) -> str:
+    """What the docstring names as source; else the first work that it or its module cites in brackets."""
+    paragraphs = _paragraphs(kind)
+    # A full stop ends it unless it follows an initial or stands before a bracket, as in "Eq. (6.9)".
+    if found := re.search(r"Source: (.*?)(?<![A-Z])\.(?: [A-Z]|$)", " ".join(paragraphs)):
+        return found.group(1)
+    module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
+    for text in (paragraphs[0], module):
+        if found := re.search(r"\(([A-Z]\d\d[^()]*(?:\([^)]*\)[^()]*)*)\)", text):
+            return found.group(1)
+    return ""
+
+
+def _paragraphs(kind: type) -> list[str]:
+    return [" ".join(part.split()) for part in (inspect.getdoc(kind) or "").split("\n\n")]
+
+
+def render(found: Explanation) -> RenderableType:
+    """The explanation for a terminal."""
+    head = Text.assemble(
+        (found.name, "bold"),
+        f": {found.particles} particles, room for {found.capacity}; {found.precision}; "
+        f"schedule '{found.schedule}'; {_bytes(found.bytes)} per world; "
+        f"at least {found.steps:.3g} steps",
+    )
+    what = _table("It has", "effect", "parameters", "what it is", "source")
+    for part in (*found.effects, *found.others):
+        values = "\n".join(f"{name} = {value} {unit}".rstrip() for name, value, unit in part.parameters)
+        what.add_row(part.name, values, part.summary, part.source)
+    memory = _table("It allocates", "", "bytes", "for")
+    memory.columns[1].justify = "right"
+    for item in found.memory:
+        memory.add_row(item.name, f"{item.bytes:,}", item.why)
+    phases = Text.assemble(("A step runs  ", "italic"), " > ".join(found.phases))
+    absent = _table("It leaves out (not compiled, nothing allocated)", "effect", "what it is", "source")
+    for part in found.absent_effects:
+        absent.add_row(part.name, part.summary, part.source)
+    fields = [f"{name} (of {kinds_})" for name, kinds_ in found.absent_fields]
+    lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
+    left_out = absent if found.absent_effects else Text("It leaves out no effect that tisim knows.")
+    return Group(head, "", what, "", memory, "", phases, "", left_out, lacking)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0), header_style="dim")
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def _bytes(size: int) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000  # type: ignore[assignment]
+    return f"{size:.3g} GB"

@@ -1,0 +1,92 @@
+"""What a start must be for a scene, and how it is laid out in the memory of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tisim.backend import runtime
+from tisim.errors import InputError, must
+from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
+from tisim.worlds.state import SHARED, Field
+
+
+def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
+    """InputError unless the start gives what the scene needs and no more, of the right shape, in its domain.
+
+    A quantity that effects share, such as temperature, may be given to a scene that has no use for it.
+    """
+    low, high = scene.domain.bounds()
+    if low is not None:
+        inside = ((start["position"] >= low) & (start["position"] < high)).all()
+        must(bool(inside), "particles.position", "inside the domain", "a particle outside")
+    known = {f.name for f in fields} | SHARED.keys()
+    for name in start:
+        must(name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name)
+    missing = [f.name for f in fields if f.default is None and f.name not in start]
+    if missing:
+        names = ", ".join(sorted(missing))
+        raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
+    n = len(start["mass"])
+    if "fixed" in start and start["fixed"].shape == (n,):
+        rest = not np.any(start["velocity"][start["fixed"] != 0])
+        must(rest, "particles.velocity", "0 where particles are fixed", "one that moves")
+    for f in {**SHARED, **{f.name: f for f in fields}}.values():
+        if f.name in start:
+            _check(f, start[f.name], n)
+    with np.errstate(over="ignore", invalid="ignore"):
+        momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
+    must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))
+    # Where rounding is coarser than a particle, it is not known what it touches.
+    farthest = np.abs(start["position"]).max(axis=1)
+    coarse = np.spacing(farthest.astype(_real())) > start["radius"]
+    worst = float(farthest[coarse][0]) if coarse.any() else 0.0
+    rule = f"so near the origin that {runtime.current().precision} rounds it by less than a radius"
+    must(not coarse.any(), "particles.position", rule, worst)
+
+
+def _check(f: Field, values: np.ndarray, n: int) -> None:
+    must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
+    held: np.ndarray
+    with np.errstate(over="ignore"):
+        held = values.astype(_real())
+    lost, least = ~np.isfinite(held), float(np.finfo(_real()).tiny)
+    if f.name == "mass":
+        # Kernels flush smaller numbers to zero, and no mass is what marks a particle as gone.
+        lost |= held < least
+    if f.name == "radius":
+        # Volumes are its cube.
+        lost |= (held < least ** (1 / 3)) | (held > float(np.finfo(_real()).max) ** (1 / 3))
+    if lost.any():
+        rule = f"within the range of {runtime.current().precision}"
+        must(False, f"particles.{f.name}", rule, float(values[lost][0]))
+    if f.minimum is not None:
+        least = float(values.min())
+        must(least >= f.minimum, f"particles.{f.name}", f"at least {f.minimum:g} {f.unit}", least)
+
+
+def _real() -> type:
+    return np.float64 if runtime.current().precision == "f64" else np.float32
+
+
+def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
+    """A field of all worlds: what each start says of it, else its default; ids count from 0."""
+    copied, number = (f.default, 0) if isinstance(f.default, str) else (None, f.default or 0)
+    kind = np.int32 if f.integer else np.float64 if f.double else _real()
+    column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=kind)
+    for w, start in enumerate(starts):
+        n = len(start["mass"])
+        default = start[copied] if copied else column[w, :n]
+        column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, default)
+    return column
+
+
+def volume(scene: Scene, start: Arrays) -> float:
+    """Of the domain, or of the box around the particles where it has no bounds. m^3."""
+    low, high = scene.domain.bounds()
+    if low is None or high is None:
+        reach = start["radius"].max()
+        low, high = start["position"].min(axis=0) - reach, start["position"].max(axis=0) + reach
+    return float(np.prod(high - low))

@@ -1,0 +1,135 @@
+"""Look whether every quantity is finite, and keep the last good state of every world."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tisim.engine.replay import Image, Replay
+from tisim.engine.result import Status
+from tisim.worlds.state import (
+    ASKED,
+    CROWDED,
+    ENDED,
+    FULL,
+    INDEFINITE,
+    LOST,
+    NOBODY,
+    NOT_FINITE,
+    RUNNING,
+    STEEP,
+    STUCK,
+    UNSETTLED,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tisim.engine.simulation import Simulation
+
+REASONS = {
+    RUNNING: "running",
+    ENDED: "reached its end",
+    NOT_FINITE: "a quantity is not finite",
+    FULL: "more fragments than there is room for",
+    CROWDED: "more simultaneous contacts than there is room for",
+    UNSETTLED: "a quantity that particles settle among themselves does not converge",
+    LOST: "a step so long or so fast that rounding loses the place in the box",
+    STUCK: "the implicit equations of a step cannot be solved even at the shortest step",
+    STEEP: "a force so strong that it asks for a step shorter than the shortest",
+    INDEFINITE: "the diffusion matrix is not positive definite",
+}
+
+
+class Watch:
+    """The last good state of a loaded batch, and what has gone wrong in it.
+
+    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
+        between two steps; those of the last good step, where a world has failed.
+    faults : world -> (time found, s; what is wrong).
+    """
+
+    def __init__(self, simulation: Simulation, image: Image | None = None) -> None:
+        """``image`` : where the simulation has been put, or where it was before the step under way, when that
+        is not its start."""
+        self.simulation, self.s = simulation, simulation.s
+        self.replay = Replay(simulation, image)
+        names = (*self._told(), "time", "count")
+        self.good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
+        self.faults: dict[int, tuple[float, str]] = {}
+
+    def look(self) -> None:
+        """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
+        now = self._snapshot()
+        # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
+        wrong = ~self._sound(now) | ~np.isin(now["status"], (RUNNING, ENDED))
+        known = ~wrong & (now["underway"] == 0)
+        for name, kept in self.good.items():
+            kept[known] = now[name][known]
+        wrong[list(self.faults)] = False
+        if wrong.any():
+            self._stop(np.flatnonzero(wrong))
+        self.replay.keep()
+
+    def _snapshot(self) -> Image:
+        return self.s.snapshot((*self._told(), *self.s.columns))
+
+    def _told(self) -> tuple[str, ...]:
+        return tuple(f.name for f in self.s.told)
+
+    def _stop(self, worlds: np.ndarray) -> None:
+        """Put worlds that have failed where they were last good, from where a step fails again: so a
+        checkpoint holds that too, and why they have failed is found once more when it is restored."""
+        live = self.s.image()
+        try:
+            good = self.replay.last_good(worlds, self._sound)
+            if (self.s.read("blame") == ASKED).any():
+                self.simulation.made.inquest.hold()
+            then = self._snapshot()
+            for name, values in live.items():
+                values[worlds] = good[name][worlds]
+            failed = then["failed"][worlds]
+            live["status"][worlds] = np.where(failed > 0, failed, NOT_FINITE)
+        finally:
+            self.simulation.put(live)
+        for w in map(int, worlds):
+            self.faults[w] = float(then["time"][w]), self._fault(w, then)
+        for name, kept in self.good.items():
+            kept[worlds] = good[name][worlds]
+
+    def _spoilt(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
+        """Each quantity with the live particles, (worlds, capacity), of which it is not finite."""
+        live = np.arange(self.s.capacity) < now["count"][:, None]
+        for f in self.s.told:
+            yield f.name, live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
+
+    def _sound(self, now: Image) -> np.ndarray:
+        """Whether no step has failed and every quantity is finite, by world."""
+        sound = now["failed"] == 0
+        for _, spoilt in self._spoilt(now):
+            sound &= ~spoilt.any(axis=1)
+        return sound
+
+    def status(self, w: int, code: int) -> Status:
+        """How a world whose status field holds ``code`` has ended, or that it runs."""
+        if w in self.faults:
+            when, why = self.faults[w]
+            return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
+        return Status(code == ENDED, REASONS[code])
+
+    def _fault(self, w: int, then: Image) -> str:
+        """What is wrong with a world: what the kernels have recorded of it, or what is not finite."""
+        code = int(then["failed"][w])
+        if code == 0:
+            for name, spoilt in self._spoilt(then):
+                if spoilt[w].any():
+                    return f"{name} of particle {then['id'][w][spoilt[w]].min()} is not finite"
+        blame, who = int(then["blame"][w]), int(then["culprit"][w])
+        effects = self.simulation.scenes[w].effects
+        reason = REASONS[code or NOT_FINITE]
+        if code == UNSETTLED:
+            reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
+        if blame < len(effects):
+            reason += f", by effects.{effects[blame].kind()}"
+        return reason if who == NOBODY else f"{reason}, at particle {who}"

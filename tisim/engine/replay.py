@@ -1,0 +1,115 @@
+"""The last good step of worlds that have failed, found by running them once more.
+
+Whether all is finite is asked now and then only, between many steps, and a failing step can leave its work
+half done. But a run has the same bits again, so worlds go back to a time at which all of their state is
+known, and from there by bisection to the last step after which they were good: all that have failed at once,
+each to its own. That takes no longer than about twice the way from there to the failure did, and what is
+found does not depend on when anybody looked, nor on what else is in the batch.
+
+Particles that do not feel each other have no state in common but at the end of a window of their longest
+step (steppers/alone.py), which is a step here. One in which a particle fails is made once more, and cut where
+the last good step of that particle ended: the others go as far, in a last step that is cut short. There the
+world is known, and from there it must fail again, or the window's beginning is what is good.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tisim.worlds.state import ENDED, RUNNING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tisim.engine.simulation import Simulation
+
+Image = dict[str, np.ndarray]
+EVERY = 10.0
+"""Wall time (s) between images of the whole state, from which worlds can go on."""
+
+
+class Replay:
+    """Where the worlds of a loaded simulation can be run once more from: an image of them, or their start.
+
+    base : the image, of every world between two steps; None for the start, of which none is made, as most
+        runs are short and none fails.
+    """
+
+    def __init__(self, simulation: Simulation, base: Image | None) -> None:
+        self.simulation, self.base, self.made = simulation, base, time.perf_counter()
+
+    def keep(self) -> None:
+        """Make the image anew, where that is due; every world that runs must be good."""
+        if time.perf_counter() - self.made > EVERY:
+            self.base, self.made = self.whole(), time.perf_counter()
+
+    def whole(self) -> Image:
+        """An image of worlds as they are, or as they were, where a step is under way."""
+        image = self.simulation.s.image()
+        waiting = image["underway"] > 0
+        if waiting.any():
+            before = self.base
+            if before is None:
+                try:
+                    before = self._rewound()
+                finally:
+                    self.simulation.put(image)
+            for name, values in image.items():
+                values[waiting] = before[name][waiting]
+        return image
+
+    def last_good(self, worlds: np.ndarray, sound: Callable[[Image], np.ndarray]) -> Image:
+        """Bring worlds to where they fail, and the others nowhere; an image that has their last good steps.
+
+        worlds : indices. sound : whether all is well, for each world of an image. A world in which something
+        is wrong from the start is left there.
+        """
+        last = self.simulation.s.read("steps")
+        good = self._rewound()
+        going = worlds[sound(good)[worlds]]
+        # How many steps are good, from the highest binary digit of that number to the lowest.
+        jump = 1 << int((last - good["steps"])[going].max(initial=0)).bit_length()
+        while jump > 1:
+            jump //= 2
+            able = going[good["steps"][going] + jump <= last[going]]
+            now = self._after(good, able, jump)
+            fine = able[sound(now)[able]]
+            for name, values in good.items():
+                values[fine] = now[name][fine]
+        self._cut(good, going, sound)
+        self._after(good, going, 1)
+        return good
+
+    def _cut(self, good: Image, going: np.ndarray, sound: Callable[[Image], np.ndarray]) -> None:
+        """Go as far into the step that fails as all was well, where from there it fails again."""
+        cut = self._after(good, going, 1)["cut"]
+        part = going[cut[going] > 0]
+        if len(part) == 0:
+            return
+        good["cut"][part] = cut[part]
+        met = self._after(good, part, 1)
+        good["cut"][part] = 0.0
+        again = self._after(met, part, 1)
+        fine = part[sound(met)[part] & ~sound(again)[part]]
+        for name, values in good.items():
+            values[fine] = met[name][fine]
+
+    def _rewound(self) -> Image:
+        if self.base is None:
+            self.simulation.begin()
+        else:
+            self.simulation.put(self.base)
+        return self.simulation.s.image()
+
+    def _after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
+        """What an image becomes when only these worlds take a number of steps."""
+        image["status"][:] = ENDED
+        image["status"][worlds] = RUNNING
+        image["goal"] = image["steps"] + steps
+        self.simulation.put(image)
+        while self.simulation.going_on():
+            self.simulation.program.advance(steps)
+        return self.simulation.s.image()

@@ -1,0 +1,46 @@
+"""Run scenes, one or many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+from tisim.backend import runtime
+from tisim.engine.batches import Batches, Progress
+from tisim.engine.result import Result
+from tisim.io.trajectory import Recording, Trajectory
+from tisim.scene.scene import Scene
+
+_batches = Batches()
+
+
+@overload
+def run(scenes: Scene, progress: Progress | None = None, record: Recording | None = None) -> Result: ...
+
+
+@overload
+def run(
+    scenes: Sequence[Scene], progress: Progress | None = None, record: Recording | None = None
+) -> list[Result]: ...
+
+
+def run(
+    scenes: Scene | Sequence[Scene], progress: Progress | None = None, record: Recording | None = None
+) -> Result | list[Result]:
+    """Run a scene, or many as one batch; returns its Result, or theirs in order.
+
+    progress : called about four times a second with the finished fraction, 0..1. record : a trajectory to
+    write, such as ``Recording("flow.h5", frames=100)``; it does not change the results.
+    What has been compiled is kept for later calls. A world's result is the same bits alone or in a batch.
+    Several threads may call at once: each waits for its turn. ``progress`` may call this in turn.
+    Raises InputError when a start cannot be made or lacks what an effect needs.
+    """
+    if isinstance(scenes, Scene):
+        return run([scenes], progress, record)[0]
+    with runtime.turn:
+        if record is None:
+            found = dict(_batches.run(scenes, progress))
+        else:
+            with Trajectory(record, scenes, runtime.current().precision) as trajectory:
+                found = dict(_batches.run(scenes, progress, trajectory=trajectory))
+    return [found[index] for index in range(len(scenes))]

@@ -1,0 +1,249 @@
+"""Compile once, load many, run: a batch of worlds of one structure."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from tisim.backend import runtime
+from tisim.backend.memory import Tree, collected
+from tisim.backend.thread import in_taichi_thread
+from tisim.engine.assembly import Composition, declared, needed_fields
+from tisim.engine.loading import check_start, laid_out, volume
+from tisim.engine.monitor import Watch
+from tisim.engine.result import Result
+from tisim.errors import must
+from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
+from tisim.worlds.parameter_table import Table, connect
+from tisim.worlds.program import Nest, Program
+from tisim.worlds.state import ENDED, NEVER, NOBODY, RUNNING, State, resolve_fields
+
+CHUNK_SECONDS, FIRST = 0.25, 2**16
+"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; steps of all
+particles together before the first look."""
+
+
+class Simulation:
+    """Compiled for the structure of a scene, a number of worlds and a capacity of particles.
+
+    scene : any scene of the structure; its values do not matter here.
+    schedule : "world" or "particle" (see program.py), or None to choose by device and size.
+    Loading and running other scenes of the same structure compiles nothing. It is for one thread at a time.
+    """
+
+    def __init__(
+        self, scene: Scene, worlds: int = 1, capacity: int | None = None, schedule: str | None = None
+    ) -> None:
+        must(worlds >= 1, "worlds", "at least 1", worlds)
+        began = time.perf_counter()
+        self.runtime, self.worlds = runtime.current(), worlds
+        self.structure = scene.structure()
+        capacity = capacity or scene.capacity()
+        # Fields and lists of a particle come to some hundred bytes; refused here, not in the compiler.
+        needed, there = 300 * worlds * capacity, runtime.memory()
+        rule = f"within the {there / 1e9:.0f} GB of this machine"
+        must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
+        must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
+        self.trees = self._make(scene, worlds, capacity, schedule)
+        self.scenes: list[Scene] = []
+        self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
+
+    @in_taichi_thread
+    def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
+        """Place all fields, which are returned, and compile the kernels of a step."""
+        with collected() as trees:
+            self._place(scene, worlds, capacity)
+        self.schedule = schedule or self._choose(capacity)
+        self.program = Program(self.s, self.made.step, self.schedule)
+        self.first = Program(self.s, self.made.first, self.schedule)
+        self.s.write("status", ENDED)
+        self.program.compile()
+        if self.first.items:
+            self.first.compile()
+        return trees
+
+    def _place(self, scene: Scene, worlds: int, capacity: int) -> None:
+        asked = (scene.effects, scene.stepper)
+        fields = resolve_fields(needed_fields(*asked))
+        self.s = State(worlds, capacity, fields, declared(*asked, "counts"), declared(*asked, "keeps"))
+        parts = self._parts(scene)
+        self.table = Table(parts, worlds, self.runtime.real)
+        *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
+        connect(effects)
+        self.made = Composition(self.s, stepper, tuple(effects), domain, control)
+
+    @staticmethod
+    def _parts(scene: Scene) -> list[Any]:
+        return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
+
+    def _choose(self, capacity: int) -> str:
+        if any(phase.long for phase, _ in Nest().phases(self.made.step)):
+            return "particle"
+        # A world per thread needs as many worlds as threads; one small world is faster without launches.
+        small = capacity * self.worlds <= 20_000
+        many = self.worlds >= self.runtime.threads
+        return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
+
+    def load(self, scenes: Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
+        """Put one scene in each of the first worlds; the others stay empty. No compilation.
+
+        starts : ``particles.arrays`` of each scene, where the caller has made them already.
+        Raises InputError when a scene is of another structure, or larger than the capacity.
+        """
+        self.s.check()
+        must(0 < len(scenes) <= self.worlds, "number of scenes", f"1 to {self.worlds}", len(scenes))
+        for scene in scenes:
+            must(scene.structure() == self.structure, "scene", "of the structure compiled", scene.name)
+            room = scene.capacity()
+            must(
+                room <= self.s.capacity,
+                f"particles of scene {scene.name!r}",
+                f"at most {self.s.capacity}",
+                room,
+            )
+        starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
+        for scene, start in zip(scenes, starts, strict=True):
+            check_start(self.s.fields, scene, start)
+        self.table.write([self._parts(scene) for scene in scenes])
+        self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
+        self.look: Callable[[], None] | None = None
+        self.s.fill({"hold": np.inf, "goal": NEVER})
+        self.begin()
+        self.watch = Watch(self)
+        # A start can fail already: more contacts than there is room for, an infinite force.
+        self.watch.look()
+
+    def begin(self) -> None:
+        """Put every world at its start, with all that its first step takes."""
+        self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
+        counts = [len(start["mass"]) for start in self.starts]
+        self._reset(self.scenes, self.starts, np.array(counts + [0] * (self.worlds - len(counts))))
+        self.forget_lists()
+        if self.first.items:
+            self.first.advance(1)
+
+    def put(self, image: dict[str, np.ndarray]) -> None:
+        """Put all worlds where they were when ``s.image()`` was made of them."""
+        self.s.fill(image)
+        self.forget_lists()
+
+    def forget_lists(self) -> None:
+        """Pair lists are made anew before they are used again."""
+        if self.made.near is not None:
+            self.made.near.forget()
+
+    def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
+        empty = self.worlds - len(scenes)
+        frame = [np.average(a["velocity"], axis=0, weights=a["mass"]) for a in starts]
+        self.s.fill(
+            {
+                # What worlds wait for is asked of them by others, and stays.
+                **dict.fromkeys((name for name in self.s.columns if name not in ("hold", "goal")), 0),
+                "frame": np.array(frame + [np.zeros(3)] * empty),
+                "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
+                "count": counts,
+                "next_id": counts,
+                "most": np.array([scene.capacity() for scene in scenes] + [0] * empty),
+                "status": np.array([RUNNING] * len(scenes) + [ENDED] * empty),
+                "end": np.array([scene.duration for scene in scenes] + [0.0] * empty),
+                "volume": np.array(
+                    [volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty
+                ),
+                "approach_time": np.inf,
+                "culprit": NOBODY,
+                "blame": NOBODY,
+            }
+        )
+
+    def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:
+        """Run every world to its end, or for at most ``steps`` more steps each.
+
+        progress : called about four times a second with the fraction done, 0..1.
+        """
+        for _ in self.chunks(steps):
+            if progress:
+                progress(self.fraction())
+
+    def chunks(self, steps: int | None = None) -> Iterator[None]:
+        """The same in stretches of some steps, about four a second: between them, whoever runs this may look
+        at the state, save a checkpoint, or stop for good or for a while.
+
+        What a recorder has put in ``look`` is called there too; worlds wait at ``s.hold`` for it.
+        """
+        self.s.check()
+        self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
+        # Short enough to be heard from soon, long enough that looking costs little.
+        chunk = max(8, FIRST // (self.worlds * self.s.capacity))
+        while self.going_on():
+            began = time.perf_counter()
+            self.program.advance(chunk)
+            self.watch.look()
+            if self.look:
+                self.look()
+            taken = time.perf_counter() - began
+            self.wall_s += taken
+            if taken < CHUNK_SECONDS / 2:
+                chunk = min(2 * chunk, 100_000)
+            elif taken > 2 * CHUNK_SECONDS:
+                chunk = max(chunk // 2, 1)
+            yield
+
+    def going_on(self) -> bool:
+        """Whether any world runs that has not taken all of the steps asked for."""
+        now = self.s.snapshot(("status", "steps", "goal"))
+        return bool(((now["status"] == RUNNING) & (now["steps"] < now["goal"])).any())
+
+    def fraction(self) -> float:
+        """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
+        n = len(self.scenes)
+        now = self.s.snapshot(("status", "time", "reached", "end"))
+        done = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
+        return float(np.where(now["status"][:n] != RUNNING, 1.0, done).mean())
+
+    def ahead(self) -> float:
+        """Steps before the world that has most of them, if they go on as long as its last one; those that it
+        takes at least where there was none."""
+        n = len(self.scenes)
+        running = self.s.read("status")[:n] == RUNNING
+        left, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
+        fewest = [scene.stepper.fewest(scene.effects, scene.duration) for scene in self.scenes]
+        steps = np.where(dt > 0, left / np.where(dt > 0, dt, 1.0), fewest)
+        return float(np.where(running, np.ceil(steps), 0.0).max())
+
+    def ended(self) -> list[int]:
+        """The loaded worlds that run no more, for good or ill."""
+        status = self.s.read("status")[: len(self.scenes)]
+        return [int(w) for w in np.flatnonzero(status != RUNNING)]
+
+    def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
+        """Loaded worlds read back: those asked for, or all of them, in order."""
+        now, good = self.s.snapshot(self.s.columns), self.watch.good
+        tallies = {name: now[name] for name in self.s.counters}
+        kept = {name: now[name] for e in self.scenes[0].effects for name in e.keeps}
+        status = now["status"]
+        found = []
+        for w in range(len(self.scenes)) if worlds is None else worlds:
+            n = int(good["count"][w])
+            found.append(
+                Result(
+                    scene=self.scenes[w],
+                    state={f.name: good[f.name][w, :n].copy() for f in self.s.told},
+                    start=self.starts[w],
+                    time=float(good["time"][w]),
+                    work={name: int(tally[w]) for name, tally in tallies.items()},
+                    status=self.watch.status(w, int(status[w])),
+                    wall_s=self.wall_s / len(self.scenes),
+                    settings=self.runtime.settings,
+                    measures={name: float(values[w]) for name, values in kept.items()},
+                )
+            )
+        return found
+
+    def close(self) -> None:
+        """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""
+        for tree in self.trees:
+            tree.destroy()

@@ -1,0 +1,187 @@
+"""Files that survive a kill at any instant and a full disk: locks, appends and whole-file replacement."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from tisim.errors import InputError, RunError
+from tisim.files.regular_file import opened, status
+
+try:
+    import fcntl
+except ImportError:
+    fcntl = None  # type: ignore[assignment]
+
+PATIENCE = 60.0
+"""s, longer than any process at work holds a lock; one that is stopped holds it for good."""
+
+
+@contextlib.contextmanager
+def locked(path: Path, *, exclusive: bool, patience: float | None = None) -> Iterator[int]:
+    """Hold the advisory lock of a lock file, among processes and threads; a killed holder lets go of it.
+
+    patience : s, to wait for another holder; PATIENCE unless given.
+    Gives a handle of the file; of its folder, to one that only reads where no lock file is and none can be
+    made. A lock file stays behind on purpose: removing it would let two processes lock two different files.
+    InputError where it cannot be had, RunError when another process holds it for longer.
+    """
+    if fcntl is None:
+        raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
+    handle = opened(path, os.O_RDWR | os.O_CREAT) if exclusive else _for_reading(path)
+    try:
+        kind = fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH
+        _wait(handle, path, kind, PATIENCE if patience is None else patience)
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _for_reading(path: Path) -> int:
+    """A handle to lock: of the lock file, which may be another user's."""
+    try:
+        return opened(path, os.O_RDONLY)
+    except FileNotFoundError:
+        pass
+    try:
+        return opened(path, os.O_RDONLY | os.O_CREAT)
+    except InputError as refused:
+        try:
+            return os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError:
+            raise refused from None
+
+
+def _wait(handle: int, path: Path, kind: int, patience: float) -> None:
+    until = time.monotonic() + patience
+    while True:
+        try:
+            return fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > until:
+                raise RunError(f"{path} has been locked by another process for {patience:g} s") from None
+            time.sleep(0.002)
+        except OSError as error:
+            raise InputError(f"{path} must be where files can be locked; received {error.strerror}") from None
+
+
+def append_at(path: Path, end: int, data: bytes) -> int:
+    """Cut the file at byte end, write data there and flush it to the disk; return the new end.
+
+    If the disk is full, the file is cut at end again and RunError raised: what was there before is whole.
+    InputError when something that is no file is in its place.
+    """
+    try:
+        handle = opened(path, os.O_RDWR | os.O_CREAT)
+        try:
+            if os.fstat(handle).st_size > end:
+                os.ftruncate(handle, end)
+            try:
+                write_at(handle, data, end)
+                os.fsync(handle)
+            except OSError:
+                os.ftruncate(handle, end)
+                raise
+        finally:
+            os.close(handle)
+        if end == 0:
+            _sync_folder(path)
+    except OSError as error:
+        raise _full(path, error) from error
+    return end + len(data)
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Put data in the place of path so that path is, at every instant, the old file or a new one, whole.
+
+    Writers of one path take turns: one name serves for the unfinished file, and a killed writer's is reused.
+    RunError if the disk is full; path is then the old file. InputError when something that is no file has the
+    unfinished one's name; a link in the place of path is replaced itself, not what it points to.
+    """
+    new = path.with_name(unfinished(path.name))
+    try:
+        while True:
+            with locked(new, exclusive=True) as handle:
+                # Whoever had it before may have put it in its place; then that is the file locked here.
+                if _names(new, handle):
+                    _finish(handle, new, path, data)
+                    break
+        _sync_folder(path)
+    except OSError as error:
+        raise _full(path, error) from error
+
+
+def unfinished(name: str) -> str:
+    """What a file of this name is called while it is written."""
+    return f"{name}.new"
+
+
+@contextlib.contextmanager
+def replacing(path: Path, new: Path) -> Iterator[None]:
+    """While this lasts, ``new``, an empty file at first, is written; then it is put in the place of path.
+
+    RunError if the disk is full; path is then the old file, and nothing unfinished is left. InputError when
+    something that is no file is in the place of ``new``.
+    """
+    try:
+        _fresh(new)
+        try:
+            yield
+            new.replace(path)
+        finally:
+            new.unlink(missing_ok=True)
+    except OSError as error:
+        raise _full(path, error) from error
+
+
+def _fresh(path: Path) -> None:
+    """Make an empty file for those who write by name, in place of one that a killed process has left: that
+    may have another name, and a link in its place would have them write over what it points to."""
+    if status(path) is not None:
+        path.unlink()
+    os.close(opened(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
+
+
+def _names(path: Path, handle: int) -> bool:
+    try:
+        return os.path.samestat(path.lstat(), os.fstat(handle))
+    except FileNotFoundError:
+        return False
+
+
+def _finish(handle: int, new: Path, path: Path, data: bytes) -> None:
+    """Make data all that is in the file, on the disk, and put it in its place; take it away if that fails."""
+    try:
+        os.ftruncate(handle, 0)
+        write_at(handle, data, 0)
+        os.fsync(handle)
+        new.replace(path)
+    except OSError:
+        new.unlink(missing_ok=True)
+        raise
+
+
+def write_at(handle: int, data: bytes, offset: int) -> None:
+    """Write all of data into an open file from a byte on; OSError when there is no room for it."""
+    view = memoryview(data)
+    while view:
+        written = os.pwrite(handle, view, offset)
+        view, offset = view[written:], offset + written
+
+
+def _sync_folder(path: Path) -> None:
+    """A new name is on the disk only when its folder is."""
+    handle = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _full(path: Path, error: OSError) -> RunError:
+    return RunError(
+        f"{path} could not be written: {error.strerror or error}; everything stored before is intact"
+    )

@@ -1,0 +1,93 @@
+"""Checksums of HDF5 files that are written whole: behind their end, where HDF5 does not look.
+
+The HDF5 library, given a damaged structure, may read wrong data or never return: it must not be given one.
+The seal covers the file, or all of it but data that has checksums of its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import zlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import h5py
+
+from tisim.errors import InputError, must
+from tisim.files import regular_file
+from tisim.files.atomic import replace_file
+from tisim.files.framing import MAGIC, frame, scan
+from tisim.files.superblock import SIGNATURE
+
+OLDER = "an older version has written it, whose files h5py still reads"
+"""What messages say of a file that is of tisim but has no checksum."""
+
+
+@contextlib.contextmanager
+def created(path: Path) -> Iterator[h5py.File]:
+    """A new HDF5 file in memory; at the end of the ``with`` it is sealed and put in the place of path.
+
+    RunError when it cannot be written; path is then what it was.
+    """
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        yield file
+    replace_file(path, sealed(image.getvalue()))
+
+
+@contextlib.contextmanager
+def opened(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> Iterator[h5py.File]:
+    """A file that ``created`` has left. InputError unless it is there, whole and of this kind.
+
+    kind : its attribute ``format``. what, rule : what it is called in messages, and what it must be.
+    """
+    with h5py.File(io.BytesIO(image(path, what, rule)), "r") as found:
+        must(found.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
+        yield found
+
+
+def image(path: Path, what: str, rule: str) -> bytes:
+    """The HDF5 file that ``sealed`` has sealed. InputError unless it is there and whole; what, rule : as of
+    opened."""
+    content = regular_file.content(Path(os.path.realpath(path)))
+    if content is None:
+        raise InputError(f"{what} must be an existing file; received {str(path)!r}")
+    found = unsealed(content)
+    if found is None:
+        bare = MAGIC not in content and content.startswith(SIGNATURE) and b"tisim" in content
+        why = f", without one: it was cut short or damaged, or {OLDER}" if bare else ""
+        raise InputError(f"{what} must be {rule}, whole and with its checksum; received {str(path)!r}{why}")
+    return found
+
+
+def sealed(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
+    """The file image with its seal; data : (offset, size) in bytes of data that the seal leaves out."""
+    spans = sorted(data)
+    seal = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
+    return image + frame(json.dumps(seal).encode())
+
+
+def unsealed(content: bytes) -> bytes | None:
+    """The HDF5 file without its seal; None without a whole seal, or when the file is not what was sealed."""
+    start = max(content.rfind(MAGIC), 0)
+    payloads = scan(content[start:]).payloads
+    if not content.startswith(SIGNATURE) or not payloads:
+        return None
+    try:
+        seal = json.loads(payloads[0])
+        size, spans, crc = seal["size"], seal["data"], seal["crc"]
+    except (ValueError, KeyError, TypeError):
+        # A frame, but of something else.
+        return None
+    image = content[:start]
+    return image if len(image) == size and _checksum(image, spans) == crc else None
+
+
+def _checksum(image: bytes, spans: Iterable[Iterable[int]]) -> int:
+    crc = at = 0
+    for offset, size in spans:
+        crc, at = zlib.crc32(image[at:offset], crc), offset + size
+    return zlib.crc32(image[at:], crc)

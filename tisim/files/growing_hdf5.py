@@ -1,0 +1,90 @@
+"""An HDF5 file that grows: any reader can open it after every write, and a full disk ends no process.
+
+HDF5 in its single-writer mode writes what is new before what refers to it, so a file is sound after every
+write but for its superblock: that marks the file as open, which keeps readers out for good when the writer
+is killed, and says where the file ended when it was opened. And when a write fails, HDF5 ends the process.
+So it writes to the object below, which leaves the mark out, keeps the superblock's end of the file up to
+date, and of what could not be written tells its owner and not HDF5, for which it is kept in memory.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from tisim.files.atomic import write_at
+from tisim.files.file_object import Seekable
+from tisim.files.superblock import SIZE, superblock
+
+
+class Growing(Seekable):
+    """The HDF5 file at path, made with a superblock of version 3, as a file object for ``h5py.File``.
+
+    failure : why something could not be written, after which nothing is; None while all is well.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.failure: OSError | None = None
+        super().__init__(os.open(path, os.O_RDWR | os.O_CLOEXEC))
+        self._end = os.fstat(self._handle).st_size
+        self._superblock = os.pread(self._handle, SIZE, 0)
+        self._unwritten: list[tuple[int, bytes]] = []
+
+    def write(self, data: bytes) -> int:  # type: ignore[override]
+        at, piece = self._at, bytes(data)
+        self._at += len(piece)
+        if self.failure is None:
+            try:
+                self._put(at, piece)
+            except OSError as failure:
+                self._fail(failure)
+        if self.failure is not None:
+            self._unwritten.append((at, piece))
+        return len(piece)
+
+    def _put(self, at: int, piece: bytes) -> None:
+        if at == 0:
+            self._superblock = piece
+            self._tell_end(self._end)
+            return
+        write_at(self._handle, piece, at)
+        if at + len(piece) > self._end:
+            self._tell_end(at + len(piece))
+
+    def _tell_end(self, end: int) -> None:
+        write_at(self._handle, superblock(self._superblock, end), 0)
+        self._end = end
+
+    def _fail(self, failure: OSError) -> None:
+        """Note the failure, and give back what was written of a piece behind the end."""
+        self.failure = failure
+        os.ftruncate(self._handle, self._end)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Make the file at least this long, bytes; HDF5 asks for it once all is written."""
+        end = self._end if size is None else size
+        if self.failure is None and end > self._end:
+            try:
+                os.ftruncate(self._handle, end)
+                self._tell_end(end)
+            except OSError as failure:
+                self._fail(failure)
+        return end
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        view = memoryview(buffer).cast("B")
+        first, last = self._at, self._at + len(view)
+        found = bytearray(os.pread(self._handle, len(view), first).ljust(len(view), b"\0"))
+        for at, piece in self._unwritten:
+            a, b = max(at, first), min(at + len(piece), last)
+            if a < b:
+                found[a - first : b - first] = piece[a - at : b - at]
+        view[:] = found
+        self._at = last
+        return len(view)
+
+    def _size(self) -> int:
+        return max([self._end, *(at + len(piece) for at, piece in self._unwritten)])
+
+    def writable(self) -> bool:
+        return True

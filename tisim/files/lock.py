@@ -1,0 +1,43 @@
+"""One command at a time makes files in a folder: it holds a lock for as long as it is at work.
+
+The lock is of a file of its own, which stays (see durable.locked); a killed process lets go of it. Commands
+that draw or copy what is in a folder do without, so that a run can be looked at while it goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from tisim.errors import InputError, RunError
+from tisim.files import regular_file
+from tisim.files.atomic import locked
+
+LOCK = ".tisim.lock"
+PATIENCE = 1.0
+"""s, far longer than it takes to look whether a folder is in use, for which the lock is held as well."""
+
+
+def check(folder: Path, patience: float = PATIENCE) -> None:
+    """InputError where another process is at work in the folder; touches nothing."""
+    if regular_file.status(folder / LOCK) is not None:
+        with held(folder, exclusive=False, patience=patience):
+            pass
+
+
+@contextmanager
+def held(folder: Path, *, exclusive: bool = True, patience: float = PATIENCE) -> Iterator[None]:
+    """Be alone at work in a folder, which exists; InputError where another process still is.
+
+    exclusive : False to share it with those who only look. patience : to wait for the other one, s.
+    """
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(locked(folder / LOCK, exclusive=exclusive, patience=patience))
+        except RunError:
+            raise InputError(
+                "output folder must be without a command that is still at work there; "
+                f"received {str(folder)!r}, where another process is running"
+            ) from None
+        yield

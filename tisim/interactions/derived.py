@@ -1,0 +1,90 @@
+"""Quantities of particles that are settled before forces are summed (effect.Settled)."""
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Settled
+from tisim.worlds.program import Item, PerParticle
+from tisim.worlds.state import State
+
+
+@ti.func
+def _length(value):
+    return value.norm()
+
+
+@ti.func
+def _magnitude(value):
+    return ti.abs(value)
+
+
+@ti.func
+def _packed(number):
+    return ti.Vector([number])
+
+
+@ti.func
+def _unpacked(vector):
+    return vector[0]
+
+
+@ti.func
+def _same(vector):
+    return vector
+
+
+@ti.data_oriented
+class Settling:
+    """A quantity that follows from what a particle is and where: nothing of the others, and no memory."""
+
+    def __init__(self, s: State, effect: Settled) -> None:
+        self.s, self.effect = s, effect
+        declared = [f.components for f in s.fields if f.name == effect.quantity]
+        if not declared:
+            raise TypeError(f"{type(effect).__name__}.needs must name its quantity, {effect.quantity!r}")
+        self.value, self.components = getattr(s, effect.quantity), declared[0]
+        vector = self.components == 3
+        self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)
+        self.size = _length if vector else _magnitude
+
+    def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
+        """Settle it; ``again``, only in worlds where events have changed who is where; ``trial``, in a state
+        that may be far from any solution: what is not finite is then left to the forces to show."""
+        return ((SetAgain if again else Set)(self, trial),)
+
+    @ti.func
+    def set(self, s, w, i, t):
+        """Settle that of particle i, as it is in s."""
+        nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
+        self.value[w, i] = self.effect.response(s, w, i, nothing, t)
+
+
+class Set(PerParticle):
+    """value_i = response(0)."""
+
+    def __init__(self, settling: Settling, trial: bool) -> None:
+        super().__init__(settling.s)
+        self.settling, self.trial = settling, trial
+
+    @ti.func
+    def run(self, w, i):
+        self.settling.set(self.s, w, i, self.s.time[w])
+        if ti.static(not self.trial):
+            self.check(w, i)
+
+    @ti.func
+    def check(self, w, i):
+        a = self.settling
+        # Not below infinity: also true of NaN.
+        if not (a.size(a.value[w, i]) < ti.math.inf):
+            self.s.fault(w, i, a.effect.index)
+
+
+class SetAgain(Set):
+    """The same after events."""
+
+    conditional: ClassVar[bool] = True
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]

@@ -1,0 +1,32 @@
+"""Which force it was that stopped a world: asked afterwards, by a kernel that is compiled only then.
+
+In the kernels of a step the laws of all forces would stand once more for it, and take as long to compile.
+"""
+
+from __future__ import annotations
+
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.interactions.force_sum import SumForces
+from tisim.worlds.state import ASKED
+
+
+@ti.data_oriented
+class Inquest:
+    """Of the worlds of a batch that have failed by a force."""
+
+    def __init__(self, summed: SumForces) -> None:
+        self.s, self.summed = summed.s, summed
+
+    @in_taichi_thread
+    def hold(self) -> None:
+        """Blame the effect whose force on the culprit is largest, or not finite, where it was when asked."""
+        self._hold()
+
+    @ti.kernel
+    def _hold(self):
+        for w in range(self.s.worlds):
+            if self.s.blame[w] == ASKED:
+                for i in range(self.s.count[w]):
+                    if self.s.id[w, i] == self.s.culprit[w]:
+                        self.s.blame[w] = self.summed.largest(w, i, self.s.asked_at[w])

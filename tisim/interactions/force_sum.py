@@ -1,0 +1,154 @@
+"""Force and torque on every particle."""
+
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.domain import Domain
+from tisim.effects.base import Force, PairForce
+from tisim.interactions.pair_sum import PairSum
+from tisim.neighbours.full_list import Halves
+from tisim.worlds.state import NOT_FINITE, Field, State
+
+FORCE = Field("force", "N", 3, "sum")
+TORQUE = Field("torque", "N m", 3, "sum")
+
+
+def turning(forces: tuple[Force, ...], pair_forces: tuple[PairForce, ...]) -> bool:
+    """Whether any of these exerts torques."""
+    return any(e.offers("torque") for e in forces) or any(e.offers("pair_torque") for e in pair_forces)
+
+
+@ti.func
+def _both(force, torque):
+    return ti.Vector([force[0], force[1], force[2], torque[0], torque[1], torque[2]])
+
+
+@ti.func
+def _force(force, torque):
+    return force
+
+
+class SumForces(PairSum):
+    """force[w, i] = sum of the scene's forces on i: single, all pairs, near pairs; each in a fixed order.
+
+    Where an effect of the scene exerts torques these are summed along with it: one vector of six. A particle
+    that is ``fixed``, where the scene has that field, takes none.
+    """
+
+    trial: ClassVar[bool] = False
+
+    def __init__(
+        self,
+        s: State,
+        domain: Domain,
+        forces: tuple[Force, ...],
+        pair_forces: tuple[PairForce, ...],
+        halves: Halves | None,
+        settlings: tuple[Any, ...],
+    ) -> None:
+        super().__init__(s, domain, pair_forces, halves)
+        self.forces, self.pair_forces, self.settlings = forces, pair_forces, settlings
+        self.turning = turning(forces, pair_forces)
+        self.fixes = any(field.name == "fixed" for field in s.fields)
+        self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
+
+    @ti.func
+    def start(self, w, i, t):
+        return self.singles(w, i, t)
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        taken = ti.select(self.moves(w, i), total, 0.0)
+        self.write(w, i, taken)
+        self.check(w, i, taken)
+
+    @ti.func
+    def alone(self, w, i, t):
+        """The force on i, at a time of its own, where particles do not feel each other."""
+        for settling in ti.static(self.settlings):
+            settling.set(self.s, w, i, t)
+        self.write(w, i, self.singles(w, i, t))
+
+    @ti.func
+    def singles(self, w, i, t):
+        """Sum of the forces on i by itself."""
+        s = self.s
+        total = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
+        if self.moves(w, i):
+            for effect in ti.static(self.forces):
+                total += self.single(effect, w, i, t)
+        return total
+
+    @ti.func
+    def moves(self, w, i):
+        """Whether forces may move i."""
+        free = True
+        if ti.static(self.fixes):
+            free = self.s.fixed[w, i] == 0
+        return free
+
+    @ti.func
+    def write(self, w, i, total):
+        s = self.s
+        for k in ti.static(range(3)):
+            s.force[w, i][k] = total[k]
+            if ti.static(self.turning):
+                s.torque[w, i][k] = total[3 + k]
+
+    @ti.func
+    def check(self, w, i, total):
+        # Not below infinity: also true of NaN.
+        if not (total.norm_sqr() < ti.math.inf):
+            self.s.suspect(w, NOT_FINITE, i)
+
+    @ti.func
+    def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
+        return self.wrench(effect.force(self.s, w, i, t), effect.torque(self.s, w, i, t))
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
+        s = self.s
+        return self.wrench(
+            effect.pair_force(s, w, i, j, separation, distance, t),
+            effect.pair_torque(s, w, i, j, separation, distance, t),
+        )
+
+    @ti.func
+    def largest(self, w, i, t):
+        """Index of the effect whose force on i is largest, or not finite, or settles to nothing finite."""
+        s = self.s
+        most, found = ti.cast(-1.0, s.real), 0
+        for effect in ti.static(self.forces):
+            size = self.single(effect, w, i, t).norm()
+            if most < ti.math.inf and not (size <= most):
+                most, found = size, effect.index
+        for effect in ti.static(self.pair_forces):
+            total = ti.Vector.zero(s.real, self.components)
+            for j in range(s.count[w]):
+                total += self.of((effect,), w, i, j, t)
+            if most < ti.math.inf and not (total.norm() <= most):
+                most, found = total.norm(), effect.index
+        for settling in ti.static(self.settlings):
+            if not (settling.size(settling.value[w, i]) < ti.math.inf):
+                found = settling.effect.index
+        return found
+
+
+class SumTrialForces(SumForces):
+    """The same for a trial state, which may be one that is to be given up."""
+
+    trial = True
+
+    @ti.func
+    def check(self, w, i, total):
+        pass
+
+
+class SumForcesAgain(SumForces):
+    """After events have changed who is where: the forces that the next step begins with."""
+
+    conditional = True
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]

@@ -1,0 +1,126 @@
+"""Sums over the other particles, in a fixed order; they know no physics.
+
+On a CPU, sums over all pairs are made for a tile of particles at once, one lane each: the inner loop is over
+the lanes, without a branch, and its sums have no other readers, so compilers vectorise it.
+The order in which a particle adds up the others is that of their indices all the same, whatever the tile.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.components.domain import Domain
+from tisim.neighbours.full_list import Halves
+from tisim.worlds.program import PerParticle
+from tisim.worlds.state import State
+
+LANES = 32
+"""Particles of a tile. Measured best of 8 to 128 with AVX-512: the sums of more do not fit the registers, and
+loops over fewer are unrolled before they are vectorised. From 96 on some kernels are not vectorised."""
+
+
+MANY = 1000
+"""With so many others, the pairs of a world are work enough for more threads than one (measured on 2 cores:
+launches cost a step 0.2 ms, as much as the pairs of 400)."""
+
+
+class PairSum(PerParticle):
+    """For each particle a sum over the others: all of them, or those near enough to be listed.
+
+    A subclass says what the sum begins with, in ``start``, what one other contributes, in ``term``, and what
+    becomes of it, in ``finish``; ``components`` is its length.
+    """
+
+    components: int = 3
+
+    def __init__(self, s: State, domain: Domain, effects: Sequence[Any], halves: Halves | None) -> None:
+        super().__init__(s)
+        self.domain, self.halves = domain, halves
+        self.long_ranged = tuple(e for e in effects if not e.short_ranged)
+        self.short_ranged = tuple(e for e in effects if e.short_ranged)
+        # A tile may reach past the particles alive, but not past the slots that there are.
+        idle = s.worlds < runtime.current().threads
+        self.long = bool(self.long_ranged) and idle and s.capacity >= MANY
+        self.tiled = bool(self.long_ranged) and runtime.current().device == "cpu" and s.capacity >= LANES
+
+    @ti.func
+    def start(self, w, i, t):
+        """What the sum of i begins with; a vector of ``components``."""
+        return ti.Vector.zero(self.s.real, self.components)
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
+        """What j contributes to the sum of i; a vector of ``components``."""
+        return ti.Vector.zero(self.s.real, self.components)
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        """Make use of the sum of i."""
+
+    @ti.func
+    def run(self, w, i):
+        t = self.s.time[w]
+        if ti.static(self.tiled):
+            if i % LANES == 0:
+                self.tile(w, i, t)
+        else:
+            total = self.start(w, i, t)
+            if ti.static(len(self.long_ranged) > 0):
+                for j in range(self.s.count[w]):
+                    total += self.of(self.long_ranged, w, i, j, t)
+            self.finish(w, i, self.with_near(total, w, i, t), t)
+
+    @ti.func
+    def tile(self, w, begin, t):
+        """The same for particles from ``begin`` on; lanes without a particle compute what nobody reads."""
+        n = self.s.count[w]
+        first, end = ti.min(begin, self.s.capacity - LANES), ti.min(begin + LANES, n)
+        # An array for each component: with one of 96 numbers for all, some kernels read parameters again for
+        # each pair and did not vectorise (presumably it has more uses than LLVM follows to see that nothing
+        # else points to it; each number it starts with is one).
+        sums = [ti.Vector([0.0] * LANES, self.s.real) for _ in ti.static(range(self.components))]
+        # Numbers of lanes as wide as the sums: comparing integers of 64 bits would halve the lanes in f32.
+        number = ti.Vector([float(lane) for lane in range(LANES)], self.s.real)
+        for i in range(begin, end):
+            total = self.start(w, i, t)
+            for c in ti.static(range(self.components)):
+                sums[c][i - first] = total[c]
+        for j in range(n):
+            itself = ti.cast(j - first, self.s.real)
+            for lane in range(LANES):
+                terms = self.terms(self.long_ranged, w, first + lane, j, t)
+                for c in ti.static(range(self.components)):
+                    total = sums[c][lane]
+                    sums[c][lane] = ti.select(number[lane] != itself, total + terms[c], total)
+        for i in range(begin, end):
+            total = ti.Vector.zero(self.s.real, self.components)
+            for c in ti.static(range(self.components)):
+                total[c] = sums[c][i - first]
+            self.finish(w, i, self.with_near(total, w, i, t), t)
+
+    @ti.func
+    def with_near(self, total, w, i, t):
+        """``total`` and the terms of those that are near."""
+        if ti.static(len(self.short_ranged) > 0):
+            for k in range(self.halves.size(w, i)):
+                total += self.of(self.short_ranged, w, i, self.halves.candidate(w, i, k), t)
+        return total
+
+    @ti.func
+    def of(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
+        """Terms of j for i; none of itself."""
+        total = ti.Vector.zero(self.s.real, self.components)
+        if i != j:
+            total = self.terms(effects, w, i, j, t)
+        return total
+
+    @ti.func
+    def terms(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
+        """Terms of j for i, which are not the same."""
+        d = self.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
+        distance = d.norm()
+        total = self.term(effects[0], w, i, j, d, distance, t)
+        for effect in ti.static(effects[1:]):
+            total += self.term(effect, w, i, j, d, distance, t)
+        return total

@@ -1,0 +1,181 @@
+"""Sweeps that settle a quantity which particles give each other, such as induced dipoles (effect.Mutual)."""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.components.domain import Domain
+from tisim.effects.base import Mutual, Settled
+from tisim.interactions.derived import Settling
+from tisim.interactions.pair_sum import PairSum
+from tisim.neighbours.full_list import Halves
+from tisim.worlds.program import Item, PerParticle, Phase, Repeat
+from tisim.worlds.state import UNSETTLED, State
+
+ROUNDING = 4.0
+"""Changes of so many units in the last place are none: sweeps in f32 may go on with them for ever."""
+
+
+class MutualSettling(Settling):
+    """A quantity that particles give each other: the values of the next sweep, and whether there is one.
+
+    changes : the largest of a particle in this sweep, the last, and the one before.
+    """
+
+    effect: Mutual
+
+    def __init__(self, s: State, effect: Mutual, domain: Domain, halves: Halves | None) -> None:
+        super().__init__(s, effect)
+        self.domain, self.halves = domain, halves
+        self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
+        self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
+        self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.next)
+        for column in (self.pending, self.sweeps, self.again, self.largest, *self.changes):
+            builder.dense(ti.i, s.worlds).place(column)
+        self.tree = Tree(builder)
+
+    def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
+        return ((StartAgain if again else Start)(self), Sweeps(self, trial))
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        real = 8 if self.s.real == ti.f64 else 4
+        return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12)
+
+
+class Start(PerParticle):
+    """There must be a sweep, from the last values, or from nothing where they have been lost."""
+
+    def __init__(self, settling: MutualSettling) -> None:
+        super().__init__(settling.s)
+        self.settling = settling
+
+    @ti.func
+    def run(self, w, i):
+        a = self.settling
+        if i == 0:
+            a.pending[w], a.sweeps[w], a.again[w] = 1, 0, 0
+            a.largest[w] = 0.0
+            for change in ti.static(a.changes):
+                change[w] = 0.0
+        if not (a.size(a.value[w, i]) < ti.math.inf):
+            a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
+
+
+class StartAgain(Start):
+    """The same after events."""
+
+    conditional: ClassVar[bool] = True
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]
+
+
+class Sweeps(Repeat):
+    """Sweep until it has settled."""
+
+    def __init__(self, settling: MutualSettling, trial: bool) -> None:
+        super().__init__((Sweep(settling, trial), Take(settling, trial), Judge(settling)))
+        self.settling = settling
+
+    @ti.func
+    def pending(self, w):
+        return self.settling.pending[w]
+
+
+class Sweep(PairSum):
+    """next_i = (1 - a) value_i + a response(sum_j influence(value_j))."""
+
+    def __init__(self, settling: MutualSettling, trial: bool) -> None:
+        super().__init__(settling.s, settling.domain, (settling.effect,), settling.halves)
+        self.settling, self.effect, self.trial = settling, settling.effect, trial
+        self.components = settling.components
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
+        return self.settling.packed(effect.influence(self.s, w, i, j, separation, distance, t))
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        a, part = self.settling, self.effect.relaxation(w)
+        new = self.effect.response(self.s, w, i, a.unpacked(total), t)
+        a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
+        size = a.size(new)
+        if size > a.largest[w]:
+            ti.atomic_max(a.largest[w], size)
+        if ti.static(not self.trial):
+            self.check(w, i, size)
+
+    @ti.func
+    def check(self, w, i, size):
+        """What is not finite in the first sweep never was; what becomes so has not converged."""
+        # Not below infinity: also true of NaN.
+        if not (size < ti.math.inf):
+            if self.settling.sweeps[w] == 0:
+                self.s.fault(w, i, self.effect.index)
+            else:
+                unsettled(self.s, w, i, self.effect)
+
+
+class Take(PerParticle):
+    """The new values take the place of the old, and are compared with them."""
+
+    def __init__(self, settling: MutualSettling, trial: bool) -> None:
+        super().__init__(settling.s)
+        self.settling, self.effect, self.trial = settling, settling.effect, trial
+        self.least = ROUNDING * float(np.finfo(np.float64 if settling.s.real == ti.f64 else np.float32).eps)
+
+    @ti.func
+    def run(self, w, i):
+        a, s = self.settling, self.s
+        change = a.size(a.next[w, i] - a.value[w, i])
+        a.value[w, i] = a.next[w, i]
+        if change > a.changes[0][w]:
+            ti.atomic_max(a.changes[0][w], change)
+        if ti.static(self.effect.sweeps > 0):
+            tolerance = ti.max(self.effect.relaxation(w) * self.effect.tolerance(w), self.least)
+            on = change > tolerance * a.largest[w]
+            if on and a.sweeps[w] + 1 < self.effect.sweeps:
+                ti.atomic_max(a.again[w], 1)
+            elif on:
+                if ti.static(self.trial):
+                    # Forces that are not finite: the step is given up.
+                    a.value[w, i] *= ti.math.inf
+                else:
+                    unsettled(s, w, i, self.effect)
+
+
+@ti.func
+def unsettled(s, w, i, effect: ti.template()):  # type: ignore[valid-type]
+    s.fail(w, UNSETTLED, i)
+    ti.atomic_min(s.blame[w], effect.index)
+
+
+class Judge(Phase):
+    """One sweep more, or none."""
+
+    def __init__(self, settling: MutualSettling) -> None:
+        self.settling = settling
+
+    @ti.func
+    def run(self, w, _k):
+        a, s = self.settling, self.settling.s
+        s.mutual_sweeps[w] += 1
+        now, last, before = ti.static(a.changes)
+        if before[w] > 0.0 and now[w] < ti.math.inf:
+            # Of two sweeps: where others act as much along as against, changes grow by turns.
+            s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
+        before[w], last[w], now[w] = last[w], now[w], 0.0
+        a.sweeps[w] += 1
+        a.pending[w] = a.again[w]
+        a.again[w], a.largest[w] = 0, 0.0
+
+
+def settling(s: State, effect: Settled, domain: Domain, halves: Halves | None) -> Any:
+    """What settles the quantity of an effect."""
+    return MutualSettling(s, effect, domain, halves) if isinstance(effect, Mutual) else Settling(s, effect)

@@ -1,0 +1,78 @@
+"""Save a simulation between two steps, and go on from there to the same bits.
+
+A checkpoint holds every particle field, the clock, the books and the counters of every world. Pair lists are
+not in it: they are made anew, and results do not depend on when that was. A world that has failed is in it
+at its last good step, and why it has failed is found again when it is restored. Where a step is under way it
+holds besides where worlds were before.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tisim.backend import runtime
+from tisim.engine.monitor import Watch
+from tisim.engine.simulation import Simulation
+from tisim.errors import must
+from tisim.files import checksum
+
+FORMAT = "tisim checkpoint 2"
+BEFORE = "before"
+
+
+def _identity(simulation: Simulation) -> dict[str, Any]:
+    """What a checkpoint must have in common with the simulation it is restored to."""
+    return {
+        "scenes": json.dumps([scene.digest() for scene in simulation.scenes]),
+        "precision": simulation.runtime.precision,
+        "device": simulation.runtime.device,
+        "backend": runtime.backend(),
+        "worlds": simulation.worlds,
+        "capacity": simulation.s.capacity,
+    }
+
+
+def save(simulation: Simulation, path: str | Path) -> None:
+    """Write a checkpoint of a loaded simulation that is between two steps.
+
+    path is, at every instant, what it was before or the whole new file. RunError when the disk is full.
+    """
+    simulation.s.check()
+    with checksum.created(Path(path)) as file:
+        file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
+        now = simulation.s.image()
+        for name, values in now.items():
+            file[name] = values
+        if now["underway"].any():
+            for name, values in simulation.watch.replay.whole().items():
+                file[f"{BEFORE}/{name}"] = values
+
+
+def restore(simulation: Simulation, path: str | Path) -> None:
+    """Bring a simulation, loaded with the same scenes, to where the checkpoint was saved.
+
+    InputError when the file is none, is cut short or damaged, or is of other scenes, another precision or
+    another capacity; the simulation is then as it was.
+    """
+    simulation.s.check()
+    with checksum.opened(Path(path), "checkpoint", FORMAT) as file:
+        for name, value in _identity(simulation).items():
+            _agree(name, value, file.attrs[name])
+        wall_s = float(file.attrs["wall_s"])
+        columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
+        group = file.get(BEFORE, file)
+        before = {name: np.asarray(group[name]) for name in columns}
+    simulation.put(columns)
+    simulation.wall_s = wall_s
+    simulation.watch = Watch(simulation, before)
+    simulation.watch.look()
+
+
+def _agree(name: str, value: Any, received: Any) -> None:
+    if name == "scenes":
+        must(value == received, "checkpoint", "of the same scenes", "one of others")
+    must(value == received, f"checkpoint's {name}", str(value), received)

@@ -1,0 +1,149 @@
+"""The layout of H5MD 1.1 files (P. de Buyl, P. H. Colberg and F. Hoefling, Comput. Phys. Commun. 185 (2014)
+1546, and nongnu.org/h5md).
+
+Of the specification this needs the metadata, the units module, and groups of particles whose number varies:
+entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``, which is for what
+programs add, has the scenes as TOML and checksums of all that frames hold: HDF5 1.10 and later check the
+structure of a file but not the data in it.
+"""
+
+from __future__ import annotations
+
+import getpass
+import re
+import struct
+import zlib
+from typing import Any
+
+import h5py
+import numpy as np
+
+from tisim.components.domain import Domain
+from tisim.errors import must
+from tisim.scene.initial_state import Arrays
+from tisim.worlds.state import Field
+
+VERSION = (1, 1)
+ABSENT = -1
+"""Id of an entry that is no particle; its other values are not-a-number, or 0 where they are integers."""
+ASCII = h5py.string_dtype("ascii")
+CHUNK = 1 << 16
+"""Particles of a frame that are stored, and compressed, together."""
+ROWS = 1024
+"""Frames whose times and checksums are stored together."""
+SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
+
+
+def names(worlds: int) -> list[str]:
+    """The names of the groups of particles of so many worlds."""
+    return ["all"] if worlds == 1 else [f"world_{index}" for index in range(worlds)]
+
+
+def metadata(file: h5py.File, version: str) -> None:
+    """The group ``h5md``: who made the file, by which program and by which rules."""
+    group = file.create_group("h5md")
+    group.attrs.create("version", VERSION, dtype=np.int32)
+    group.create_group("author").attrs["name"] = np.bytes_(_author())
+    creator = group.create_group("creator")
+    creator.attrs["name"], creator.attrs["version"] = np.bytes_("tisim"), np.bytes_(version)
+    units = group.create_group("modules/units")
+    units.attrs.create("version", (1, 0), dtype=np.int32)
+    units.attrs.create("system", "SI", dtype=ASCII)
+
+
+def _author() -> str:
+    try:
+        return getpass.getuser().encode("ascii", "replace").decode()
+    except (KeyError, OSError):
+        return "unknown"
+
+
+def unit(text: str) -> str:
+    """A unit as the units module writes it: "kg/m^3" is "kg m-3"."""
+    found = []
+    for sign, part in zip((1, -1), text.split("/", 1), strict=False):
+        for symbol, power in re.findall(r"([A-Za-z]+)(?:\^?(-?\d+))?", part):
+            n = sign * int(power or 1)
+            found.append(symbol if n == 1 else f"{symbol}{n:+d}")
+    return " ".join(found)
+
+
+def box(group: h5py.Group, domain: Domain) -> None:
+    """The group ``box``. Where it is periodic, positions are those of the image that lies in the domain.
+
+    Beyond the specification, ``origin`` is the lower corner of the domain, m.
+    """
+    low, high = domain.bounds()
+    kind = b"periodic" if low is not None and domain.joined() else b"none"
+    made = group.create_group("box")
+    made.attrs.create("dimension", 3, dtype=np.int32)
+    made.attrs["boundary"] = np.array([kind] * 3)
+    if low is not None and high is not None:
+        # Within the header of the dataset, of which HDF5 checks the checksum.
+        compact = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        compact.set_layout(h5py.h5d.COMPACT)
+        for name, values in (("edges", high - low), ("origin", low)):
+            space, double = h5py.h5s.create_simple(values.shape), h5py.h5t.NATIVE_DOUBLE
+            h5py.h5d.create(made.id, name.encode(), double, space, compact)
+            made[name][...] = values
+            _with_unit(made[name], "m")
+
+
+def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: Any) -> None:
+    """A time-dependent element for each field, empty as yet, all on the ``step`` and ``time`` of position."""
+    for field in fields:
+        element = group.create_group(field.name)
+        if field.name == "position":
+            element.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(ROWS,), fillvalue=-1)
+            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(ROWS,))
+            _with_unit(time, "s")
+        else:
+            element["step"], element["time"] = group["position/step"], group["position/time"]
+        fill = ABSENT if field.name == "id" else 0 if field.integer else np.nan
+        value = element.create_dataset(
+            "value", field.shape(0, 0), np.int32 if field.integer else real,
+            maxshape=field.shape(None, capacity),  # type: ignore[arg-type]
+            chunks=field.shape(1, min(capacity, CHUNK)), fillvalue=fill,
+            compression="gzip", compression_opts=1, shuffle=True,
+        )  # fmt: skip
+        _with_unit(value, field.unit)
+
+
+def scene(file: h5py.File, name: str, text: str) -> None:
+    """The scene of a group of particles, as TOML."""
+    data = text.encode()
+    numbers = np.frombuffer(data, np.uint8)
+    stored = file.create_dataset(f"{SCENES}/{name}", data=numbers, chunks=True, compression="gzip")
+    stored.attrs["crc32"] = np.uint32(zlib.crc32(data))
+
+
+def scene_text(file: h5py.File, name: str) -> str:
+    """What ``scene`` has written; InputError when it is damaged."""
+    stored = file[f"{SCENES}/{name}"]
+    text = stored[:].tobytes()
+    same = zlib.crc32(text) == stored.attrs["crc32"]
+    must(same, "file", "undamaged", "a scene whose checksum does not fit")
+    return text.decode()
+
+
+def checksums(file: h5py.File, name: str) -> h5py.Dataset:
+    """For each frame of a group of particles, two numbers: see ``clock_checksum`` and ``frame_checksum``."""
+    return file.create_dataset(f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(ROWS, 2))
+
+
+def clock_checksum(step: int, time: float) -> int:
+    """CRC-32 of a frame's step and time (s)."""
+    return zlib.crc32(struct.pack("<qd", step, time))
+
+
+def frame_checksum(clock: int, arrays: Arrays) -> int:
+    """CRC-32 of a frame's clock, of which the checksum is given, and its arrays as stored, by name."""
+    crc = clock
+    for name in sorted(arrays):
+        crc = zlib.crc32(arrays[name].tobytes(), crc)
+    return crc
+
+
+def _with_unit(dataset: h5py.Dataset, text: str) -> None:
+    if text:
+        dataset.attrs.create("unit", unit(text), dtype=ASCII)

@@ -1,0 +1,62 @@
+"""The observer that writes a trajectory while a simulation runs: it says when frames are due."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+
+from tisim.engine.simulation import Simulation
+from tisim.io.reader import Frame
+from tisim.worlds.state import RUNNING
+
+if TYPE_CHECKING:
+    from tisim.io.trajectory import Trajectory
+
+EARLY = 1e-9
+"""Part of an interval by which a frame may come early, so that rounding of times costs no further step."""
+
+
+class Recorder:
+    """Looks at a simulation between stretches of steps, and has its worlds wait where a frame is due."""
+
+    def __init__(self, trajectory: Trajectory, simulation: Simulation, indices: Sequence[int]) -> None:
+        self.trajectory, self.simulation, self.indices = trajectory, simulation, list(indices)
+        self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
+        self.last = [_last(trajectory.groups[index]) for index in self.indices]
+        self.due = np.full(simulation.worlds, np.inf)
+        for w, interval in enumerate(self.interval):
+            # A run that goes on may owe the frame of the time where it goes on: the disk was full.
+            self.due[w] = 0.0 if self.last[w] < 0 else self._after(self.last[w], interval)
+        simulation.look = self.look
+        self.look()
+
+    @staticmethod
+    def _after(time: float, interval: float) -> float:
+        """The first time after this one at which a frame is due, s."""
+        return float((np.floor(time / interval + EARLY) + 1 - EARLY) * interval)
+
+    def look(self) -> None:
+        """Write what is due, and say when each world is due next."""
+        s, good = self.simulation.s, self.simulation.watch.good
+        running = s.read("status") == RUNNING
+        steps = s.read("steps")
+        for w, interval in enumerate(self.interval):
+            time = float(good["time"][w])
+            if time < self.due[w] and running[w]:
+                continue
+            self.due[w] = self._after(time, interval)
+            if time > self.last[w]:
+                n = int(good["count"][w])
+                arrays = {f.name: good[f.name][w, :n] for f in self.trajectory.fields[self.indices[w]]}
+                self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
+                self.last[w] = time
+        s.write("hold", self.due)
+
+
+def _last(group: h5py.Group) -> float:
+    """Time of the last frame, s; below 0 when there is none."""
+    times = group["position/time"]
+    return float(times[-1]) if len(times) else -1.0

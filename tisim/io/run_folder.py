@@ -1,0 +1,137 @@
+"""What a run leaves in its folder: result.h5, scene.toml, versions.json, cloud.png; trajectory.h5 if asked.
+
+result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
+one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts, ``measures``
+what effects keep of the world; the attributes say how the run ended and under which settings, and hold the
+scene as TOML. A checksum of the whole file stands behind its end (see checksum.py).
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+import tisim
+from tisim.backend import runtime
+from tisim.engine.result import Result
+from tisim.errors import must
+from tisim.files import checksum, lock, ownership, regular_file
+from tisim.files.atomic import replace_file
+from tisim.io.reader import RESULT
+from tisim.plotting import cloud
+from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
+from tisim.worlds.state import resolve_fields
+
+NAMES = (
+    "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,
+)  # fmt: skip
+"""Of all files that a run writes."""
+
+
+@dataclass(frozen=True)
+class Folder:
+    """Where a run goes."""
+
+    path: Path
+
+    @property
+    def result(self) -> Path:
+        return self.path / "result.h5"
+
+    @property
+    def trajectory(self) -> Path:
+        return self.path / "trajectory.h5"
+
+    @property
+    def checkpoint(self) -> Path:
+        return self.path / "checkpoint.h5"
+
+    def check(self, overwrite: bool = False, resume: bool = False) -> None:
+        """InputError when a run is under way here, or writing here would lose what is not to be lost; touches
+        nothing."""
+        lock.check(self.path)
+        self._check(overwrite, resume)
+
+    def _check(self, overwrite: bool, resume: bool) -> None:
+        what, begun = "output folder", regular_file.exists(self.checkpoint)
+        if resume:
+            must(begun, what, "one that an interrupted run has left", str(self.path))
+        elif not overwrite:
+            finished = regular_file.exists(self.result)
+            must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
+            how = "--resume or --overwrite" if begun else "--overwrite; there is no checkpoint to go on from"
+            rule = f"without an interrupted run (or give {how})"
+            must(not begun and not regular_file.exists(self.trajectory), what, rule, str(self.path))
+        ownership.check(self.path, NAMES, overwrite or resume)
+
+    @contextmanager
+    def taken(self, overwrite: bool = False, resume: bool = False) -> Iterator[None]:
+        """Make the folder, mark it as one of tisim's, and be alone at work there while this lasts.
+
+        InputError as of check, and where that cannot be.
+        """
+        ownership.take(self.path, NAMES, overwrite or resume)
+        with lock.held(self.path):
+            self._check(overwrite, resume)  # another run may have come and gone since that was looked at
+            yield
+
+
+def versions() -> dict[str, str]:
+    """What a result depends on beside its scene."""
+    return {
+        "tisim": tisim.__version__,
+        "backend": runtime.backend(),
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def write(result: Result, folder: Folder) -> list[Path]:
+    """Write all files of a run, in place of any before; returns their paths. RunError on a full disk."""
+    folder.result.unlink(missing_ok=True)
+    paths = {name: folder.path / name for name in ("scene.toml", "versions.json", "cloud.png")}
+    replace_file(paths["scene.toml"], result.scene.to_toml().encode())
+    replace_file(paths["versions.json"], (json.dumps(versions(), indent=2) + "\n").encode())
+    with tempfile.SpooledTemporaryFile() as image:
+        cloud.cloud(result).savefig(image, dpi=150, format="png")
+        image.seek(0)
+        replace_file(paths["cloud.png"], image.read())
+    write_result(result, folder.result)
+    folder.checkpoint.unlink(missing_ok=True)
+    return [folder.result, *paths.values()]
+
+
+def write_result(result: Result, path: Path) -> None:
+    """Write the result.h5 of a run, in place of any before. RunError on a full disk."""
+    with checksum.created(path) as file:
+        file.attrs.update({
+            "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,
+            "reason": result.status.reason, "time": result.time, "wall_s": result.wall_s,
+            "settings": json.dumps(result.settings), "versions": json.dumps(versions()),
+        })  # fmt: skip
+        units = _units(result.scene)
+        for name, arrays in (("start", result.start), ("end", result.state)):
+            _write_arrays(file.create_group(name), arrays, units)
+        file.create_group("work").attrs.update(result.work)
+        file.create_group("measures").attrs.update(result.measures)
+
+
+def _units(scene: Scene) -> dict[str, str]:
+    fields = resolve_fields(need for effect in scene.effects for need in effect.needed())
+    return {field.name: field.unit for field in fields}
+
+
+def _write_arrays(group: h5py.Group, arrays: Arrays, units: dict[str, str]) -> None:
+    for name, values in arrays.items():
+        group.create_dataset(name, data=values).attrs["unit"] = units.get(name, "")

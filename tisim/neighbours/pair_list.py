@@ -1,0 +1,137 @@
+"""Pairs whose surfaces are near: all pairs for small worlds, a cell list with a skin for larger ones.
+
+Each pair is listed once, by its larger member (of equals, the lower index). A particle then searches only
+as far as twice its own radius, so a few large grains among many small ones cost no more than their volume.
+A list is made anew when particles have moved, relative to the world's own frame, so far that a pair it
+lacks could matter. What is done with a pair depends on its true distance, never on whether the list was
+due: results do not depend on when lists were made, and a restarted run keeps its bits.
+"""
+
+from __future__ import annotations
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.components.domain import Domain
+from tisim.effects.base import PairForce
+from tisim.worlds.state import State
+
+SMALL = 48
+"""Worlds of at most this many particles look at all pairs."""
+LISTED = 24
+"""Neighbours a particle can list; one with more looks at all particles."""
+HORIZON = 0.15
+"""Gap within which every pair is sure to be offered, in mean distances between particles."""
+AHEAD = 2.0
+"""Steps that a list is meant to last: its skin along each axis is what particles move in them."""
+CELLS_PER_PARTICLE = 2
+
+
+@ti.data_oriented
+class Neighbours:
+    """The pair list of every world."""
+
+    def __init__(self, s: State, domain: Domain, short_ranged: tuple[PairForce, ...] = ()) -> None:
+        self.short_ranged = short_ranged
+        self.s, self.domain, self.joined = s, domain, domain.joined()
+        worlds, capacity = s.worlds, s.capacity
+        self.max_cells = CELLS_PER_PARTICLE * capacity + 8
+        self.small, self.room, self.ahead = SMALL, LISTED, AHEAD
+        builder = ti.FieldsBuilder()
+        self.cell_start, self.cell_of, self.order, self.listed = (ti.field(ti.i32) for _ in range(4))
+        self.other = ti.field(ti.i32)
+        self.dims = ti.Vector.field(3, ti.i32)
+        self.corner, self.cell = ti.Vector.field(3, s.real), ti.Vector.field(3, s.real)
+        self.sorted_position, self.sorted_radius = ti.Vector.field(3, s.real), ti.field(s.real)
+        self.skin = ti.Vector.field(3, s.real)
+        self.gap = ti.field(s.real)
+        self.stale = ti.field(ti.i32)
+        builder.dense(ti.i, worlds).dense(ti.j, self.max_cells + 1).place(self.cell_start)
+        for column in (self.cell_of, self.order, self.listed, self.sorted_position, self.sorted_radius):
+            builder.dense(ti.i, worlds).dense(ti.j, capacity).place(column)
+        builder.dense(ti.i, worlds).dense(ti.j, capacity).dense(ti.k, self.room + 1).place(self.other)
+        for column in (self.dims, self.corner, self.cell, self.skin, self.gap, self.stale):
+            builder.dense(ti.i, worlds).place(column)
+        self.tree = Tree(builder)
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        real = 8 if self.s.real == ti.f64 else 4
+        per_world = 4 * (self.max_cells + 5 + self.s.capacity * (4 + self.room))
+        return self.s.worlds * (per_world + real * (10 + 4 * self.s.capacity))
+
+    @in_taichi_thread
+    def forget(self) -> None:
+        """Have every list made anew before it is used again."""
+        self.stale.fill(1)
+
+    @ti.func
+    def owns(self, w, i, j):
+        """Whether the pair is i's to list."""
+        a, b = self.s.radius[w, i], self.s.radius[w, j]
+        return a > b or (a == b and i < j)
+
+    @ti.func
+    def size(self, w, i):
+        """How many candidates ``candidate`` offers particle i."""
+        n = self.s.count[w]
+        if n > self.small and self.listed[w, i] >= 0:
+            n = self.listed[w, i]
+        return n
+
+    @ti.func
+    def candidate(self, w, i, k):
+        """The k-th particle that may be a neighbour owned by i; i itself where there is none."""
+        j = k
+        if self.s.count[w] > self.small and self.listed[w, i] >= 0:
+            j = self.other[w, i, k]
+        elif not self.owns(w, i, k):
+            j = i
+        return j
+
+    @ti.func
+    def spacing(self, w):
+        """Mean distance between particles: the cube root of the volume at the start for each. m."""
+        return ti.cast(ti.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
+
+    @ti.func
+    def horizon(self, w):
+        """Gap between surfaces (m) within which every pair is sure to be offered."""
+        return HORIZON * self.spacing(w)
+
+    @ti.func
+    def reach(self, w, i):
+        """Widest gap (m) at which i is to list a particle that is no larger."""
+        gap = self.gap[w]
+        for effect in ti.static(self.short_ranged):
+            gap = ti.max(gap, effect.reach(self.s, w, i))
+        return gap
+
+    @ti.func
+    def sure(self, w):
+        """The same where only near pairs are offered; 0, for no limit, where all pairs are. m."""
+        return ti.select(self.s.count[w] > self.small, self.horizon(w), 0.0)
+
+    @ti.func
+    def moved(self, w):
+        """Note that particles have moved by at most ``stride`` relative to the frame, along each axis."""
+        for k in ti.static(range(3)):
+            self.s.travel[w, k] += self.s.stride[w, k]
+            if 2.0 * self.s.travel[w, k] > self.skin[w][k]:
+                self.stale[w] = 1
+
+    @ti.func
+    def place(self, w, r):
+        """Index of the cell along each axis."""
+        c = ti.floor((r - self.corner[w]) / self.cell[w], ti.i32)
+        return ti.max(0, ti.min(c, self.dims[w] - 1))
+
+    @ti.func
+    def around(self, c, cells):
+        """Index of a cell that may lie across a joined face, by less than one turn."""
+        return c + ti.select(c < 0, cells, 0) - ti.select(c >= cells, cells, 0)
+
+    @ti.func
+    def turns(self, c, cells):
+        """Which image of the box a cell lies in, along each axis: -1, 0 or 1."""
+        return ti.select(c >= cells, 1, 0) - ti.select(c < 0, 1, 0)

@@ -1,0 +1,163 @@
+"""Random sequential addition: spheres placed one after another at random, where they do not overlap.
+
+B. Widom, J. Chem. Phys. 44 (1966) 3888. The start of Z04 section 8 ("initially non-intersecting") and of
+Z16 section 9. Equal spheres jam at a volume fraction of 0.3841 in the bulk (G. Zhang and S. Torquato,
+Phys. Rev. E 88 (2013) 053312), at less between walls.
+"""
+
+import numpy as np
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.components.ranges import check_resolved
+from tisim.errors import InputError, must
+from tisim.numerics import philox
+from tisim.packing.region import Region, box
+from tisim.packing.saturation import fill
+
+STREAM = 0x52534100
+SATURATION = 0.3841
+"""Volume fraction at which no further sphere fits, in the bulk."""
+PATIENCE = 5_000
+"""Failures in a row after which places are no longer tried everywhere, only where there is room."""
+CELLS = 64
+"""Cells along an axis, at most."""
+
+
+@in_taichi_thread
+@ti.kernel
+def _add(
+    centres: ti.types.ndarray(),  # type: ignore[valid-type]
+    heads: ti.types.ndarray(),  # type: ignore[valid-type]
+    follow: ti.types.ndarray(),  # type: ignore[valid-type]
+    spheres: ti.i32,
+    radius: ti.f64,
+    seed: ti.u64,
+    patience: ti.i32,
+    x_low: ti.f64,
+    y_low: ti.f64,
+    z_low: ti.f64,
+    x_side: ti.f64,
+    y_side: ti.f64,
+    z_side: ti.f64,
+    nx: ti.i32,
+    ny: ti.i32,
+    nz: ti.i32,
+    periodic: ti.i32,
+    ball: ti.i32,
+) -> ti.i32:
+    """Place the spheres; returns how many found room.
+
+    ``heads`` has the last member of each cell, and ``follow`` the one before each sphere in its cell; -1
+    where there is none.
+    """
+    placed = 0
+    ti.loop_config(serialize=True)
+    for _once in range(1):
+        side, low = ti.Vector([x_side, y_side, z_side]), ti.Vector([x_low, y_low, z_low])
+        dims = ti.Vector([nx, ny, nz])
+        attempt = ti.cast(0, ti.u64)
+        stuck = False
+        for i in range(spheres):
+            free = False
+            tries = 0
+            while not free and tries < patience and not stuck:
+                a = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 0))
+                b = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 1))
+                u = ti.Vector([a[0], a[1], b[0]])
+                attempt += ti.cast(1, ti.u64)
+                if ball == 0 or (u - 0.5).norm_sqr() <= 0.25:
+                    tries += 1
+                    cell = ti.min(ti.floor(u * dims, ti.i32), dims - 1)
+                    x = low + u * side
+                    free = True
+                    for k in range(27):
+                        # From the cell itself on: most places that are taken are found to be so there.
+                        turn = (k + 13) % 27
+                        c = cell + ti.Vector([turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1])
+                        if periodic > 0:
+                            c = (c + dims) % dims
+                        if free and c.min() >= 0 and (c < dims).all():
+                            at = (c[0] * dims[1] + c[1]) * dims[2] + c[2]
+                            j = heads[at]
+                            while j >= 0:
+                                gap = ti.Vector([
+                                    x[0] - centres[j, 0], x[1] - centres[j, 1], x[2] - centres[j, 2]
+                                ])  # fmt: skip
+                                if periodic > 0:
+                                    gap -= side * ti.round(gap / side)
+                                if gap.norm_sqr() < 4.0 * radius * radius:
+                                    free = False
+                                j = follow[j]
+                    if free:
+                        at = (cell[0] * dims[1] + cell[1]) * dims[2] + cell[2]
+                        follow[i] = heads[at]
+                        heads[at] = i
+                        for k in ti.static(range(3)):
+                            centres[i, k] = x[k]
+            if free:
+                placed += 1
+            else:
+                stuck = True
+    return placed
+
+
+def sequential_addition(
+    count: int, radius: float, low: np.ndarray, high: np.ndarray, seed: int, periodic: bool = False
+) -> np.ndarray:
+    """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) that do not overlap.
+
+    Centres lie anywhere in the box ``low``..``high`` (m); spheres may reach over its faces, and where the box
+    is ``periodic`` they do not overlap across them either. Further as ``place``.
+    """
+    return place(count, radius, box(low, high, periodic), seed)
+
+
+def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
+    """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) in a region, none overlapping.
+
+    Depends on the arguments alone, not on device or threads. Goes up to saturation: InputError, which says
+    the volume fraction reached, when no further sphere fits.
+    """
+    runtime.current()
+    check_resolved("places of the packing", np.stack([region.low, region.high]), radius)
+    sphere = 4 / 3 * np.pi * radius**3
+    # Refused at once where no choice of places would do: a few spheres can exceed the limit of many.
+    most = (SATURATION + count**-0.5) * region.covered(radius) / region.volume
+    wanted = count * sphere / region.volume
+    rule = f"at most {SATURATION:.3f}, where random sequential addition of many spheres ends"
+    must(wanted <= most, "volume fraction", rule, float(f"{wanted:.4g}"))
+    centres = _everywhere(count, radius, region, seed)
+    if len(centres) < count:
+        generator = np.random.Generator(np.random.Philox(key=[seed, STREAM]))
+        centres = fill(centres, count, 2 * radius, region, generator)
+    if len(centres) < count:
+        raise InputError(
+            f"volume fraction must be at most {len(centres) * sphere / region.volume:.4f}, where no further "
+            f"sphere fits ({len(centres)} of {count} were placed); received {wanted:.4f}"
+        )
+    return centres
+
+
+def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
+    """The first centres, found by trying places in all of the region."""
+    # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
+    dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, CELLS).astype(int)
+    heads = np.full(int(np.prod(dims)), -1, dtype=np.int32)
+    centres, follow = np.zeros((count, 3)), np.full(count, -1, dtype=np.int32)
+    placed = _add(
+        centres,
+        heads,
+        follow,
+        count,
+        radius,
+        seed,
+        PATIENCE,
+        *region.low.tolist(),
+        *region.side.tolist(),
+        *dims.tolist(),
+        region.periodic,
+        region.ball,
+    )
+    return centres[:placed]

@@ -1,0 +1,187 @@
+"""A picture of a cloud: its start and its end, grains as spheres of their true size."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+
+from tisim.components.domain import Domain
+from tisim.engine.result import Result
+from tisim.plotting.style import empty
+from tisim.scene.initial_state import Arrays
+
+PIXELS = 1400
+"""Width of a panel as it is drawn; half of it as it is shown, so that edges are smooth."""
+SMALLEST = 4.0
+"""Least radius of a grain in those pixels: a smaller one would not be seen."""
+AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
+PLAIN = (0.36, 0.55, 0.73)
+# Without its black end, against which neither shade nor edge of a cold grain would show.
+HEAT = ListedColormap(colormaps["inferno"](np.linspace(0.17, 0.97, 256)))
+
+_TOWARDS = np.array([
+    np.cos(ELEVATION) * np.cos(AZIMUTH), np.cos(ELEVATION) * np.sin(AZIMUTH), np.sin(ELEVATION)
+])  # fmt: skip
+_RIGHT = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
+_UP = np.cross(_TOWARDS, _RIGHT)
+SEEN = np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
+"""A point times this is right, up and towards the viewer."""
+_LIGHT = np.array([-0.45, 0.6, 0.66])
+
+
+def cloud(result: Result) -> Figure:
+    """Start and end of a run side by side, as ``start_and_end``."""
+    return start_and_end((result.start, result.state), (0.0, result.time), result.scene.domain)
+
+
+def start_and_end(
+    states: tuple[Arrays, Arrays], times: tuple[float, float], domain: Domain, last: str = "end"
+) -> Figure:
+    """Two states (at times in s) side by side, seen from one side without perspective.
+
+    last : what the second is called.
+
+    Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
+    In open space each panel has its own scale, which its bar gives.
+    """
+    figure = empty(10.4, 5.0, pad=0.1)
+    axes = figure.subplots(1, 2)
+    norm = temperatures(states)
+    seen = corners(*domain.bounds())
+    both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
+    views = [view(both if len(seen) else state, seen) for state in states]
+    for axis, state, square, heading, time in zip(axes, states, views, ("start", last), times, strict=True):
+        panel(axis, state, square, seen, norm)
+        axis.set_title(f"{heading}, {caption(state, time)}", fontsize=10)
+    if norm is not None:
+        scale(figure, axes, norm)
+    return figure
+
+
+def caption(state: Arrays, time: float) -> str:
+    """Time (s), number and mean radius of the grains."""
+    n, mean = len(state["radius"]), float(state["radius"].mean())
+    return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}, mean radius {si(mean, 'm')}"
+
+
+def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = None) -> None:
+    """What the colours mean: beside axes, or in a place of its own."""
+    at = {"ax": beside, "shrink": 0.72, "pad": 0.01} if place is None else {"cax": place}
+    bar = figure.colorbar(ScalarMappable(norm, HEAT), **at)
+    bar.set_label("temperature (K)")
+    bar.outline.set_visible(False)
+
+
+def temperatures(states: Sequence[Arrays]) -> Normalize | None:
+    """Scale of temperature over all states; logarithmic when it spans much; None where one has none."""
+    if any("temperature" not in state for state in states):
+        return None
+    values = np.concatenate([state["temperature"] for state in states])
+    low, high = float(values.min()), float(values.max())
+    if low > 0 and high > 20 * low:
+        return LogNorm(low, high)
+    # A scale finer than a hundredth would colour what does not differ.
+    least = max(0.01 * abs(low), 1e-9) / 2
+    middle = (low + high) / 2
+    return Normalize(min(low, middle - least), max(high, middle + least))
+
+
+def _project(points: np.ndarray) -> np.ndarray:
+    """Right, up and towards the viewer, for points of shape (n, 3). m."""
+    return np.asarray(points) @ SEEN
+
+
+def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
+    """Corners of the box as seen, shape (8, 3); none in open space. m."""
+    if low is None or high is None:
+        return np.empty((0, 3))
+    return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
+
+
+def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
+    """Left, bottom and side of a square that holds all grains and the box. m."""
+    seen, radius = _project(state["position"]), state["radius"][:, None]
+    low = np.vstack([seen - radius, box]).min(axis=0)[:2]
+    high = np.vstack([seen + radius, box]).max(axis=0)[:2]
+    side = 1.06 * float((high - low).max())
+    left, bottom = (low + high) / 2 - side / 2
+    return float(left), float(bottom), side
+
+
+def panel(
+    axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray, norm: Normalize | None
+) -> None:
+    """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``."""
+    left, bottom, side = square
+    colour = np.tile(PLAIN, (len(state["radius"]), 1))
+    if norm is not None:
+        colour = HEAT(norm(state["temperature"]))[:, :3]
+    image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
+    axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
+    if len(box):
+        _edges(axis, box)
+    _scale_bar(axis, left, bottom, side)
+    axis.set_xlim(left, left + side)
+    axis.set_ylim(bottom, bottom + side)
+    axis.set_axis_off()
+
+
+def _draw(seen: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:
+    """Shaded spheres, hidden where another is in front. RGBA, shape (pixels, pixels, 4) / 2."""
+    scale = PIXELS / side
+    depth = np.full((PIXELS, PIXELS), -np.inf)
+    image = np.zeros((PIXELS, PIXELS, 4))
+    for (x, y, z), r, rgb in zip(seen * scale, np.maximum(radius * scale, SMALLEST), colour, strict=True):
+        i0, i1 = max(int(y - r), 0), min(int(y + r) + 2, PIXELS)
+        j0, j1 = max(int(x - r), 0), min(int(x + r) + 2, PIXELS)
+        v, u = np.mgrid[i0:i1, j0:j1] + 0.5
+        u, v = (u - x) / r, (v - y) / r
+        w2 = 1.0 - u * u - v * v
+        w = np.sqrt(np.maximum(w2, 0.0))
+        front = (w2 > 0) & (z + r * w > depth[i0:i1, j0:j1])
+        depth[i0:i1, j0:j1][front] = (z + r * w)[front]
+        lit = np.clip(u * _LIGHT[0] + v * _LIGHT[1] + w * _LIGHT[2], 0.0, 1.0)[..., None]
+        # Dark grains keep an outline to be seen by; the glint tells a sphere from a disc.
+        shade = np.clip((0.42 + 0.58 * lit) * (0.1 + 0.9 * rgb) + 0.35 * lit**24, 0.0, 1.0)
+        image[i0:i1, j0:j1, :3][front] = shade[front]
+        image[i0:i1, j0:j1, 3][front] = 1.0
+    half = image.reshape(PIXELS // 2, 2, PIXELS // 2, 2, 4)
+    covered = half[..., 3:].sum(axis=(1, 3))
+    rgb = (half[..., :3] * half[..., 3:]).sum(axis=(1, 3)) / np.maximum(covered, 1.0)
+    return np.concatenate([rgb, covered / 4], axis=2)
+
+
+def _edges(axis: Axes, corners: np.ndarray) -> None:
+    """The twelve edges of the box; those that meet in its farthest corner run behind the grains."""
+    farthest = int(np.argmin(corners[:, 2]))
+    for a, b in itertools.combinations(range(8), 2):
+        if bin(a ^ b).count("1") == 1:
+            behind = farthest in (a, b)
+            axis.plot(
+                *corners[[a, b], :2].T, color="0.72" if behind else "0.45", lw=0.8, zorder=1 if behind else 3
+            )
+
+
+def _scale_bar(axis: Axes, left: float, bottom: float, side: float) -> None:
+    power = 10.0 ** np.floor(np.log10(side / 4))
+    length = power * max(k for k in (1, 2, 5) if k * power <= side / 4)
+    x, y = left + 0.02 * side, bottom + 0.015 * side
+    axis.plot([x, x + length], [y, y], color="0.2", lw=2, solid_capstyle="butt", zorder=4)
+    axis.text(x + length / 2, y + 0.012 * side, si(length, "m"), ha="center", fontsize=9, zorder=4)
+
+
+def si(value: float, unit: str) -> str:
+    """A value with a prefix: 0.01 s is 10 ms."""
+    if value == 0:
+        return f"0 {unit}"
+    power = int(np.clip(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3), -4, 3))
+    prefix = ("p", "n", "µ", "m", "", "k", "M", "G")[power + 4]
+    return f"{value / 10.0 ** (3 * power):.3g} {prefix}{unit}"

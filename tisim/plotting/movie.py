@@ -1,0 +1,87 @@
+"""A moving picture of a run: its frames one after another, as .gif or .mp4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CalledProcessError
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from tisim.errors import InputError, RunError, must
+from tisim.files.atomic import replacing
+from tisim.io.reader import Frames
+from tisim.plotting import cloud
+from tisim.scene.initial_state import Arrays
+
+SIDE = 5.0
+"""Of the picture, inches; of DPI pixels each."""
+DPI = 110
+
+
+def movie(
+    found: Frames, path: Path, rate: int = 20, progress: Callable[[float], None] = lambda fraction: None
+) -> None:
+    """Write a moving picture of all frames, ``rate`` of them a second, in place of any before.
+
+    path : ends in .gif, or in .mp4 where ffmpeg is installed; InputError otherwise. progress : called with
+    the finished fraction, 0..1.
+    """
+    writer = check(found, path, rate)
+    coloured, ranges = _scales(found)
+    figure = Figure(figsize=(SIDE + 0.9 * (coloured is not None), SIDE), facecolor="white")
+    FigureCanvasAgg(figure)
+    axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
+    seen = cloud.corners(*found.scene.domain.bounds())
+    square = cloud.view(ranges, seen)
+    if coloured is not None:
+        side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
+        cloud.scale(figure, None, coloured, side)
+    # Between the caption and what is drawn, where it covers neither grains nor their scale.
+    figure.text(0.5, 0.935, found.missing, ha="center", fontsize=7)
+    unfinished = path.with_name(while_drawn(path))
+    try:
+        with replacing(path, unfinished), writer.saving(figure, str(unfinished), DPI):
+            for k, frame in enumerate(found):
+                axis.clear()
+                cloud.panel(axis, frame.arrays, square, seen, coloured)
+                figure.suptitle(cloud.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
+                writer.grab_frame()
+                progress((k + 1) / len(found))
+    except CalledProcessError as error:
+        raise RunError(f"{path} could not be written: {error}") from error
+
+
+def while_drawn(path: Path) -> str:
+    """What the file is called while it is not whole; its end says what it is to those who write it."""
+    return f"{path.stem}.new{path.suffix}"
+
+
+def check(found: Frames, path: Path, rate: int) -> AbstractMovieWriter:
+    """What writes such a file; InputError when there is no movie to make, or nothing to make it with."""
+    must(0 < rate <= 100, "frames a second", "1 to 100", rate)
+    must(len(found) > 1, "file", "one with 2 frames or more", f"{len(found)} frames")
+    if path.suffix == ".mp4":
+        if not FFMpegWriter.isAvailable():
+            raise InputError(f"movie must be a .gif where ffmpeg is not installed; received {path.name!r}")
+        return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
+    must(path.suffix == ".gif", "movie", "a .gif or .mp4 file", path.name)
+    return PillowWriter(fps=rate)
+
+
+def _scales(found: Frames) -> tuple[cloud.Normalize | None, Arrays]:
+    """Scale of temperature, and the farthest reaches of the cloud, over all frames."""
+    position, radius, heat = [], [], []
+    for frame in found:
+        arrays = frame.arrays
+        for extreme in (np.argmin, np.argmax):
+            for k in {int(i) for i in extreme(arrays["position"] @ cloud.SEEN, axis=0)}:
+                position.append(arrays["position"][k])
+                radius.append(arrays["radius"].max())
+        if "temperature" in arrays:
+            heat.append({"temperature": arrays["temperature"]})
+    norm = cloud.temperatures(heat) if heat else None
+    return norm, {"position": np.array(position), "radius": np.array(radius)}

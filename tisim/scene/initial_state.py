@@ -1,0 +1,210 @@
+"""What a scene starts with: particles given one by one, or a cloud of equal spheres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from tisim.components.component import Spec, Text, Vector, parameter
+from tisim.components.domain import Domain
+from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
+from tisim.errors import InputError, must, shown
+from tisim.packing.placement import Placement, RandomInDomain
+from tisim.scene.initial_velocity import Pulse
+
+Arrays = dict[str, np.ndarray]
+"""Particle quantities by field name: shape (n,) or (n, 3), SI."""
+
+
+class Start(Spec):
+    """A starting configuration."""
+
+    contract: ClassVar[bool] = True
+
+    def masses(self) -> np.ndarray:
+        """Mass of each particle, kg, shape (n,); known without placing them."""
+        raise NotImplementedError(f"{type(self).__name__} must define masses")
+
+    def arrays(self, domain: Domain, seed: int) -> Arrays:
+        """position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
+        raise NotImplementedError(f"{type(self).__name__} must define arrays")
+
+
+def _listed(value: Any) -> Any:
+    """An array, or one number, as rows of plain numbers; anything else as it is."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    return (value,) if isinstance(value, float | int) else value
+
+
+class Particles(Start):
+    """Particles given one by one.
+
+    position, velocity : m and m/s, shape (n, 3).
+    radius : m, > 0; mass : kg, > 0; one number for all, or n of them. Give mass or density (kg/m^3).
+    quantities : any further field by name, such as temperature (K); one number, or n, or (n, 3).
+    """
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    position: tuple[Vector, ...] = parameter("m", min_length=1)
+    velocity: tuple[Vector, ...] = parameter("m/s", min_length=1)
+    radius: tuple[float, ...] = parameter("m")
+    mass: tuple[float, ...] | None = parameter("kg", None)
+    density: float | None = parameter("kg/m^3", None, gt=0)
+    quantities: Mapping[Text, Any] = Field(default_factory=dict)
+
+    @field_validator("position", "velocity", "radius", "mass", mode="before")
+    @classmethod
+    def _from_array(cls, value: Any) -> Any:
+        return _listed(value)
+
+    def _column(self, name: str, value: Any, n: int) -> np.ndarray:
+        try:
+            column = np.asarray(value)
+        except (ValueError, RecursionError):
+            raise InputError(f"particles.{name} must be numbers; received {shown(value)}") from None
+        # Neither text nor whole numbers of more than 64 bits.
+        must(column.dtype.kind in "biuf", f"particles.{name}", "numbers", value)
+        column = column.astype(float)
+        if column.ndim == 0 or column.shape == (1,):
+            column = np.full(n, float(column.reshape(-1)[0]))
+        must(len(column) == n, f"particles.{name}", f"one value or {n} of them", column.shape)
+        must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", _worst(column))
+        return column
+
+    @field_validator("quantities", mode="before")
+    @classmethod
+    def _plain(cls, value: Any) -> Any:
+        listed = isinstance(value, Mapping)
+        return (
+            {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in value.items()} if listed else value
+        )
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        self._arrays()
+        return self
+
+    def masses(self) -> np.ndarray:
+        return self._arrays()["mass"]
+
+    def arrays(self, domain: Domain, seed: int) -> Arrays:
+        return self._arrays()
+
+    def _arrays(self) -> Arrays:
+        n = len(self.position)
+        arrays = {
+            name: self._column(name, getattr(self, name), n) for name in ("position", "velocity", "radius")
+        }
+        given = "both" if self.mass is not None else "neither"
+        must((self.mass is None) != (self.density is None), "particles", "given mass or density", given)
+        farthest = float(np.abs(arrays["position"]).max())
+        must(farthest <= MOST, "particles.position", f"at most {MOST:g} m from the origin", farthest)
+        _check_sizes("radius", "m", arrays["radius"])
+        if self.density is not None:
+            with np.errstate(over="ignore"):
+                arrays["mass"] = 4 / 3 * np.pi * arrays["radius"] ** 3 * self.density
+        else:
+            arrays["mass"] = self._column("mass", self.mass, n)
+        _check_sizes("mass", "kg", arrays["mass"])
+        for name, value in self.quantities.items():
+            must(
+                name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value
+            )
+            arrays[name] = self._column(name, value, n)
+        return arrays
+
+    def structure(self) -> tuple[Any, ...]:
+        return (type(self),)
+
+
+def _worst(column: np.ndarray) -> float:
+    return float(column[~np.isfinite(column)].flat[0]) if not np.isfinite(column).all() else 0.0
+
+
+def _check_sizes(name: str, unit: str, column: np.ndarray) -> None:
+    """InputError unless all are above 0 and within the limits of their unit."""
+    least, most = limits(unit)
+    must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min()))
+    outside = column[(column < least) | (column > most)]
+    worst = float(outside[0]) if len(outside) else 0.0
+    must(not len(outside), f"particles.{name}", f"from {least:g} to {most:g} {unit}", worst)
+
+
+class Cloud(Start):
+    """Equal spheres: where they lie, how fast they are and what they carry.
+
+    number : of spheres; left out where the placement fixes it, as a lattice does.
+    placement : where the centres lie; at random in the domain unless given.
+    pulse : velocities added at the start, such as a blast's.
+    specific_charge : C/kg; each sphere carries its mass times this.
+    quantities : any further field by name, such as charge (C); one number, or three components, for all.
+
+    Velocity: ``mean_velocity + deviation * lambda`` with lambda uniform in -1..1 for each particle and
+    component (Z04 section 7), and the pulse. The same seed gives the same lambdas whatever the other
+    parameters.
+    """
+
+    number: int | None = Field(None, gt=0, le=PARTICLES)
+    radius: float = parameter("m", gt=0)
+    density: float = parameter("kg/m^3", gt=0)
+    placement: Placement = RandomInDomain()
+    mean_velocity: Vector = parameter("m/s", (0.0, 0.0, 0.0))
+    deviation: Vector = parameter("m/s", (0.0, 0.0, 0.0))
+    pulse: Pulse | None = None
+    temperature: float = parameter("K", 300.0, gt=0)
+    specific_charge: float | None = parameter("C/kg", None)
+    quantities: Mapping[Text, float | Vector] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        sites = self.placement.sites()
+        rule = "given" if sites is None else f"{sites}, as the placement has sites, or left out"
+        agrees = self.number is not None if sites is None else self.number in (None, sites)
+        must(agrees, "cloud.number", rule, "nothing" if self.number is None else self.number)
+        own = {"position", "velocity", "radius", "mass", "temperature", "id"}
+        own |= {"charge"} if self.specific_charge is not None else set()
+        for name, value in self.quantities.items():
+            must(name not in own, f"cloud.quantities.{name}", "given beside quantities, and once", value)
+        mass, rule = self._mass(), f"from {LEAST:g} to {MOST:g} kg"
+        must(LEAST <= mass <= MOST, "mass of a particle of the cloud", rule, mass)
+        return self
+
+    def count(self) -> int:
+        """Number of spheres."""
+        return self.placement.sites() or self.number or 0
+
+    def _mass(self) -> float:
+        """Mass of each sphere, kg."""
+        return self.density * 4 / 3 * np.pi * self.radius**3
+
+    def masses(self) -> np.ndarray:
+        # All in one place of memory, as the number may be large and a scene is checked before it is run.
+        return np.broadcast_to(self._mass(), self.count())
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def arrays(self, domain: Domain, seed: int) -> Arrays:
+        n = self.count()
+        check_memory(f"a cloud of {n} particles", n)
+        draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
+        arrays = {
+            "position": self.placement.centres(n, self.radius, domain, seed),
+            "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
+            "radius": np.full(n, self.radius),
+            "mass": np.full(n, self._mass()),
+            "temperature": np.full(n, self.temperature),
+            **{name: np.repeat([value], n, axis=0).astype(float) for name, value in self.quantities.items()},
+        }
+        if self.specific_charge is not None:
+            arrays["charge"] = arrays["mass"] * self.specific_charge
+        if self.pulse is not None:
+            arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
+        for name, values in arrays.items():
+            must(bool(np.isfinite(values).all()), f"{name} of the cloud", "finite", _worst(values))
+        return arrays
+
+    def structure(self) -> tuple[Any, ...]:
+        return (type(self),)

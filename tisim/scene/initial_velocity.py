@@ -1,0 +1,45 @@
+"""Velocities that a start is given at once, on top of those that it has."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from tisim.components.component import Spec, parameter
+from tisim.errors import must
+
+
+class Pulse(Spec):
+    """A change of all velocities at the start; the contract of a pulse."""
+
+    contract: ClassVar[bool] = True
+
+    def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
+        """What is added to velocities: m/s, shape (n, 3); for positions, m, (n, 3), and masses, kg, (n,)."""
+        raise NotImplementedError(f"{type(self).__name__} must define velocity")
+
+
+class Blast(Pulse):
+    """The same speed for all, away from the centre of mass: |dv| = sqrt(2 W/M), Z16 (3.1)-(3.4).
+
+    energy : W, J; the kinetic energy of particles that were at rest.
+
+    Total momentum is that of the unit vectors, which do not quite cancel in a random start. A particle in the
+    centre of mass, which has no direction to go, stays as it is, and M is the mass of the others.
+    """
+
+    energy: float = parameter("J", gt=0)
+
+    def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
+        arm = position - np.average(position, axis=0, weights=mass)
+        distance = np.linalg.norm(arm, axis=1)
+        # Nearer than the rounding of the coordinates, a direction would be one of rounding errors.
+        moved = distance > 1e-12 * np.abs(position).max(initial=0.0)
+        must(
+            bool(moved.any()), "particles of a blast", "apart from their centre of mass", f"{len(mass)} in it"
+        )
+        speed = np.sqrt(2 * self.energy / mass[moved].sum())
+        pulse = np.zeros_like(position)
+        pulse[moved] = speed * arm[moved] / distance[moved, None]
+        return pulse

@@ -1,0 +1,210 @@
+"""A scene: what the user asks for, as plain validated data. TOML in and out; no Taichi."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from tisim import effects, operators, sources, steppers
+from tisim.components import serialization
+from tisim.components.component import Spec, Text
+from tisim.components.domain import Box, Domain, Open
+from tisim.effects.base import Effect, Source
+from tisim.errors import InputError, must, shown
+from tisim.scene.initial_state import Start
+from tisim.steppers.base import Stepper
+from tisim.steppers.verlet import Verlet
+
+PHYSICS_VERSION = 2
+"""Raised whenever a change of code changes the result of a scene; part of its digest."""
+
+__all__ = ["Box", "Open", "Scene"]
+
+
+class Scene(Spec):
+    """Particles, the effects they are subject to, and for how long.
+
+    particles : the start, ``Particles`` or ``Cloud``.
+    effects : what acts, in this order; a scene pays only for what it calls for.
+    domain : ``Open()`` or ``Box(low, high)``, m.
+    stepper : how time advances; tolerances and limits are stated here.
+    duration : s, > 0. seed : of all that is random in the scene, 0..2^63-1.
+
+    Raises InputError ("X must be Y; received Z") when made from anything that cannot be run.
+    """
+
+    name: Text = "scene"
+    particles: Start
+    effects: tuple[Effect, ...] = ()
+    domain: Domain = Open()
+    stepper: Stepper = Verlet()
+    duration: float = Field(gt=0)
+    seed: int = Field(0, ge=0, lt=2**63)
+
+    @field_validator("effects", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        present = [type(effect) for effect in self.effects]
+        for kind in present:
+            must(present.count(kind) == 1, f"effects.{kind.kind()}", "given once", present.count(kind))
+            for needed in kind.requires:
+                must(
+                    any(issubclass(other, needed) for other in present),
+                    f"effects.{kind.kind()}",
+                    f"used together with {' or '.join(_names(needed))}",
+                    ", ".join(other.kind() for other in present),
+                )
+            for other in present:
+                alone = not issubclass(other, kind.excludes)
+                must(alone, f"effects.{kind.kind()}", f"used without {other.kind()}", other.kind())
+            must(
+                not isinstance(self.stepper.control, kind.unfit),
+                "stepper.control",
+                f"one that suits {kind.kind()}, such as fixed_step or that of an implicit stepper",
+                self.stepper.control.kind(),
+            )
+            given = {other.quantity for other in present if issubclass(other, Source)}
+            must(
+                not kind.feels or not given.isdisjoint(kind.feels),
+                f"effects.{kind.kind()}",
+                f"used together with a source of {' or '.join(kind.feels)}",
+                ", ".join(other.kind() for other in present),
+            )
+        self.stepper.suits(self.effects, self.domain)
+        self.stepper.fewest(self.effects, self.duration)
+        self.capacity()
+        return self
+
+    def structure(self) -> tuple[Any, ...]:
+        """What is compiled in; scenes that agree in it can run as one batch."""
+        parts = (*self.effects, self.domain, self.stepper)
+        return tuple(part.structure() for part in parts)
+
+    def acting(self) -> tuple[Effect, ...]:
+        """The effects, with what they take from the start filled in."""
+        masses = self.particles.masses()
+        return tuple(effect.at_start(masses) for effect in self.effects)
+
+    def capacity(self) -> int:
+        """Particles that may ever live at once."""
+        masses = self.particles.masses()
+        return max([len(masses), *(effect.capacity(masses) for effect in self.effects)])
+
+    def digest(self) -> str:
+        """Hex hash of everything that decides the result: physics version, every parameter, the seed."""
+        order = [effect.kind() for effect in self.effects]
+        text = json.dumps([PHYSICS_VERSION, order, self.to_dict()], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as in a TOML file; ``from_dict`` is its inverse."""
+        return {
+            "name": self.name,
+            "duration": self.duration,
+            "seed": self.seed,
+            "particles": serialization.to_dict(self.particles),
+            "domain": serialization.to_dict(self.domain),
+            "stepper": serialization.to_dict(self.stepper),
+            "effects": {effect.kind(): serialization.to_dict(effect, named=False) for effect in self.effects},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Scene:
+        """A scene from plain data; InputError names the key that is wrong."""
+        rest = serialization.table(data, "scene")
+        must("particles" in rest, "scene.particles", "given", "nothing")
+        made: dict[str, Any] = {
+            "particles": serialization.from_dict(Start, rest.pop("particles"), "particles")
+        }
+        if "domain" in rest:
+            made["domain"] = serialization.from_dict(Domain, rest.pop("domain"), "domain")
+        if "stepper" in rest:
+            made["stepper"] = cls._stepper(rest.pop("stepper"))
+        listed = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
+        serialization.load(effects)
+        serialization.load(operators)
+        serialization.load(sources)
+        tables = {kind: serialization.table(values, f"effects.{kind}") for kind, values in listed.items()}
+        made["effects"] = tuple(
+            serialization.from_dict(Effect, {"kind": kind, **values}, f"effects.{kind}")
+            for kind, values in tables.items()
+        )
+        return cls(**made, **rest)
+
+    @staticmethod
+    def _stepper(data: Any) -> Stepper:
+        serialization.load(steppers)
+        return serialization.from_dict(
+            Stepper, {"kind": Verlet.kind(), **serialization.table(data, "stepper")}, "stepper"
+        )
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Scene:
+        """A scene from a TOML file; InputError when it is not one."""
+        file, what = Path(path), "scene file"
+        text = None
+        try:
+            # Neither a folder nor a pipe, which may never end.
+            if file.is_file() or not file.exists():
+                text = file.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            raise InputError(f"{what} must exist; received {shown(str(path))}") from None
+        except OSError as error:
+            received = f"{shown(str(path))} ({error.strerror})"
+            raise InputError(f"{what} must be readable; received {received}") from None
+        except ValueError as fault:
+            # Bytes that are no text, or a name with a NUL.
+            raise InputError(f"{what} must be TOML; received {shown(str(path))} ({fault})") from None
+        if text is None:
+            raise InputError(f"{what} must be a file; received {shown(str(path))}")
+        return cls.from_dict(serialization.read_toml(text, what, str(path)))
+
+    def to_toml(self) -> str:
+        """The scene as TOML text; ``from_toml`` gives it back."""
+        return serialization.toml(self.to_dict())
+
+    def replace(self, settings: Mapping[str, Any]) -> Scene:
+        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a list by
+        number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
+        data = self.to_dict()
+        for key, value in settings.items():
+            *path, last = key.split(".")
+            place: Any = data
+            for step in path:
+                place = place[_step(place, step, key)]
+            # A key that is not there may be one that is left at its default.
+            place[last if isinstance(place, dict) else _step(place, last, key)] = value
+        return type(self).from_dict(data)
+
+    def without(self, *names: str) -> Scene:
+        """A copy that leaves effects out; InputError when one is not there, or those that stay need it."""
+        data = self.to_dict()
+        for name in names:
+            known = ", ".join(data["effects"]) or "none, as this scene has none"
+            must(name in data["effects"], "effect to leave out", f"one of {known}", name)
+        kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
+        return type(self).from_dict({**data, "effects": kept})
+
+
+def _step(place: Any, step: str, key: str) -> Any:
+    """The key or number by which a place in plain data is entered; InputError naming the whole ``key``."""
+    # Of few digits: Python does not read numbers of some thousand.
+    listed = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
+    must(listed or (isinstance(place, dict) and step in place), key, "a setting of this scene", step)
+    return int(step) if listed else step
+
+
+def _names(kind: type[Spec]) -> list[str]:
+    """Of an effect in files, or of those known that are made after a contract; its own if none are."""
+    if not kind.__dict__.get("contract"):
+        return [f"effects.{kind.kind()}"]
+    return [f"effects.{name}" for name in sorted(kind.known())] or [kind.kind()]

@@ -1,0 +1,78 @@
+"""The field of a uniformly magnetised cylinder and its gradient, about its own axis and for its own units.
+
+The cylinder has radius R and reaches from z = -L to L along its axis (as in B16 chapter 5). M points any way:
+B16 Eqs (5.3) and (5.21) are the columns of one tensor, W_ij of ``cylinder_end``, whose symmetry leaves three
+functions of rho and z for the field and three more for its gradient:
+
+    W_zz,  W_rho / rho,  rho (W_rho / rho)_rho / rho,  W_rho z / rho,  W_zzz,  W_rho zz / rho
+"""
+
+from tisim.backend.taichi import ti
+from tisim.sources.magnetic.cylinder_far import far_away
+
+
+@ti.func
+def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+    """The six functions, as a vector. Lengths in one unit. end : |z| - half, which the caller knows without
+    cancellation. ends : closed or tabulated."""
+    six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
+    if rho * rho + z * z > ends.far * (radius * radius + half * half):
+        six = far_away(rho, z, radius, half, ends.small)
+    else:
+        six = close_by(rho, z, end, radius, half, ends)
+    return six
+
+
+@ti.func
+def close_by(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+    """The difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
+    side, between = ti.select(z < 0.0, -1.0, 1.0), end < 0.0
+    pair = ends.both(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
+    odd = ti.select(between, 1.0, -1.0)
+    six = ti.Vector(
+        [
+            pair[0, 0] + odd * pair[0, 1],
+            pair[1, 0] + odd * pair[1, 1],
+            pair[2, 0] + odd * pair[2, 1],
+            side * (pair[3, 0] - pair[3, 1]),
+            side * (pair[4, 0] - pair[4, 1]),
+            pair[5, 0] + odd * pair[5, 1],
+        ]
+    )
+    if between:
+        if rho < radius:
+            six[1] -= 0.5
+        else:
+            six[1] -= 0.5 * (radius / rho) ** 2
+            six[2] += (radius / rho) ** 2 / rho
+    return six
+
+
+@ti.func
+def field(six, rho, outward, m_across, m_along):
+    """H across and along the axis, of M across and along it: sum_j W_ij M_j, in the unit of M.
+
+    outward : unit vector from the axis to the point. All but the last are vectors across the axis.
+    """
+    m_out = outward.dot(m_across)
+    across = six[1] * m_across + rho * (six[2] * m_out + six[3] * m_along) * outward
+    return across, rho * six[3] * m_out + six[0] * m_along
+
+
+@ti.func
+def gradient(six, rho, outward, axis, m_across, m_along):
+    """[i, k] dH_i / dr_k = sum_j W_ijk M_j, per unit of length: symmetric and without trace."""
+    turn, cross, bend = six[2], six[3], rho * six[5]
+    both, steep = six[4] + 2.0 * cross, bend + 4.0 * turn
+    m_out = outward.dot(m_across)
+    tilt = cross * m_across + (bend * m_along - both * m_out) * outward
+    spread = turn * m_out + cross * m_along
+    mixed = turn * m_across - 0.5 * (steep * m_out + both * m_along) * outward
+    # x y^T + y x^T for the pairs that are not alike, and what stands alone on the diagonal.
+    half = outward.outer_product(mixed) + axis.outer_product(
+        tilt + 0.5 * (bend * m_out + six[4] * m_along - spread) * axis
+    )
+    found = half + half.transpose()
+    for i in ti.static(range(3)):
+        found[i, i] += spread
+    return found

@@ -1,0 +1,69 @@
+"""What uniformly magnetised bodies have in common, whatever their shape."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Spec, Vector
+from tisim.effects.base import Source, parameter
+
+
+class Body(Spec):
+    """A solid body that may be magnetised. Bound, its functions are of the world and the row of the list."""
+
+    contract: ClassVar[bool] = True
+
+    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+    magnetisation: Vector = parameter("A/m", (0.0, 0.0, 0.0))
+
+    @ti.func
+    def nearest(self, w, k, r):
+        """Distance of r (m) from the surface of body k, negative inside, and the unit vector along which it
+        grows."""
+        return 0.0 * r[0], 0.0 * r
+
+    @ti.func
+    def flux_density(self, w, k, r):
+        """B (T) of body k at r."""
+        return 0.0 * r
+
+    @ti.func
+    def flux(self, w, k, r):
+        """B, and dB_i/dr_j (T/m) where r is not on the surface."""
+        return 0.0 * r, 0.0 * r.outer_product(r)
+
+
+class Magnets(Source):
+    """The sum of the fields of a list of bodies, each magnetised as it says, not by the others."""
+
+    contract: ClassVar[bool] = True
+    quantity: ClassVar[str] = "magnetic_flux_density"
+
+    def bodies(self) -> Any:
+        """The list; bound, the one row that stands for it."""
+        ((name, _),) = self.lists()
+        return getattr(self, name)
+
+    @ti.func
+    def value(self, w, r, t):
+        b = 0.0 * r
+        for k in range(self.each.size(w)):
+            b += self.each.flux_density(w, k, r)
+        return b
+
+    @ti.func
+    def gradient(self, w, r, t):
+        return self.value_and_gradient(w, r, t)[1]
+
+    @ti.func
+    def value_and_gradient(self, w, r, t):
+        b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
+        for k in range(self.each.size(w)):
+            one, slope = self.each.flux(w, k, r)
+            b += one
+            gradient += slope
+        return b, gradient
+
+    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+        return {"each": self.bodies()}

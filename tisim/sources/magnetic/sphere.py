@@ -1,0 +1,53 @@
+"""The magnetic field of uniformly magnetised spheres, any number of them, anywhere."""
+
+from __future__ import annotations
+
+from scipy.constants import mu_0
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import parameter
+from tisim.sources.magnetic.magnets import Body, Magnets
+
+
+class Sphere(Body):
+    """A sphere, magnetised uniformly or not at all. centre; radius; magnetisation : M."""
+
+    radius: float = parameter("m", gt=0)
+
+    @ti.func
+    def nearest(self, w, k, r):
+        d = r - self.centre(w, k)
+        size = d.norm()
+        up = ti.Vector([0.0, 0.0, 1.0 + 0.0 * size])
+        return size - self.radius(w, k), ti.select(size > 0.0, d / ti.select(size > 0.0, size, 1.0), up)
+
+    @ti.func
+    def flux_density(self, w, k, r):
+        return self.flux(w, k, r)[0]
+
+    @ti.func
+    def flux(self, w, k, r):
+        d, m, radius = r - self.centre(w, k), mu_0 * self.magnetisation(w, k), self.radius(w, k)
+        size = d.norm()
+        b, slope = 2.0 / 3.0 * m, 0.0 * r.outer_product(r)
+        if size >= radius:
+            e, part = d / size, (radius / size) ** 3 / 3.0
+            along = m.dot(e)
+            b = part * (3.0 * along * e - m)
+            half = e.outer_product(m - 2.5 * along * e)
+            slope = half + half.transpose()
+            for i in ti.static(range(3)):
+                slope[i, i] += along
+            slope *= 3.0 * part / size
+        return b, slope
+
+
+class MagneticSpheres(Magnets):
+    """B of uniformly magnetised spheres: 2/3 mu_0 M inside, outside that of a dipole, m = M V. They do not
+    magnetise each other.
+
+    spheres : any number of them, which may differ per world.
+    Source: J. D. Jackson, Classical Electrodynamics (1999), Eqs (5.56), (5.105).
+    """
+
+    spheres: tuple[Sphere, ...]

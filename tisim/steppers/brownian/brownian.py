@@ -1,0 +1,121 @@
+"""Brownian dynamics of D. L. Ermak and J. A. McCammon, J. Chem. Phys. 69, 1352 (1978)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
+
+from tisim.components.component import parameter
+from tisim.components.domain import Domain
+from tisim.effects.base import Effect, Force, Operator, PairEvent, PairForce
+from tisim.errors import must
+from tisim.interactions.force_sum import FORCE
+from tisim.steppers.base import Parts, Stepper, single
+from tisim.steppers.brownian.coupled import Drift, Proceed, Scatter, Separate
+from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers.brownian.exact_noise import GAUSS, Exact
+from tisim.steppers.brownian.fast_noise import SUMS, Fast
+from tisim.steppers.brownian.fluid import Fluid
+from tisim.steppers.brownian.independent import OWN, EndWandering, Wander
+from tisim.steppers.brownian.mobility import Mobility, Oseen, RotnePrager
+from tisim.steppers.brownian.vectorised import Abreast, abreast
+from tisim.steppers.common import Clock
+from tisim.steppers.implicit.independent import KEEPS, Stretch
+from tisim.worlds.program import Item
+from tisim.worlds.state import Field
+
+
+class Brownian(Stepper):
+    """dr_i = u(r_i) dt + dt/(kT) sum_j D_ij F_j + R_i, R normal with mean 0 and <R_i R_j> = 2 D_ij dt.
+
+    u is the sum of all sources of a flow velocity, F the sum of forces, D that at the start of the step. For
+    spheres so small that they have no inertia; ``velocity`` is that of drift in the last step,
+    u + sum_j D_ij F_j / kT. Its mean is exact to first order in dt, and so is every statistic (weak order 1).
+
+    temperature : T; viscosity : eta, of the fluid, which has no inertia either; infinite, and at rest but for
+    u. hydrodynamics : what D_ij is for i != j, zero or a tensor (mobility.py). noise : by Cholesky's
+    decomposition, or by the truncated expansion, in N^2 operations (fast_noise.py). A world in which the
+    matrix is not positive definite fails, with time and particle: that happens with Oseen's tensor at
+    distances below some 3/2 R. "fast" sees only pairs for which it is not.
+
+    Particles whose field ``fixed`` is not 0 stay where they are, and take no part in D. Spheres do not
+    rotate: refused are torques, and also what asks for velocities, which particles here do not have: drag,
+    loss in contact, and what happens in an impact. Interaction is refused in a periodic box, as the tensors
+    are of an infinite fluid.
+
+    Particles that do not feel each other, and that operators change one by one, take steps of their own and
+    meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
+
+    Source: B16 Eqs (6.1)-(6.16).
+    """
+
+    temperature: float = parameter("K", ge=0)
+    viscosity: float = parameter("Pa s", gt=0)
+    control: DriftLimit
+    hydrodynamics: Literal["none", "oseen", "rotne-prager"] = "none"
+    noise: Literal["exact", "fast"] = "exact"
+
+    random: ClassVar = True
+    keeps: ClassVar = (*KEEPS, "beta")
+
+    @property
+    def order(self) -> int:
+        return 1
+
+    def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
+        for effect in effects:
+            name = f"effects.{effect.kind()}"
+            turns = effect.offers("torque") if isinstance(effect, Force) else False
+            turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
+            must(not turns, name, "without torques in a scene stepped by brownian", name)
+            drags = isinstance(effect, Force) and effect.offers("velocity_jacobian")
+            drags = drags or isinstance(effect, PairEvent) or "velocity" in effect.needed()
+            rule = "one that does not depend on velocity in a scene stepped by brownian"
+            must(not drags, name, rule, name)
+        fits = self.hydrodynamics == "none" or not domain.periodic()
+        must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
+
+    def independent(self, effects: Sequence[Effect]) -> bool:
+        alone = all(single(effect) or _one_by_one(effect) for effect in effects)
+        return alone and self.hydrodynamics == "none"
+
+    def countable(self, effects: Sequence[Effect]) -> float:
+        # Where each takes its own, the noise of a step is numbered by 32 bits of its window.
+        return 2**32 if self.independent(effects) else super().countable(effects)
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
+        if self.hydrodynamics == "none":
+            return ()
+        return (self.model_copy(update={"noise": "fast" if self.noise == "exact" else "exact"}),)
+
+    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+        if independent:
+            return (FORCE, *OWN)
+        if self.hydrodynamics == "none":
+            return (FORCE,)
+        return (FORCE, GAUSS) if self.noise == "exact" else (FORCE, *SUMS)
+
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        s, fluid = parts.s, Fluid(parts, self)
+        if parts.independent:
+            wander = Abreast if abreast(parts) else Wander
+            return (Stretch(s, parts.control), wander(parts, fluid), EndWandering(parts))
+        interaction = self._interaction(parts, fluid)
+        drift = (*interaction.phases(), Drift(fluid, interaction, parts.control))
+        move = (Clock(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
+        return (*drift, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
+
+    def _interaction(self, parts: Parts, fluid: Fluid) -> Any:
+        if self.hydrodynamics == "none":
+            return Separate(fluid)
+        mobility = Mobility(fluid, Oseen() if self.hydrodynamics == "oseen" else RotnePrager())
+        if self.noise == "fast":
+            return Fast(fluid, mobility, parts.domain)
+        exact = Exact(fluid, mobility, parts.domain)
+        parts.owned.append((exact, "diffusion matrix", self.kind()))
+        return exact
+
+
+def _one_by_one(effect: Effect) -> bool:
+    """Whether it changes each particle by itself, and a world as a whole never."""
+    return isinstance(effect, Operator) and not effect.offers("world")

@@ -1,0 +1,87 @@
+"""Brownian particles that feel each other: all take the same step, the longest that each of them allows."""
+
+from tisim.backend.taichi import ti
+from tisim.steppers.brownian.drift_limit import fault
+from tisim.steppers.common import advance_clock, arrive
+from tisim.worlds.program import PerParticle, Phase
+
+
+@ti.data_oriented
+class Separate:
+    """No hydrodynamic interaction: D_ij = 0 for i != j."""
+
+    def __init__(self, fluid) -> None:
+        self.s, self.fluid = fluid.s, fluid
+
+    def phases(self):
+        """What prepares a step."""
+        return ()
+
+    @ti.func
+    def pushed(self, w, i):
+        """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
+        return self.fluid.pushed(w, i, self.fluid.mobility(w, i))
+
+    @ti.func
+    def scattered(self, w, i):
+        """A random vector z_i with <z_i z_j> = D_ij. m/s^0.5."""
+        return ti.sqrt(self.fluid.diffusivity(w, i)) * self.fluid.normals(w, i, self.s.steps[w])
+
+
+class Drift(PerParticle):
+    """The velocity of drift at the start of a step, and the step that it allows."""
+
+    def __init__(self, fluid, interaction, control) -> None:
+        super().__init__(fluid.s)
+        self.fluid, self.interaction, self.control = fluid, interaction, control
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        velocity = 0.0 * s.velocity[w, i]
+        if self.fluid.mobile(w, i) > 0:
+            pushed = self.interaction.pushed(w, i)
+            rate = self.control.rate(s, w, i, pushed)
+            if self.control.hopeless(w, rate):
+                s.suspect(w, fault(rate), i)
+            elif rate > s.steepest[w]:
+                ti.atomic_max(s.steepest[w], rate)
+            velocity = self.fluid.flow(w, i, s.time[w]) + pushed
+        s.velocity[w, i] = velocity
+
+
+class Scatter(PerParticle):
+    """r += dt v + sqrt(2 dt) z (B16 Eqs 6.11, 6.15), and what operators do to single particles."""
+
+    def __init__(self, parts, fluid, interaction) -> None:
+        super().__init__(parts.s)
+        self.fluid, self.interaction = fluid, interaction
+        self.domain, self.operators = parts.domain, parts.operators
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        dt = ti.cast(s.dt[w], s.real)
+        before, size = s.position[w, i], s.radius[w, i]
+        if self.fluid.mobile(w, i) > 0:
+            z = self.interaction.scattered(w, i)
+            s.position[w, i] = before + dt * s.velocity[w, i] + ti.sqrt(2.0 * dt) * z
+        for operator in ti.static(self.operators):
+            operator.particle(s, w, i, s.time[w] + s.dt[w], dt)
+        after = s.position[w, i]
+        moved, grown = ti.cast(after - before, ti.f64), ti.cast(s.radius[w, i] - size, ti.f64)
+        arrive(s, self.domain, w, i, after, moved, grown)
+
+
+class Proceed(Phase):
+    """Time moves on, pair lists hear how far particles have moved, and nothing limits the next step yet."""
+
+    def __init__(self, s, near) -> None:
+        self.s, self.near, self.lists = s, near, near is not None
+
+    @ti.func
+    def run(self, w, _k):
+        advance_clock(self.s, w)
+        self.s.steepest[w] = 0.0
+        if ti.static(self.lists):
+            self.near.moved(w)

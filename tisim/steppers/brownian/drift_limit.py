@@ -1,0 +1,86 @@
+"""How long a step of Brownian dynamics may be: from how far forces would push particles in it."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import Knob
+from tisim.components.component import parameter
+from tisim.errors import must
+from tisim.steppers.step_control import LEAST, Controller
+from tisim.worlds.state import NOT_FINITE, STEEP
+
+MOST = 1e9
+"""Steps of one longest step at most: a particle by itself numbers them with 32 bits."""
+
+
+@ti.func
+def fault(rate):
+    """What is wrong with a force that asks for steps of 1/rate which are too short."""
+    return ti.select(rate < ti.math.inf, STEEP, NOT_FINITE)
+
+
+class DriftLimit(Controller):
+    """Steps in which no force pushes a particle farther than ``drift`` radii, and of ``longest`` at most.
+
+    The velocity that is limited is that which forces give, sum_j D_ij F_j / kT, at the start of the step; so
+    the step depends on nothing that is random in it, and its noise has the law of a step given beforehand.
+    The flow is left out: it pushes neighbours alike, and to resolve it is up to ``longest``. What noise does
+    in a step is not limited either: a particle diffuses by sqrt(2 D dt) into the potential of another before
+    it feels that, and is pushed out again in steps of at most ``drift`` radii. So overlaps stay bounded
+    whatever the step, but for right statistics of contacts, ``longest`` has to keep sqrt(2 D dt) below the
+    range over which the potential changes by kT.
+
+    drift : in radii. longest : also what particles by themselves meet at multiples of. shortest : a force
+    that asks for less stops its world, with time and particle.
+    """
+
+    longest: float = parameter("s", ge=LEAST)
+    shortest: float = parameter("s", 1e-12, ge=LEAST)
+    drift: float = parameter("", 0.05, gt=0)
+
+    keeps: ClassVar = ("steepest",)
+    knobs: ClassVar[tuple[Knob, ...]] = (Knob(longest=1, drift=1), Knob(longest=1, converges=False))
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        must(self.longest >= self.shortest, "drift_limit.longest", "at least shortest", self.longest)
+        allowed = f"at least longest/{MOST:.0e}"
+        must(self.shortest * MOST >= self.longest, "drift_limit.shortest", allowed, self.shortest)
+        return self
+
+    def fewest(self, duration: float) -> float:
+        return duration / self.longest
+
+    @ti.func
+    def rate(self, s, w, i, velocity):
+        """1 over the step that a particle allows which forces move at ``velocity`` (m/s). 1/s, f64."""
+        return ti.cast(velocity.norm() / (self.drift(w) * s.radius[w, i]), ti.f64)
+
+    @ti.func
+    def easy(self, s, w, i, velocity):
+        """Whether the longest step is one that a particle allows: without root and division, which take
+        longer than the rest of a step. False of NaN."""
+        reach, path = self.drift(w) * s.radius[w, i], self.longest(w) * velocity
+        return path.norm_sqr() < reach * reach
+
+    @ti.func
+    def hopeless(self, w, rate):
+        """Whether that step is too short; also true of NaN."""
+        return not (rate * ti.cast(self.shortest(w), ti.f64) <= 1.0)
+
+    @ti.func
+    def step(self, w, rate):
+        """The step for this rate. s, f64."""
+        dt = ti.cast(self.longest(w), ti.f64)
+        # A branch that is mostly not taken: others need not wait for the force.
+        if rate * dt > 1.0:
+            dt = 1.0 / rate
+        return dt
+
+    @ti.func
+    def next(self, s, w, horizon):
+        return self.step(w, s.steepest[w])

@@ -1,0 +1,163 @@
+"""Hydrodynamic interaction with noise of exactly the covariance it must have, by a Cholesky decomposition.
+
+D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 multiplications; the matrix is kept.
+"""
+
+from tisim.backend import runtime
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.errors import must
+from tisim.interactions.pair_sum import PairSum
+from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.state import INDEFINITE, Field
+
+GAUSS = Field("gauss", "", 3, "keep", scratch=True)
+"""Three standard normal numbers of a particle in a step."""
+LANES = 32
+"""Rows of the matrix that are reduced together, so that compilers vectorise it."""
+
+
+@ti.data_oriented
+class Exact:
+    """The matrix of every world, over sqrt(D_ii D_jj); then C^T in its place, a row for each column of C.
+
+    InputError where all of them are more than the machine has room for.
+    """
+
+    def __init__(self, fluid, mobility, domain) -> None:
+        self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
+        self.rows = -(-3 * self.s.capacity // LANES) * LANES
+        rule = f"within the {runtime.memory() / 1e9:.0f} GB of this machine"
+        fits = self.bytes() <= runtime.memory()
+        must(fits, "memory for diffusion matrices", rule, f"{self.bytes() / 1e9:.0f} GB")
+        self.matrix = ti.field(self.s.real)
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, self.s.worlds).dense(ti.jk, (self.rows, self.rows)).place(self.matrix)
+        self.tree = Tree(builder)
+        # Pivots as small as rounding makes them are those of spheres in each other's place.
+        self.least = 1e-12 if self.s.real == ti.f64 else 1e-5
+
+    def phases(self):
+        """What prepares a step."""
+        return (Draw(self.fluid), Push(self), Fill(self), Factor(self))
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        return (8 if self.s.real == ti.f64 else 4) * self.s.worlds * self.rows**2
+
+    @ti.func
+    def pushed(self, w, i):
+        """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
+        return self.s.velocity[w, i]
+
+    @ti.func
+    def scattered(self, w, i):
+        """A random vector z_i with <z_i z_j> = D_ij, sum_j C_ij g_j. m/s^0.5."""
+        z = 0.0 * self.s.gauss[w, i]
+        for j in range(i + 1):
+            g = self.s.gauss[w, j]
+            for a, b in ti.static(ti.ndrange(3, 3)):
+                # Also of the part above the diagonal of C, which is left as it was.
+                z[a] += ti.select(3 * j + b <= 3 * i + a, self.matrix[w, 3 * j + b, 3 * i + a] * g[b], 0.0)
+        return ti.sqrt(self.fluid.diffusivity(w, i)) * z
+
+
+class Draw(PerParticle):
+    """The noise of a step."""
+
+    def __init__(self, fluid) -> None:
+        super().__init__(fluid.s)
+        self.fluid = fluid
+
+    @ti.func
+    def run(self, w, i):
+        self.s.gauss[w, i] = self.fluid.normals(w, i, self.s.steps[w])
+
+
+class Push(PairSum):
+    """What forces do, sum_j D_ij F_j / kT, kept in ``velocity``."""
+
+    def __init__(self, exact) -> None:
+        super().__init__(exact.s, exact.domain, (exact.mobility,), None)
+        self.fluid = exact.fluid
+
+    @ti.func
+    def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
+        return effect.times(effect.pair(w, i, j, distance), separation, self.s.force[w, j])
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        self.s.velocity[w, i] = (
+            self.fluid.pushed(w, i, self.fluid.mobility(w, i)) + self.fluid.softness(w) * total
+        )
+
+
+class Fill(PerParticle):
+    """The blocks of a particle and those after it."""
+
+    def __init__(self, exact) -> None:
+        super().__init__(exact.s)
+        self.m = exact
+
+    @ti.func
+    def run(self, w, j):
+        m, s = self.m, self.s
+        for i in range(j, s.count[w]):
+            r = m.domain.separation(w, s.position[w, j], s.position[w, i])
+            parts = ti.Vector([ti.cast(1.0, s.real), ti.cast(0.0, s.real)])
+            if i != j:
+                parts = ti.sqrt(s.radius[w, i] * s.radius[w, j]) * m.mobility.pair(w, i, j, r.norm())
+            for a, b in ti.static(ti.ndrange(3, 3)):
+                m.matrix[w, 3 * j + b, 3 * i + a] = (parts[0] if a == b else 0.0) + parts[1] * r[a] * r[b]
+
+
+class Factor(Phase):
+    """Cholesky's decomposition, left-looking, three columns at a time."""
+
+    def __init__(self, exact) -> None:
+        self.s, self.m = exact.s, exact
+        self.tiles = exact.rows // LANES
+
+    @ti.func
+    def run(self, w, _k):
+        n = 3 * self.s.count[w]
+        for j in range(self.s.count[w]):
+            for tile in range(3 * j // LANES, (n + LANES - 1) // LANES):
+                self.reduce(w, 3 * j, tile * LANES)
+            for b in ti.static(range(3)):
+                self.close(w, j, 3 * j + b, n)
+
+    @ti.func
+    def reduce(self, w, column, row):
+        """Take what earlier columns account for off three columns, in a tile of rows."""
+        matrix = ti.static(self.m.matrix)
+        left = [ti.Vector([0.0] * LANES, self.s.real) for _ in ti.static(range(3))]
+        for c in ti.static(range(3)):
+            for lane in range(LANES):
+                left[c][lane] = matrix[w, column + c, row + lane]
+        for k in range(column):
+            x, y, z = matrix[w, k, column], matrix[w, k, column + 1], matrix[w, k, column + 2]
+            for lane in range(LANES):
+                value = matrix[w, k, row + lane]
+                left[0][lane] -= x * value
+                left[1][lane] -= y * value
+                left[2][lane] -= z * value
+        for c in ti.static(range(3)):
+            for lane in range(LANES):
+                matrix[w, column + c, row + lane] = left[c][lane]
+
+    @ti.func
+    def close(self, w, j, column, n):
+        """The same for those of the three that are earlier; then divide by the root of the pivot."""
+        matrix = ti.static(self.m.matrix)
+        for k in range(3 * j, column):
+            x = matrix[w, k, column]
+            for row in range(column, n):
+                matrix[w, column, row] -= x * matrix[w, k, row]
+        pivot = matrix[w, column, column]
+        # Not above: also true of NaN.
+        if not (pivot > -self.m.least):
+            self.s.fail(w, INDEFINITE, j)
+        scale = ti.select(pivot > self.m.least, 1.0 / ti.sqrt(ti.max(pivot, self.m.least)), 0.0)
+        for row in range(column, n):
+            matrix[w, column, row] *= scale

@@ -1,0 +1,77 @@
+"""The fluid that Brownian particles move in: how each answers to forces, flow and heat by itself."""
+
+import scipy.constants
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import sources
+from tisim.numerics import philox
+
+STREAM = 1
+"""Of the random numbers (philox.py)."""
+PER_KELVIN = scipy.constants.k
+"""Boltzmann's constant, J/K."""
+
+
+@ti.data_oriented
+class Fluid:
+    """At rest but for the flow, and infinite.
+
+    In a scene with the field ``fixed``, particles for which that is not 0 stay where they are.
+    """
+
+    def __init__(self, parts, stepper) -> None:
+        self.s, self.temperature, self.viscosity = parts.s, stepper.temperature, stepper.viscosity
+        self.streams = sources(parts.sources, "flow_velocity")
+        self.forced = parts.forced
+        self.holds = any(field.name == "fixed" for field in parts.s.fields)
+
+    @ti.func
+    def mobile(self, w, i):
+        """1 for a particle that can move, else 0."""
+        mobile = 1
+        if ti.static(self.holds):
+            mobile = ti.select(self.s.fixed[w, i] == 0, 1, 0)
+        return mobile
+
+    @ti.func
+    def softness(self, w):
+        """1/(6 pi eta): the mobility of a sphere times its radius. m^2/(N s)."""
+        return 1.0 / (6.0 * ti.math.pi * self.viscosity(w))
+
+    @ti.func
+    def heat(self, w):
+        """kT. J."""
+        return PER_KELVIN * self.temperature(w)
+
+    @ti.func
+    def mobility(self, w, i):
+        """1/(6 pi eta R) (B16 Eq. 6.1). s/kg."""
+        return self.softness(w) / self.s.radius[w, i]
+
+    @ti.func
+    def pushed(self, w, i, mobility):
+        """Velocity that the force on i gives it. m/s."""
+        velocity = 0.0 * self.s.velocity[w, i]
+        if ti.static(self.forced):
+            velocity = mobility * self.s.force[w, i]
+        return velocity
+
+    @ti.func
+    def flow(self, w, i, t):
+        """Velocity of the flow at the centre of i. m/s."""
+        velocity = 0.0 * self.s.velocity[w, i]
+        for source in ti.static(self.streams):
+            velocity += source.value(w, self.s.position[w, i], t)
+        return velocity
+
+    @ti.func
+    def diffusivity(self, w, i):
+        """D_ii = kT/(6 pi eta R) (B16 Eq. 6.8). m^2/s."""
+        return self.heat(w) * self.mobility(w, i)
+
+    @ti.func
+    def normals(self, w, i, step):
+        """Three independent standard normal numbers, those of a particle in a step."""
+        s = self.s
+        g = philox.normals(philox.bits(s.seed[w], STREAM, s.id[w, i], step))
+        return ti.cast(ti.Vector([g[0], g[1], g[2]]), s.real)

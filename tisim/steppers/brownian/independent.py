@@ -1,0 +1,178 @@
+"""Brownian particles that do not feel each other: each takes its own steps, many of them in one go.
+
+They meet at every multiple of the longest step, a window, which is what counts as a step of the world (see
+independent.py). A step of a particle is numbered by its window and within it, so that how many windows or steps a
+launch takes them through makes no difference to the noise either.
+"""
+
+from tisim.backend.taichi import ti
+from tisim.steppers.brownian.drift_limit import fault
+from tisim.steppers.implicit.independent import LITTLE, PLACE, EndStretch, beginning, duration
+from tisim.steppers.implicit.registers import Registers
+from tisim.worlds.program import PerParticle
+from tisim.worlds.state import LOST, NOT_FINITE, Field
+
+OWN = (
+    *PLACE,
+    Field("own_steps", "", 1, "keep", integer=True, scratch=True),
+    Field("own_fault", "", 1, "keep", integer=True, scratch=True),
+)
+"""Where a particle is on its way, after how many steps in its window, and what has stopped it: a status of
+the world, or 0."""
+AHEAD = 8
+"""Windows for which the noise of the first step, mostly the only one, is drawn at once: in vectors."""
+
+
+@ti.func
+def stepped(s, fluid: ti.template(), w, i, mobility, pushed, t, dt, g):  # type: ignore[valid-type]
+    """Velocity of drift, u + F/(6 pi eta R), and where a step leads: by dt times that + sqrt(2 D dt) g."""
+    velocity = fluid.flow(w, i, t) + pushed
+    width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
+    return velocity, s.position[w, i] + (dt * velocity + width * g)
+
+
+class Wander(PerParticle):
+    """A particle through the windows of a launch."""
+
+    long = True
+
+    def __init__(self, parts, fluid) -> None:
+        super().__init__(parts.s)
+        self.registers = Registers(parts.s, ("position", "velocity", "force"), ())
+        self.own, self.control, self.domain = self.registers.state, parts.control, parts.domain
+        self.fluid, self.summed = self.registers.given(fluid), self.registers.given(parts.summed)
+        self.operators, self.forced = parts.operators, parts.forced
+
+    @ti.func
+    def run(self, w, i):
+        self.alone(w, i)
+
+    @ti.func
+    def alone(self, w, i):
+        """Particle i through the windows of the launch, from where it is."""
+        s = self.s
+        self.registers.load(w, i)
+        window, end = s.own_window[w, i], s.windows[w] + s.stretch_windows[w]
+        elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
+        taken, going, short = 0, self.able(w, i), 0
+        allowance, cut = ti.cast(s.allowance[w], ti.i32), s.cut[w]
+        while going > 0 and window < end:
+            kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
+            for lane in range(AHEAD):
+                g = self.fluid.normals(w, i, self.number(window + lane))
+                for k in ti.static(range(3)):
+                    kicks[k][lane] = g[k]
+            for lane in range(ti.min(AHEAD, ti.cast(end - window, ti.i32))):
+                if going > 0:
+                    kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
+                    elapsed, carry, steps, going, over = self.window(
+                        w, i, window, kick, elapsed, carry, before, allowance - taken
+                    )
+                    taken += steps - before
+                    before = steps
+                    if over == 0:
+                        short, going = going, 0
+                    elif cut > 0.0:
+                        going = 0
+                    else:
+                        window, elapsed, carry, before = window + 1.0, 0.0, 0.0, 0
+        if self.able(w, i) == 0 and s.own_fault[w, i] == 0:
+            # It waits where the others will meet.
+            window, elapsed, carry, before = end, 0.0, 0.0, 0
+        self.registers.store(w, i)
+        s.own_window[w, i], s.own_elapsed[w, i], s.own_carry[w, i] = window, elapsed, carry
+        s.own_steps[w, i] = before
+        if short > 0:
+            ti.atomic_add(s.underway[w], 1)
+        ti.atomic_add(s.particle_steps[w], taken)
+
+    @ti.func
+    def number(self, window):
+        """Of the first step in a window."""
+        return ti.cast(window, ti.i64) << 32
+
+    @ti.func
+    def able(self, w, i):
+        """Whether there is anything to do for it: it is there, can move, and nothing has stopped it."""
+        s = self.s
+        there = s.mass[w, i] > 0.0 and s.own_fault[w, i] == 0
+        return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
+
+    @ti.func
+    def window(self, w, i, window, kick, start, rounding, before, most):
+        """A particle through a window from ``start`` (s) on, ``before`` steps after its beginning: how far it
+        gets, to the end unless stopped, in ``most`` further steps; the rounding error of that; its steps in
+        the window; whether it can go on, and whether it is at the end. ``kick`` are the normal numbers of the
+        first step in the window."""
+        begin = beginning(self.s, self.control, w, window)
+        length = duration(self.s, self.control, w, window, begin)
+        elapsed, carry = start, rounding
+        taken, going, g = before, 1, kick
+        while elapsed < length and going > 0 and taken - before < most:
+            # An operator may have changed the radius in the last step.
+            mobility = self.fluid.mobility(w, i)
+            if ti.static(self.forced):
+                self.summed.alone(w, i, begin + elapsed)
+            pushed = self.fluid.pushed(w, i, mobility)
+            dt, left = ti.cast(self.control.longest(w), ti.f64), length - elapsed
+            if not self.control.easy(self.own, w, i, pushed):
+                rate = self.control.rate(self.own, w, i, pushed)
+                dt = self.control.step(w, rate)
+                if self.control.hopeless(w, rate):
+                    self.stop(w, i, fault(rate))
+                    going = 0
+            if going > 0:
+                # The rounding error of the sum is carried along (W. Kahan 1965).
+                step = dt - carry
+                total = elapsed + step
+                carry = (total - elapsed) - step
+                if dt * (1.0 + LITTLE) >= left:
+                    dt, total = left, length
+                if taken > 0:
+                    g = self.fluid.normals(w, i, self.number(window) + taken)
+                self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
+                if self.s.own_fault[w, i] == 0:
+                    elapsed = total
+                    taken += 1
+                going = self.able(w, i)
+        return elapsed, carry, taken, going, ti.select(elapsed < length, 0, 1)
+
+    @ti.func
+    def move(self, w, i, mobility, pushed, t, dt, g):
+        """A step, and what operators do to it."""
+        s, step = self.own, ti.cast(dt, self.s.real)
+        s.velocity[w, i], s.position[w, i] = stepped(s, self.fluid, w, i, mobility, pushed, t, step, g)
+        for operator in ti.static(self.operators):
+            operator.particle(s, w, i, t + dt, step)
+        r = s.position[w, i]
+        # Not below infinity: also true of NaN.
+        if not (r.norm_sqr() < ti.math.inf):
+            self.stop(w, i, NOT_FINITE)
+        elif self.domain.lost(w, r):
+            self.stop(w, i, LOST)
+        else:
+            s.position[w, i] = self.domain.wrap(w, r)
+
+    @ti.func
+    def stop(self, w, i, fault):
+        """It goes no further, and its world ends with the launch."""
+        s = self.s
+        s.own_fault[w, i] = fault
+        ti.atomic_max(s.stuck[w], 1.0)
+
+
+class EndWandering(EndStretch):
+    """The windows are done; or the first particle to be stopped is found."""
+
+    def __init__(self, parts) -> None:
+        super().__init__(parts)
+        self.forced = parts.forced
+
+    @ti.func
+    def accuse(self, w):
+        """The particle that was stopped first, and when."""
+        s = self.s
+        first = self.slowest(w)
+        self.stop(w, first, s.own_fault[w, first])
+        if ti.static(self.forced):
+            s.ask(w, s.time[w])

@@ -1,0 +1,96 @@
+"""Brownian particles that do not feel each other, many at once: a particle in each lane of the CPU.
+
+While every particle of a tile takes windows in one step each, nothing branches, and compilers vectorise the
+loop over lanes. From the window on in which one of them does not, the tile goes on one by one. The bits are
+the same.
+"""
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.interactions.pair_sum import LANES
+from tisim.steppers.brownian.independent import Wander, stepped
+from tisim.steppers.implicit.independent import beginning
+from tisim.steppers.implicit.registers import Registers
+
+
+def abreast(parts) -> bool:
+    """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
+    as what settles and what operators do."""
+    simple = not parts.operators and not parts.summed.settlings
+    return simple and runtime.current().device == "cpu" and parts.s.capacity >= LANES
+
+
+class Abreast(Wander):
+    """Tiles of particles through the windows of a launch."""
+
+    def __init__(self, parts, fluid) -> None:
+        super().__init__(parts, fluid)
+        self.lane = Registers(parts.s, ("force",), ())
+        self.there, self.drop, self.sums = (
+            self.lane.state,
+            self.lane.given(fluid),
+            self.lane.given(parts.summed),
+        )
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        if i % LANES == 0:
+            done = 0
+            if i + LANES <= s.count[w] and self.level(w, i) > 0:
+                done = self.tile(w, i)
+                for j in range(i, i + LANES):
+                    s.own_window[w, j] = s.windows[w] + done
+            if done < s.stretch_windows[w]:
+                for j in range(i, ti.min(i + LANES, s.count[w])):
+                    self.alone(w, j)
+
+    @ti.func
+    def level(self, w, first):
+        """Whether all particles of a tile are where the launch begins, and have whole windows before them."""
+        s = self.s
+        level = ti.select(s.cut[w] > 0.0, 0, 1)
+        for j in range(first, first + LANES):
+            if s.own_window[w, j] > s.windows[w] or s.own_elapsed[w, j] > 0.0:
+                level = 0
+        return level
+
+    @ti.func
+    def tile(self, w, first):
+        """Particles from ``first`` on, through as many windows as all take in one step: that number."""
+        s = self.s
+        place = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
+        drift = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
+        force = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
+        windows, done, halted = ti.cast(s.stretch_windows[w], ti.i32), 0, 0
+        while done < windows and halted == 0:
+            begin = beginning(s, self.control, w, s.windows[w] + done)
+            dt = beginning(s, self.control, w, s.windows[w] + done + 1) - begin
+            number, step = self.number(s.windows[w] + done), ti.cast(dt, s.real)
+            if not (dt > 0.0):
+                halted = 1
+            for lane in range(LANES):
+                i = first + lane
+                f = 0.0 * s.force[w, i]
+                ti.static(self.lane.hold(f))
+                if ti.static(self.forced):
+                    self.sums.alone(w, i, begin)
+                mobility = self.drop.mobility(w, i)
+                pushed = self.drop.pushed(w, i, mobility)
+                g = self.drop.normals(w, i, number)
+                v, r = stepped(self.there, self.drop, w, i, mobility, pushed, begin, step, g)
+                for k in ti.static(range(3)):
+                    place[k][lane], drift[k][lane], force[k][lane] = r[k], v[k], f[k]
+                fine = self.able(w, i) > 0 and self.control.easy(s, w, i, pushed)
+                fine = fine and r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
+                halted += ti.select(fine, 0, 1)
+            if halted == 0:
+                for lane in range(LANES):
+                    i = first + lane
+                    r = ti.Vector([place[0][lane], place[1][lane], place[2][lane]])
+                    s.position[w, i] = self.domain.wrap(w, r)
+                    s.velocity[w, i] = ti.Vector([drift[0][lane], drift[1][lane], drift[2][lane]])
+                    s.force[w, i] = ti.Vector([force[0][lane], force[1][lane], force[2][lane]])
+                done += 1
+        ti.atomic_add(s.particle_steps[w], done * LANES)
+        return done

@@ -1,0 +1,123 @@
+"""Phases that several steppers have in common."""
+
+from tisim.backend.taichi import ti
+from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.state import ENDED, LOST, NOT_FINITE
+
+
+@ti.func
+def note_stride(s, w, moved):
+    """Note that a particle has moved so far relative to the world's frame, for the pair lists. m, f64."""
+    for k in ti.static(range(3)):
+        far = ti.abs(moved[k])
+        if far > s.stride[w, k]:
+            ti.atomic_max(s.stride[w, k], far)
+
+
+@ti.func
+def arrive(s, domain: ti.template(), w, i, r, moved, grown):  # type: ignore[valid-type]
+    """Put a particle at r, wherever that is in the domain; ``moved`` relative to the frame, and ``grown`` in
+    radius: for pair lists a surface that grows is one that moves. m; the last two in f64."""
+    stride = ti.abs(moved) + ti.abs(grown)
+    # Not below infinity: also true of NaN.
+    if not (stride.sum() < ti.math.inf):
+        s.fail(w, NOT_FINITE, i)
+    elif domain.lost(w, r):
+        s.fail(w, LOST, i)
+    else:
+        note_stride(s, w, stride)
+        s.position[w, i] = domain.wrap(w, r)
+
+
+class Clock(Phase):
+    """Choose the step; the last one ends exactly on time."""
+
+    def __init__(self, s, controller, near) -> None:
+        self.s, self.controller, self.near, self.lists = s, controller, near, near is not None
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        horizon = ti.cast(0.0, s.real)
+        if ti.static(self.lists):
+            horizon = self.near.sure(w)
+        dt = self.controller.next(s, w, horizon)
+        left = s.end[w] - s.time[w]
+        # A remainder as small as rounding leaves is not worth a step of its own.
+        if dt * (1.0 + 1e-6) >= left:
+            dt = left
+        s.dt[w] = dt
+        s.approach_time[w] = ti.math.inf
+        s.fastest[w] = 0.0
+        s.steps[w] += 1
+        s.particle_steps[w] += s.count[w]
+        for k in ti.static(range(3)):
+            s.stride[w, k] = 0.0
+        s.events[w] = 0
+
+
+@ti.func
+def advance_clock(s, w):
+    """Time moves on by dt, with the rounding error carried along (W. Kahan 1965)."""
+    last = s.dt[w] == s.end[w] - s.time[w]
+    step = s.dt[w] - s.time_carry[w]
+    time = s.time[w] + step
+    s.time_carry[w] = (time - s.time[w]) - step
+    s.time[w] = time
+    if last:
+        s.time[w], s.time_carry[w] = s.end[w], 0.0
+
+
+class Listen(Phase):
+    """Tell the pair lists how far particles have moved."""
+
+    def __init__(self, parts) -> None:
+        self.s, self.near = parts.s, parts.near
+
+    @ti.func
+    def run(self, w, _k):
+        self.near.moved(w)
+        for k in ti.static(range(3)):
+            self.s.stride[w, k] = 0.0
+
+
+class Operate(PerParticle):
+    """What operators do to single particles after the step, which began at ``time_before``."""
+
+    def __init__(self, parts) -> None:
+        super().__init__(parts.s)
+        self.domain, self.operators = parts.domain, parts.operators
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        before, size = s.position[w, i], s.radius[w, i]
+        for operator in ti.static(self.operators):
+            operator.particle(s, w, i, s.time_before[w] + s.dt[w], ti.cast(s.dt[w], s.real))
+        after = s.position[w, i]
+        grown = ti.cast(s.radius[w, i] - size, ti.f64)
+        arrive(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)
+
+
+class Arrive(Phase):
+    """The step is done: time, which was that of a trial state, moves on from where the step began."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.time[w] = self.s.time_before[w]
+        advance_clock(self.s, w)
+
+
+class Finish(Phase):
+    """A world that has reached its end stops."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        if self.s.time[w] >= self.s.end[w]:
+            ti.atomic_max(self.s.status[w], ENDED)

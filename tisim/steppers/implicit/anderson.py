@@ -1,0 +1,100 @@
+"""Anderson's acceleration of the fixed point (D. G. Anderson, J. ACM 12 (1965) 547-560), of depth 1.
+
+The unknown is the force x that an iterate is made with; f(x) is the force that the iterate then gives, and
+r = f(x) - x the residual. In place of the next x = f the combination of the last two is taken that would make
+the residual smallest if f were linear: x = f - theta (f - f_last), theta = <r, r - r_last> / |r - r_last|^2.
+Forces enter the inner product as the displacement that they would cause. Torques go along with forces.
+"""
+
+from tisim.backend.taichi import ti
+from tisim.steppers.base import Parts
+from tisim.worlds.block_sum import BlockSums, PerBlock
+from tisim.worlds.program import Item, PerParticle
+from tisim.worlds.state import Field
+
+
+def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
+    """Force that an iterate was made with, that the last one gave, and its residual; and torques."""
+    names = [("force", "N"), *([("torque", "N m")] if turning else [])]
+    return tuple(
+        Field(f"{name}_{what}", unit, 3, "keep", scratch=True)
+        for name, unit in names
+        for what in ("used", "last", "residual")
+    )
+
+
+def accelerated(parts: Parts, forces: tuple[Item, ...]) -> tuple[Item, ...]:
+    """The phases ``forces`` within an iteration, and those that mix the result with the last one."""
+    sums = BlockSums(parts.s, 2)
+    parts.owned.append((sums, "sums of the acceleration", "trapezoid"))
+    return (Used(parts), *forces, Compare(parts, sums), Mix(parts, sums))
+
+
+class Mixed:
+    """What is mixed: value, that used, that of the last iterate, its residual; and whether it is a torque."""
+
+    def __init__(self, parts: Parts) -> None:
+        s = parts.s
+        names = ("force", "torque") if parts.turning else ("force",)
+        self.columns = tuple(
+            (*(getattr(s, name + what) for what in ("", "_used", "_last", "_residual")), name == "torque")
+            for name in names
+        )
+
+
+class Used(PerParticle):
+    """Note the force that the present iterate was made with."""
+
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts.s)
+        self.columns = Mixed(parts).columns
+
+    @ti.func
+    def run(self, w, i):
+        for column in ti.static(self.columns):
+            column[1][w, i] = column[0][w, i]
+
+
+class Compare(PerBlock):
+    """<r, r - r_last> and |r - r_last|^2, of displacements."""
+
+    def __init__(self, parts: Parts, sums: BlockSums) -> None:
+        super().__init__(sums)
+        self.columns = Mixed(parts).columns
+
+    @ti.func
+    def each(self, w, i):
+        s = self.s
+        total = ti.Vector.zero(ti.f64, 2)
+        for column in ti.static(self.columns):
+            inertia = s.mass[w, i]
+            if ti.static(column[4]):
+                # A torque moves the surface as a force of 5/2 of it, over R, would: I = 2/5 m R^2.
+                inertia *= 0.4 * s.radius[w, i]
+            here = (column[0][w, i] - column[1][w, i]) / inertia
+            change = here - column[3][w, i] / inertia
+            total += ti.cast(ti.Vector([here.dot(change), change.norm_sqr()]), ti.f64)
+        return total
+
+
+class Mix(PerParticle):
+    """x = f - theta (f - f_last); f itself when there is no last one."""
+
+    def __init__(self, parts: Parts, sums: BlockSums) -> None:
+        super().__init__(parts.s)
+        self.columns, self.sums = Mixed(parts).columns, sums
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        total = self.sums.total(w)
+        theta = ti.cast(0.0, ti.f64)
+        # Not so for a NaN.
+        if s.solver_iteration[w] > 1.0 and total[1] > 0.0 and ti.abs(total[0]) < ti.math.inf:
+            theta = total[0] / total[1]
+        for column in ti.static(self.columns):
+            new, last = column[0][w, i], column[2][w, i]
+            column[3][w, i] = new - column[1][w, i]
+            column[2][w, i] = new
+            if theta != 0.0:
+                column[0][w, i] = new - ti.cast(theta, s.real) * (new - last)

@@ -1,0 +1,120 @@
+"""What implicit steppers have in common: attempts at a step, until one is accepted or all hope is lost."""
+
+from tisim.backend.taichi import ti
+from tisim.steppers.common import note_stride
+from tisim.steppers.implicit.saved_state import Kept
+from tisim.worlds.program import PerParticle, Phase, Repeat
+from tisim.worlds.state import STUCK
+
+TRIED, ACCEPTED, HOPELESS = range(3)
+"""Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
+
+SHORTER = 0.8
+"""The longest that a second attempt may be, in lengths of the first."""
+
+
+class Begin(Phase):
+    """A step begins."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.time_before[w] = s.time[w]
+        s.attempting[w] = 1.0
+        s.approach_time[w] = ti.math.inf
+        s.fastest[w] = 0.0
+        s.events[w] = 0
+        s.steps[w] += 1
+        s.particle_steps[w] += s.count[w]
+        for k in ti.static(range(3)):
+            s.stride[w, k] = 0.0
+
+
+class Keep(PerParticle):
+    """Keep the state at the beginning of the step."""
+
+    def __init__(self, kept: Kept) -> None:
+        super().__init__(kept.s)
+        self.kept = kept
+
+    @ti.func
+    def run(self, w, i):
+        self.kept.keep(w, i)
+
+
+class Attempt(Repeat):
+    """Attempts at a step, until one is accepted or all hope is lost."""
+
+    def __init__(self, s, items) -> None:
+        super().__init__(items)
+        self.s = s
+
+    @ti.func
+    def pending(self, w):
+        return ti.cast(self.s.attempting[w], ti.i32)
+
+
+@ti.func
+def length(s, control: ti.template(), w):  # type: ignore[valid-type]
+    """Of the next attempt (s, f64); the last step ends exactly on time."""
+    dt = control.step(s, w, s.next_dt[w])
+    left = s.end[w] - s.time_before[w]
+    # A remainder as small as rounding leaves is not worth a step of its own.
+    if dt * (1.0 + 1e-6) >= left:
+        dt = left
+    return dt
+
+
+@ti.func
+def accuse(s, w):
+    """The particle whose last iterate changed most; which force on it is at fault, failure_attribution.py finds out."""
+    worst, most = 0, s.iterate_change[w, 0]
+    for i in range(s.count[w]):
+        if s.iterate_change[w, i] > most:
+            worst, most = i, s.iterate_change[w, i]
+    s.culprit[w] = s.id[w, worst]
+    s.ask(w, s.time[w])
+
+
+class GiveUp(PerParticle):
+    """An attempt that has failed leaves everything as it was, for the next one.
+
+    One that is hopeless is left as it is: there, which force it was can still be seen (failure_attribution.py).
+    """
+
+    conditional = True
+
+    def __init__(self, kept: Kept) -> None:
+        super().__init__(kept.s)
+        self.kept = kept
+
+    @ti.func
+    def when(self, w):
+        return ti.select(self.s.verdict[w] == TRIED, 1, 0)
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        back = self.kept.domain.nearest(w, s.position[w, i], s.position_before[w, i])
+        note_stride(s, w, ti.cast(back, ti.f64))
+        self.kept.give_up(w, i)
+
+
+class Decide(Phase):
+    """Try again, or not."""
+
+    def __init__(self, parts) -> None:
+        self.s = parts.s
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        if s.verdict[w] != ACCEPTED:
+            s.rejections[w] += 1
+            s.time[w] = s.time_before[w]
+        if s.verdict[w] == HOPELESS:
+            s.failed[w] = STUCK
+        s.attempting[w] = ti.select(s.verdict[w] == TRIED, 1.0, 0.0)

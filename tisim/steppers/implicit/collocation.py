@@ -1,0 +1,87 @@
+"""The implicit stepper of high order: Lobatto's collocation, of which the papers' trapezoid is the first."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Self
+
+from pydantic import Field as Option
+
+from tisim.components.accuracy_parameter import three_digits
+from tisim.effects.base import Effect, Force, PairForce
+from tisim.interactions.force_sum import FORCE
+from tisim.steppers.base import Parts, Stepper
+from tisim.steppers.common import Arrive, Listen, Operate
+from tisim.steppers.implicit.attempts import Attempt, Begin, Decide, GiveUp, Keep
+from tisim.steppers.implicit.collocation_phases import Conclude, Forget, Place, Predict, Sweep, Take, Try
+from tisim.steppers.implicit.collocation_verdict import Judge
+from tisim.steppers.implicit.saved_state import CHANGE, kept
+from tisim.steppers.implicit.span import Went, spans
+from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers.implicit.stages import Stages
+from tisim.worlds.block_sum import BlockSums
+from tisim.worlds.program import Item
+from tisim.worlds.state import Field
+
+
+class Collocation(Stepper):
+    """Order 2s - 2 with s stages: v_i = v + dt sum_j a_ij v'_j, r_i = r + dt sum_j a_ij v_j, v'_j = F_j/m.
+
+    Symmetric and implicit as the trapezoidal rule, which is s = 2. The equations are solved by sweeps over
+    the stages, each with what is newest of the others. The first sweep starts from the polynomial of the
+    last step; what it turns out to be off at one stage tells what it is off at the later ones, so that one
+    or two sweeps are enough: some s - 1 to 2 (s - 1) sums of forces for a step. The part of the force that is
+    linear in velocity is solved exactly with each stage. Spin is stepped as velocity is. What the first sweep
+    starts from is made anew when there have been impacts.
+
+    It pays where forces are smooth and more than three digits are wanted; for forces with kinks, such as
+    contacts, its order is lost.
+
+    Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.5; sweeps from
+    the last step's polynomial: E. Everhart, Celest. Mech. 10 (1974) 35-55, and H. Rein, D. S. Spiegel, MNRAS
+    446 (2015) 1424-1437, both for Radau's stages.
+    """
+
+    stages: int = Option(5, ge=3, le=8)
+    control: StageControl = StageControl()
+
+    counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
+    keeps: ClassVar = (
+        "time_before", "attempting", "verdict", "next_dt", "last_dt", "sweeping", "sweep", "stage", "unsound",
+        "sweep_change", "last_change", "contraction", "measured_dt",
+    )  # fmt: skip
+
+    @property
+    def order(self) -> int:
+        return 2 * self.stages - 2
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        forced = any(isinstance(effect, Force | PairForce) for effect in effects)
+        shortest = min(1e-12, three_digits(1e-3 * dt))
+        return (cls(control=StageControl(first=dt, shortest=shortest)),) if forced else ()
+
+    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
+        return work["force_evaluations"]
+
+    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+        return (
+            FORCE,
+            *kept(turning),
+            CHANGE,
+            *spans(self.control.at_end),
+            *Stages.fields(self.stages, turning),
+        )
+
+    def step(self, parts: Parts) -> tuple[Item, ...]:
+        s, stages, sums = parts.s, Stages(parts, self.stages), BlockSums(parts.s, 4)
+        parts.owned.append((stages, "coefficients of the stages", self.kind()))
+        parts.owned.append((sums, "sums of the stages", self.kind()))
+        listen = (Listen(parts),) if parts.near else ()
+        take = Take(parts, sums, stages)
+        judge = Judge(parts, sums, stages)
+        sweep = Sweep(s, (Place(stages), *listen, *parts.lists, *parts.trial_forces, take, judge))
+        attempt = (Try(parts, stages), Predict(stages), sweep, Conclude(stages), GiveUp(stages), *listen)
+        operate = (Operate(parts), *listen) if parts.operators else ()
+        begin = (Forget(s), Begin(s), Keep(stages))
+        note = (Went(stages),) if self.control.at_end else ()
+        step = (Attempt(s, (*attempt, Decide(parts))), *note, *parts.remember, *operate, Arrive(s))
+        return (*begin, *step)

@@ -1,0 +1,174 @@
+"""The phases of an attempt at a step of collocation: sweeps over its stages; the verdict is next door."""
+
+import numpy as np
+
+from tisim.backend.taichi import ti
+from tisim.steppers.common import note_stride
+from tisim.steppers.implicit.attempts import ACCEPTED, length
+from tisim.worlds.block_sum import PerBlock
+from tisim.worlds.program import PerParticle, Phase, Repeat
+
+
+class Forget(Phase):
+    """After impacts the past says nothing about what is to come."""
+
+    def __init__(self, s) -> None:
+        self.s = s
+
+    @ti.func
+    def run(self, w, _k):
+        if self.s.events[w] > 0:
+            self.s.last_dt[w] = 0.0
+
+
+class Try(Phase):
+    """Choose the step, and begin at the first stage after its beginning."""
+
+    def __init__(self, parts, stages) -> None:
+        self.s, self.control, self.stages = parts.s, parts.control, stages
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        dt = length(s, self.control, w)
+        s.dt[w] = dt
+        self.stages.extrapolate(w, ti.select(s.last_dt[w] > 0.0, dt / s.last_dt[w], 0.0))
+        s.sweeping[w], s.sweep[w], s.stage[w] = 1.0, 1.0, 1.0
+        s.sweep_change[w], s.last_change[w], s.unsound[w] = 0.0, 0.0, 0.0
+        s.time[w] = s.time_before[w] + dt * self.stages.c[1]
+
+
+class OfStages(PerParticle):
+    """A loop over particles that knows the stages."""
+
+    def __init__(self, stages) -> None:
+        super().__init__(stages.s)
+        self.stages = stages
+
+
+class Predict(OfStages):
+    """The rates at all stages, from the polynomial of the last step; at the first they are known."""
+
+    @ti.func
+    def run(self, w, i):
+        s, stages = self.s, self.stages
+        stages.put(s.stage_acceleration, w, i, 0, s.force_before[w, i] / s.mass[w, i])
+        if ti.static(stages.turning):
+            stages.put(s.stage_turning, w, i, 0, s.torque_before[w, i] / stages.inertia(w, i))
+        for now, last in ti.static(stages.rates):
+            for j in range(1, stages.number):
+                rate = stages.at(now, w, i, 0)
+                if s.last_dt[w] > 0.0:
+                    rate *= 0.0
+                    for k in range(stages.number):
+                        rate += ti.cast(stages.predict[w, j, k], s.real) * stages.at(last, w, i, k)
+                stages.put(now, w, i, j, rate)
+
+
+class Sweep(Repeat):
+    """Stage after stage, again and again, until there is a verdict."""
+
+    def __init__(self, s, items) -> None:
+        super().__init__(items)
+        self.s = s
+
+    @ti.func
+    def pending(self, w):
+        return ti.cast(self.s.sweeping[w], ti.i32)
+
+
+class Place(OfStages):
+    """Put particles where they are at the stage, as far as is known."""
+
+    @ti.func
+    def run(self, w, i):
+        s, stages = self.s, self.stages
+        dt, stage = ti.cast(s.dt[w], s.real), ti.cast(s.stage[w], ti.i32)
+        r = s.position_before[w, i] + stages.displacement(w, i, stage, dt)
+        if stages.sound(w, r):
+            here = stages.domain.wrap(w, r)
+            moved = stages.domain.nearest(w, s.position[w, i], here)
+            note_stride(s, w, ti.cast(moved, ti.f64))
+            s.position[w, i], s.velocity[w, i] = here, stages.velocity(w, i, stage, dt)
+            if ti.static(stages.turning):
+                s.spin[w, i] = stages.spin(w, i, stage, dt)
+        else:
+            ti.atomic_max(s.unsound[w], 1.0)
+
+
+class Take(PerBlock):
+    """The rates that the forces at the stage give; sums of their change, as displacements (m), and at the
+    last stage of the error, of what both are compared with, and of what displacements are rounded to."""
+
+    def __init__(self, parts, sums, stages) -> None:
+        super().__init__(sums)
+        self.control, self.stages = parts.control, stages
+        self.eps = float(np.finfo(np.float64 if self.s.real == ti.f64 else np.float32).eps)
+
+    @ti.func
+    def each(self, w, i):
+        s, stages = self.s, self.stages
+        dt, stage = ti.cast(s.dt[w], s.real), ti.cast(s.stage[w], ti.i32)
+        new = stages.newest(w, i, stage, dt, s.time[w])
+        change = self.take(s.stage_acceleration, w, i, stage, new)
+        error, scale, rounding = ti.cast(0.0, s.real), ti.cast(0.0, s.real), ti.cast(0.0, s.real)
+        if ti.static(stages.turning):
+            change += s.radius[w, i] * self.take(
+                s.stage_turning, w, i, stage, s.torque[w, i] / stages.inertia(w, i)
+            )
+        s.iterate_change[w, i] = dt * dt * change
+        if stage == stages.number - 1:
+            error = dt * dt * self.estimate(s.stage_acceleration, w, i)
+            if ti.static(stages.turning):
+                error += dt * dt * s.radius[w, i] * self.estimate(s.stage_turning, w, i)
+            scale = self.control.scale(s, w, i, stages.displacement(w, i, stage, dt).norm(), dt)
+            # Of the place, and of what the force there adds to it.
+            rounding = self.eps * (s.position[w, i].norm() + dt * dt * new.norm())
+        return ti.cast(ti.Vector([dt * dt * change, error, scale, rounding]), ti.f64)
+
+    @ti.func
+    def take(self, rate: ti.template(), w, i, stage, new):  # type: ignore[valid-type]
+        """Note a rate; how much it differs from what was known. Later stages are off alike (``shape``)."""
+        s, stages = self.s, self.stages
+        off = new - stages.at(rate, w, i, stage)
+        stages.put(rate, w, i, stage, new)
+        if s.sweep[w] == 1.0:
+            for j in range(stage + 1, stages.number):
+                more = ti.cast(stages.shape[w, j] / stages.shape[w, stage], s.real)
+                stages.put(rate, w, i, j, stages.at(rate, w, i, j) + more * off)
+        return off.norm()
+
+    @ti.func
+    def estimate(self, rate: ti.template(), w, i):  # type: ignore[valid-type]
+        """The error over dt^2: |sum_j d_j rate_j|, which bounds it, or what that says of its leading term."""
+        total, largest = ti.Vector.zero(self.s.real, 3), ti.cast(0.0, self.s.real)
+        for j in range(self.stages.number):
+            here = self.stages.at(rate, w, i, j)
+            total += ti.cast(self.stages.estimate[j], self.s.real) * here
+            largest = ti.max(largest, here.norm())
+        error = total.norm()
+        if ti.static(self.control.at_end):
+            factor, power = ti.static(self.stages.leading)
+            error = largest * ti.pow(factor * error / ti.select(largest > 0.0, largest, 1.0), power)
+        return error
+
+
+class Conclude(OfStages):
+    """The velocity at the end, and what the next step is predicted from; positions are there already."""
+
+    conditional = True
+
+    @ti.func
+    def when(self, w):
+        return ti.select(self.s.verdict[w] == ACCEPTED, 1, 0)
+
+    @ti.func
+    def run(self, w, i):
+        s, stages = self.s, self.stages
+        dt, last = ti.cast(s.dt[w], s.real), stages.number - 1
+        s.velocity[w, i] = stages.velocity(w, i, last, dt)
+        if ti.static(stages.turning):
+            s.spin[w, i] = stages.spin(w, i, last, dt)
+        for now, before in ti.static(stages.rates):
+            for k in range(3 * stages.number):
+                before[w, i, k] = now[w, i, k]

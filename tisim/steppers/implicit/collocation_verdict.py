@@ -1,0 +1,91 @@
+"""The verdict on an attempt at a step of collocation: from how its sweeps converge, and from its error."""
+
+from tisim.backend.taichi import ti
+from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse
+from tisim.worlds.program import Phase
+
+GUESS = 0.5
+"""Taken for the factor by which a sweep makes the error smaller where nothing is known of it, and at most."""
+DIVERGED = 0.5
+"""The longest that a second attempt may be where sweeps did not converge, in lengths of the first."""
+
+
+class Judge(Phase):
+    """To the next stage; after the last one: is the step solved, to be swept again, or to be given up?"""
+
+    def __init__(self, parts, sums, stages) -> None:
+        self.s, self.control, self.sums, self.stages = parts.s, parts.control, sums, stages
+        self.order = parts.control.order(stages.number)
+
+    @ti.func
+    def run(self, w, _k):
+        s, last = self.s, self.stages.number - 1
+        total = self.sums.total(w)
+        s.force_evaluations[w] += 1
+        # Not below infinity: also true of NaN, which a maximum would lose.
+        if not (total[0] < ti.math.inf) or s.unsound[w] > 0.0:
+            total[0] = ti.math.inf
+        s.sweep_change[w] = ti.max(s.sweep_change[w], total[0])
+        stage = ti.cast(s.stage[w], ti.i32)
+        if stage < last and s.sweep_change[w] < ti.math.inf:
+            s.stage[w] = stage + 1
+        else:
+            self.judge(w, total)
+            s.stage[w], s.sweep_change[w] = 1.0, 0.0
+            s.sweep[w] += 1.0
+            s.solver_iterations[w] += 1
+        here = self.stages.c[ti.cast(s.stage[w], ti.i32)]
+        s.time[w] = s.time_before[w] + s.dt[w] * here
+
+    @ti.func
+    def judge(self, w, total):
+        """At the end of a sweep."""
+        s = self.s
+        change, error = s.sweep_change[w], ti.cast(0.0, ti.f64)
+        # Nothing moves where nothing changes: 0/0 is no error.
+        if change > 0.0:
+            change /= total[2]
+        if total[1] > 0.0:
+            error = total[1] / total[2]
+        first = s.sweep[w] == 1.0
+        contraction = self.foreseen(w)
+        if not first and s.last_change[w] > 0.0:
+            contraction = change / s.last_change[w]
+            # For later steps no less than can be told: what is rounded away now is not 0 in longer ones.
+            told = total[3] / total[2] / s.last_change[w]
+            s.contraction[w] = ti.select(told > contraction, told, contraction)
+            s.measured_dt[w] = s.dt[w]
+        s.last_change[w] = change
+        solved = change * contraction < ti.math.inf and self.control.solved(w, change * contraction)
+        if solved or (not first and not (contraction < 1.0)) or s.sweep[w] >= self.control.sweeps:
+            self.decide(w, solved, contraction, error)
+        elif not (change < ti.math.inf):
+            self.decide(w, False, change, error)
+
+    @ti.func
+    def foreseen(self, w):
+        """What a sweep multiplies the error by: it grows as dt^2 and, to be safe, falls as dt only."""
+        s = self.s
+        factor = ti.cast(GUESS, ti.f64)
+        if s.measured_dt[w] > 0.0:
+            ratio = s.dt[w] / s.measured_dt[w]
+            factor = ti.min(factor, s.contraction[w] * ratio * ti.max(1.0, ratio))
+        return factor
+
+    @ti.func
+    def decide(self, w, solved, contraction, error):
+        """The verdict, and how long the next step is to be."""
+        s = self.s
+        s.sweeping[w], s.verdict[w] = 0.0, TRIED
+        # One that is only foreseen may be of long ago: it is no reason for a shorter step.
+        known = ti.select(s.sweep[w] > 1.0 or not solved, contraction, 0.0)
+        factor = self.control.factor(w, known, error, self.order)
+        if solved and self.control.accepts(w, error):
+            s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
+        else:
+            # A step that was not accepted would fail again in the same way if it were as long.
+            factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
+            if self.control.hopeless(s, w, s.dt[w]):
+                s.verdict[w] = HOPELESS
+                accuse(s, w)
+        s.next_dt[w] = s.dt[w] * factor

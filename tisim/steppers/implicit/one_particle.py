@@ -1,0 +1,101 @@
+"""The implicit equations of a step, for one particle and given the force on it (Z13 appendix, Z16 section 8).
+
+What is exact of a step is its velocity: displacement is dt (phi v' + (1 - phi) v), so two iterates are
+compared by their velocities, and positions may be wrapped into a box in between.
+"""
+
+from tisim.backend.taichi import ti
+from tisim.steppers.implicit.saved_state import Kept
+
+
+def with_jacobian(forces):
+    """Those forces that say how they depend on velocity."""
+    return tuple(force for force in forces if force.offers("velocity_jacobian"))
+
+
+@ti.func
+def summed_jacobian(forces: ti.template(), s, w, i, t):  # type: ignore[valid-type]
+    """Sum of the derivatives of forces on i by its velocity. N s/m."""
+    total = ti.Matrix.zero(s.real, 3, 3)
+    for force in ti.static(forces):
+        total += force.velocity_jacobian(s, w, i, t)
+    return total
+
+
+@ti.func
+def solved(a, b):
+    """x of a x = b, by Cramer's rule; the division comes last, so that nothing waits for it."""
+    x, y, z = a[:, 0], a[:, 1], a[:, 2]
+    yz = y.cross(z)
+    return 1.0 / x.dot(yz) * ti.Vector([b.dot(yz), x.dot(b.cross(z)), x.dot(y.cross(b))])
+
+
+@ti.data_oriented
+class Solve(Kept):
+    """One iterate of a particle, given the force at the last one."""
+
+    def __init__(self, parts, phi) -> None:
+        super().__init__(parts)
+        self.phi = phi
+        self.linear = with_jacobian(parts.singles)
+
+    @ti.func
+    def displacement(self, w, i, v, dt):
+        """dt (phi v' + (1 - phi) v). m."""
+        return dt * (self.phi(w) * v + (1.0 - self.phi(w)) * self.s.velocity_before[w, i])
+
+    @ti.func
+    def gone(self, w, i, dt):
+        """The displacement in a step that has been accepted. m."""
+        return self.displacement(w, i, self.s.velocity[w, i], dt)
+
+    @ti.func
+    def jacobian(self, w, i, t):
+        """J, the derivative of the force by velocity where effects give it, at the present v. N s/m."""
+        return summed_jacobian(self.linear, self.s, w, i, t)
+
+    @ti.func
+    def velocity(self, w, i, dt, jacobian):
+        """v' of m v' = m v + dt (phi (F' + J (v' - v_K)) + (1 - phi) F), with F' and J those at v_K. m/s."""
+        s, phi, over_mass = self.s, self.phi(w), dt / self.s.mass[w, i]
+        v, total = s.velocity_before[w, i], phi * s.force[w, i] + (1.0 - phi) * s.force_before[w, i]
+        new = v + over_mass * total
+        if ti.static(len(self.linear) > 0):
+            # Divided by the mass: a determinant of kg^3 is nothing to f32.
+            matrix = ti.Matrix.identity(s.real, 3) - phi * over_mass * jacobian
+            new = solved(matrix, v + over_mass * (total - phi * (jacobian @ s.velocity[w, i])))
+            s.force[w, i] += jacobian @ (new - s.velocity[w, i])
+        return new
+
+    @ti.func
+    def turn(self, w, i, dt):
+        """spin' = spin + dt/I (phi M' + (1 - phi) M), I = 2/5 m R^2; returns how far the surface moved, m."""
+        s, phi, radius = self.s, self.phi(w), self.s.radius[w, i]
+        torque = phi * s.torque[w, i] + (1.0 - phi) * s.torque_before[w, i]
+        new = s.spin_before[w, i] + dt / (0.4 * s.mass[w, i] * radius * radius) * torque
+        change = phi * dt * radius * (new - s.spin[w, i]).norm()
+        s.spin[w, i] = new
+        return change
+
+    @ti.func
+    def advance(self, w, i, v, dt):
+        """Put a particle where it gets with v'; returns how far its surface moved besides, by turning, m."""
+        s = self.s
+        s.velocity[w, i] = v
+        s.position[w, i] = self.domain.wrap(w, s.position_before[w, i] + self.displacement(w, i, v, dt))
+        turned = ti.cast(0.0, s.real)
+        if ti.static(self.turning):
+            turned = self.turn(w, i, dt)
+        return turned
+
+    @ti.func
+    def error(self, w, i, dt):
+        """Of a step, to leading order: (phi - 1/2) dt^2 a + (phi^2 - 1/6) dt^3 da/dt. m."""
+        a, b, phi = self.s.force_before[w, i], self.s.force[w, i], self.phi(w)
+        total = (phi - 0.5) * (phi * b + (1.0 - phi) * a) + (phi * phi - 1.0 / 6.0) * (b - a)
+        return dt * dt / self.s.mass[w, i] * total.norm()
+
+    @ti.func
+    def bearable(self, w, i, v, dt):
+        """Whether a particle with v' gets to a place that numbers can tell."""
+        return self.sound(w, self.s.position_before[w, i] + self.displacement(w, i, v, dt))

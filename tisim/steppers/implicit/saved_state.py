@@ -1,0 +1,53 @@
+"""The state at the beginning of a step, kept until the step is accepted."""
+
+from tisim.backend.taichi import ti
+from tisim.worlds.state import Field
+
+BEFORE = (
+    Field("position_before", "m", 3, "keep", scratch=True),
+    Field("velocity_before", "m/s", 3, "keep", scratch=True),
+    Field("force_before", "N", 3, "keep", scratch=True),
+)
+CHANGE = Field("iterate_change", "m", 1, "keep", scratch=True)
+"""How much the last iterate differs from the one before."""
+TURNING_BEFORE = (
+    Field("spin_before", "rad/s", 3, "keep", scratch=True),
+    Field("torque_before", "N m", 3, "keep", scratch=True),
+)
+
+
+def kept(turning: bool) -> tuple[Field, ...]:
+    """The fields it takes, in a scene that has torques or not."""
+    return (*BEFORE, *(TURNING_BEFORE if turning else ()))
+
+
+@ti.data_oriented
+class Kept:
+    """Keeps the state of a particle, and gives it back."""
+
+    def __init__(self, parts) -> None:
+        self.s, self.domain, self.turning = parts.s, parts.domain, parts.turning
+
+    @ti.func
+    def keep(self, w, i):
+        """Keep the state of a particle at the beginning of a step."""
+        s = self.s
+        s.position_before[w, i], s.velocity_before[w, i] = s.position[w, i], s.velocity[w, i]
+        s.force_before[w, i] = s.force[w, i]
+        if ti.static(self.turning):
+            s.spin_before[w, i], s.torque_before[w, i] = s.spin[w, i], s.torque[w, i]
+
+    @ti.func
+    def give_up(self, w, i):
+        """Back to the beginning of the step."""
+        s = self.s
+        s.position[w, i], s.velocity[w, i] = s.position_before[w, i], s.velocity_before[w, i]
+        s.force[w, i] = s.force_before[w, i]
+        if ti.static(self.turning):
+            s.spin[w, i], s.torque[w, i] = s.spin_before[w, i], s.torque_before[w, i]
+
+    @ti.func
+    def sound(self, w, r):
+        """Whether this is a place (m) that numbers can tell."""
+        # Below infinity: not true of NaN.
+        return r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)

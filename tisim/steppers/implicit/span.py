@@ -1,0 +1,54 @@
+"""How far particles have been from where they started: what an error at the end of a run is compared with.
+
+A control that aims at the end gives a step its share of the error, as much of it as the step is of the run:
+the error per unit step (L. F. Shampine, Math. Comp. 31 (1977) 500-512; E. Hairer, S. P. Norsett, G. Wanner,
+Solving Ordinary Differential Equations I, section II.4). What errors are compared with is not the step's own
+displacement but the size of the motion so far, so that they may be added up over the run.
+"""
+
+from typing import Literal
+
+from tisim.backend.taichi import ti
+from tisim.worlds.program import PerParticle
+from tisim.worlds.state import Field
+
+Per = Literal["step", "run"]
+"""What an error that is asked for is of: a step, over the displacement in it, or the end of a run, over the
+size of the motion."""
+GONE = Field("gone", "m", 3, "keep", scratch=True)
+"""The displacement of a particle since its start, through faces of a box too."""
+SPAN = Field("span", "m", 1, "keep", scratch=True)
+"""The largest of its distances from its start, at the ends of steps."""
+
+
+def spans(at_end: bool) -> tuple[Field, ...]:
+    """The fields that it takes."""
+    return (GONE, SPAN) if at_end else ()
+
+
+@ti.func
+def compared(control: ti.template(), s, w, i, moved, dt):  # type: ignore[valid-type]
+    """What the error is compared with of a particle that has moved so far in a step of dt (s). m."""
+    size, share = moved, ti.cast(1.0, s.real)
+    if ti.static(control.at_end):
+        size, share = ti.max(s.span[w, i], moved), dt / ti.cast(s.end[w], s.real)
+    return share * (size + control.resolution(w) * s.radius[w, i])
+
+
+@ti.func
+def went(s, w, i, moved):
+    """Note the displacement (m, a vector) in a step that is accepted."""
+    s.gone[w, i] += moved
+    s.span[w, i] = ti.max(s.span[w, i], s.gone[w, i].norm())
+
+
+class Went(PerParticle):
+    """Note the displacements in a step. ``solve`` tells them."""
+
+    def __init__(self, solve) -> None:
+        super().__init__(solve.s)
+        self.solve = solve
+
+    @ti.func
+    def run(self, w, i):
+        went(self.s, w, i, self.solve.gone(w, i, ti.cast(self.s.dt[w], self.s.real)))

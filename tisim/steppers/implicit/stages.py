@@ -1,0 +1,138 @@
+"""The rates of motion at the stages of a step, and the coefficients that make places and speeds of them."""
+
+import numpy as np
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.steppers.implicit.lobatto import highest, integrals, leading, nodes
+from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
+from tisim.steppers.implicit.saved_state import Kept
+from tisim.worlds.state import Field
+
+
+@ti.data_oriented
+class Stages(Kept):
+    """``acceleration[w, i, 3 j + k]`` of stage j along axis k, and with torques ``turning`` likewise.
+
+    ``c[j]`` is where stage j is, in parts of the step; ``speeds[i, j]`` gives v_i, ``places[i, j]`` r_i, and
+    ``estimate[j]`` the error. Of each world: ``predict[w, i, j]`` gives what the polynomial of the last step
+    says of stage i, ``shape[w, i]`` how much it is off there, compared with the other stages.
+    """
+
+    def __init__(self, parts, number: int) -> None:
+        super().__init__(parts)
+        s, self.number, self.leading = self.s, number, leading(number)
+        self.linear = with_jacobian(parts.singles)
+        rates = [(s.stage_acceleration, s.last_acceleration)]
+        if self.turning:
+            rates.append((s.stage_turning, s.last_turning))
+        self.rates = tuple(rates)
+        self.c, self.estimate = ti.field(ti.f64), ti.field(ti.f64)
+        self.speeds, self.places = ti.field(ti.f64), ti.field(ti.f64)
+        self.predict, self.shape = ti.field(ti.f64), ti.field(ti.f64)
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, number).place(self.c, self.estimate)
+        builder.dense(ti.i, number).dense(ti.j, number).place(self.speeds, self.places)
+        builder.dense(ti.i, s.worlds).dense(ti.j, number).dense(ti.k, number).place(self.predict)
+        builder.dense(ti.i, s.worlds).dense(ti.j, number).place(self.shape)
+        self.tree = Tree(builder)
+        once = integrals(number)
+        for column, values in (
+            (self.c, nodes(number)),
+            (self.estimate, highest(number)),
+            (self.speeds, once),
+            (self.places, once @ once),
+        ):
+            column.from_numpy(np.ascontiguousarray(values))
+
+    @staticmethod
+    def fields(number: int, turning: bool) -> tuple[Field, ...]:
+        """The rates of this step and of the last one."""
+        names = [("acceleration", "m/s^2"), *([("turning", "rad/s^2")] if turning else [])]
+        return tuple(
+            Field(f"{when}_{name}", unit, merge="keep", slots=3 * number, scratch=True)
+            for name, unit in names
+            for when in ("stage", "last")
+        )
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        n = self.number
+        return 8 * (2 * n + 2 * n * n + self.s.worlds * n * (n + 1))
+
+    @ti.func
+    def extrapolate(self, w, ratio):
+        """Prepare to predict a step that is ``ratio`` as long as the last one; 0 where there was none."""
+        for i in range(self.number):
+            at = 1.0 + ratio * self.c[i]
+            off = ti.cast(1.0, ti.f64)
+            for j in range(self.number):
+                weight = ti.cast(1.0, ti.f64)
+                for k in range(self.number):
+                    if k != j:
+                        weight *= (at - self.c[k]) / (self.c[j] - self.c[k])
+                # Without a last step all stages are taken to be as the first.
+                self.predict[w, i, j] = ti.select(ratio > 0.0, weight, ti.cast(j == 0, ti.f64))
+                off *= at - self.c[j]
+            self.shape[w, i] = ti.select(ratio > 0.0, off, self.c[i])
+
+    @ti.func
+    def at(self, rate: ti.template(), w, i, j):  # type: ignore[valid-type]
+        """A rate at stage j."""
+        return ti.Vector([rate[w, i, 3 * j], rate[w, i, 3 * j + 1], rate[w, i, 3 * j + 2]])
+
+    @ti.func
+    def put(self, rate: ti.template(), w, i, j, value):  # type: ignore[valid-type]
+        for k in ti.static(range(3)):
+            rate[w, i, 3 * j + k] = value[k]
+
+    @ti.func
+    def sum(self, weights: ti.template(), stage, rate: ti.template(), w, i):  # type: ignore[valid-type]
+        """sum_j weights[stage, j] rate_j."""
+        total = ti.Vector.zero(self.s.real, 3)
+        for j in range(self.number):
+            total += ti.cast(weights[stage, j], self.s.real) * self.at(rate, w, i, j)
+        return total
+
+    @ti.func
+    def velocity(self, w, i, stage, dt):
+        """v_i = v + dt sum_j a_ij v'_j. m/s."""
+        s = self.s
+        return s.velocity_before[w, i] + dt * self.sum(self.speeds, stage, s.stage_acceleration, w, i)
+
+    @ti.func
+    def displacement(self, w, i, stage, dt):
+        """r_i - r = c_i dt v + dt^2 sum_jk a_ij a_jk v'_k. m."""
+        s = self.s
+        moved = dt * ti.cast(self.c[stage], s.real) * s.velocity_before[w, i]
+        return moved + dt * dt * self.sum(self.places, stage, s.stage_acceleration, w, i)
+
+    @ti.func
+    def gone(self, w, i, dt):
+        """The displacement in a step that has been accepted. m."""
+        return self.displacement(w, i, self.number - 1, dt)
+
+    @ti.func
+    def spin(self, w, i, stage, dt):
+        """As the velocity. rad/s."""
+        return self.s.spin_before[w, i] + dt * self.sum(self.speeds, stage, self.s.stage_turning, w, i)
+
+    @ti.func
+    def inertia(self, w, i):
+        """2/5 m R^2, a solid sphere's (Z16 7.8). kg m^2."""
+        return 0.4 * self.s.mass[w, i] * self.s.radius[w, i] ** 2
+
+    @ti.func
+    def newest(self, w, i, stage, dt, t):
+        """The acceleration that the force at a stage gives, m/s^2; what is linear in velocity solved exactly:
+        m v' = F + J dt a_ii (v' - v'_last)."""
+        s = self.s
+        m = s.mass[w, i]
+        new = s.force[w, i] / m
+        if ti.static(len(self.linear) > 0):
+            rate = summed_jacobian(self.linear, s, w, i, t) / m
+            implicit = dt * ti.cast(self.speeds[stage, stage], s.real) * rate
+            last = self.at(s.stage_acceleration, w, i, stage)
+            new = solved(ti.Matrix.identity(s.real, 3) - implicit, new - implicit @ last)
+            s.force[w, i] = m * new
+        return new

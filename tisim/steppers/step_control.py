@@ -1,0 +1,124 @@
+"""How long the next step may be: fixed, or from the time until surfaces meet."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import Knob
+from tisim.components.component import Spec, parameter
+from tisim.errors import must
+
+TOUCH = 1.0 + 1e-6
+"""Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
+LEAST = 1e-30
+"""The shortest step that may be asked for, s: light goes 3e-22 m in it, and single precision holds it."""
+MOST_STEPS = 2.0**53
+"""Steps that a run may take: with more, one is shorter than what the time at the end is rounded to."""
+
+
+@ti.func
+def told(s, w, shortest):
+    """The shortest step (s, f64), where this one is asked for, that the time at the end still tells."""
+    return ti.max(ti.cast(shortest, ti.f64), s.end[w] / MOST_STEPS)
+
+
+class StepControl(Spec):
+    """The contract of step control: ``pair`` sees every near pair, ``note`` every particle.
+
+    ``watches_pairs`` says whether it needs to see pairs at all; ``keeps`` names quantities of a world.
+    """
+
+    contract: ClassVar[bool] = True
+    watches_pairs: ClassVar[bool] = False
+    keeps: ClassVar[tuple[str, ...]] = ()
+
+    @ti.func
+    def pair(self, s, w, i, j, separation):
+        """Time (s, f64) that this pair allows."""
+        return ti.cast(ti.math.inf, ti.f64)
+
+    @ti.func
+    def note(self, s, w, i, soonest):
+        """Note for a particle the least time that its pairs allow. s, f64."""
+
+    def fewest(self, duration: float) -> float:
+        """The number of steps that a run of this duration (s) takes at least."""
+        return 1.0
+
+
+class Controller(StepControl):
+    """Control of explicit steppers: ``next`` decides before the step is made."""
+
+    contract: ClassVar[bool] = True
+
+    @ti.func
+    def next(self, s, w, horizon):
+        """Length of the next step. s, f64. ``horizon``: gap (m) within which every pair has been seen."""
+        return ti.cast(0.0, ti.f64)
+
+
+class FixedStep(Controller):
+    """Steps of one length; the last one is cut to end on time."""
+
+    dt: float = parameter("s", ge=LEAST)
+
+    knobs = (Knob(dt=2),)
+
+    def fewest(self, duration: float) -> float:
+        return duration / self.dt
+
+    @ti.func
+    def next(self, s, w, horizon):
+        return ti.cast(self.dt(w), ti.f64)
+
+
+class ApproachTime(Controller):
+    """The least time until two surfaces meet, gap over approach speed (Z04 Eq. 6.14), within limits.
+
+    Z04 asks each particle's nearest neighbour only; here every approaching pair is asked, as the nearest
+    is not always the first to be met. Limits of Z04 section 8: 1e-6 s and 1e-3 s.
+    """
+
+    shortest: float = parameter("s", 1e-6, ge=LEAST)
+    longest: float = parameter("s", 1e-3, ge=LEAST)
+    watches_pairs: ClassVar[bool] = True
+
+    knobs = (Knob(shortest=1, longest=1), Knob(shortest=1, converges=False), Knob(longest=1, converges=False))
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        must(self.longest >= self.shortest, "approach_time.longest", "at least shortest", self.longest)
+        return self
+
+    def fewest(self, duration: float) -> float:
+        return duration / self.longest
+
+    @ti.func
+    def pair(self, s, w, i, j, separation):
+        # Approach speed times distance: (v_i - v_j).(r_j - r_i).
+        closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
+        reach = s.radius[w, i] + s.radius[w, j]
+        time = ti.cast(ti.math.inf, ti.f64)
+        if closing > 0.0 and separation.norm_sqr() > reach * reach:
+            distance = separation.norm()
+            time = ti.cast((distance - reach) * distance / closing, ti.f64) * TOUCH
+        return time
+
+    @ti.func
+    def note(self, s, w, i, soonest):
+        if soonest < s.approach_time[w]:
+            ti.atomic_min(s.approach_time[w], soonest)
+        speed = (ti.cast(s.velocity[w, i], ti.f64) - s.axes(s.frame, w)).norm()
+        if speed > s.fastest[w]:
+            ti.atomic_max(s.fastest[w], speed)
+
+    @ti.func
+    def next(self, s, w, horizon):
+        dt = s.approach_time[w]
+        if horizon > 0.0:
+            # Pairs not seen are farther apart than this, and close no faster than twice the fastest.
+            dt = ti.min(dt, ti.cast(horizon, ti.f64) / (2.0 * s.fastest[w] + 1e-300))
+        return ti.max(told(s, w, self.shortest(w)), ti.min(dt, ti.cast(self.longest(w), ti.f64)))

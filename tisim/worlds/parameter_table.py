@@ -1,0 +1,159 @@
+"""From plain data to what kernels see: one parameter table for all worlds.
+
+A bound copy of a Spec has, in place of each parameter, a function of the world that reads the table. So a
+kernel written ``self.hardness(w)`` sees the value of world w, and loading other designs changes numbers in
+a table, not code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.components.component import Spec, room
+from tisim.errors import must
+
+Part = TypeVar("Part", bound=Spec)
+
+
+def _reader(table: Any, slot: int, size: int) -> Any:
+    if size == 1:
+
+        @ti.func
+        def read(w):
+            return table[w, slot]
+
+    else:
+
+        @ti.func
+        def read(w):
+            return ti.Vector([table[w, slot], table[w, slot + 1], table[w, slot + 2]])
+
+    return read
+
+
+def _row_reader(table: Any, slot: int, size: int, stride: int) -> Any:
+    if size == 1:
+
+        @ti.func
+        def read(w, k):
+            return table[w, slot + k * stride]
+
+    else:
+
+        @ti.func
+        def read(w, k):
+            at = slot + k * stride
+            return ti.Vector([table[w, at], table[w, at + 1], table[w, at + 2]])
+
+    return read
+
+
+def _length_reader(table: Any, slot: int) -> Any:
+    @ti.func
+    def read(w):
+        return ti.cast(table[w, slot], ti.i32)
+
+    return read
+
+
+def _width(kind: type[Spec]) -> int:
+    return sum(size for _, size in kind.columns())
+
+
+def _slots(part: Spec) -> int:
+    """In the table of a world: the part's own, and for each list its length and room for its rows."""
+    return _width(type(part)) + sum(
+        1 + _width(kind) * room(len(getattr(part, n))) for n, kind in part.lists()
+    )
+
+
+def _entries(part: Spec, where: str) -> Iterator[tuple[str, float]]:
+    """What stands in the slots of a part, in order, each with its dotted name."""
+    names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
+    yield from zip(names, part.values(), strict=True)
+    for name, kind in part.lists():
+        rows = getattr(part, name)
+        yield f"{where}.{name}", float(len(rows))
+        for k, row in enumerate(rows):
+            yield from _entries(row, f"{where}.{name}.{k}")
+        spare = _width(kind) * (room(len(rows)) - len(rows))
+        yield from [(f"{where}.{name}", 0.0)] * spare
+
+
+class Table:
+    """The parameters of every part of a scene, for every world: ``table[world, slot]``."""
+
+    def __init__(self, parts: Sequence[Spec], worlds: int, real: Any) -> None:
+        self.slots = sum(_slots(part) for part in parts)
+        self.field = ti.field(real)
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, worlds).dense(ti.j, max(1, self.slots)).place(self.field)
+        self.trees = [Tree(builder)]
+        self._next, self.array_bytes = 0, 0
+
+    def bind(self, part: Part) -> Part:
+        """A copy of a part, of the same class, whose parameters are functions of the world."""
+        bound, slot = part.model_copy(), self._next
+        for name, size in part.columns():
+            bound.__dict__[name] = _reader(self.field, slot, size)
+            slot += size
+        for name, kind in part.lists():
+            bound.__dict__[name] = self._bind_rows(kind, slot)
+            slot += 1 + _width(kind) * room(len(getattr(part, name)))
+        self._next = slot
+        for name, values in part.lookups().items():
+            bound.__dict__[name] = self._place(values)
+        return bound
+
+    @in_taichi_thread
+    def _place(self, values: np.ndarray) -> Any:
+        """An array in device memory."""
+        column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
+        builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
+        self.trees.append(Tree(builder))
+        held = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
+        column.from_numpy(held)
+        self.array_bytes += held.nbytes
+        return column
+
+    def _bind_rows(self, kind: type[Spec], slot: int) -> Spec:
+        """The one bound row that stands for a list."""
+        bound, first = kind.model_construct(), slot + 1
+        bound.__dict__["size"] = _length_reader(self.field, slot)
+        for name, size in kind.columns():
+            bound.__dict__[name] = _row_reader(self.field, first, size, _width(kind))
+            first += size
+        return bound
+
+    def write(self, rows: Sequence[Sequence[Spec]]) -> None:
+        """Set the parameters of each world from its parts, in the order they were bound.
+
+        InputError for one that the precision cannot hold, or that kernels would flush to zero.
+        """
+        table = np.ones((self.field.shape[0], max(1, self.slots)))
+        for world, parts in enumerate(rows):
+            table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.kind())]
+        real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
+        with np.errstate(over="ignore", under="ignore"):
+            held = table.astype(real)
+        flushed = (table != 0) & (np.abs(held) < np.finfo(real).tiny)
+        for world, slot in np.argwhere(~np.isfinite(held) | flushed):
+            names = [name for part in rows[world] for name, _ in _entries(part, part.kind())]
+            must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
+        self._put(held)
+
+    @in_taichi_thread
+    def _put(self, held: np.ndarray) -> None:
+        self.field.from_numpy(held)
+
+
+def connect(bound: Sequence[Any]) -> None:
+    """Let each bound effect know its index and choose what it wants to know of the others."""
+    for index, effect in enumerate(bound):
+        effect.__dict__.update(effect.connect(tuple(bound)), index=index)

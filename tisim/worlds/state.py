@@ -1,0 +1,332 @@
+"""The particle fields of a batch of worlds: a core, plus the union of what the scene's effects need.
+
+Every field has a leading world axis. Vectors are stored as separate components (structure of arrays),
+which the compiler can vectorise over particles.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from tisim.backend import runtime
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.transfer import Exchange
+from tisim.errors import RunError
+
+
+@dataclass(frozen=True)
+class Field:
+    """A quantity that particles carry.
+
+    merge : what becomes of it when two particles become one: "mean" by mass, "sum", "volume" (a radius),
+        or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
+    slots : a particle has so many values, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
+        They are its own: a piece that breaks off starts with the default.
+    default : what a particle starts with where the start does not say: a number, or the name of a field of
+        which it is a copy then, such as "position"; None where the start must say.
+    minimum : the least value that a start may give.
+    scratch : of use to a stepper only: results do not have it. double : in f64 also in single precision.
+    """
+
+    name: str
+    unit: str
+    components: Literal[1, 3] = 1
+    merge: Literal["mean", "sum", "volume", "keep"] = "mean"
+    integer: bool = False
+    slots: int = 0
+    default: float | str | None = 0.0
+    minimum: float | None = None
+    scratch: bool = False
+    double: bool = False
+
+    def __post_init__(self) -> None:
+        if self.slots and (self.merge != "keep" or self.components != 1):
+            raise TypeError(f"field {self.name} with slots must have one component and be merged as 'keep'")
+        if self.integer and self.merge != "keep":
+            raise TypeError(f"field {self.name} of integers must be merged as 'keep'")
+
+    def shape(self, *particles: int) -> tuple[int, ...]:
+        """Of an array of it, for an array of particles of this shape."""
+        return (*particles, *((3,) if self.components == 3 else ()), *((self.slots,) if self.slots else ()))
+
+
+CORE = (
+    Field("position", "m", 3, "keep", default=None),
+    Field("velocity", "m/s", 3, default=None),
+    Field("mass", "kg", 1, "sum", default=None),
+    Field("radius", "m", 1, "volume", default=None),
+    Field("id", "", 1, "keep", integer=True),
+)
+SHARED = {
+    field.name: field
+    for field in (
+        *CORE,
+        Field("temperature", "K", default=None, minimum=0.0),
+        Field("spin", "rad/s", 3),
+        Field("charge", "C", 1, "sum", default=None),
+        Field("fixed", "", 1, "keep", integer=True, minimum=0.0),
+    )
+}
+"""Fields that several effects share by name."""
+
+RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED, LOST, STUCK, STEEP, INDEFINITE = range(10)
+"""Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow;
+a quantity that particles settle among themselves does not settle; a particle has left the box so far that its
+place is lost; no step is short enough to be solved; a force asks for a step shorter than the shortest; a
+diffusion matrix is not positive definite."""
+
+NOBODY = 2**31 - 1
+"""For the particle that has stopped a world, and the index of the effect that is to blame: none."""
+ASKED = NOBODY - 1
+"""The same: a force, not yet known which."""
+
+NEVER = 2**62
+"""A number of steps that no world gets to."""
+
+CLOCK = (
+    *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "asked_at"),
+    *("reached", "cut"),
+)
+BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id", "underway")
+MOTION = ("frame", "stride", "travel")
+TALLIES = ("steps", "particle_steps")
+
+
+def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
+    """The core and everything needed, each once, in a fixed order."""
+    wanted = {field.name: field for field in CORE}
+    for need in needs:
+        field = SHARED[need] if isinstance(need, str) else need
+        wanted.setdefault(field.name, field)
+    return tuple(wanted.values())
+
+
+@ti.data_oriented
+class State:
+    """Device memory of ``worlds`` worlds of at most ``capacity`` particles.
+
+    Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
+    ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
+    and quantities (f64) that effects and steppers declare.
+
+    A step that takes long may be made in several launches. ``underway`` is the number of particles that have
+    not ended it yet: unless that is 0 the particles have no time in common, ``time`` is that of when the step
+    began, and ``reached`` (s) one that all have got to. ``cut`` is how far into such a step all was well (s),
+    when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
+    """
+
+    def __init__(
+        self,
+        worlds: int,
+        capacity: int,
+        fields: tuple[Field, ...],
+        counters: tuple[str, ...],
+        keeps: tuple[str, ...] = (),
+    ) -> None:
+        self.worlds, self.capacity = worlds, capacity
+        self.fields, self.counters, self.keeps = fields, (*TALLIES, *counters), keeps
+        self.told = tuple(field for field in fields if not field.scratch)
+        self.real = runtime.current().real
+        builder = ti.FieldsBuilder()
+        for field in fields:
+            setattr(self, field.name, self._place(builder, field))
+        for names, dtype in (((*CLOCK, *keeps), ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
+            for name in names:
+                column = ti.field(dtype)
+                builder.dense(ti.i, worlds).place(column)
+                setattr(self, name, column)
+        self.seed = ti.field(ti.i64)
+        builder.dense(ti.i, worlds).place(self.seed)
+        # Particles that its scene may ever have; the capacity may be that of a larger one.
+        self.most = ti.field(ti.i32)
+        builder.dense(ti.i, worlds).place(self.most)
+        # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s), at
+        # ``goal`` steps, and for the next launches at ``until`` steps.
+        self.hold, self.held = ti.field(ti.f64), ti.field(ti.i32)
+        self.goal, self.until = ti.field(ti.i64), ti.field(ti.i64)
+        builder.dense(ti.i, worlds).place(self.hold, self.held, self.goal, self.until)
+        for name in MOTION:
+            # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
+            column = ti.field(ti.f64)
+            builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
+            setattr(self, name, column)
+        self._tree = Tree(builder)
+        self._exchanges: dict[tuple[str, ...], Exchange] = {}
+        own = ("seed", "most", "hold", "held", "goal", "until")
+        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *keeps, *own)
+        self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
+        self.slotted = tuple(
+            (
+                getattr(self, field.name),
+                field.slots,
+                int(field.default or 0) if field.integer else float(field.default or 0.0),
+            )
+            for field in fields
+            if field.slots
+        )
+        self.means = self._ruled("mean")
+        self.sums = self._ruled("sum")
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    def _place(self, builder: Any, field: Field) -> Any:
+        dtype = ti.i32 if field.integer else ti.f64 if field.double else self.real
+        if field.slots:
+            column = ti.field(dtype)
+            builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).dense(ti.k, field.slots).place(column)
+            return column
+        column = ti.field(dtype) if field.components == 1 else ti.Vector.field(field.components, dtype)
+        parts = [column] if field.components == 1 else [column.get_scalar_field(k) for k in range(3)]
+        for part in parts:
+            builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).place(part)
+        return column
+
+    def _ruled(self, rule: str) -> tuple[Any, ...]:
+        return tuple(getattr(self, field.name) for field in self.fields if field.merge == rule)
+
+    def bytes(self) -> dict[str, int]:
+        """Bytes of each particle field, all worlds together."""
+        size = 8 if self.real == ti.f64 else 4
+        return {
+            f.name: int(np.prod(f.shape(self.worlds, self.capacity)))
+            * (4 if f.integer else 8 if f.double else size)
+            for f in self.fields
+        }
+
+    def _exchange(self, names: tuple[str, ...]) -> Exchange:
+        self.check()
+        if names not in self._exchanges:
+            self._exchanges[names] = Exchange({name: getattr(self, name) for name in names})
+        return self._exchanges[names]
+
+    def snapshot(self, names: Iterable[str]) -> dict[str, np.ndarray]:
+        """Fields as arrays of their full shapes, by name.
+
+        A copy is compiled for each choice of particle fields, and one for all quantities of the worlds.
+        """
+        names = tuple(names)
+        particles = tuple(name for name in names if name not in self.columns)
+        found = self._exchange(particles).read() if particles else {}
+        if len(particles) < len(names):
+            found |= self._exchange(self.columns).read()
+        return {name: found[name] for name in names}
+
+    def read(self, name: str) -> np.ndarray:
+        """A field as an array of its full shape."""
+        return self.snapshot((name,))[name]
+
+    def saved(self) -> tuple[str, ...]:
+        """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
+        fields = (field.name for field in self.fields)
+        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.keeps, "frame", "seed", "goal")
+
+    def image(self) -> dict[str, np.ndarray]:
+        """A copy of all worlds as they are, by the names that are saved."""
+        return self.snapshot(self.saved())
+
+    def fill(self, values: Mapping[str, Any]) -> None:
+        """Set fields, each from an array of its full shape or to one number."""
+        worlds = {name: values[name] for name in self.columns if name in values}
+        if worlds:
+            exchange = self._exchange(self.columns)
+            exchange.write(worlds if len(worlds) == len(self.columns) else {**exchange.read(), **worlds})
+        particles = tuple(name for name in values if name not in worlds)
+        if particles:
+            self._exchange(particles).write(values)
+
+    def write(self, name: str, values: Any) -> None:
+        """Set a field from an array of its full shape, or to one number."""
+        self.fill({name: values})
+
+    @property
+    def alive(self) -> bool:
+        """Whether the memory is there: neither given back, nor gone because Taichi has been started anew."""
+        return self._tree.alive
+
+    def check(self) -> None:
+        """RunError when the memory is gone."""
+        if self._tree.generation != runtime.generation():
+            raise RunError("a Simulation must be used with the settings it was made under; start it anew")
+        if not self.alive:
+            raise RunError("a Simulation must be used before it is closed; make another")
+
+    @ti.func
+    def axes(self, column: ti.template(), w):  # type: ignore[valid-type]
+        """The three components of a world quantity."""
+        return ti.Vector([column[w, 0], column[w, 1], column[w, 2]])
+
+    @ti.func
+    def copy(self, w, source, target):
+        """Copy every field of one slot to another."""
+        for field in ti.static(self.singles):
+            field[w, target] = field[w, source]
+        for column in ti.static(self.slotted):
+            for k in range(column[1]):
+                column[0][w, target, k] = column[0][w, source, k]
+
+    @ti.func
+    def remove(self, w, i):
+        """Mark a particle as gone; its slot is reused after the events of this step."""
+        self.mass[w, i] = 0.0
+        ti.atomic_max(self.changed[w], 1)
+
+    @ti.func
+    def disturb(self, w):
+        """Say that a particle has been moved or resized other than by a step: it is put back into the domain,
+        and pair lists are made anew."""
+        ti.atomic_max(self.changed[w], 1)
+
+    @ti.func
+    def append(self, w, i):
+        """A copy of particle i in a new slot, whose index is returned. The caller has checked ``room``."""
+        k = self.count[w]
+        self.copy(w, i, k)
+        for column in ti.static(self.slotted):
+            for m in range(column[1]):
+                column[0][w, k, m] = column[2]
+        self.id[w, k] = self.next_id[w]
+        self.next_id[w] += 1
+        self.count[w] = k + 1
+        self.changed[w] = 1
+        return k
+
+    @ti.func
+    def room(self, w):
+        """Free slots, of those that its scene has, so that no world ends otherwise in a larger simulation."""
+        return self.most[w] - self.count[w]
+
+    @ti.func
+    def fail(self, w, status, i):
+        """Stop a world, after this phase: all of its items are heard, and of several particles at fault the
+        lowest id is recorded, whatever the order of parallel work."""
+        ti.atomic_max(self.failed[w], status)
+        ti.atomic_min(self.culprit[w], self.id[w, i])
+
+    @ti.func
+    def suspect(self, w, status, i):
+        """Stop a world by a force on i; which of them, failure_attribution.py finds out."""
+        self.fail(w, status, i)
+        self.ask(w, self.time[w])
+
+    @ti.func
+    def ask(self, w, t):
+        """Which force it was at t (s), as the world is now."""
+        ti.atomic_min(self.blame[w], ASKED)
+        self.asked_at[w] = t
+
+    @ti.func
+    def fault(self, w, i, effect):
+        """Stop a world in which an effect, by its index in the scene, has made something not finite."""
+        self.fail(w, NOT_FINITE, i)
+        ti.atomic_min(self.blame[w], effect)
+
+    @ti.func
+    def spoilt(self, w, effect):
+        """The same of a quantity of the world, which is of no particle."""
+        ti.atomic_max(self.failed[w], NOT_FINITE)
+        ti.atomic_min(self.blame[w], effect)
