@@ -17,15 +17,9 @@ from cases.case import Case, Check, Size
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from tisim import Box, Cloud, Result, Scene
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import DeformationWork, Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.effects.impact.softening import Softening
+from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
 from tisim.errors import must
-from tisim.operators.cooling import Cooling
-from tisim.operators.fragmentation import Fragmentation
+from tisim.operators import Cooling, Fragmentation
 from tisim.plotting.cloud import cloud
 
 HALF_SIDE = 0.01

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tisim import Result, Scene
-from tisim.accuracy.quantity import Quantity
+from tisim.accuracy import Quantity
 
 
 def mean_radius(result: Result) -> float:

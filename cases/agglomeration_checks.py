@@ -15,13 +15,10 @@ import tisim
 from cases import agglomeration
 from cases.case import Check
 from tisim import Particles, Result, Scene
-from tisim.effects.base import Effect
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.operators.fragmentation import Fragmentation
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Agglomeration, Effect, Heating, Impact
+from tisim.operators import Fragmentation
+from tisim.scene.initial_state import Arrays
+from tisim.steppers import FixedStep, Verlet
 
 HARDNESS, DENSITY, RADIUS, LENGTH = 3e5, 2000.0, 1e-3, 0.8
 """H (Pa), rho (kg/m^3), b_0 (m) and beta of the grains here."""
@@ -139,7 +136,7 @@ def energy(result: Result) -> tuple[float, float]:
     what reaction and deformation work have supplied."""
     capacity = next(e for e in result.scene.effects if isinstance(e, Heating)).heat_capacity
 
-    def held(s: tisim.scene.initial_state.Arrays) -> float:
+    def held(s: Arrays) -> float:
         kinetic = 0.5 * (s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum()
         return float(kinetic + (s["mass"] * capacity * s["temperature"]).sum())
 

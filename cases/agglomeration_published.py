@@ -19,8 +19,7 @@ from cases.agglomeration import cost, scene
 from cases.agglomeration_strings import PUBLISHED, designs
 from tisim import Scene
 from tisim.numerics.statistics import half_width
-from tisim.steppers.step_control import ApproachTime
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import ApproachTime, Verlet
 
 
 def changed(control: ApproachTime) -> Callable[[Scene], Scene]:

@@ -19,23 +19,23 @@ from numpy.typing import ArrayLike
 from cases.blast_accuracy import half_axes, quantities
 from cases.case import Case, Check, Size
 from optimize.problem.problem import Problem
-from tisim import Cloud, Result, Scene, run
-from tisim.effects.base import Effect
-from tisim.effects.contact.dissipation import ContactDissipation
-from tisim.effects.contact.friction import ContactFriction
-from tisim.effects.contact.power_law import Contact
-from tisim.effects.contact.softening import ContactSoftening
-from tisim.effects.external.drag import ChowDrag
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.pair.near_field import NearField, TruncatedNearField
+from tisim import Blast, Cloud, RandomInBall, Result, Scene, run
+from tisim.effects import (
+    ChowDrag,
+    Contact,
+    ContactDissipation,
+    ContactFriction,
+    ContactSoftening,
+    Effect,
+    Lorentz,
+    NearField,
+    TruncatedNearField,
+)
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.io.reader import Frames
-from tisim.packing.placement import RandomInBall
-from tisim.scene.initial_velocity import Blast
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.implicit.step_control import IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.sources import MagneticField
+from tisim.steppers import IterationControl, Trapezoid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

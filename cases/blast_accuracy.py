@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tisim import Result, Scene
-from tisim.accuracy.quantity import Quantity, displacement
-from tisim.effects.base import PairForce
+from tisim.accuracy import Quantity
+from tisim.accuracy.quantity import displacement
+from tisim.effects import PairForce
 from tisim.scene.initial_state import Arrays
 
 

@@ -15,9 +15,8 @@ from matplotlib.figure import Figure
 
 from cases import blast
 from cases.blast_shape import contacts, extents
-from tisim import Recording, run
+from tisim import Recording, RunError, run
 from tisim.engine.batches import Progress, share
-from tisim.errors import RunError
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting.cloud import SEEN, corners, panel, view
 from tisim.plotting.style import empty, plain

@@ -20,18 +20,15 @@ from cases.case import Case, Check, Size
 from cases.statistics import Claim
 from optimize.problem.problem import Problem
 from tisim import Cloud, RandomAroundCylinder, Scene
-from tisim.accuracy.quantity import Quantity
+from tisim.accuracy import Quantity
 from tisim.components.component import Vector
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import FixedMoment
+from tisim.effects import FixedMoment, Magnetophoresis
 from tisim.engine.batches import Progress
 from tisim.errors import must
-from tisim.operators.capture import Capture
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.operators import Capture
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField
 from tisim.sources.magnetic.stoner_wohlfarth import magnetisation
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers import Brownian, DriftLimit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -24,8 +24,8 @@ from cases.capture_statistics import (
     results,
 )
 from cases.statistics import Mean
+from tisim import Result
 from tisim.engine.batches import Progress, share
-from tisim.engine.result import Result
 from tisim.plotting.style import empty, plain
 
 REPEATS = 10

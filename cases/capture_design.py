@@ -28,17 +28,13 @@ from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
 from tisim import Cloud, RandomInBox, Result, Scene
 from tisim.components.component import Vector
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import LangevinMoment
+from tisim.effects import LangevinMoment, Magnetophoresis
 from tisim.errors import must
-from tisim.operators.capture import Capture
+from tisim.operators import Capture
 from tisim.plotting.style import empty, plain
-from tisim.sources.flow import UniformFlow
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField, UniformFlow
 from tisim.sources.magnetic.soft_magnet import magnetisation
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.steppers import Brownian, DriftLimit
 
 WIRE = 20 * DIAMETER
 """Of all fibres together, m: one of B16's longest."""

@@ -16,8 +16,7 @@ from tisim import Scene
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, plain
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
-from tisim.sources.sample import sample
+from tisim.sources import Cylinder, MagneticCylinders, sample
 
 LEAST_FORCE = 0.5e-15
 """N, of what counts as capture volume (B16 section 6.4.1)."""

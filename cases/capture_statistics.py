@@ -16,10 +16,8 @@ import numpy as np
 from cases import capture
 from cases.case import Check
 from cases.statistics import Claim, Mean
-from tisim import Scene, run
+from tisim import Result, RunError, Scene, run
 from tisim.engine.batches import Progress
-from tisim.engine.result import Result
-from tisim.errors import RunError
 from tisim.scene.initial_state import Arrays
 
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0)

@@ -20,10 +20,9 @@ import numpy as np
 from cases import capture
 from cases.case import Case, Check, Size
 from cases.statistics import Claim
-from tisim import RandomAroundCylinder, Scene, run
+from tisim import RandomAroundCylinder, RunError, Scene, run
 from tisim.engine.batches import Progress
-from tisim.errors import RunError
-from tisim.sources.magnetic.cylinder import MagneticCylinders
+from tisim.sources import MagneticCylinders
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import cases
 from cases.statistics import Claim
 from optimize.problem.problem import Problem
-from tisim.accuracy.quantity import Quantity
+from tisim import InputError, Scene
+from tisim.accuracy import Quantity
 from tisim.engine.batches import Progress
-from tisim.errors import InputError, must
+from tisim.errors import must
 from tisim.io.reader import Frames
-from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

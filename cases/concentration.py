@@ -25,19 +25,14 @@ from scipy.constants import Boltzmann, mu_0
 from cases import capture
 from cases.case import Case, Check, Size
 from cases.statistics import Claim
-from tisim import Cloud, Scene
-from tisim.accuracy.quantity import Quantity, usual
-from tisim.effects.magnetic.dipole_dipole import TruncatedDipoleDipole
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import FixedMoment
-from tisim.effects.pair.mie import Mie
+from tisim import Cloud, RandomInBox, Scene
+from tisim.accuracy import Quantity
+from tisim.accuracy.quantity import usual
+from tisim.effects import FixedMoment, Magnetophoresis, Mie, TruncatedDipoleDipole
 from tisim.engine.batches import Progress
-from tisim.operators.capture import Capture
-from tisim.packing.placement import RandomInBox
-from tisim.sources.magnetic.cylinder import MagneticCylinders
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.operators import Capture
+from tisim.sources import MagneticCylinders, MagneticField
+from tisim.steppers import Brownian, DriftLimit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from cases import concentration
 from cases.concentration import coupling
 from cases.concentration_statistics import CAPTURE, chain, held
 from tisim import Recording, run
-from tisim.analysis.clusters import head_to_tail, labels
+from tisim.analysis import head_to_tail, labels
 from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frames, frames
 from tisim.plotting.style import empty, plain

@@ -12,9 +12,8 @@ from cases.capture_statistics import grouped
 from cases.case import Check
 from cases.concentration import chain_length, coupling
 from cases.statistics import Claim, Mean
-from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
-from tisim.engine.result import Result
-from tisim.errors import RunError
+from tisim import Result, RunError
+from tisim.analysis import head_to_tail, labels, mean_size, near
 from tisim.scene.initial_state import Arrays
 
 GAMMA = {25: 1.0, 125: 825.0}

@@ -24,19 +24,13 @@ from cases.case import Case, Check, Size
 from cases.charged_closed_forms import resonances
 from cases.vibration_accuracy import centre, exact, quantities
 from optimize.problem.problem import Problem
-from tisim import Cloud, Result, Scene, run
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.external.tether import Tether
-from tisim.effects.pair.near_field import NearField, TruncatedNearField
+from tisim import Cloud, Lattice, Result, Scene, run
+from tisim.effects import Lorentz, NearField, Tether, TruncatedNearField
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames
-from tisim.operators.peak_displacement import PeakDisplacement
-from tisim.packing.placement import Lattice
-from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.operators import PeakDisplacement
+from tisim.sources import ElectricField, MagneticField
+from tisim.steppers import Collocation, ErrorControl, StageControl, Trapezoid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,13 +12,12 @@ import numpy as np
 
 from cases.charged_closed_forms import response
 from tisim import Open, Result, Scene
-from tisim.accuracy.quantity import Quantity, displacement
-from tisim.effects.base import PairForce
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.external.tether import Tether
-from tisim.operators.peak_displacement import PeakDisplacement
+from tisim.accuracy import Quantity
+from tisim.accuracy.quantity import displacement
+from tisim.effects import Lorentz, PairForce, Tether
+from tisim.operators import PeakDisplacement
 from tisim.scene.initial_state import Arrays
-from tisim.sources.uniform import ElectricField, MagneticField
+from tisim.sources import ElectricField, MagneticField
 
 
 def centre(result: Result) -> np.ndarray:

@@ -18,12 +18,11 @@ import numpy as np
 from cases import vibration
 from cases.charged_closed_forms import resonances, response
 from cases.vibration import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS
-from tisim import Recording, Scene, run
+from tisim import Recording, RunError, Scene, run
 from tisim.engine.batches import Progress
-from tisim.errors import RunError
 from tisim.io.reader import Frames, frames
 from tisim.plotting.time_series import history
-from tisim.sources.uniform import ElectricField
+from tisim.sources import ElectricField
 
 SLOW, FAST = resonances(CYCLOTRON, STIFFNESS / MASS)
 """0.49974 and 955.429 1/s."""

@@ -11,15 +11,15 @@ from collections.abc import Callable
 
 from optimize.evaluation.ensemble import Ensemble
 from optimize.evaluation.runs import Evaluator
+from optimize.generation_log import statistics
 from optimize.hall_of_fame import Hall
 from optimize.methods.base import find
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress, Stopped
 from optimize.problem.problem import Problem
-from optimize.report.generation_log import statistics
+from optimize.search_records import searches, store
 from optimize.settings import Settings, fit, identity
 from optimize.storage.cache import Cache
-from optimize.storage.search_records import searches, store
 
 
 class _OutOfTime(Exception):

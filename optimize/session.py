@@ -14,9 +14,9 @@ from optimize.problem.problem import Problem
 from optimize.report import report
 from optimize.report.display import Display
 from optimize.search import search
+from optimize.search_folder import FILE, HOW, NAMES, check
 from optimize.settings import Settings, identity
 from optimize.storage.cache import Cache
-from optimize.storage.folder import FILE, HOW, NAMES, check
 from tisim.files import lock
 from tisim.files.atomic import replace_file
 from tisim.files.ownership import take
@@ -33,7 +33,7 @@ def session(
     stopping: Callable[[], None],
     overwrite: bool = False,
 ) -> Outcome:
-    """Search, or go on with the search in the folder, and write all that is listed in optimize.storage.folder.
+    """Search, or go on with the search in the folder, and write what optimize.search_folder lists.
 
     say : where lines and tables go; bar : where the progress bar goes. Ctrl-C calls ``stopping`` and ends the
     search cleanly (Outcome.interrupted). overwrite : replace files of other origin that have such names.

@@ -22,8 +22,8 @@ FORMAT = 2
 class Settings(Checked):
     """All that decides a search, and when it stops.
 
-    seed : of the search and of its random starts. method : by name, see optimize.methods.base; options : its own
-    settings. generations : after generation 0, the random start. ensemble : averaging over starts.
+    seed : of the search and of its random starts. method : by name, see optimize.methods.base; options : its
+    own settings. generations : after generation 0, the random start. ensemble : averaging over starts.
     hall_of_fame : best designs kept; a front is kept whole.
     Stopping rules, None = off, looked at after each generation: target - best fitness as good as that;
     patience - generations without improvement; wall_clock_s - seconds, looked at after every evaluation too:

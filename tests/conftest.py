@@ -15,7 +15,7 @@ from tisim.backend import runtime
 @pytest.fixture(scope="session", autouse=True)
 def the_runtime():
     """The settings that every test in this process runs under."""
-    return runtime.start(device="cpu", precision=os.environ.get("TISIM_TEST_PRECISION", "f64"))
+    return runtime.init(device="cpu", precision=os.environ.get("TISIM_TEST_PRECISION", "f64"))
 
 
 @pytest.fixture
@@ -28,9 +28,9 @@ ELSEWHERE = """
 import sys
 import numpy as np
 from tests import scenes
-from tests.test_effects_contract import kicked
-from tests.test_schedules import BATCH, crowd, pick
-from tisim import runtime
+from tests.effects.test_contract import kicked
+from tests.engine.test_schedules import BATCH, crowd, pick
+from tisim.backend import runtime
 
 kept = {}
 
@@ -46,10 +46,10 @@ def keep_crowd(name):
         keep(f"{name}/{w}", result)
     kept[f"{name}/left"] = np.array([len(result.state["mass"]) for result in results])
 
-runtime.start(threads=1)
+runtime.init(threads=1)
 keep_crowd("one thread")
 keep("one thread/kicked", scenes.simulate([kicked()], worlds=1, capacity=32)[0])
-runtime.start(precision="f32", threads=2)
+runtime.init(precision="f32", threads=2)
 keep_crowd("single precision")
 np.savez(sys.argv[1], **kept)
 """
@@ -72,7 +72,7 @@ def single():
 
     def call(module, name):
         code = (
-            "import json; from tisim import runtime; runtime.start(precision='f32'); "
+            "import json; from tisim.backend import runtime; runtime.init(precision='f32'); "
             f"from tests.{module} import {name}; print(json.dumps({name}()))"
         )
         command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]

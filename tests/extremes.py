@@ -17,20 +17,25 @@ from typing import Any
 from tests.hostile import with_needed
 from tisim import Scene, steppers
 from tisim.components import serialization
-from tisim.effects.base import Effect, Settled, Source
-from tisim.effects.external.drag import StokesDrag
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.external.tether import Tether
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.impact import Impact
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import MOMENT, InducedMoment, LangevinMoment
-from tisim.effects.pair.mie import Mie
-from tisim.effects.pair.near_field import NearField
+from tisim.effects import (
+    Agglomeration,
+    DerivedQuantity,
+    Effect,
+    Impact,
+    InducedMoment,
+    LangevinMoment,
+    Lorentz,
+    Magnetophoresis,
+    Mie,
+    NearField,
+    StokesDrag,
+    Tether,
+)
+from tisim.effects.magnetic.moment import MOMENT
 from tisim.engine.assembly import needed_fields
 from tisim.engine.explain import known_effects
-from tisim.sources.magnetic.sphere import MagneticSpheres
-from tisim.sources.uniform import ElectricField, MagneticField
+from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Source
+from tisim.steppers import Stepper
 
 MAGNITUDES = (
     5e-324, 2.3e-308, 1e-300, 1e-155, 1e-100, 1e-60, 1e-30, 1e-15, 1e-9, 1e-3, 0.5, math.nextafter(1.0, 0.0),
@@ -129,10 +134,10 @@ def _company(kind: type[Effect]) -> dict[str, Any]:
     felt: tuple[type[Effect], ...] = ()
     if issubclass(kind, Source):
         felt = FIELDS.get(kind.quantity, (Lorentz, LangevinMoment, Magnetophoresis))
-    elif issubclass(kind, Settled):
+    elif issubclass(kind, DerivedQuantity):
         felt = (MagneticSpheres, Magnetophoresis)
-    elif MOMENT in kind.needs or "magnetic_flux_density" in kind.feels:
-        felt = (MagneticSpheres, *((InducedMoment,) if MOMENT in kind.needs else ()))
+    elif MOMENT in kind.fields or "magnetic_flux_density" in kind.requires_source:
+        felt = (MagneticSpheres, *((InducedMoment,) if MOMENT in kind.fields else ()))
         felt += (ElectricField,) if kind is Lorentz else ()
     return _effects((*felt, kind))
 

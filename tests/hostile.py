@@ -12,13 +12,11 @@ from tests.packing.test_placement import BALL, VIBRATION
 from tests.scenes import flow, scene
 from tisim import Blast, Cloud, RandomAroundCylinder, RandomInBox, steppers
 from tisim.components import serialization
-from tisim.components.component import Spec
-from tisim.effects.base import Effect
+from tisim.components.component import Component
+from tisim.effects import Effect
 from tisim.engine.explain import known_effects
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.base import Stepper
-from tisim.steppers.brownian.drift_limit import DriftLimit
-from tisim.steppers.step_control import FixedStep
+from tisim.sources import MagneticField
+from tisim.steppers import DriftLimit, FixedStep, Stepper
 
 
 def nested(levels: int) -> list[Any]:
@@ -138,13 +136,13 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
     partners: dict[str, Any] = {}
     for contract in kind.requires:
         partners |= with_needed(next(known for known in known_effects() if issubclass(known, contract)))
-    if kind.feels:
+    if kind.requires_source:
         partners |= with_needed(MagneticField)
     rows = {name: [_required(row)] for name, row in kind.lists()}
     return {**partners, kind.kind(): serialization.to_dict(kind(**_required(kind), **rows), named=False)}
 
 
-def _required(kind: type[Spec]) -> dict[str, Any]:
+def _required(kind: type[Component]) -> dict[str, Any]:
     """A value that will do for each parameter that must be given."""
     fit = {"cutoff": 4.0}
     return {

@@ -12,17 +12,15 @@ from unittest.mock import patch
 
 import numpy as np
 
-from tisim import Scene
+from tisim import Result, RunError, Scene
 from tisim.backend.runtime import Runtime
 from tisim.cli.main import main
 from tisim.engine.monitor import REASONS
-from tisim.engine.result import Result
-from tisim.errors import RunError
-from tisim.worlds.state import CROWDED, FULL, RUNNING
+from tisim.worlds.state import WorldStatus
 
 ACCEPTED = "accepted"
 """What a command says in place of running."""
-OF_THE_WORLD = FULL, CROWDED
+OF_THE_WORLD = WorldStatus.OUT_OF_ROOM, WorldStatus.CONTACT_OVERFLOW
 """Failures that are of no particle and no force: there is no more room."""
 
 
@@ -58,7 +56,7 @@ def nothing_runs() -> Iterator[list[Scene]]:
     with ExitStack() as patches:
         for place in ("tisim.cli.main.Simulation", "tisim.cli.cost._measure", "optimize.session.session"):
             patches.enter_context(patch(place, accept))
-        patches.enter_context(patch("tisim.backend.runtime.start", Runtime))
+        patches.enter_context(patch("tisim.backend.runtime.init", Runtime))
         yield scenes
 
 
@@ -84,7 +82,7 @@ def check_result(result: Result) -> None:
     told = {name: values for name, values in result.state.items() if begun or name in result.start}
     for name, values in {**told, **result.measures, "time": result.time}.items():
         assert np.isfinite(values).all(), f"{name} is not finite, and the status is {result.status}"
-    if result.status.ok or result.status.reason == REASONS[RUNNING]:
+    if result.status.ok or result.status.reason == REASONS[WorldStatus.RUNNING]:
         return
     assert re.fullmatch(r"found at t = \S+ s: .+; kept t = \S+ s", result.status.reason), result.status.reason
     named = "particle" in result.status.reason or "effects." in result.status.reason

@@ -7,16 +7,9 @@ import pytest
 
 from tisim import Box, Particles, Scene, Simulation
 from tisim.backend import runtime
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import DeformationWork, Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.effects.impact.softening import Softening
-from tisim.operators.cooling import Cooling
-from tisim.operators.fragmentation import Fragmentation
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
+from tisim.operators import Cooling, Fragmentation
+from tisim.steppers import FixedStep, Verlet
 
 DENSITY = 2000.0
 RADIUS = 1e-3

@@ -4,8 +4,9 @@ import numpy as np
 
 from tests.scenes import scene, simulate
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, Operator, PairForce, parameter
+from tisim.effects import Force, PairForce, parameter
 from tisim.numerics import philox
+from tisim.operators import Operator
 from tisim.worlds.state import Field
 
 K_E = 8.9875517873681764e9
@@ -15,7 +16,7 @@ K_E = 8.9875517873681764e9
 class Coulomb(PairForce):
     """F_i = -k q_i q_j / d^2 n_ij, between all pairs; only this effect needs the charge."""
 
-    needs = ("charge",)
+    fields = ("charge",)
     constant: float = parameter("N m^2/C^2", K_E, gt=0)
 
     @ti.func
@@ -40,8 +41,8 @@ class Trap(Force):
 class RandomKicks(Operator):
     """v += sigma sqrt(dt) normal, three draws for each particle and step; sums what each has received."""
 
-    needs = (Field("kicked", "m/s", 3), "velocity")
-    counts = ("kicks",)
+    fields = (Field("kicked", "m/s", 3), "velocity")
+    counters = ("kicks",)
     sigma: float = parameter("m/s^1.5", ge=0)
 
     @ti.func

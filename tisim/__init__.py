@@ -1,31 +1,10 @@
-"""tisim: clouds of interacting particles, simulated in batches of worlds."""
+"""tisim: clouds of interacting particles, simulated in batches of worlds.
 
-from tisim.engine.result import Result
-from tisim.engine.run import run
-from tisim.engine.simulation import Simulation
-from tisim.io.trajectory import Recording
-from tisim.packing.around_cylinder import RandomAroundCylinder
-from tisim.packing.placement import Lattice, RandomInBall, RandomInBox, RandomInDomain
-from tisim.scene.initial_state import Cloud, Particles
-from tisim.scene.initial_velocity import Blast
-from tisim.scene.scene import Box, Open, Scene
+Names are loaded when they are first asked for, so that ``import tisim`` is quick; __init__.pyi lists them.
+"""
 
-__version__ = "0.1.0"
-__all__ = [
-    "Blast",
-    "Box",
-    "Cloud",
-    "Lattice",
-    "Open",
-    "Particles",
-    "RandomAroundCylinder",
-    "RandomInBall",
-    "RandomInBox",
-    "RandomInDomain",
-    "Recording",
-    "Result",
-    "Scene",
-    "Simulation",
-    "__version__",
-    "run",
-]
+import lazy_loader
+
+from tisim.version import __version__ as __version__
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from pydantic import Field, model_validator
 
-from optimize.evaluation.estimate import Estimate, settled_after
+from optimize.evaluation.estimate import FitnessEstimate, settled_after
 from optimize.evaluation.runs import Evaluator, Runs, Sample
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
@@ -87,7 +87,7 @@ class Ensemble:
 
     def estimate(
         self, designs: Sequence[Design], progress: Report | None = None
-    ) -> list[tuple[Estimate, ...] | None]:
+    ) -> list[tuple[FitnessEstimate, ...] | None]:
         """Of each design, in order; None where the budget was spent before its first block of starts.
 
         progress is called with the finished fraction, never decreasing. A design with any failed start has
@@ -125,7 +125,9 @@ class Ensemble:
             progress(1.0)
         return [self._summary(sample) if sample.used or sample.reason else None for sample in samples]
 
-    def race(self, designs: Sequence[Design], progress: Report | None = None) -> list[tuple[Estimate, ...]]:
+    def race(
+        self, designs: Sequence[Design], progress: Report | None = None
+    ) -> list[tuple[FitnessEstimate, ...]]:
         """Spend starts on those of the designs that may still be the best; all their estimates afterwards.
 
         Every round gives a block of starts more, up to max_starts, to each design that no other one beats
@@ -151,7 +153,7 @@ class Ensemble:
 
     def confirm(
         self, designs: Sequence[Design], progress: Report | None = None
-    ) -> list[tuple[Estimate, ...]]:
+    ) -> list[tuple[FitnessEstimate, ...]]:
         """Of each design from `confirm` starts that no estimate has used; the budget is not looked at.
 
         A winner has won by being good and by being lucky in its starts; this is without the luck.
@@ -178,12 +180,12 @@ class Ensemble:
         good = [sample for sample in dict.fromkeys(samples) if not sample.reason]
         return [one for one in good if not any(_beats(other, one) for other in good)]
 
-    def _summary(self, sample: Sample) -> tuple[Estimate, ...]:
+    def _summary(self, sample: Sample) -> tuple[FitnessEstimate, ...]:
         if sample.reason:
-            failed = Estimate(math.inf, math.nan, math.nan, len(sample.costs), False, sample.reason)
+            failed = FitnessEstimate(math.inf, math.nan, math.nan, len(sample.costs), False, sample.reason)
             return (failed,) * self.objectives
         columns = zip(*sample.costs[: sample.used], strict=True)
-        return tuple(Estimate.of(column, sample.settled) for column in columns)
+        return tuple(FitnessEstimate.of(column, sample.settled) for column in columns)
 
 
 def _beats(one: Sample, other: Sample) -> bool:

@@ -13,7 +13,7 @@ from tisim.numerics.statistics import half_width
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FitnessEstimate:
     """Fitness of one design.
 
     mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
@@ -34,7 +34,7 @@ class Estimate:
         return not self.reason
 
     @classmethod
-    def of(cls, values: Sequence[float], settled: bool) -> Estimate:
+    def of(cls, values: Sequence[float], settled: bool) -> FitnessEstimate:
         """From the fitness of each start; at least one."""
         n = len(values)
         mean = float(np.cumsum(values)[-1] / n)  # summed as in settled_after, to the last bit

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from tisim import Result, Scene
 from tisim.backend import runtime
 from tisim.engine.batches import Batches
-from tisim.engine.result import Result
-from tisim.scene.scene import Scene
 
 
 class Evaluator:

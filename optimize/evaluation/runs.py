@@ -14,11 +14,10 @@ import numpy as np
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
 from optimize.storage.record import Record, canonical, evaluation_key
-from tisim.errors import InputError, RunError
+from tisim import InputError, RunError
 
 if TYPE_CHECKING:
-    from tisim.engine.result import Result
-    from tisim.scene.scene import Scene
+    from tisim import Result, Scene
 
 
 class Evaluator(Protocol):

@@ -14,7 +14,7 @@ from tisim.components.component import Checked
 from tisim.errors import must
 
 
-class Method(ABC):
+class SearchMethod(ABC):
     """Proposes designs and is told what they are worth.
 
     1. ``ask`` gives the strings of the next generation, in the unit cube. Those whose fitness is not valid
@@ -52,18 +52,22 @@ class Method(ABC):
         """What the strings of the last ``ask`` are worth."""
 
 
-def every() -> dict[str, type[Method]]:
+def every() -> dict[str, type[SearchMethod]]:
     """All methods by name."""
-    found: dict[str, type[Method]] = {}
+    found: dict[str, type[SearchMethod]] = {}
     for entry in pkgutil.iter_modules(methods.__path__):
         module = importlib.import_module(f"{methods.__name__}.{entry.name}")
         for kind in vars(module).values():
-            if isinstance(kind, type) and issubclass(kind, Method) and kind.__module__ == module.__name__:
+            if (
+                isinstance(kind, type)
+                and issubclass(kind, SearchMethod)
+                and kind.__module__ == module.__name__ != __name__
+            ):
                 found[kind.name] = kind
     return found
 
 
-def find(name: str) -> type[Method]:
+def find(name: str) -> type[SearchMethod]:
     """A method by name; InputError naming the known ones when there is none."""
     known = every()
     must(isinstance(name, str) and name in known, "method", f"one of {', '.join(known)}", name)

@@ -15,9 +15,10 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from optimize.methods.individual import Individual
 from optimize.methods.random_state import OwnRandom
-from optimize.problem.genome import Box
+from optimize.problem.genome import SearchBox
+from tisim import InputError
 from tisim.components.component import Checked
-from tisim.errors import InputError, must
+from tisim.errors import must
 
 _UNFIT = {
     **dict.fromkeys(("selRoulette", "selStochasticUniversalSampling"), "favours large fitness values"),
@@ -33,7 +34,7 @@ POPULATION, PARENTS = 20, 6
 _WHOLE = TypeAdapter(int)
 
 
-class Operator(Checked):
+class GeneticOperator(Checked):
     """An operator of deap.tools by name, with its keyword arguments (bounds low and up are filled in)."""
 
     name: str
@@ -95,9 +96,11 @@ class Breeding(Checked):
     recentre_every: int = Field(4, ge=0)
     recentre_factor: float = Field(0.5, gt=0, le=1)
     breeding: Literal["z04", "deap"] = "z04"
-    select: Operator = Operator(name="selTournament", options={"tournsize": 3})
-    mate: Operator = Operator(name="cxBlend", options={"alpha": 0.5})
-    mutate: Operator = Operator(name="mutGaussian", options={"mu": 0.0, "sigma": 0.1, "indpb": 0.2})
+    select: GeneticOperator = GeneticOperator(name="selTournament", options={"tournsize": 3})
+    mate: GeneticOperator = GeneticOperator(name="cxBlend", options={"alpha": 0.5})
+    mutate: GeneticOperator = GeneticOperator(
+        name="mutGaussian", options={"mu": 0.0, "sigma": 0.1, "indpb": 0.2}
+    )
     crossover_probability: float = Field(0.9, ge=0, le=1)
     mutation_probability: float = Field(0.5, ge=0, le=1)
 
@@ -174,7 +177,7 @@ class Breeder:
 
     def __init__(self, genes: int, settings: Breeding, seed: int) -> None:
         self.settings = settings
-        self.box = Box.full(genes)
+        self.box = SearchBox.full(genes)
         self._rng = np.random.default_rng(np.random.SeedSequence([seed, 0]))
         self.random = OwnRandom(seed)
         self.toolbox = base.Toolbox()

@@ -9,7 +9,7 @@ from deap import cma
 from numpy.typing import NDArray
 from pydantic import Field
 
-from optimize.methods.base import Method
+from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
 from tisim.components.component import Checked
 
@@ -30,7 +30,7 @@ class CmaOptions(Checked):
         return "search.options"
 
 
-class CmaEs(Method):
+class CmaEs(SearchMethod):
     """N. Hansen and A. Ostermeier, Evol. Comput. 9 (2001) 159-195, as deap.cma.Strategy has it.
 
     Starts in the middle of the range. A component outside the range is reflected at its bound, as often as

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from optimize.methods.base import Method
+from optimize.methods.base import SearchMethod
 from optimize.methods.breeding import Breeder, Breeding
 from optimize.methods.individual import Individual
 
 
-class Genetic(Method):
+class Genetic(SearchMethod):
     """Z04 sections 7 and 8; see optimize.methods.breeding."""
 
     name = "genetic"

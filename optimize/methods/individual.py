@@ -7,7 +7,7 @@ from functools import cache
 
 from deap import base
 
-from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.estimate import FitnessEstimate
 
 
 @cache
@@ -25,10 +25,10 @@ class Individual(list[float]):
     def __init__(self, genes: Iterable[float], objectives: int = 1) -> None:
         super().__init__(float(x) for x in genes)
         self.fitness = minimised(objectives)()
-        self.estimates: tuple[Estimate, ...] = ()
-        self.confirmed: tuple[Estimate, ...] = ()
+        self.estimates: tuple[FitnessEstimate, ...] = ()
+        self.confirmed: tuple[FitnessEstimate, ...] = ()
 
-    def know(self, estimates: tuple[Estimate, ...]) -> None:
+    def know(self, estimates: tuple[FitnessEstimate, ...]) -> None:
         """Take these estimates as its fitness."""
         self.estimates = estimates
         self.fitness.values = tuple(estimate.mean for estimate in estimates)

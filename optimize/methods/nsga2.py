@@ -10,7 +10,7 @@ import numpy as np
 from deap import tools
 from pydantic import Field, model_validator
 
-from optimize.methods.base import Method
+from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
 from optimize.methods.random_state import OwnRandom
 from tisim.components.component import Checked
@@ -39,7 +39,7 @@ class Nsga2Options(Checked):
         return self
 
 
-class Nsga2(Method):
+class Nsga2(SearchMethod):
     """K. Deb, A. Pratap, S. Agarwal and T. Meyarivan, IEEE Trans. Evol. Comput. 6 (2002) 182-197."""
 
     name = "nsga2"

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from optimize.methods.base import Method
+from optimize.methods.base import SearchMethod
 from optimize.methods.individual import Individual
 from tisim.components.component import Checked
 
 
-class ChanceOptions(Checked):
+class RandomSearchOptions(Checked):
     """population : strings per generation."""
 
     population: int = Field(20, ge=1)
@@ -23,14 +23,14 @@ class ChanceOptions(Checked):
         return "search.options"
 
 
-class Chance(Method):
+class RandomSearch(SearchMethod):
     """Uniform over the whole range, whatever it is told."""
 
     name = "random"
     several = True
-    Options = ChanceOptions
+    Options = RandomSearchOptions
 
-    def __init__(self, genes: int, objectives: int, options: ChanceOptions, seed: int) -> None:
+    def __init__(self, genes: int, objectives: int, options: RandomSearchOptions, seed: int) -> None:
         self.shape, self.objectives = (options.population, genes), objectives
         self.rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
 

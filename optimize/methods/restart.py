@@ -9,7 +9,7 @@ from pydantic import Field
 from optimize.methods.breeding import Breeding
 from optimize.methods.genetic import Genetic
 from optimize.methods.individual import Individual
-from optimize.problem.genome import Box
+from optimize.problem.genome import SearchBox
 
 
 class RestartOptions(Breeding):
@@ -51,7 +51,7 @@ class Restart(Genetic):
             return
         self.waited = 0
         if self.width * self.options.recentre_factor < self.options.smallest:
-            self.breeder.box = Box.full(len(hall[0]))
+            self.breeder.box = SearchBox.full(len(hall[0]))
         else:
             self.breeder.recentre(hall[0])
         self.following = [hall[0], *self.breeder.first()[1:]]

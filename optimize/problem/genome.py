@@ -84,14 +84,14 @@ class Genome:
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class SearchBox:
     """The part of the unit cube that fresh strings are drawn from: arrays low and high, shape (genes,)."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
     @classmethod
-    def full(cls, genes: int) -> Box:
+    def full(cls, genes: int) -> SearchBox:
         """The whole unit cube of that many genes."""
         return cls(np.zeros(genes), np.ones(genes))
 
@@ -103,7 +103,7 @@ class Box:
         """A point drawn uniformly, shape (genes,)."""
         return np.clip(self.low + rng.random(len(self.low)) * self.width, self.low, self.high)
 
-    def recentre(self, best: ArrayLike, factor: float) -> Box:
+    def recentre(self, best: ArrayLike, factor: float) -> SearchBox:
         """The box shrunk by factor (0 < factor <= 1) around best, shifted to stay in the unit cube.
 
         The new box contains best but may reach beyond the old one, so an optimum that an earlier box cut
@@ -115,4 +115,4 @@ class Box:
         must(bool(np.all((centre >= 0) & (centre <= 1))), "best point", "within 0..1", centre.tolist())
         width = self.width * factor
         low = np.clip(centre - width / 2, 0.0, 1.0 - width)
-        return Box(np.minimum(low, centre), np.maximum(np.minimum(low + width, 1.0), centre))
+        return SearchBox(np.minimum(low, centre), np.maximum(np.minimum(low + width, 1.0), centre))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tisim.errors import must
 
 if TYPE_CHECKING:
-    from tisim.engine.result import Result
+    from tisim import Result
 
 
 @dataclass(frozen=True)

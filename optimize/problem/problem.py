@@ -13,8 +13,7 @@ from tisim.errors import must
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tisim.engine.result import Result
-    from tisim.scene.scene import Scene
+    from tisim import Result, Scene
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,16 @@ import numpy as np
 from rich.table import Table
 
 from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
-from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.evaluation.runs import Evaluator
 from optimize.outcome import Outcome, Progress
 from optimize.problem.problem import Problem
 from optimize.search import search
 from optimize.settings import Settings, fit, proposed
 from optimize.storage.cache import Cache
+from tisim import RunError
 from tisim.console import plain_table
-from tisim.errors import RunError, must
+from tisim.errors import must
 
 FILE, CSV = "compare.h5", "compare.csv"
 NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV)
@@ -35,8 +36,8 @@ class Found:
     method: str
     repeat: int
     evaluations: int
-    claimed: Estimate
-    fresh: Estimate
+    claimed: FitnessEstimate
+    fresh: FitnessEstimate
 
 
 def settings_of(

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from optimize.generation_log import best_of
 from optimize.outcome import Outcome
-from optimize.report.generation_log import best_of
-from optimize.report.tables import logbook_columns
+from optimize.tables import logbook_columns
 from tisim.plotting.style import empty
 
 _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"

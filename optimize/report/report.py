@@ -17,7 +17,7 @@ from rich.text import Text
 from optimize.outcome import Outcome
 from optimize.report.convergence import convergence_figure
 from optimize.report.front import front_figure
-from optimize.report.tables import best_columns
+from optimize.tables import best_columns
 from tisim.files.atomic import replace_file
 
 WIDTH = 80

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from optimize.storage import hdf5_store, salvage
-from optimize.storage.hdf5_store import Table
+from optimize.storage.hdf5_store import Hdf5Table
 from optimize.storage.journal import Journal, Mark
 from optimize.storage.record import Record
 from tisim.errors import must
@@ -42,7 +42,7 @@ class Cache:
         self.path, journal, self._lock = _files(path)
         self._journal = Journal(journal)
         self._records: dict[str, Record] = {}
-        self._pending: dict[str, Table] = {}
+        self._pending: dict[str, Hdf5Table] = {}
         self._version: tuple[int, ...] | None = None
         self._end = self._frames = 0
         if status(self.path) is not None:
@@ -104,9 +104,9 @@ class Cache:
             f"non-empty and not below {hdf5_store.ROWS!r}",
             name,
         )
-        self._pending[name] = Table(dict(columns), dict(attrs or {}))
+        self._pending[name] = Hdf5Table(dict(columns), dict(attrs or {}))
 
-    def table(self, name: str) -> Table:
+    def table(self, name: str) -> Hdf5Table:
         """A stored table. InputError if there is none of that name."""
         if name in self._pending:
             return self._pending[name]

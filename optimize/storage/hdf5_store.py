@@ -21,7 +21,8 @@ import h5py
 import numpy as np
 
 from optimize.storage.record import Record, canonical
-from tisim.errors import InputError, must
+from tisim import InputError
+from tisim.errors import must
 from tisim.files import regular_file
 from tisim.files.checksum import sealed, unsealed
 
@@ -37,7 +38,7 @@ _OTHERS = "others"
 
 
 @dataclass(frozen=True)
-class Table:
+class Hdf5Table:
     """Named columns of equal length (numbers or strings) and attributes (numbers or strings).
 
     Raises InputError if the columns differ in length.
@@ -80,7 +81,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 
 def image(
-    old: Path | None, records: Sequence[Record], tables: Mapping[str, Table], damaged: bool = True
+    old: Path | None, records: Sequence[Record], tables: Mapping[str, Hdf5Table], damaged: bool = True
 ) -> bytes:
     """The bytes of a new file: these records, the tables of the file old, and tables (which win).
 
@@ -126,7 +127,7 @@ def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
     return records, damaged
 
 
-def read_table(file: h5py.File, name: str) -> Table:
+def read_table(file: h5py.File, name: str) -> Hdf5Table:
     """One table. InputError if there is none of that name, or it is damaged."""
     must(name in tables(file), "table name", f"one of {tables(file)}", name)
     must(
@@ -211,7 +212,7 @@ def _clear(group: h5py.Group) -> None:
         del group.attrs[name]
 
 
-def _write_table(group: h5py.Group, table: Table) -> None:
+def _write_table(group: h5py.Group, table: Hdf5Table) -> None:
     _clear(group)
     for name, column in table.columns.items():
         text = any(isinstance(value, str) for value in column)
@@ -223,12 +224,12 @@ def _write_table(group: h5py.Group, table: Table) -> None:
     group.attrs["crc32"] = _crc(_read_table(group))
 
 
-def _read_table(group: h5py.Group) -> Table:
+def _read_table(group: h5py.Group) -> Hdf5Table:
     columns = {}
     for name in json.loads(group.attrs["columns"]):
         values = group[_dataset(name)][...].tolist()
         columns[name] = [value.decode() if isinstance(value, bytes) else value for value in values]
-    return Table(columns, attributes(group))
+    return Hdf5Table(columns, attributes(group))
 
 
 def _place(dataset: h5py.Dataset) -> tuple[int, int]:
@@ -241,5 +242,5 @@ def _dataset(heading: str) -> str:
     return heading.replace("/", "\u2215")
 
 
-def _crc(table: Table) -> int:
+def _crc(table: Hdf5Table) -> int:
     return zlib.crc32(canonical([list(table.columns), dict(table.columns), dict(table.attrs)]))

@@ -9,10 +9,8 @@ from tisim import Box, Cloud, Scene, steppers
 from tisim.accuracy import Quantity
 from tisim.accuracy.quantity import displacement, kinetic_energy
 from tisim.components.serialization import load
-from tisim.effects.external.tether import Tether
-from tisim.steppers.base import Stepper
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Tether
+from tisim.steppers import FixedStep, Stepper, Verlet
 
 RATE, SPEED, DURATION, STEP = 3.0, 1.0, 2.0, 0.001
 """sqrt(k/m) (1/s), speed at the start (m/s), s, s."""

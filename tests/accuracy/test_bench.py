@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.accuracy.scenes import oscillator
-from tisim import steppers
+from tisim import Result, Status, steppers
 from tisim.accuracy import timing
 from tisim.accuracy.sweep import in_steps_of_at_most
 from tisim.accuracy.timing import LOOKS, ROOM, Bench, watched
@@ -13,9 +13,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.serialization import load
-from tisim.engine.result import Result, Status
-from tisim.steppers.base import Stepper
-from tisim.steppers.step_control import StepControl
+from tisim.steppers import StepControl, Stepper
 
 load(steppers)
 CONTROLS = {k: c for k, c in StepControl.known().items() if c.__module__.startswith("tisim.")}
@@ -25,7 +23,7 @@ class Waiting:
     """A world that is where it waits to be looked at, or at its end."""
 
     def __init__(self, duration):
-        self.s, self.hold, self.time = self, np.zeros(1), 0.0
+        self.s, self.pause_time, self.time = self, np.zeros(1), 0.0
         self.scenes = [oscillator().model_copy(update={"duration": duration})]
 
     def results(self, worlds):
@@ -35,7 +33,7 @@ class Waiting:
         return self.hold.copy()
 
     def write(self, name, value):
-        self.hold = value
+        self.pause_time = value
 
 
 def test_a_world_is_looked_at_each_time_once_and_waits_for_what_is_to_come():

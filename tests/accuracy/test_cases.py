@@ -9,7 +9,7 @@ from tests.scenes import simulate
 from tisim import Box, Particles
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.reference import closed_form
-from tisim.sources.uniform import ElectricField
+from tisim.sources import ElectricField
 
 
 @pytest.mark.parametrize("name", sorted(every()))

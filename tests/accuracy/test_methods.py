@@ -8,25 +8,18 @@ import pytest
 from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
-from tisim.accuracy import Quantity, Study
+from tisim import InputError, RunError
+from tisim.accuracy import Quantity, Row, Study
 from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
-from tisim.accuracy.row import Row, decades, tied
+from tisim.accuracy.row import decades, tied
 from tisim.accuracy.sweep import exchanged, finest, methods, parts
-from tisim.components.accuracy_parameter import Knob
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
-from tisim.effects.external.tether import Tether
-from tisim.effects.magnetic.moment import InducedMoment
-from tisim.effects.magnetic.mutual_moment import MutualInducedMoment
-from tisim.effects.pair.near_field import NearField, TruncatedNearField
-from tisim.errors import InputError, RunError
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.base import Stepper
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import InducedMoment, MutualInducedMoment, NearField, Tether, TruncatedNearField
+from tisim.sources import MagneticField
+from tisim.steppers import Brownian, DriftLimit, FixedStep, Stepper, Verlet
 
 LEVELS = (2.0, 1.0, 0.0)
 
@@ -35,7 +28,7 @@ class Pace(FixedStep):
     """A step control with a setting of its own."""
 
     error: float = parameter("", 1e-4, gt=0)
-    knobs = (Knob(error=1),)
+    accuracy_parameters = (AccuracyParameter(error=1),)
 
 
 class Sharp(Stepper):
@@ -57,7 +50,7 @@ class Patchy(Trap):
     """A force that is as good as its setting."""
 
     grain: float = parameter("m", 1e-3, gt=0)
-    knobs = (Knob(grain=2),)
+    accuracy_parameters = (AccuracyParameter(grain=2),)
 
 
 def found(scene, precisions=("f64",)):
@@ -172,13 +165,13 @@ def test_a_part_is_exchanged_in_its_place():
     assert expression(changed.stepper) == f"Verlet(control=FixedStep(dt={scene.stepper.control.dt}))"
 
 
-def test_a_knob_is_turned_by_decades_of_error():
-    both = Knob(dt=2, error=1)
+def test_an_accuracy_parameter_is_turned_by_decades_of_error():
+    both = AccuracyParameter(dt=2, error=1)
     turned = both.turned(Pace(dt=1.0, error=1e-3), 1)
     assert (turned.dt, turned.error) == (3.16, 1e-2)
     assert both.turned(Pace(dt=0.123456, error=1e-3), 0).dt == 0.123456
     with pytest.raises(InputError, match=r"pace.dt must be at least 1e-30; received 0.0"):
-        Knob(dt=0.01).turned(Pace(dt=1.0), -4)
+        AccuracyParameter(dt=0.01).turned(Pace(dt=1.0), -4)
 
 
 WRONG = [

@@ -12,11 +12,8 @@ from tisim.accuracy.quantity import displacement
 from tisim.accuracy.table import sources
 from tisim.accuracy.timing import LOOKS, Bench
 from tisim.backend import runtime
-from tisim.effects.external.tether import Tether
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Tether
+from tisim.steppers import ErrorControl, FixedStep, Trapezoid, Verlet
 
 PERIOD = 2 * np.pi / RATE
 FEW = {"precisions": ("f64",), "repeats": 1, "coarser": 2}

@@ -5,14 +5,13 @@ import pytest
 
 from tests.accuracy.scenes import DEVIATION, ENERGY, GRAIN, GRAINS, MEAN, drift, energy
 from tests.scenes import head_on, simulate
-from tisim import Box
+from tisim import Box, InputError
 from tisim.accuracy import Quantity, Study
 from tisim.accuracy.quantity import displacement, estimate, kinetic_energy, mean, usual
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import TRUSTED
 from tisim.accuracy.sweep import methods
-from tisim.effects.impact.impact import Impact
-from tisim.errors import InputError
+from tisim.effects import Impact
 
 ENSEMBLES, STARTS = 60, 8
 

@@ -11,22 +11,15 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-import tisim
 from tests.accuracy.scenes import DURATION, KNOWN, STEP, UNKNOWN, only, oscillator
 from tests.steppers.charged import charged
+from tisim import InputError, Result, RunError, Status
 from tisim.accuracy import Quantity, Study, storage, study
 from tisim.accuracy.quantity import displacement
 from tisim.accuracy.timing import Bench, Timed
 from tisim.backend import runtime
 from tisim.cli import scene_arguments
-from tisim.engine.result import Result, Status
-from tisim.errors import InputError, RunError
-from tisim.steppers.boris import Boris
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import Boris, Collocation, ErrorControl, FixedStep, IterationControl, Trapezoid, Verlet
 
 pytestmark = pytest.mark.slow
 STEPPERS = {
@@ -180,7 +173,7 @@ def test_files_are_read_back(measured, tmp_path, monkeypatch):
     storage.resume(again, tmp_path)
     assert again.rows == measured.rows
     assert again.complete
-    monkeypatch.setattr(tisim, "__version__", "0.0.1")
+    monkeypatch.setattr("tisim.version.__version__", "0.0.1")
     with pytest.raises(InputError, match="of another scene, version"):
         storage.resume(again, tmp_path)
     monkeypatch.undo()

@@ -12,13 +12,12 @@ import pytest
 import tisim
 from tests.scenes import scene
 from tests.throwaway import Trap
-from tisim import Scene, Simulation
+from tisim import InputError, RunError, Scene, Simulation
 from tisim.backend import memory, runtime
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine.batches import Batches, rounded
-from tisim.errors import InputError, RunError
 
 
 @pytest.mark.parametrize(
@@ -32,29 +31,30 @@ from tisim.errors import InputError, RunError
 def test_unknown_settings_are_refused_before_anything_starts(settings, message):
     before = runtime.generation()
     with pytest.raises(InputError, match=f"^{message}$"):
-        runtime.start(**settings)
+        runtime.init(**settings)
     assert runtime.generation() == before
 
 
 def test_starting_again_with_the_same_settings_changes_nothing():
     now, before = runtime.current(), runtime.generation()
-    assert runtime.start(now.device, now.precision, now.threads) is now or runtime.current() == now
+    assert runtime.init(now.device, now.precision, now.threads) is now or runtime.current() == now
     assert runtime.generation() == before
 
 
 STALE = """
 import numpy as np
-from tisim import Particles, Scene, Simulation, memory, runtime, run
-from tisim.errors import InputError, RunError
-from tisim.steppers.controller import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim import Particles, Scene, Simulation, run
+from tisim.backend import memory, runtime
+from tisim import InputError, RunError
+from tisim.steppers import FixedStep
+from tisim.steppers import Verlet
 at = np.zeros((1, 3))
 scene = Scene(particles=Particles(position=at, velocity=at + 1, radius=1.0, mass=1.0),
               stepper=Verlet(control=FixedStep(dt=0.5)), duration=1.0)
-runtime.start(threads=1)
+runtime.init(threads=1)
 old = Simulation(scene)
 old.load([scene])
-runtime.start(threads=2)
+runtime.init(threads=2)
 uses = (
     lambda: old.run(), lambda: old.load([scene]), lambda: old.results(), lambda: old.s.read("mass"),
     lambda: old.s.write("mass", 1.0), lambda: old.fraction(), lambda: next(old.chunks()), lambda: old.ended(),
@@ -66,7 +66,7 @@ for use in uses:
         print(refusal)
 result = run(scene)
 assert result.status.ok and (result.state["position"] == 1).all()
-runtime.start(threads=1)
+runtime.init(threads=1)
 assert (run(scene).state["position"] == 1).all()
 print("made anew")
 old.close()
@@ -74,9 +74,9 @@ old.close()
 mine = Simulation(scene)
 assert np.float64(5e-324) * 1.0 > 0.0
 try:
-    runtime.start(device="cuda")
+    runtime.init(device="cuda")
 except InputError:
-    runtime.start(threads=2)
+    runtime.init(threads=2)
 mine.close()
 assert (run(scene).state["position"] == 1).all()
 print("closed")
@@ -105,8 +105,9 @@ def test_simulation_of_an_earlier_start_says_so():
 def test_absent_device_is_refused():
     """A machine without a GPU says so; one with a GPU starts it."""
     code = (
-        "from tisim import runtime, errors\n"
-        "try: print(runtime.start(device='cuda').device)\n"
+        "from tisim import errors\n"
+        "from tisim.backend import runtime\n"
+        "try: print(runtime.init(device='cuda').device)\n"
         "except errors.InputError as fault: print(fault)"
     )
     done = subprocess.run(
@@ -256,7 +257,7 @@ def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
 
 GROWTH = """
 from tests.benchmarks.changing_structure import soak
-from tisim import memory, runtime
+from tisim.backend import memory, runtime
 memory.WORN = 10
 sizes = [size for _, _, size in soak(40, 5)]
 print(runtime.generation(), *sizes)

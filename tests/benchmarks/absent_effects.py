@@ -21,8 +21,8 @@ ROOT = Path(__file__).parents[2]
 
 IMPACTS = """
 from tisim import Box, Cloud, Scene
-from tisim.effects.impact import Impact
-from tisim.operators.agglomeration import Agglomeration
+from tisim.effects import Impact
+from tisim.effects import Agglomeration
 effects = [Impact(hardness=1e6), Agglomeration()]
 if full:
     from cases import agglomeration
@@ -39,22 +39,15 @@ VIBRATION = """
 from cases.vibration import RATIOS, scene
 scenes = [scene(ratio, duration=1e-4) for ratio in RATIOS]
 """
-CONTACT = (
-    "contact", "contact_bond", "contact_dissipation", "contact_friction", "contact_softening", "hertz",
-    "normal_contact", "surface_contact",
-)  # fmt: skip
+IMPACT = "effects.impact."
 SCENES = {
     "impacts": (
         IMPACTS,
-        ("effects.softening", "effects.reaction", "operators.cooling", "operators.fragmentation"),
+        (IMPACT + "softening", IMPACT + "reaction", "operators.cooling", "operators.fragmentation"),
     ),
     "vibration": (
         VIBRATION,
-        (
-            *(f"effects.{name}" for name in CONTACT),
-            *(f"effects.{name}" for name in ("impact", "friction", "heating", "softening", "reaction")),
-            *(f"operators.{name}" for name in ("agglomeration", "cooling", "fragmentation")),
-        ),
+        (*("effects.contact", "effects.impact", "operators.cooling", "operators.fragmentation"),),
     ),
 }
 """Scenes, and what is left out of the package: from vibration, all laws of contact, impact,
@@ -67,12 +60,13 @@ absent, full = {absent!r}, {full!r}
 for name in absent:
     sys.modules[name] = None  # importing it is an ImportError
 import tisim
-from tisim import runtime
-runtime.start(threads=1)
+from tisim.backend import runtime
+runtime.init(threads=1)
 if not absent:
-    from tisim import effects as laws, kinds, operators
-    kinds.load(laws)
-    kinds.load(operators)
+    from tisim import effects, operators
+    from tisim.components import serialization
+    serialization.load(effects)
+    serialization.load(operators)
 {scenes}
 simulation = tisim.Simulation(scenes[0], worlds=8, capacity=1000)
 simulation.load(scenes)

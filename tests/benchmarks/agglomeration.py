@@ -89,7 +89,7 @@ def main() -> None:
     for name, value in (("worlds", 240), ("grains", 1000), ("repeats", 3), ("threads", 2)):
         parser.add_argument(f"--{name}", type=int, default=value)
     args = parser.parse_args()
-    runtime.start(threads=args.threads)
+    runtime.init(threads=args.threads)
     numba.set_num_threads(args.threads)
 
     designs = [DESIGNS[k % len(DESIGNS)] for k in range(args.worlds)]

@@ -86,7 +86,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=7)
     parser.add_argument("--threads", type=int, default=2)
     args = parser.parse_args()
-    runtime.start(threads=args.threads)
+    runtime.init(threads=args.threads)
     numba.set_num_threads(args.threads)
     for number in args.numbers:
         compare(number, args.duration * min(1.0, 5000 / number), args.repeats)

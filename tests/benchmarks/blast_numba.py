@@ -92,7 +92,7 @@ def displaced(v, v0, dt, phi):
 
 @numba.njit(parallel=True, fastmath=FAST, error_model="numpy")
 def stretch(r, v, f, own_dt, counts, begins, mass, charge, radius, b, air, control, limit):
-    """Every particle through windows that begin so; adds its steps and iterations to ``counts``."""
+    """Every particle through windows that begin so; adds its steps and iterations to ``counters``."""
     density, viscosity = air
     phi, tolerance, order, first, longest, shortest, most, least = control
     wanted = tolerance ** (1.0 / (order * limit))

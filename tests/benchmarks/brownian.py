@@ -29,7 +29,7 @@ from tests.benchmarks import brownian_numba as peer
 from tests.steppers.brownian.colloids import DIFFUSIVITY, MOBILITY, RADIUS, colloids
 from tisim import Simulation
 from tisim.backend import runtime
-from tisim.effects.external.tether import Tether
+from tisim.effects import Tether
 
 RATE, DT = 100.0, 1e-4
 PULL, WIDTH = RATE * DT, float(np.sqrt(2 * DIFFUSIVITY * DT))
@@ -104,7 +104,7 @@ def main() -> None:
     ask.add_argument("--threads", type=int, default=runtime.cores())
     ask.add_argument("--small", action="store_true", help="a tenth of the steps")
     given = ask.parse_args()
-    runtime.start(threads=given.threads)
+    runtime.init(threads=given.threads)
     numba.set_num_threads(given.threads)
     less = 10 if given.small else 1
     print(f"{runtime.backend()}, numba {numba.__version__}, numpy {np.__version__}, {given.threads} threads")

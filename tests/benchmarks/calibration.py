@@ -21,7 +21,7 @@ from tests.steppers.calibrated import CHAOTIC, CONTROLS, KNOWN, collocation, rat
 from tests.steppers.test_calibration import BAND
 from tisim.backend import runtime
 from tisim.plotting.style import empty, plain
-from tisim.steppers.implicit.stage_control import StageControl
+from tisim.steppers import StageControl
 
 Found = dict[str, dict[str, np.ndarray]]
 BY_DEFAULT = collocation("run", StageControl().first)
@@ -65,13 +65,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
     parser.add_argument("--figure", type=Path, default=Path("docs/steppers_calibration.png"))
     asked = parser.parse_args()
-    runtime.start(device="cpu", precision="f64")
+    runtime.init(device="cpu", precision="f64")
     found = {control: ratios(*settings) for control, settings in CONTROLS.items()}
     table(found)
     draw(found, asked.figure)
     errors = CONTROLS["Collocation, StageControl"][1]
     more = {"Collocation, by default": ratios(BY_DEFAULT, errors)}
-    runtime.start(device="cpu", precision="f32")
+    runtime.init(device="cpu", precision="f32")
     for name, make in (("Trapezoid, f32", trapezoid("run")), ("Collocation, by default, f32", BY_DEFAULT)):
         more[name] = ratios(make, SINGLE_PRECISION)
     print()

@@ -22,9 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import tisim
 from tisim import Particles, Scene
 from tisim.backend import memory, runtime
-from tisim.effects.pair.near_field import NearField
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import NearField
+from tisim.steppers import FixedStep, Verlet
 
 PAGE = 4096
 
@@ -67,7 +66,7 @@ def main() -> None:
     asked.add_argument("--worn", type=int, default=memory.WORN, help="trees after which Taichi starts anew")
     given = asked.parse_args()
     memory.WORN = given.worn
-    runtime.start(threads=given.threads)
+    runtime.init(threads=given.threads)
     print(f"{runtime.backend()}\n{'scenes':>8}{'s each':>9}{'MB':>8}{'trees':>8}{'starts':>8}")
     for done, seconds, size in soak(given.scenes, given.every):
         made, starts = memory.made(), runtime.generation()

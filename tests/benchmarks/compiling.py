@@ -20,8 +20,8 @@ SCRIPT = """
 import json, time
 import tisim
 from tests.scenes import flow, head_on
-from tisim import runtime
-runtime.start(threads=2)
+from tisim.backend import runtime
+runtime.init(threads=2)
 scene = {scene}
 seconds = []
 for _ in range(2):

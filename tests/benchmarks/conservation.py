@@ -18,14 +18,17 @@ import numpy as np
 from cases.vibration import ATTRACTION, REPULSION, scene
 from tisim import Result, run
 from tisim.backend import runtime
-from tisim.effects.pair.near_field import NearField
-from tisim.steppers.base import Stepper
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import NearField
+from tisim.steppers import (
+    Collocation,
+    ErrorControl,
+    FixedStep,
+    IterationControl,
+    StageControl,
+    Stepper,
+    Trapezoid,
+    Verlet,
+)
 
 
 def trapezoid(error: float) -> Trapezoid:
@@ -71,7 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--sites", type=int, default=7)
     asked = parser.parse_args()
-    runtime.start()
+    runtime.init()
     for name, stepper in STEPPERS.items():
         result = measure(stepper, asked.sites)
         sums = result.work.get("force_evaluations", result.work["steps"])

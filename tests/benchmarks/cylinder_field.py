@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
-from tisim.worlds.parameter_table import Table, connect
+from tisim.sources import Cylinder, MagneticCylinders
+from tisim.worlds.parameter_table import ParameterTable, connect
 
 RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 
@@ -52,7 +52,7 @@ def bound(digits):
     source = MagneticCylinders(
         cylinders=[Cylinder(radius=RADIUS, length=LENGTH, magnetisation=M)], table_digits=digits
     )
-    table = Table([source], 1, runtime.current().real)
+    table = ParameterTable([source], 1, runtime.current().real)
     made = table.bind(source)
     connect([made])
     table.write([[source]])
@@ -111,6 +111,6 @@ if __name__ == "__main__":
     parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--repeats", type=int, default=7)
     chosen = parser.parse_args()
-    runtime.start(device="cpu", threads=1)
+    runtime.init(device="cpu", threads=1)
     print(runtime.backend(), magpylib.__version__)
     compare(chosen.points, chosen.repeats)

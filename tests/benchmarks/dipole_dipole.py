@@ -21,9 +21,8 @@ import numpy as np
 
 from tisim import Particles, Scene, Simulation
 from tisim.backend import runtime
-from tisim.effects.magnetic.dipole_dipole import DipoleDipole
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import DipoleDipole
+from tisim.steppers import FixedStep, Verlet
 
 
 @numba.njit(parallel=True, fastmath=True, error_model="numpy")
@@ -60,7 +59,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--steps", type=int, default=50, help="of each try")
     asked = parser.parse_args()
-    settings = runtime.start(precision=asked.precision, threads=asked.threads).settings
+    settings = runtime.init(precision=asked.precision, threads=asked.threads).settings
     numba.set_num_threads(asked.threads)
     draw, n = np.random.default_rng(0), asked.number
     side = int(np.ceil(n ** (1 / 3)))

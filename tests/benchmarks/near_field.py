@@ -25,9 +25,8 @@ import numpy as np
 
 from tisim import Particles, Scene, Simulation
 from tisim.backend import runtime
-from tisim.effects.pair.near_field import NearField
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import NearField
+from tisim.steppers import FixedStep, Verlet
 
 FLOPS = 21
 """Products and sums of a pair in NearField with exponents 1 and 2, beside a root and a division."""
@@ -157,7 +156,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--schedule", choices=("world", "particle"))
     args = parser.parse_args()
-    runtime.start(precision=args.precision, threads=args.threads)
+    runtime.init(precision=args.precision, threads=args.threads)
     numba.set_num_threads(args.threads)
     for n in args.numbers:
         compare(n, np.float64 if args.precision == "f64" else np.float32, args)

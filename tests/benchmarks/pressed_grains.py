@@ -9,12 +9,8 @@ that bonds; grains in a row hit each other again while the row comes to rest, an
 import numpy as np
 
 from tisim import Particles, Scene, run
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.effects.pair.near_field import NearField
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Heating, Impact, NearField, Reaction
+from tisim.steppers import FixedStep, Verlet
 
 RADIUS, DENSITY, DURATION = 1e-3, 2000.0, 1e-4
 ALPHA = 10.0

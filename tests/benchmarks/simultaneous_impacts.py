@@ -24,7 +24,7 @@ SPEED, RADIUS, DENSITY, DT = 2.0, 1e-3, 2000.0, 1e-9
 def ring(number, restitution, delay=0.0):
     """Grains around one that they just touch; each is later than the one before by ``delay`` (s)."""
     from tests.scenes import scene
-    from tisim.effects.impact.impact import Impact
+    from tisim.effects import Impact
 
     angle = 2 * np.pi * np.arange(number) / number
     out = np.stack([np.cos(angle), np.sin(angle), np.zeros(number)], axis=1)

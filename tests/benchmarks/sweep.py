@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
     args = parser.parse_args()
-    runtime.start(threads=args.threads)
+    runtime.init(threads=args.threads)
     scenes = SWEEPS[args.case]()
     batch, single = Simulation(scenes[0], len(scenes)), Simulation(scenes[0], 1)
     together, apart = [], []

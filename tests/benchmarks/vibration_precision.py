@@ -33,11 +33,7 @@ from cases import vibration
 from tisim import Simulation
 from tisim.backend import runtime
 from tisim.plotting.style import empty, plain
-from tisim.steppers.base import Stepper
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers import Collocation, ErrorControl, StageControl, Stepper, Trapezoid
 
 RATIO, DURATION = 0.8, 0.005
 OMEGA = RATIO * vibration.CYCLOTRON
@@ -208,7 +204,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("out/vibration_precision"))
     asked = parser.parse_args()
-    runtime.start(threads=asked.threads)
+    runtime.init(threads=asked.threads)
     numba.set_num_threads(asked.threads)
     arrays = vibration.scene(RATIO).particles.arrays(vibration.scene(RATIO).domain, 0)
     start = np.ascontiguousarray(arrays["position"].T)

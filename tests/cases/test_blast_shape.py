@@ -12,9 +12,7 @@ from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
 from tests.scenes import simulate
-from tisim import Recording, run
-from tisim.engine.result import Result, Status
-from tisim.errors import InputError
+from tisim import InputError, Recording, Result, Status, run
 from tisim.io.reader import frames
 from tisim.plotting.cloud import SEEN
 

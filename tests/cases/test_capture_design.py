@@ -13,11 +13,8 @@ from optimize.report.comparison import FRESH
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
-from tisim import Result, run
-from tisim.engine.result import Status
-from tisim.errors import InputError
-from tisim.sources.magnetic.cylinder import MagneticCylinders
-from tisim.sources.uniform import MagneticField
+from tisim import InputError, Result, Status, run
+from tisim.sources import MagneticCylinders, MagneticField
 
 FIBRES = {"flux": 0.8, "field_angle": 90.0, "aspect": 2.5, "number": 8.2, "spacing": 3.0}
 

@@ -20,9 +20,8 @@ from cases.concentration_statistics import (
     results,
 )
 from cases.statistics import Claim, Mean
-from tisim import Particles, Simulation, run
-from tisim.analysis.clusters import head_to_tail, labels, mean_size, near
-from tisim.errors import RunError
+from tisim import Particles, RunError, Simulation, run
+from tisim.analysis import head_to_tail, labels, mean_size, near
 
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])

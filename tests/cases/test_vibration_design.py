@@ -10,7 +10,7 @@ from optimize.evaluation.evaluator import Evaluator
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
-from tisim.errors import InputError
+from tisim import InputError
 
 DESIGNS = {
     "far": {"flux": 1.0, "stiffness": 1.0},

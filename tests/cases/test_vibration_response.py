@@ -8,7 +8,7 @@ from cases.charged_closed_forms import response
 from cases.vibration_accuracy import constants
 from cases.vibration_pictures import drawn, table
 from cases.vibration_response import FAST, SLOW, Course, Sweep, fast_scenes, peak, slow_scenes, vertex
-from tisim.effects.external.gravity import Gravity
+from tisim.effects import Gravity
 
 CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
              "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip

@@ -7,10 +7,9 @@ import pytest
 
 from tisim import Box, Cloud, Scene
 from tisim.cli.main import main
-from tisim.effects.impact.impact import Impact
+from tisim.effects import Impact
 from tisim.interrupt import Interrupt
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import FixedStep, Verlet
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from tisim.files import lock
 
 STOPPED = """
 import os, signal
-from tisim import checkpoint
-from tisim.cli import main
+from tisim.cli.main import main
+from tisim.io import checkpoint
 
 def save(*arguments, save=checkpoint.save):
     save(*arguments)

@@ -12,8 +12,7 @@ from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
 from tisim import Box, Cloud, Scene
 from tisim.plotting.cloud import cloud
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import FixedStep, Verlet
 
 
 def spread(result):

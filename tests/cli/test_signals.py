@@ -85,7 +85,7 @@ def test_comparison_says_how_to_go_on(tisim, tmp_path, monkeypatch, press_ctrl_c
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
 def test_commands_that_keep_nothing_end_as_well(tisim, monkeypatch, number, code):
-    monkeypatch.setattr(runtime, "start", lambda *settings: os.kill(os.getpid(), number))
+    monkeypatch.setattr(runtime, "init", lambda *settings: os.kill(os.getpid(), number))
     assert tisim("check", "vibration") == (code, "", "")
 
 
@@ -95,7 +95,7 @@ def test_run_whose_terminal_is_closed_saves_a_checkpoint(toml, tmp_path):
     scene = Scene.from_toml(tmp_path / toml).model_copy(update={"duration": 1e3})
     (tmp_path / toml).write_text(scene.to_toml())
     ours, theirs = os.openpty()
-    command = "from tisim.cli import main; main()"
+    command = "from tisim.cli.main import main; main()"
     process = subprocess.Popen(
         [sys.executable, "-c", command, "run", toml, "--out", "cut"],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},

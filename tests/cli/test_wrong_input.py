@@ -83,7 +83,7 @@ def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
 
 
 @pytest.mark.parametrize(
-    "code", ["from tisim.cli import main; main(['cases'])", "import tisim.cli.main as c; c.main()"]
+    "code", ["from tisim.cli.main import main; main(['cases'])", "import tisim.cli.main as c; c.main()"]
 )
 def test_a_backend_that_is_none(code):
     """Told in a line by the command, as importing the package has gone well."""

@@ -5,11 +5,12 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from tisim.components.component import ROWS, Spec, Vector, parameter, unit_of
-from tisim.errors import InputError, must
+from tisim import InputError
+from tisim.components.component import ROWS, Component, Vector, parameter, unit_of
+from tisim.errors import must
 
 
-class SampleSpring(Spec):
+class SampleSpring(Component):
     """A part with one parameter of each sort."""
 
     stiffness: float = parameter("N/m", gt=0)
@@ -69,9 +70,9 @@ def test_frozen_named_and_with_units():
     with pytest.raises(Exception, match="frozen"):
         part.stiffness = 3.0
     assert SampleSpring.kind() == "sample_spring"
-    assert Spec.named("sample_spring", "part") is SampleSpring
+    assert Component.named("sample_spring", "part") is SampleSpring
     with pytest.raises(InputError, match=r"^part must be one of .*sample_spring.*; received 'sample_sprig'$"):
-        Spec.named("sample_sprig", "part")
+        Component.named("sample_sprig", "part")
     assert unit_of(SampleSpring.model_fields["stiffness"]) == "N/m"
     assert unit_of(SampleSpring.model_fields["stiff"]) == ""
 
@@ -90,14 +91,14 @@ def test_parameters_vary_and_options_are_structure():
     assert part.structure() != SampleSpring(stiffness=2, order=3).structure()
 
 
-class SampleRow(Spec):
+class SampleRow(Component):
     """A row of a list."""
 
     radius: float = parameter("m", gt=0)
     centre: Vector = parameter("m", (0.0, 0.0, 0.0))
 
 
-class SampleList(Spec):
+class SampleList(Component):
     """A part with a list of rows, of which each world may have its own number."""
 
     scale: float = parameter("", 1.0)

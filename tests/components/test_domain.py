@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 from tests.scenes import HEAT_CAPACITY, by_id, check_sums, scene, simulate
-from tisim import Box
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.errors import InputError
-from tisim.steppers.step_control import ApproachTime
-from tisim.steppers.verlet import Verlet
+from tisim import Box, InputError
+from tisim.effects import Heating, Impact
+from tisim.steppers import ApproachTime, Verlet
 
 
 def run(scenes):

@@ -8,10 +8,8 @@ from scipy import stats
 
 from tests.scenes import fixed, scene
 from tests.throwaway import K_E, WORLDS, Coulomb, RandomKicks, Trap, charges, run
-from tisim import Scene, Simulation
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.impact import Impact
-from tisim.errors import InputError
+from tisim import InputError, Scene, Simulation
+from tisim.effects import Agglomeration, Impact
 
 
 def test_forces_are_their_numpy_twin(rng):
@@ -95,7 +93,7 @@ def test_what_no_effect_needs_is_not_allocated():
     assert sum(bare.s.bytes().values()) == 3 * 7 * (8 * (3 + 3 + 1 + 1) + 4)
     assert set(bare.s.counters) == {"steps", "particle_steps"}
     assert not any(
-        word in name for name in bare.program.names() for word in ("Force", "Kick", "Survey", "Bid")
+        word in name for name in bare.program.names() for word in ("Force", "Kick", "FindContacts", "Bid")
     )
     extra = {
         (Trap(stiffness=1),): {"force"},

@@ -14,11 +14,9 @@ from tests.effects.contact.loads import (
 )
 from tests.effects.magnetic.magnets import Quadrupole
 from tests.scenes import scene, simulate
-from tisim import Scene
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.magnetic.body_force import MagneticBodyForce
-from tisim.errors import InputError
-from tisim.sources.uniform import ElectricField, MagneticField
+from tisim import InputError, Scene
+from tisim.effects import Lorentz, MagneticBodyForce
+from tisim.sources import ElectricField, MagneticField
 
 
 def waves(source, t):

@@ -5,11 +5,10 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, close, cloud, loads, vector
 from tests.scenes import scene, simulate
-from tisim.effects.external.drag import StokesDrag
-from tisim.errors import InputError
-from tisim.sources.flow import DarcyFlow, UniformFlow, kozeny_carman
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim import InputError
+from tisim.effects import StokesDrag
+from tisim.sources import DarcyFlow, UniformFlow, kozeny_carman
+from tisim.steppers import ErrorControl, Trapezoid
 
 FORMS = [("fibres", "packing", 4.0), pytest.param("spheres", "pores", 6.0, marks=pytest.mark.long)]
 

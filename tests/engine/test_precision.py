@@ -5,10 +5,8 @@ import pytest
 
 from tests.engine.test_schedules import WORLDS
 from tests.scenes import energy, head_on, simulate
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.softening import Softening
-from tisim.errors import InputError
+from tisim import InputError
+from tisim.effects import Heating, Impact, Softening
 
 
 def world(elsewhere, precision, w):
@@ -63,13 +61,13 @@ def rebounds_of_cold_grains():
 @pytest.mark.slow
 def test_grains_too_hard_for_single_precision_rebound(single):
     """exp(Q / (R T)) is capped where hardness still fits f32: nothing turns into a NaN that bonds."""
-    assert single("test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3
+    assert single("engine.test_precision", "rebounds_of_cold_grains") == [[True, 1, 0, 0]] * 3
 
 
 @pytest.mark.slow
 def test_cooling_is_as_right_as_single_precision_can_be(single):
     """From 0 K to 1e5 K; a stop criterion of double precision would be below the last digit here."""
-    assert max(single("test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps
+    assert max(single("operators.test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps
 
 
 def refused():
@@ -90,7 +88,7 @@ def refused():
 @pytest.mark.long
 def test_what_single_precision_cannot_hold_is_refused(single):
     """Not an infinite hardness, nor a mass of zero, which would make the particle vanish."""
-    hardness, mass, temperature = single("test_precision", "refused")
+    hardness, mass, temperature = single("engine.test_precision", "refused")
     assert hardness.startswith("impact.hardness must be within the range of f32; received 1e+200")
     assert mass.startswith("particles.mass must be within the range of f32; received 8.37")
     assert temperature.startswith("particles.temperature must be within the range of f32")

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene, simulate
-from tisim import Scene
+from tisim import InputError, Scene
 from tisim.backend.taichi import ti
-from tisim.components.component import Spec, Vector
-from tisim.effects.base import Force, parameter
-from tisim.errors import InputError
+from tisim.components.component import Component, Vector
+from tisim.effects import Force, parameter
 
 
-class Spring(Spec):
+class Spring(Component):
     """A spring to a point."""
 
     stiffness: float = parameter("N/m", gt=0)

@@ -5,8 +5,7 @@ import pytest
 
 from tests.effects.test_contract import kicked
 from tests.scenes import GRAIN, compiled, flow, simulate
-from tisim import Simulation
-from tisim.errors import InputError
+from tisim import InputError, Simulation
 
 WORLDS = [
     flow(seed=1, grains=150),

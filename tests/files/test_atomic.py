@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from tisim.errors import InputError, RunError
+from tisim import InputError, RunError
 from tisim.files import atomic, regular_file
 from tisim.files.atomic import append_at, locked, replace_file, replacing
 
@@ -121,9 +121,9 @@ def test_a_lock_that_is_never_given_back_is_told(tmp_path, monkeypatch):
 
 OTHER_USER = """
 import os, pathlib, sys
-from tisim import regular
-from tisim.durable import append_at, locked, replace_file
-from tisim.errors import InputError, RunError
+from tisim.files import regular_file
+from tisim.files.atomic import append_at, locked, replace_file
+from tisim import InputError, RunError
 if os.geteuid() == 0:  # whom no mode stops
     os.setgroups([]); os.setgid(65534); os.setuid(65534)
 folder = pathlib.Path(sys.argv[1])
@@ -132,10 +132,10 @@ for number, what in enumerate((
     lambda: locked(folder / "none", exclusive=False).__enter__() and "got",
     lambda: locked(folder / "lock", exclusive=True).__enter__(),
     lambda: locked(folder / "secret", exclusive=False).__enter__(),
-    lambda: regular.content(folder / "secret"),
+    lambda: regular_file.content(folder / "secret"),
     lambda: append_at(folder / "lock", 0, b"new"),
     lambda: replace_file(folder / "lock", b"new"),
-    lambda: regular.status(folder / "closed" / "file"),
+    lambda: regular_file.status(folder / "closed" / "file"),
 )):
     try:
         print(number, what())
@@ -194,7 +194,7 @@ for command in COMMANDS:
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            tisim.cli.main(command)
+            tisim.cli.main.main(command)
     except SystemExit as ended:
         ends.append((ended.code, said.getvalue()))
 print(json.dumps(ends))

@@ -10,13 +10,13 @@ import pytest
 
 from tests.files.test_growing_hdf5 import STILL, frame, same
 from tests.soak import damage
+from tisim import InputError, Recording
 from tisim.accuracy import storage
-from tisim.errors import InputError
 from tisim.files import checksum
 from tisim.io import checkpoint, h5md
 from tisim.io.export import export
 from tisim.io.reader import frames, worlds
-from tisim.io.trajectory import LIBRARY, Recording, Trajectory
+from tisim.io.trajectory import LIBRARY, Trajectory
 
 
 @pytest.mark.parametrize(

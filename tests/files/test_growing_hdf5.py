@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene
-from tisim.errors import InputError, RunError
+from tisim import InputError, Recording, RunError
 from tisim.files import atomic
 from tisim.files.growing_hdf5 import Growing
 from tisim.files.shared_hdf5 import Reading
 from tisim.files.superblock import SIZE, lookup3, sound, superblock
 from tisim.io.reader import Frame, frames
-from tisim.io.trajectory import LIBRARY, Recording, Trajectory
+from tisim.io.trajectory import LIBRARY, Trajectory
 
 GRAINS = 300
 STILL = scene([(0, 0, 0)] * GRAINS, [(0.0, 0, 0)] * GRAINS)

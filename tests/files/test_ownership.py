@@ -5,7 +5,7 @@ import multiprocessing
 import h5py
 import pytest
 
-from tisim.errors import InputError
+from tisim import InputError
 from tisim.files import ownership
 from tisim.files.framing import MAGIC
 from tisim.files.ownership import MARKER, Leavings, check, check_all, take

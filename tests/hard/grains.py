@@ -6,14 +6,17 @@ from scipy.integrate import quad
 from tests.scenes import by_id, compiled, fixed, scene
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Force, parameter
-from tisim.effects.contact.bond import ContactBond
-from tisim.effects.contact.dissipation import ContactDissipation
-from tisim.effects.contact.friction import ContactFriction
-from tisim.effects.contact.power_law import Contact
-from tisim.effects.contact.softening import ContactSoftening
-from tisim.effects.external.gravity import Gravity
-from tisim.effects.external.tether import Tether
+from tisim.effects import (
+    Contact,
+    ContactBond,
+    ContactDissipation,
+    ContactFriction,
+    ContactSoftening,
+    Force,
+    Gravity,
+    Tether,
+    parameter,
+)
 
 WORLDS, CAPACITY = 6, 12
 K, R, SPRING = 1e6, 1.0, 1e5
@@ -23,7 +26,7 @@ K, R, SPRING = 1e6, 1.0, 1e5
 class Held(Force):
     """A spring to the place where it is slack, for the first ``number`` particles; a pull for the others."""
 
-    needs = Tether.needs
+    fields = Tether.fields
     number: float = parameter("", 0.0, ge=0)
     pull: Vector = parameter("N", (0.0, 0.0, 0.0))
 

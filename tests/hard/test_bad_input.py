@@ -5,14 +5,10 @@ import pytest
 
 import tisim
 from tests.scenes import flow
-from tisim import Box, Cloud, Lattice, Particles, RandomAroundCylinder, Scene, Simulation
-from tisim.effects.impact.impact import Impact
-from tisim.effects.pair.mie import Mie
-from tisim.errors import InputError
-from tisim.operators.cooling import Cooling
-from tisim.operators.fragmentation import Fragmentation
-from tisim.steppers.step_control import ApproachTime, FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim import Box, Cloud, InputError, Lattice, Particles, RandomAroundCylinder, Scene, Simulation
+from tisim.effects import Impact, Mie
+from tisim.operators import Cooling, Fragmentation
+from tisim.steppers import ApproachTime, FixedStep, Verlet
 
 NAN, INF = float("nan"), float("inf")
 CLOUD = {"number": 3, "radius": 0.1, "density": 1.0}

@@ -12,15 +12,9 @@ import pytest
 
 from tests.scenes import by_id, scene, simulate
 from tests.throwaway import K_E
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.pair.near_field import NearField
-from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.steppers.boris import Boris
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
+from tisim.effects import Lorentz, NearField
+from tisim.sources import ElectricField, MagneticField
+from tisim.steppers import Boris, Collocation, ErrorControl, FixedStep, StageControl, Trapezoid
 
 WORLDS = 8
 W, DRIFT = 3.0, 0.75

@@ -10,8 +10,7 @@ from tests import extremes
 from tests.soak.running import FAILED, RAN, REFUSED, Runs
 from tisim import steppers
 from tisim.components import serialization
-from tisim.steppers.base import Stepper
-from tisim.steppers.step_control import StepControl
+from tisim.steppers import StepControl, Stepper
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from tests.interactions.test_collision_rounds import laws as merging
 from tests.interactions.test_collision_rounds import run as run_merging
 from tests.judged import check_message
 from tests.scenes import DENSITY, RADIUS, by_id, compiled, energy, momentum, scene
-from tisim.errors import InputError
+from tisim import InputError
 
 
 def pair(gap, approach, hardness=1e9, radius=RADIUS, **more):

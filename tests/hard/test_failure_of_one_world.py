@@ -5,13 +5,14 @@ import pytest
 
 from tests.scenes import compiled, energy, fixed, flow, simulate
 from tisim.backend.taichi import ti
-from tisim.effects.base import Operator, parameter
+from tisim.operators import Operator
+from tisim.operators.base import parameter
 
 
 class Poison(Operator):
     """At a step, makes something of one particle not finite; each flag spoils one quantity."""
 
-    needs = ("temperature",)
+    fields = ("temperature",)
     at_step: float = parameter("", 0.0)
     victim: float = parameter("", 0.0)
     velocity: float = parameter("", 0.0)

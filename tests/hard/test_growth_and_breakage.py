@@ -5,9 +5,8 @@ import pytest
 
 from tests.engine.test_schedules import BATCH
 from tests.scenes import GRAIN, HEAT_CAPACITY, RADIUS, check_sums, flow, hit, laws, momentum, simulate
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.operators.fragmentation import Fragmentation
+from tisim.effects import Heating, Impact
+from tisim.operators import Fragmentation
 
 
 def run(scenes):

@@ -5,11 +5,8 @@ import pytest
 
 from tests.engine.test_schedules import BATCH
 from tests.scenes import DENSITY, HEAT_CAPACITY, energy, flow, head_on, hit, simulate
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import DeformationWork, Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.effects.impact.softening import GAS_CONSTANT, Softening
+from tisim.effects import DeformationWork, Friction, Heating, Impact, Reaction, Softening
+from tisim.effects.impact.softening import GAS_CONSTANT
 
 
 def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):

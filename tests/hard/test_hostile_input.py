@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from tests import hostile
 from tests.judged import ACCEPTED, check_file, check_message, command, nothing_runs
-from tisim import Scene
+from tisim import InputError, Scene
 from tisim.cli import scene_arguments
-from tisim.errors import InputError
 
 pytestmark = pytest.mark.long
 

@@ -7,14 +7,11 @@ import pytest
 from tests.scenes import compiled, scene
 from tisim import Particles, Scene, Simulation
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter
+from tisim.effects import Force, parameter
 from tisim.io.checkpoint import restore, save
-from tisim.sources.flow import UniformFlow
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.sources import UniformFlow
+from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 from tisim.steppers.implicit import independent
-from tisim.steppers.implicit.step_control import IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
 
 SPEED = np.resize([1.0, 0.5, 0.25], 10)
 """m/s; some particles arrive at the cliff at 0.783 s, others never. More than a tile that goes together."""

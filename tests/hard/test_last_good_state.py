@@ -5,13 +5,9 @@ import pytest
 
 from tests.scenes import compiled, fixed, scene
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter
-from tisim.effects.impact.impact import Impact
+from tisim.effects import Force, Impact, parameter
 from tisim.io.checkpoint import restore, save
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
-from tisim.steppers.implicit.step_control import IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 
 WHEN = 0.783
 """s, when things go wrong."""

@@ -11,16 +11,19 @@ from tests.scenes import by_id, fixed, scene, simulate
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects.magnetic.dipole_dipole import DipoleDipole
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import FixedMoment, LangevinMoment
-from tisim.effects.magnetic.mutual_moment import MutualInducedMoment, MutualLangevinMoment
-from tisim.effects.pair.mie import Mie
-from tisim.effects.pair.near_field import NearField
+from tisim.effects import (
+    DipoleDipole,
+    FixedMoment,
+    LangevinMoment,
+    Magnetophoresis,
+    Mie,
+    MutualInducedMoment,
+    MutualLangevinMoment,
+    NearField,
+)
 from tisim.numerics.langevin import langevin_ratio
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.sources import MagneticField
+from tisim.steppers import ErrorControl, Trapezoid
 
 N = np.array([2.0, -3.0, 6.0]) / 7
 ARGUMENTS = np.concatenate(

@@ -8,10 +8,9 @@ from tests.effects.contact.loads import WORLDS, loads
 from tests.scenes import by_id, fixed, scene, simulate
 from tisim import Box
 from tisim.backend.taichi import ti
-from tisim.effects.base import Operator, parameter
-from tisim.effects.contact.hertz import Hertz
-from tisim.effects.contact.power_law import Contact
-from tisim.effects.pair.near_field import NearField
+from tisim.effects import Contact, Hertz, NearField
+from tisim.operators import Operator
+from tisim.operators.base import parameter
 
 CROWD = 1000
 BOX = Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0))

@@ -9,13 +9,8 @@ from scipy.integrate import solve_ivp
 
 from tests.scenes import by_id, compiled, fixed, scene, simulate
 from tests.throwaway import SoftShellOfAll
-from tisim.effects.contact.power_law import Contact
-from tisim.effects.external.tether import Tether
-from tisim.effects.pair.near_field import NearField
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.effects import Contact, NearField, Tether
+from tisim.steppers import Collocation, ErrorControl, StageControl, Trapezoid
 
 WORLDS = 16
 TRAPEZOID, COLLOCATION = {"error": 1e-6, "tolerance": 1e-8}, {"error": 1e-8}

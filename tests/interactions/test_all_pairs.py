@@ -5,8 +5,8 @@ import pytest
 
 from tests.scenes import fixed, scene, simulate
 from tisim import Box
-from tisim.effects.external.gravity import STANDARD, Gravity
-from tisim.effects.pair.near_field import NearField
+from tisim.effects import Gravity, NearField
+from tisim.effects.external.gravity import STANDARD
 from tisim.interactions.pair_sum import LANES
 
 NUMBERS = (1, LANES - 1, LANES, LANES + 1, 2 * LANES + 6)

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import DENSITY, RADIUS, by_id, momentum, scene, simulate
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.impact import Impact
+from tisim.effects import Agglomeration, Friction, Impact
 
 MU = 0.2
 DT = 1e-7

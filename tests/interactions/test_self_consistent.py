@@ -7,7 +7,8 @@ from tests.scenes import scene, simulate
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Force, Mutual, PairForce, Source, parameter, sources
+from tisim.effects import Force, PairForce, SelfConsistentQuantity, parameter
+from tisim.sources import Source, sources
 from tisim.worlds.state import Field
 
 DIPOLE = Field("dipole", "A m^2", 3, "sum")
@@ -29,10 +30,10 @@ class Ramp(Source):
         return self.slope(w).outer_product(ti.Vector([1.0, 0.0, 0.0]))
 
 
-class Polarisation(Mutual):
+class Polarisation(SelfConsistentQuantity):
     """m_i = chi R_i^3 (H0(r_i) + sum_j H_j(r_i)), H_j the field of dipole j."""
 
-    needs = (DIPOLE, "radius")
+    fields = (DIPOLE, "radius")
     quantity = "dipole"
     chi: float = parameter("", gt=0)
 
@@ -55,7 +56,7 @@ class Polarisation(Mutual):
 class Pull(Force):
     """F = (m . grad) H of the applied field, per unit permeability."""
 
-    needs = (DIPOLE,)
+    fields = (DIPOLE,)
 
     def connect(self, peers):
         return {"applied": sources(peers, "magnetic_field_strength")}
@@ -71,7 +72,7 @@ class Pull(Force):
 class DipoleForce(PairForce):
     """Force between point dipoles, per unit permeability."""
 
-    needs = (DIPOLE,)
+    fields = (DIPOLE,)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
@@ -195,10 +196,10 @@ def test_one_sweep_a_step_when_asked():
     assert 1e-8 < error < 1e-2
 
 
-class Potential(Mutual):
+class Potential(SelfConsistentQuantity):
     """phi_i = 1 + strength sum_j phi_j / d_ij: a number, not a vector."""
 
-    needs = (Field("potential", "V", 1, "keep"),)
+    fields = (Field("potential", "V", 1, "keep"),)
     quantity = "potential"
     strength: float = parameter("m", gt=0)
 
@@ -225,10 +226,10 @@ def test_a_number_settles_too_and_without_any_force(schedule):
 class Forgetful(Polarisation):
     """Does not say that it needs its quantity."""
 
-    needs = ("radius",)
+    fields = ("radius",)
 
 
 def test_a_quantity_that_is_not_needed_is_refused():
     made = scene([[0, 0, 0]], [[0, 0, 0]], (Forgetful(chi=1.0),))
-    with pytest.raises(TypeError, match=r"Forgetful\.needs must name its quantity, 'dipole'"):
+    with pytest.raises(TypeError, match=r"Forgetful\.fields must name its quantity, 'dipole'"):
         Simulation(made)

@@ -7,7 +7,7 @@ from tests.scenes import by_id, compiled, scene, simulate
 from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation
 from tisim.backend.taichi import ti
-from tisim.effects.base import PairForce, parameter
+from tisim.effects import PairForce, parameter
 from tisim.io import checkpoint
 
 
@@ -53,7 +53,7 @@ class Grip(PairForce):
     the surfaces have slid, both linear; torques about the centres. The spring follows the pair as it turns.
     """
 
-    needs = ("spin",)
+    fields = ("spin",)
     short_ranged = True
     memory = 3
     stiffness: float = parameter("N/m", gt=0)

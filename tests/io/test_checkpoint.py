@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import Agglomeration, Cooling, Heating, Impact
-from tisim import Box, Cloud, Scene, Simulation
-from tisim.errors import InputError, RunError
+from tisim import Box, Cloud, InputError, RunError, Scene, Simulation
 from tisim.io.checkpoint import restore, save
 
 

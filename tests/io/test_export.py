@@ -12,8 +12,7 @@ import pytest
 
 import tisim
 from tests.scenes import flow, scene
-from tisim import Recording
-from tisim.errors import InputError
+from tisim import InputError, Recording
 from tisim.io.export import export
 from tisim.io.reader import frames
 from tisim.io.run_folder import Folder, write

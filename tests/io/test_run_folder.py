@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene, simulate
-from tisim import Scene
-from tisim.errors import InputError, RunError
+from tisim import InputError, RunError, Scene
 from tisim.files.ownership import writable
 from tisim.io.run_folder import Folder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud

@@ -18,11 +18,11 @@ COMMAND = [
     "run", "agglomeration", "--size", "paper",
     "--set", "effects.impact.hardness=1e7", "--set", "duration=3e-3", "--seed", "4", "--out",
 ]  # fmt: skip
-MAIN = "from tisim.cli import main; main()"
+MAIN = "from tisim.cli.main import main; main()"
 KILLED = (
     """
 import os, signal
-from tisim import checkpoint
+from tisim.io import checkpoint
 save, left = checkpoint.save, {saves}
 
 def counted(*arguments):
@@ -37,7 +37,7 @@ checkpoint.save = counted
     + MAIN
 )
 """Killed after some checkpoints. There are more, however fast the machine: the first come after few steps."""
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def begin(folder, *more, code=MAIN):

@@ -15,8 +15,7 @@ import pytest
 
 import tisim
 from tests.scenes import by_id, compiled, flow, scene
-from tisim import Box, Recording
-from tisim.errors import InputError
+from tisim import Box, InputError, Recording
 from tisim.io import h5md
 from tisim.io.checkpoint import restore, save
 from tisim.io.reader import Frame, frames, worlds
@@ -25,7 +24,7 @@ from tisim.io.trajectory import Trajectory, written
 FLOWS = [flow(0, surface_energy=1e3, threshold=0.9, images=True), flow(1, duration=4e-4, images=True)]
 """Worlds in which grains merge and break, of different durations."""
 CAPACITY = max(made.capacity() for made in FLOWS)
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def simulation(schedule="world"):
@@ -248,8 +247,9 @@ KILLED = """
 import sys, time
 import numpy as np
 import tests.io.test_trajectory as t
-from tisim.frames import Frame
-from tisim.trajectory import Recording, Trajectory
+from tisim.io.reader import Frame
+from tisim import Recording
+from tisim.io.trajectory import Trajectory
 scene = t.scene([(0, 0, 0)] * 3000, [(0.0, 0, 0)] * 3000)
 with Trajectory(Recording(sys.argv[1], frames=10**6), [scene]) as trajectory:
     for k in range(10**6):

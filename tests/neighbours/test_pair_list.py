@@ -10,12 +10,9 @@ from tests.scenes import fixed, scene
 from tisim import Box, Open, Simulation
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects.base import PairEvent
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.impact import Impact
+from tisim.effects import Agglomeration, Friction, Impact, PairEvent
 from tisim.neighbours import pair_list
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import Verlet
 
 WORLDS, CAPACITY, STEPS, DT = 18, 300, 5, 1.0
 

@@ -57,7 +57,7 @@ def _normals(words: ti.types.ndarray(), normal: ti.types.ndarray()):
             normal[n, k] = z[k]
 
 
-def philox(counters, keys):
+def words_of(counters, keys):
     counters = np.ascontiguousarray(counters, np.uint32)
     out = np.zeros((len(counters), 4), np.uint32)
     _philox(counters, np.ascontiguousarray(keys, np.uint32), out)
@@ -96,14 +96,14 @@ def twin(counter, key):
 def test_known_answers_of_random123(counter, key, expected):
     """The known-answer vectors that come with Random123 (kat_vectors, philox4x32 10)."""
     words = [int(text, 16) for text in expected.split()]
-    assert philox([counter], [key])[0].tolist() == words
+    assert words_of([counter], [key])[0].tolist() == words
     assert twin(counter, key) == words
 
 
 def test_philox_is_its_twin_in_python_integers(rng):
     counters = rng.integers(0, 2**32, (500, 4), dtype=np.uint32)
     keys = rng.integers(0, 2**32, (500, 2), dtype=np.uint32)
-    assert philox(counters, keys).tolist() == [twin(c, k) for c, k in zip(counters, keys, strict=True)]
+    assert words_of(counters, keys).tolist() == [twin(c, k) for c, k in zip(counters, keys, strict=True)]
 
 
 def test_every_coordinate_of_a_draw_reaches_its_place_in_the_counter(rng):

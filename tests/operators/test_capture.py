@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 
 from tests.scenes import compiled, scene, simulate
-from tisim import Scene
-from tisim.effects.external.gravity import Gravity
-from tisim.effects.external.tether import Tether
-from tisim.effects.impact.impact import Impact
-from tisim.effects.magnetic.body_force import MagneticBodyForce
-from tisim.errors import InputError
-from tisim.operators.capture import Capture
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
-from tisim.sources.magnetic.sphere import MagneticSpheres, Sphere
-from tisim.sources.uniform import MagneticField
+from tisim import InputError, Scene
+from tisim.effects import Gravity, Impact, MagneticBodyForce, Tether
+from tisim.operators import Capture
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField, MagneticSpheres, Sphere
 
 DT, STEPS, RADIUS = 0.02, 60, 0.05
 """Flights of 1.2 s at speeds of about 1 m/s, in steps shorter than a radius."""

@@ -9,18 +9,16 @@ from tests.scenes import by_id, scene
 from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation, run
 from tisim.backend.taichi import ti
-from tisim.effects.base import Operator
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.impact import Impact
-from tisim.steppers.step_control import ApproachTime
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Agglomeration, Impact
+from tisim.operators import Operator
+from tisim.steppers import ApproachTime, Verlet
 from tisim.worlds.state import Field
 
 
 class Census(Operator):
     """Counts its calls; a world has no pair events to wait for."""
 
-    counts = ("censuses",)
+    counters = ("censuses",)
 
     @ti.func
     def world(self, s, w):
@@ -30,7 +28,7 @@ class Census(Operator):
 class Stepping(Operator):
     """Moves particles by itself, as Brownian displacement does."""
 
-    needs = (Field("leap", "m", 3, "keep"),)
+    fields = (Field("leap", "m", 3, "keep"),)
 
     @ti.func
     def particle(self, s, w, i, t, dt):
@@ -40,7 +38,7 @@ class Stepping(Operator):
 class Growing(Operator):
     """Radii grow, each at a rate of its own."""
 
-    needs = ("radius", Field("growth", "m/s", 1, "keep"))
+    fields = ("radius", Field("growth", "m/s", 1, "keep"))
 
     @ti.func
     def particle(self, s, w, i, t, dt):
@@ -174,7 +172,7 @@ class Teleport(Operator):
     def world(self, s, w):
         if s.steps[w] % 10 == 0:
             s.position[w, 0] += ti.Vector([0.7, 0.9, 1.3])
-            s.disturb(w)
+            s.invalidate_lists(w)
 
 
 @pytest.mark.slow

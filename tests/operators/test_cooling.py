@@ -6,9 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from tests.scenes import DENSITY, HEAT_CAPACITY, RADIUS, energy, scene, simulate
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.operators.cooling import Cooling
+from tisim.effects import Heating, Impact
+from tisim.operators import Cooling
 
 SIGMA = 5.670374419e-8
 

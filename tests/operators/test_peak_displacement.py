@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from tests.scenes import scene, simulate
-from tisim.effects.external.tether import Tether
+from tisim.effects import Tether
 from tisim.io import run_folder
-from tisim.operators.peak_displacement import PeakDisplacement
+from tisim.operators import PeakDisplacement
 
 
 def swinging(periods, speed):

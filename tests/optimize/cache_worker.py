@@ -7,10 +7,9 @@ import sys
 import time
 from pathlib import Path
 
-from fake_runs import FakeEvaluator, fake_problem, fake_record
-
 from optimize.storage.cache import Cache
-from tisim.errors import RunError
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
+from tisim import RunError
 
 
 def write(path, first):
@@ -123,9 +122,8 @@ def asleep():
 
 def tisim(*arguments):
     """The command, naming each evaluation."""
-    from drift_case import CASE
-
     from cases import case
+    from tests.optimize.drift_case import CASE
     from tisim.cli.main import main
 
     every = case.every

@@ -6,8 +6,7 @@ from cases.case import Case, Size
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from tisim import Box, Cloud, Scene
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import FixedStep, Verlet
 
 
 def scene(design, seed):

@@ -5,9 +5,9 @@ import subprocess
 import time
 
 import pytest
-from cache_files import PIPE, worker
 
 from optimize.storage.cache import Cache, existing, verify
+from tests.optimize.cache_files import PIPE, worker
 
 QUICK = ("drift",)
 REAL = ("agglomeration", "--size", "small")

@@ -1,12 +1,12 @@
 import random
 
 import pytest
-from cache_files import PIPE, worker
-from fake_runs import FakeEvaluator, fake_problem
 
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache, verify
+from tests.optimize.cache_files import PIPE, worker
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 
 SETTINGS = Settings(seed=2, generations=4)
 

@@ -5,22 +5,22 @@ import random
 
 import numpy as np
 import pytest
-from fake_runs import FakeEvaluator, bowl, fake_problem
 
 from optimize.evaluation.ensemble import EnsembleSettings
 from optimize.evaluation.runs import start_seed
-from optimize.methods.breeding import Operator
+from optimize.methods.breeding import GeneticOperator
 from optimize.search import search
+from optimize.search_records import searches
 from optimize.settings import Settings
 from optimize.storage.cache import Cache, verify
-from optimize.storage.search_records import searches
-from tisim.errors import InputError, RunError
+from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
+from tisim import InputError, RunError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)  # a function without noise needs no averaging
 DEAP_OPTIONS = {
     "breeding": "deap",
-    "mate": Operator(name="cxSimulatedBinaryBounded", options={"eta": 10.0}),
-    "mutate": Operator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.3}),
+    "mate": GeneticOperator(name="cxSimulatedBinaryBounded", options={"eta": 10.0}),
+    "mutate": GeneticOperator(name="mutPolynomialBounded", options={"eta": 20.0, "indpb": 0.3}),
 }
 DEAP = {"options": DEAP_OPTIONS}
 
@@ -228,7 +228,7 @@ def test_best_designs_are_confirmed_from_starts_that_have_not_been_used(path):
 def test_unfit_operators_stop_it_before_anything_runs(path):
     evaluator = FakeEvaluator()
     with pytest.raises(InputError, match="fit for real-valued strings"):
-        run(path, evaluator, options={"breeding": "deap", "mate": Operator(name="cxOrdered")})
+        run(path, evaluator, options={"breeding": "deap", "mate": GeneticOperator(name="cxOrdered")})
     assert evaluator.ran == []
 
 

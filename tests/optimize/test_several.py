@@ -7,11 +7,10 @@ import zlib
 import h5py
 import numpy as np
 import pytest
-from fake_runs import FakeEvaluator, fake_problem, fake_record
 from matplotlib.image import imread
 
 from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.hall_of_fame import Hall, compromise
 from optimize.methods.individual import Individual
 from optimize.problem.objective import Objective
@@ -22,7 +21,8 @@ from optimize.storage import hdf5_store
 from optimize.storage.cache import Cache, compact, existing, verify
 from optimize.storage.journal import frame
 from optimize.storage.record import Record
-from tisim.errors import InputError
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
+from tisim import InputError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
 OBJECTIVES = (
@@ -96,7 +96,7 @@ def test_hall_of_one_objective_keeps_the_best_different_ones():
 
     def string(genes, cost):
         made = Individual(genes)
-        made.know((Estimate(cost, 0.0, 0.0, 4, True, "" if cost < 9 else "failed"),))
+        made.know((FitnessEstimate(cost, 0.0, 0.0, 4, True, "" if cost < 9 else "failed"),))
         return made
 
     assert hall.update([string([0.1], 3.0), string([0.1], 3.0), string([0.2], 2.0), string([0.3], 9.0)])

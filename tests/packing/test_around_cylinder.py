@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from tisim import Open, RandomAroundCylinder
-from tisim.errors import InputError
+from tisim import InputError, Open, RandomAroundCylinder
 
 CYLINDER = {
     "centre": (1.0, 2.0, 3.0),

@@ -17,6 +17,7 @@ from tisim import (
     Blast,
     Box,
     Cloud,
+    InputError,
     Lattice,
     Open,
     RandomAroundCylinder,
@@ -26,7 +27,6 @@ from tisim import (
     Scene,
 )
 from tisim.backend import runtime
-from tisim.errors import InputError
 
 BALL = dict(number=2000, radius=0.05, density=7000.0, placement=RandomInBall(radius=1.0, centre=(3.0, 0, 0)))
 """The blast of Z16 section 6.1, off the origin."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from tisim.errors import InputError
+from tisim import InputError
 from tisim.packing.random_sequential import SATURATION, sequential_addition
 from tisim.packing.region import box
 from tisim.packing.saturation import fill

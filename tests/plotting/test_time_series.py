@@ -11,8 +11,7 @@ from PIL import Image
 
 import tisim
 from tests.scenes import scene
-from tisim import Box, Recording
-from tisim.errors import InputError
+from tisim import Box, InputError, Recording
 from tisim.io.reader import Frames, frames
 from tisim.io.trajectory import Trajectory
 from tisim.plotting.movie import movie

@@ -83,7 +83,7 @@ def main() -> int:
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print the values and nothing else")
     options = parser.parse_args()
-    runtime.start(options.device, options.precision, options.threads)
+    runtime.init(options.device, options.precision, options.threads)
     values = measure()
     if options.json:
         print(json.dumps(values))

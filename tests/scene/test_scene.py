@@ -4,17 +4,10 @@ import numpy as np
 import pytest
 
 from tests.scenes import flow, scene
-from tisim import Box, Cloud, Particles, Scene
-from tisim.effects.base import Operator
-from tisim.effects.impact.agglomeration import Agglomeration
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import DeformationWork, Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.softening import Softening
-from tisim.errors import InputError
-from tisim.operators.cooling import Cooling
-from tisim.steppers.step_control import ApproachTime, FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim import Box, Cloud, InputError, Particles, Scene
+from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Softening
+from tisim.operators import Cooling, Operator
+from tisim.steppers import ApproachTime, FixedStep, Verlet
 
 
 def cloud(**changes):

@@ -23,13 +23,11 @@ import numpy as np
 from PIL import Image
 
 from tests.soak import damage
-from tisim import Box, Cloud, Scene, Simulation
+from tisim import Box, Cloud, RunError, Scene, Simulation
 from tisim.backend import runtime
-from tisim.cli import main
-from tisim.errors import RunError
+from tisim.cli import main as command_line
 from tisim.io.checkpoint import restore, save
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import FixedStep, Verlet
 
 FRAMES = 20
 SCENE = Scene(
@@ -80,7 +78,7 @@ class Bench:
         self.toml.write_text(SCENE.to_toml())
         self.whole = folder / "whole"
         # All else in the command is as it is.
-        main.Simulation = lambda scene: self.simulation  # type: ignore[assignment, misc]
+        command_line.Simulation = lambda scene: self.simulation  # type: ignore[assignment, misc]
         assert self.call("run", self.toml, "--frames", FRAMES, "--out", self.whole) == 0
         self.frames = damage._frames(self.whole / "trajectory.h5")
         self.result = damage._frames(self.whole / "result.h5")
@@ -92,7 +90,7 @@ class Bench:
         said = io.StringIO()
         try:
             with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-                main.main([str(word) for word in words])
+                command_line.main([str(word) for word in words])
         except SystemExit as left:
             if left.code not in (0, 1, 2):
                 raise Wrong("tracebacks", f"exit code {left.code}: {said.getvalue()}") from None
@@ -197,7 +195,7 @@ TRIALS = {"run": run, "checkpoint": checkpoint, "cost": cost, **{name: show(name
 
 def _part(rng: np.random.Generator, *files: Path) -> int:
     """A random part of what the largest of these files takes, bytes; now and then all of it."""
-    return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in storage))
+    return int(rng.uniform(0, 1.1) * max(file.stat().st_size for file in files))
 
 
 def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.Generator) -> tuple[str, str]:
@@ -216,7 +214,7 @@ def trial(bench: Bench, name: str, folder: Path, room: Callable, rng: np.random.
 
 def main() -> None:
     room, seed, first, last, folder = sys.argv[1], *map(int, sys.argv[2:5]), Path(sys.argv[5])
-    runtime.start()
+    runtime.init()
     bench = Bench(folder)
     for k in range(first, last):
         name = list(TRIALS)[k % len(TRIALS)]

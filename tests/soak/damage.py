@@ -46,7 +46,8 @@ def _still():
 
 def _trajectory(folder: Path) -> Path:
     from tests.files.test_growing_hdf5 import frame
-    from tisim.io.trajectory import Recording, Trajectory
+    from tisim import Recording
+    from tisim.io.trajectory import Trajectory
 
     with Trajectory(Recording(folder / "trajectory.h5", frames=9), [_still()]) as trajectory:
         for k in range(40):
@@ -56,7 +57,7 @@ def _trajectory(folder: Path) -> Path:
 
 def _result(folder: Path) -> Path:
     from tests.files.test_growing_hdf5 import frame
-    from tisim.engine.result import Result, Status
+    from tisim import Result, Status
     from tisim.io.run_folder import write_result
 
     start, end = frame(0).arrays, frame(1).arrays
@@ -115,8 +116,7 @@ def _study():
 
 
 def _cost(folder: Path) -> Path:
-    from tisim.accuracy import storage
-    from tisim.accuracy.row import Row
+    from tisim.accuracy import Row, storage
 
     study = _study()
     for k in range(20):
@@ -204,7 +204,7 @@ def damaged(content: bytes, rng: np.random.Generator) -> bytes:
 
 def verdict(kind: Kind, path: Path, whole: list[str] | None) -> tuple[str, object]:
     """What reading a file has come to: the name of a column of Counts or "", and what was read."""
-    from tisim.errors import InputError
+    from tisim import InputError
 
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
@@ -225,7 +225,7 @@ def _reader(pipe: Connection) -> None:
     """Makes and reads files as it is told, in a process of its own."""
     from tisim.backend import runtime
 
-    runtime.start(threads=1)
+    runtime.init(threads=1)
     while True:
         name, action, path, whole = pipe.recv()
         if action == "make":

@@ -10,11 +10,10 @@ from random import Random
 from tests import extremes
 from tests.judged import check_message, check_result
 from tests.soak.apart import Apart, Came
-from tisim import Scene, Simulation
+from tisim import InputError, Scene, Simulation
 from tisim.backend import runtime
 from tisim.engine.monitor import REASONS
-from tisim.errors import InputError
-from tisim.worlds.state import RUNNING
+from tisim.worlds.state import WorldStatus
 
 STEPS = 50
 """Of a run, at most."""
@@ -34,7 +33,7 @@ this seed as are accepted, or only compile it."""
 def runner() -> Callable[[Call], str]:
     """In a process of its own: what has come of a run, in which nothing was wrong."""
     warnings.simplefilter("error")
-    runtime.start(threads=1)
+    runtime.init(threads=1)
     compiled: dict[str, Simulation] = {}
 
     def run(call: Call) -> str:
@@ -63,7 +62,7 @@ def _ran(simulation: Simulation, name: str, values: Values) -> str:
     simulation.run(steps=STEPS)
     (result,) = simulation.results()
     check_result(result)
-    good = result.status.ok or result.status.reason == REASONS[RUNNING]
+    good = result.status.ok or result.status.reason == REASONS[WorldStatus.RUNNING]
     return RAN if good else FAILED
 
 

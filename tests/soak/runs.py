@@ -34,7 +34,7 @@ RUN = (
 def begin(folder: Path, *more: str) -> subprocess.Popen[str]:
     """A run that saves a checkpoint as often as it can."""
     return subprocess.Popen(
-        [sys.executable, "-c", "from tisim.cli import main; main()", *RUN, str(folder), *more],
+        [sys.executable, "-c", "from tisim.cli.main import main; main()", *RUN, str(folder), *more],
         env={**os.environ, "TISIM_CHECKPOINT_SECONDS": "0", "PYTHONPATH": str(ROOT)},
         cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

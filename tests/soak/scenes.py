@@ -13,8 +13,7 @@ from tests.judged import ACCEPTED, check_file, check_message, command, nothing_r
 from tests.soak.apart import Apart, Came
 from tests.soak.counts import Counts
 from tests.soak.running import RAN, REFUSED, Runs
-from tisim import Scene
-from tisim.errors import InputError
+from tisim import InputError, Scene
 
 TRIALS = 1000
 """Of each kind."""

@@ -5,7 +5,7 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds.parameter_table import Table, connect
+from tisim.worlds.parameter_table import ParameterTable, connect
 
 WORLDS = 4
 _bound: dict = {}
@@ -28,7 +28,7 @@ def fields(sources, points):
     """B, (worlds, n, 3), and dB_a/dr_c, (worlds, n, 3, 3), of one source for each world at its points."""
     key = (runtime.generation(), sources[0].structure())
     if key not in _bound:
-        table = Table(sources[:1], WORLDS, runtime.current().real)
+        table = ParameterTable(sources[:1], WORLDS, runtime.current().real)
         _bound[key] = table, table.bind(sources[0])
         connect([_bound[key][1]])
     table, source = _bound[key]

@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
+from tisim import InputError
 from tisim.backend import memory
 from tisim.backend.runtime import current
-from tisim.effects.external.lorentz import Lorentz
-from tisim.errors import InputError
-from tisim.sources.magnetic.sphere import MagneticSpheres, Sphere
-from tisim.sources.sample import sample
-from tisim.sources.uniform import ElectricField, MagneticField
+from tisim.effects import Lorentz
+from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Sphere, sample
 
 
 def test_sum_of_the_sources_of_one_quantity():

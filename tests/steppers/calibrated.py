@@ -16,18 +16,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from tests.scenes import scene, simulate
-from tisim.effects.external.drag import StokesDrag
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.external.tether import Tether
-from tisim.effects.pair.near_field import NearField
-from tisim.engine.result import Result
-from tisim.sources.flow import UniformFlow
-from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.steppers.base import Stepper
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim import Result
+from tisim.effects import Lorentz, NearField, StokesDrag, Tether
+from tisim.sources import ElectricField, MagneticField, UniformFlow
+from tisim.steppers import Collocation, ErrorControl, StageControl, Stepper, Trapezoid
 
 TURN = 2 * np.pi
 """rad/s: one turn or vibration a second."""

@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tests.scenes import scene
-from tisim.effects.external.lorentz import Lorentz
-from tisim.effects.external.tether import Tether
-from tisim.sources.uniform import ElectricField, MagneticField
-from tisim.steppers.boris import Boris
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
+from tisim.effects import Lorentz, Tether
+from tisim.sources import ElectricField, MagneticField
+from tisim.steppers import Boris, ErrorControl, FixedStep, IterationControl, Trapezoid
 
 
 def equal_steps(dt, phi=0.5, tolerance=1e-13, **more):

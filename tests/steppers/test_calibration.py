@@ -17,10 +17,8 @@ from tests.steppers.calibrated import (
 from tests.steppers.charged import order
 from tisim import Box, Scene
 from tisim.io.checkpoint import restore, save
+from tisim.steppers import ErrorControl, StageControl, Trapezoid
 from tisim.steppers.implicit.lobatto import leading
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
 
 ASKED = 10.0 ** -np.arange(2, 6)
 FORGETS = "drag in a flow"

@@ -9,9 +9,8 @@ from tests.scenes import scene, simulate
 from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import Scene
 from tisim.backend.taichi import ti
-from tisim.effects.base import parameter
-from tisim.steppers.base import Stepper
-from tisim.steppers.step_control import Controller
+from tisim.effects import parameter
+from tisim.steppers import Controller, Stepper
 from tisim.worlds.program import PerParticle, Phase, Repeat
 from tisim.worlds.state import Field
 
@@ -89,12 +88,12 @@ class Iteration(Repeat):
 class Implicit(Stepper):
     """Trapezoidal rule by fixed-point iteration."""
 
-    counts = ("corrections",)
-    keeps = ("unsolved", "largest_change")
+    counters = ("corrections",)
+    world_quantities = ("unsolved", "largest_change")
     control: Controller
     tolerance: float = parameter("m", 1e-14, gt=0)
 
-    def needs(self, turning, independent):
+    def fields(self, turning, independent):
         return (
             Field("position_before", "m", 3, "keep"),
             Field("velocity_before", "m/s", 3, "keep"),

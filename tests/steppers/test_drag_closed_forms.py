@@ -6,7 +6,7 @@ import pytest
 from cases.charged_closed_forms import quadratic_drag, stokes_drag
 from tests.scenes import scene, simulate
 from tests.steppers.charged import boris, equal_steps, order
-from tisim.effects.external.drag import ConstantDrag, StokesDrag
+from tisim.effects import ConstantDrag, StokesDrag
 
 DURATION, RHO = 2.0, 900.0
 """s, and density of the spheres, kg/m^3."""

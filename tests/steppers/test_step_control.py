@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import HEAT_CAPACITY, RADIUS, by_id, check_sums, compiled, fixed, scene, simulate
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Heating, Impact
+from tisim.steppers import Verlet
 
 
 def run(scenes):

@@ -4,15 +4,19 @@ import pytest
 
 from tests.scenes import fixed, scene
 from tests.steppers.test_straight_lines import straight
-from tisim import Scene
-from tisim.errors import InputError
-from tisim.steppers.brownian.drift_limit import DriftLimit
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import LEAST, ApproachTime, FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim import InputError, Scene
+from tisim.steppers import (
+    ApproachTime,
+    Collocation,
+    DriftLimit,
+    ErrorControl,
+    FixedStep,
+    IterationControl,
+    StageControl,
+    Trapezoid,
+    Verlet,
+)
+from tisim.steppers.step_control import SHORTEST_STEP
 
 ORIGIN = [[0.0, 0.0, 0.0]]
 
@@ -60,7 +64,7 @@ def test_no_step_is_shorter_than_any_time_that_numbers_can_square(control):
     """1e-300 s of any limit of a step."""
     for name in {"dt", "first", "longest", "shortest"} & set(control.model_fields):
         needed = {"longest": 1.0} if control is DriftLimit else {}
-        with pytest.raises(InputError, match=f"{name} must be at least {LEAST}; received 1e-300"):
+        with pytest.raises(InputError, match=f"{name} must be at least {SHORTEST_STEP}; received 1e-300"):
             control(**{**needed, name: 1e-300})
 
 

@@ -4,21 +4,25 @@ import numpy as np
 import pytest
 
 from tests.scenes import compiled, scene, simulate
-from tisim import Particles, Scene
+from tisim import Particles, Recording, Scene
 from tisim.backend import runtime
-from tisim.effects.pair.near_field import NearField
+from tisim.effects import NearField
 from tisim.io.reader import frames
-from tisim.io.trajectory import Recording, Trajectory
-from tisim.sources.flow import UniformFlow
-from tisim.steppers.boris import Boris
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import ApproachTime, FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim.io.trajectory import Trajectory
+from tisim.sources import UniformFlow
+from tisim.steppers import (
+    ApproachTime,
+    Boris,
+    Brownian,
+    Collocation,
+    DriftLimit,
+    ErrorControl,
+    FixedStep,
+    IterationControl,
+    StageControl,
+    Trapezoid,
+    Verlet,
+)
 
 PARTICLES = 9
 """One more than go together on a CPU."""

@@ -1,7 +1,5 @@
 """What accuracy costs in time, for any scene."""
 
-from tisim.accuracy.quantity import Quantity
-from tisim.accuracy.row import Row
-from tisim.accuracy.study import Study, study
+import lazy_loader
 
-__all__ = ["Quantity", "Row", "Study", "study"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

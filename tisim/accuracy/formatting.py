@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from tisim.components import serialization
-from tisim.components.component import Spec
+from tisim.components.component import Component
 from tisim.scene.scene import Scene
 
 
-def given(part: Spec) -> dict[str, Any]:
+def given(part: Component) -> dict[str, Any]:
     """The settings of a part that are not at their defaults, by name."""
     return {
         name: getattr(part, name)
@@ -20,10 +20,10 @@ def given(part: Spec) -> dict[str, Any]:
     }
 
 
-def expression(part: Spec) -> str:
+def expression(part: Component) -> str:
     """A part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
     arguments = (
-        f"{name}={expression(value) if isinstance(value, Spec) else repr(value)}"
+        f"{name}={expression(value) if isinstance(value, Component) else repr(value)}"
         for name, value in given(part).items()
     )
     return f"{type(part).__name__}({', '.join(arguments)})"
@@ -46,19 +46,19 @@ def pasted(words: list[str]) -> str:
     return shlex.join(words)
 
 
-def _differences(old: Spec | None, new: Spec, path: str) -> Iterator[tuple[str, str]]:
+def _differences(old: Component | None, new: Component, path: str) -> Iterator[tuple[str, str]]:
     """Dotted key and TOML of all that is new; a part of another kind as a whole."""
     if type(old) is not type(new):
         yield path, serialization.inline(_table(new, named=not path.startswith("effects.")))
         return
     for name in type(new).model_fields:
         before, value = getattr(old, name), getattr(new, name)
-        if before != value and isinstance(value, Spec):
+        if before != value and isinstance(value, Component):
             yield from _differences(before, value, f"{path}.{name}")
         elif before != value:
             yield f"{path}.{name}", serialization.inline(value)
 
 
-def _table(part: Spec, named: bool = True) -> dict[str, Any]:
-    table = {name: _table(v) if isinstance(v, Spec) else v for name, v in given(part).items()}
+def _table(part: Component, named: bool = True) -> dict[str, Any]:
+    table = {name: _table(v) if isinstance(v, Component) else v for name, v in given(part).items()}
     return {"kind": part.kind(), **table} if named else table

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
+from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row, decades
-from tisim.accuracy.study import Study
 from tisim.files.atomic import replace_file
 from tisim.plotting.style import empty, plain
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tisim.effects.base import Operator, PairEvent
+from tisim.effects.base import PairEvent
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.numerics.statistics import half_width
+from tisim.operators.base import Operator
 from tisim.scene.scene import Scene
 
 Value = Callable[[Result], "np.ndarray | float"]
@@ -44,29 +45,29 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class QuantityEstimate:
     """A value, and how far it may be off: half the width of its 95 % interval, or a bound; 0 if exact."""
 
     value: np.ndarray
     uncertainty: float = 0.0
 
-    def error(self, truth: Estimate, size: float) -> tuple[float, float]:
+    def error(self, truth: QuantityEstimate, size: float) -> tuple[float, float]:
         """Distance from the truth relative to ``size``, and how far that may be off."""
         off = float(np.linalg.norm(self.value - truth.value))
         return off / size, float(np.hypot(self.uncertainty, truth.uncertainty)) / size
 
 
-def estimate(quantity: Quantity, results: Sequence[Result]) -> Estimate:
+def estimate(quantity: Quantity, results: Sequence[Result]) -> QuantityEstimate:
     """Of one result, or the mean over those of random starts."""
     values = np.array([np.ravel(np.asarray(quantity.value(result))) for result in results])
     if not quantity.random:
-        return Estimate(values[0])
+        return QuantityEstimate(values[0])
     return mean(values)
 
 
-def mean(values: np.ndarray) -> Estimate:
+def mean(values: np.ndarray) -> QuantityEstimate:
     """Mean over the first axis and its interval by Student's t; values of shape (n, components), n > 1."""
-    return Estimate(values.mean(axis=0), float(np.linalg.norm(half_width(values))))
+    return QuantityEstimate(values.mean(axis=0), float(np.linalg.norm(half_width(values))))
 
 
 def displacement(result: Result) -> np.ndarray:

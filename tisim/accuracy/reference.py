@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tisim.accuracy.quantity import Estimate, Quantity, estimate
-from tisim.accuracy.sweep import Method, finest
+from tisim.accuracy.quantity import Quantity, QuantityEstimate, estimate
+from tisim.accuracy.sweep import SettingSweep, finest
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.scene import Scene
@@ -30,7 +30,7 @@ class Truth:
     """The true value of a quantity; ``source`` says where it is from. size : what errors are relative to, in
     the unit of the quantity."""
 
-    estimate: Estimate
+    estimate: QuantityEstimate
     source: str
     size: float
 
@@ -41,10 +41,10 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Attempt:
+class ReferenceRun:
     """A run that a truth is made of: a method, and the decades of error that it is turned by."""
 
-    method: Method
+    method: SettingSweep
     decades: float
 
     @property
@@ -59,31 +59,31 @@ class Attempt:
         return f"{type(stepper).__name__}, {type(stepper.control).__name__}"
 
 
-def attempts(methods: Sequence[Method], level: float) -> list[Attempt]:
+def attempts(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun]:
     """The reference, itself a decade short, and another stepper at both, where there is one.
 
     level : that of the finest settings of the methods. InputError when none of them converges.
     """
     able = [m for m in methods if m.converges and all(s.precision == "f64" for s in m.settings)]
-    must(bool(able), "stepper", "one with a knob that its error vanishes with", "none")
+    must(bool(able), "stepper", "one with an accuracy parameter that its error vanishes with", "none")
     best = max(able, key=lambda method: method.base.stepper.order)
     others = [
         m for m in able if type(m.base.stepper) is not type(best.base.stepper) and m.base.stepper.order > 1
     ]
     tight = level - TIGHTER
-    return [Attempt(m, level) for m in (best, *others[:1]) for level in (tight, tight + 1)]
+    return [ReferenceRun(m, level) for m in (best, *others[:1]) for level in (tight, tight + 1)]
 
 
 def closed_form(quantity: Quantity, result: Result, largest: float = 0.0) -> Truth:
     """The truth for the scene of a result. largest : |value| on the way."""
     assert quantity.exact is not None
     return _truth(
-        quantity, Estimate(np.ravel(np.asarray(quantity.exact(result)))), "its closed form", largest
+        quantity, QuantityEstimate(np.ravel(np.asarray(quantity.exact(result)))), "its closed form", largest
     )
 
 
 def compared(
-    quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequence[Attempt], largest: float = 0.0
+    quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequence[ReferenceRun], largest: float = 0.0
 ) -> Truth:
     """The truth from the runs of a reference and its checks. largest : |value| on the way."""
     best, short, *other = (estimate(quantity, results) for results in runs)
@@ -94,10 +94,10 @@ def compared(
     source = f"{made[0].name} at {made[0].decades:+g} decades of error, checked by itself"
     source += "".join(f" and by {attempt.name}" for attempt in made[2:3])
     # What the stepper does to every start, and what so few starts leave open.
-    return _truth(quantity, Estimate(best.value, off + best.uncertainty), source, largest)
+    return _truth(quantity, QuantityEstimate(best.value, off + best.uncertainty), source, largest)
 
 
-def _truth(quantity: Quantity, found: Estimate, source: str, largest: float) -> Truth:
+def _truth(quantity: Quantity, found: QuantityEstimate, source: str, largest: float) -> Truth:
     """InputError where there is nothing that an error could be relative to."""
     size = float(np.linalg.norm(found.value))
     if quantity.returns:
@@ -107,5 +107,5 @@ def _truth(quantity: Quantity, found: Estimate, source: str, largest: float) -> 
     return Truth(found, source, size)
 
 
-def _distance(one: Estimate, other: Estimate) -> float:
+def _distance(one: QuantityEstimate, other: QuantityEstimate) -> float:
     return float(np.linalg.norm(one.value - other.value))

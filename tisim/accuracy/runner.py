@@ -17,7 +17,7 @@ from tisim.accuracy import reference
 from tisim.accuracy.formatting import expression, options, pasted
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.row import Row
-from tisim.accuracy.sweep import Method, Setting, ensembles, in_steps_of_at_most, methods
+from tisim.accuracy.sweep import Setting, SettingSweep, ensembles, in_steps_of_at_most, methods
 from tisim.accuracy.timing import LOOKS, Bench, Limit, Look, OutOfTime, Timed
 from tisim.backend import runtime
 from tisim.components.accuracy_parameter import three_digits
@@ -26,7 +26,7 @@ from tisim.errors import InputError, RunError, must
 from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from tisim.accuracy.study import Study
+    from tisim.accuracy.cost_study import Study
 
 Progress = Callable[[float, str], None]
 """Called with the fraction of the study that is done, 0..1, and what is being run."""
@@ -47,7 +47,7 @@ class Run:
     def all(self) -> None:
         study = self.study
         where = runtime.current()
-        runtime.start(where.device, "f64", where.threads)
+        runtime.init(where.device, "f64", where.threads)
         base = self._run([study.scene], 0.0)
         found = self._methods(base)
         self.base = base.seconds
@@ -63,7 +63,7 @@ class Run:
         for precision in study.precisions:
             if runtime.current().precision != precision:
                 self.bench.close()
-                runtime.start(where.device, precision, where.threads)
+                runtime.init(where.device, precision, where.threads)
             for items in plan:
                 self._round([(m, k) for m, k in items if m.settings[k].precision == precision])
         self._compare_laws(found)
@@ -71,7 +71,7 @@ class Run:
         study.complete = all((m.name, setting.words) in known for m in found for setting in m.settings)
         self.bench.close()
 
-    def _methods(self, base: Timed) -> list[Method]:
+    def _methods(self, base: Timed) -> list[SettingSweep]:
         study, result = self.study, base.results[0]
         ends = (result.start["position"], result.state["position"])
         extent = max(float(np.linalg.norm(r.max(axis=0) - r.min(axis=0))) for r in ends)
@@ -79,14 +79,19 @@ class Run:
         found = methods(study.scene, dt, extent, study.levels, study.precisions, study.starts[-1])
         return [ensembles(study.scene, study.starts), *found] if study.random else found
 
-    def _cost(self, method: Method, k: int) -> float:
+    def _cost(self, method: SettingSweep, k: int) -> float:
         """Guess of the seconds that a setting takes, all repeats, from another of its method if known."""
         weights, repeats = method.weights, self.study.repeats
         guesses = dict(zip((setting.words for setting in method.settings), weights, strict=True))
         for row in self.study.line(method.name):
             if row.seconds and row.setting in guesses:
                 return repeats * row.median * weights[k] / guesses[row.setting]
-        return repeats * self.base * method.settings[k].starts * (weights[k] if method.knob else 1.0)
+        return (
+            repeats
+            * self.base
+            * method.settings[k].starts
+            * (weights[k] if method.accuracy_parameter else 1.0)
+        )
 
     def _largest(self) -> list[float]:
         """How large each quantity has been on the way, in steps that no look has to wait for; 0 where nobody
@@ -103,7 +108,7 @@ class Run:
             self._run([often], self.base, look=look)
         return largest
 
-    def _truths(self, base: Timed, found: Sequence[Method], rest: float) -> None:
+    def _truths(self, base: Timed, found: Sequence[SettingSweep], rest: float) -> None:
         """The true values, where they are not known yet. rest : seconds planned for all that follows."""
         study, self.planned = self.study, rest
         if study.truths:
@@ -140,7 +145,7 @@ class Run:
             [scene.model_copy(update={"seed": seed + k}) for k in range(n)] if self.study.random else [scene]
         )
 
-    def _round(self, items: Sequence[tuple[Method, int]]) -> None:
+    def _round(self, items: Sequence[tuple[SettingSweep, int]]) -> None:
         """Settings of one level, repeats in turns; then their rows."""
         runs: dict[int, list[Timed]] = {at: [] for at in range(len(items))}
         failed: dict[int, str] = {}
@@ -166,7 +171,7 @@ class Run:
                 if runs[at] or at in failed:
                     self._row(method, k, runs[at], failed.get(at, ""))
 
-    def _compare_laws(self, found: Sequence[Method]) -> None:
+    def _compare_laws(self, found: Sequence[SettingSweep]) -> None:
         """Cheaper laws that make the same errors as the law they stand for are no laws of their own."""
         rows = {row.key: row for row in self.study.rows}
         stands_for = {(m.name, s.words): m.exact for m in found for s in m.settings if m.exact}
@@ -200,7 +205,7 @@ class Run:
         self.done = begun + cost
         return timed
 
-    def _row(self, method: Method, k: int, runs: Sequence[Timed], failed: str) -> None:
+    def _row(self, method: SettingSweep, k: int, runs: Sequence[Timed], failed: str) -> None:
         study, setting = self.study, method.settings[k]
         row = Row(
             method.name, setting.words, self._python(setting),

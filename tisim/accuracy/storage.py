@@ -20,10 +20,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tisim.accuracy.quantity import Estimate
+from tisim.accuracy.cost_study import Study
+from tisim.accuracy.quantity import QuantityEstimate
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
-from tisim.accuracy.study import Study
 from tisim.backend import runtime
 from tisim.errors import must
 from tisim.files import checksum, lock, regular_file
@@ -134,7 +134,7 @@ def _truths(group: Any, study: Study) -> tuple[Truth, ...]:
         return ()
     return tuple(
         Truth(
-            Estimate(group[q.name][()], float(group[q.name].attrs["uncertainty"])),
+            QuantityEstimate(group[q.name][()], float(group[q.name].attrs["uncertainty"])),
             str(group[q.name].attrs["source"]),
             float(group[q.name].attrs["size"]),
         )

@@ -9,8 +9,8 @@ from typing import Any
 from tisim import steppers
 from tisim.accuracy.formatting import given
 from tisim.components import serialization
-from tisim.components.accuracy_parameter import Knob
-from tisim.components.component import Spec, unit_of
+from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.component import Component, unit_of
 from tisim.errors import InputError
 from tisim.scene.scene import Scene
 from tisim.steppers.base import Stepper
@@ -27,12 +27,12 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Method:
+class SettingSweep:
     """A line in the picture: settings of one kind, the cheapest first.
 
-    weights : guesses of how their times go. knob : the one that is turned, of the part at ``path``; None for
-    a list of laws or of numbers of starts. exact : method and setting that such laws differ from in the law
-    only; None for all else.
+    weights : guesses of how their times go. accuracy_parameter : the one that is turned, of the part at
+    ``path``; None for a list of laws or of numbers of starts. exact : method and setting that such laws
+    differ from in the law only; None for all else.
     """
 
     name: str
@@ -40,21 +40,23 @@ class Method:
     weights: tuple[float, ...]
     base: Scene
     path: str = ""
-    knob: Knob | None = None
+    accuracy_parameter: AccuracyParameter | None = None
     exact: tuple[str, str] | None = None
 
     @property
     def converges(self) -> bool:
         """Whether the error of the stepper vanishes along this line."""
-        return self.knob is not None and self.knob.converges and self.path.startswith("stepper")
+        known = self.accuracy_parameter
+        return known is not None and known.converges and self.path.startswith("stepper")
 
     def at(self, decades: float) -> Scene:
-        """The scene with the knob turned to an error so many decades larger than at its base."""
-        assert self.knob is not None
-        return turned(self.base, self.path, self.knob, decades)
+        """The scene with the accuracy parameter turned to an error so many decades larger than at its
+        base."""
+        assert self.accuracy_parameter is not None
+        return turned(self.base, self.path, self.accuracy_parameter, decades)
 
 
-def parts(scene: Scene) -> Iterator[tuple[str, Spec]]:
+def parts(scene: Scene) -> Iterator[tuple[str, Component]]:
     """Every part of a scene with its dotted place, as in its TOML file."""
     for effect in scene.effects:
         yield from _within(f"effects.{effect.kind()}", effect)
@@ -62,14 +64,14 @@ def parts(scene: Scene) -> Iterator[tuple[str, Spec]]:
         yield from _within(name, getattr(scene, name))
 
 
-def _within(path: str, part: Spec) -> Iterator[tuple[str, Spec]]:
+def _within(path: str, part: Component) -> Iterator[tuple[str, Component]]:
     yield path, part
     for name in type(part).model_fields:
-        if isinstance(inner := getattr(part, name), Spec):
+        if isinstance(inner := getattr(part, name), Component):
             yield from _within(f"{path}.{name}", inner)
 
 
-def exchanged(scene: Scene, path: str, part: Spec) -> Scene:
+def exchanged(scene: Scene, path: str, part: Component) -> Scene:
     """A copy of a scene with another part in this place."""
     first, *rest = path.split(".")
     if first == "effects":
@@ -80,15 +82,15 @@ def exchanged(scene: Scene, path: str, part: Spec) -> Scene:
     return scene.model_copy(update={first: _put(getattr(scene, first), rest, part)})
 
 
-def _put(part: Any, path: Sequence[str], new: Spec) -> Any:
+def _put(part: Any, path: Sequence[str], new: Component) -> Any:
     if not path:
         return new
     return part.model_copy(update={path[0]: _put(getattr(part, path[0]), path[1:], new)})
 
 
-def turned(scene: Scene, path: str, knob: Knob, decades: float) -> Scene:
-    """A copy with a knob of the part at ``path`` turned; InputError where the part refuses."""
-    return exchanged(scene, path, knob.turned(dict(parts(scene))[path], decades))
+def turned(scene: Scene, path: str, accuracy_parameter: AccuracyParameter, decades: float) -> Scene:
+    """A copy with an accuracy parameter of the part at ``path`` turned; InputError where the part refuses."""
+    return exchanged(scene, path, accuracy_parameter.turned(dict(parts(scene))[path], decades))
 
 
 def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
@@ -100,31 +102,35 @@ def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
 
 
 def finest(scene: Scene, decades: float) -> Scene:
-    """A copy with every knob of its effects turned, so that they cannot hide the error of the stepper."""
+    """A copy with every accuracy parameter of its effects turned, so that they cannot hide the error of the
+    stepper."""
     for path, part in list(parts(scene)):
-        for knob in part.knobs:
-            if knob.converges and not path.startswith("stepper"):
-                scene = turned(scene, path, knob, decades)
+        for accuracy_parameter in part.accuracy_parameters:
+            if accuracy_parameter.converges and not path.startswith("stepper"):
+                scene = turned(scene, path, accuracy_parameter, decades)
     return scene
 
 
 def methods(
     scene: Scene, dt: float, extent: float, levels: Sequence[float], precisions: Sequence[str], starts: int
-) -> list[Method]:
+) -> list[SettingSweep]:
     """All methods for a scene with steps of about dt (s) and particles up to ``extent`` (m) apart.
 
-    levels : decades of error, relative to what the scene asks for, at which knobs are turned to. The first
-    method is the scene's own stepper. starts : random starts of each run.
+    levels : decades of error, relative to what the scene asks for, that accuracy parameters are turned to.
+    The first method is the scene's own stepper. starts : random starts of each run.
     """
     found = []
     own = sorted(parts(scene), key=lambda item: not item[0].startswith("stepper"))
     for path, part in own:
-        found += [_turning(scene, path, knob, levels, "f64", starts) for knob in part.knobs]
+        found += [
+            _turning(scene, path, accuracy_parameter, levels, "f64", starts)
+            for accuracy_parameter in part.accuracy_parameters
+        ]
     if found:
         first = found[0]
         for precision in precisions:
-            if precision != "f64" and first.knob:
-                found.append(_turning(scene, first.path, first.knob, levels, precision, starts))
+            if precision != "f64" and first.accuracy_parameter:
+                found.append(_turning(scene, first.path, first.accuracy_parameter, levels, precision, starts))
     for effect in scene.effects:
         laws = effect.approximations(extent)
         if laws:
@@ -135,14 +141,18 @@ def methods(
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in _within("stepper", stepper):
-            found += [_turning(other, path, k, levels, "f64", starts) for k in part.knobs if k.converges]
+            found += [
+                _turning(other, path, k, levels, "f64", starts)
+                for k in part.accuracy_parameters
+                if k.converges
+            ]
     return [method for method in found if method.settings]
 
 
-def ensembles(scene: Scene, sizes: Sequence[int]) -> Method:
+def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
     """The scene as it is, from more and more random starts."""
     settings = tuple(Setting(scene, f"{n} starts", starts=n) for n in sizes)
-    return Method("random starts", settings, tuple(n / sizes[0] for n in sizes), scene)
+    return SettingSweep("random starts", settings, tuple(n / sizes[0] for n in sizes), scene)
 
 
 def _steppers(scene: Scene, dt: float) -> list[Stepper]:
@@ -165,26 +175,31 @@ def _kind(stepper: Stepper) -> tuple[Any, ...]:
 
 
 def _turning(
-    scene: Scene, path: str, knob: Knob, levels: Sequence[float], precision: str, starts: int
-) -> Method:
+    scene: Scene,
+    path: str,
+    accuracy_parameter: AccuracyParameter,
+    levels: Sequence[float],
+    precision: str,
+    starts: int,
+) -> SettingSweep:
     settings, weights = [], []
     for decades in levels:
         try:
-            changed = turned(scene, path, knob, decades)
+            changed = turned(scene, path, accuracy_parameter, decades)
         except InputError:
             continue  # The part cannot be set so: a shortest step above the longest, for one.
         part = dict(parts(changed))[path]
-        words = ", ".join(f"{name}={getattr(part, name):.3g}" for name in knob.orders)
+        words = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
         settings.append(Setting(changed, words, precision, starts))
         weights.append(10.0 ** (-decades / scene.stepper.order) if path.startswith("stepper") else 1.0)
-    name = f"{_title(scene, path)}: {', '.join(knob.orders)}"
+    name = f"{_title(scene, path)}: {', '.join(accuracy_parameter.orders)}"
     name += "" if precision == "f64" else f", {precision}"
-    return Method(name, tuple(settings), tuple(weights), scene, path, knob)
+    return SettingSweep(name, tuple(settings), tuple(weights), scene, path, accuracy_parameter)
 
 
 def _laws(
-    scene: Scene, kind: str, laws: Sequence[Spec], starts: int, exact: tuple[str, str] | None
-) -> Method:
+    scene: Scene, kind: str, laws: Sequence[Component], starts: int, exact: tuple[str, str] | None
+) -> SettingSweep:
     own = next(effect for effect in scene.effects if effect.kind() == kind)
     settings = []
     for law in laws:
@@ -196,7 +211,7 @@ def _laws(
         words = ", ".join(differ) or type(law).__name__
         settings.append(Setting(exchanged(scene, f"effects.{kind}", law), words, starts=starts))
     name = type(laws[0]).__name__
-    return Method(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
+    return SettingSweep(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
 
 
 def _title(scene: Scene, path: str) -> str:

@@ -6,8 +6,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row
-from tisim.accuracy.study import Study
 
 
 def table(study: Study) -> RenderableType:

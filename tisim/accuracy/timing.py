@@ -60,9 +60,9 @@ def watched(simulation: Simulation, look: Look) -> None:
             look(result)
             # Later than now by all means: a world that waits for what has been would wait for ever.
             due = float(times[np.searchsorted(times, result.time, side="right")])
-            hold = simulation.s.read("hold")
+            hold = simulation.s.read("pause_time")
             hold[0] = due
-            simulation.s.write("hold", hold)
+            simulation.s.write("pause_time", hold)
 
     simulation.look = arrived
     arrived()

@@ -1,1 +1,5 @@
 """What positions of particles say about their arrangement, in NumPy."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -68,7 +68,7 @@ def _pairs(
 
 def pair_rate() -> float:
     """Pairs per second of a 1/r^2 force between all pairs: f64, one core, the running backend."""
-    runtime.start("cpu", "f64", 1)
+    runtime.init("cpu", "f64", 1)
     x, y, z = np.random.Generator(np.random.Philox(1)).random((3, PARTICLES))
     f = np.zeros(PARTICLES)
     _pairs(x, y, z, f, PARTICLES)
@@ -84,7 +84,7 @@ def rate_of(backend: str) -> float | None:
     """The same for any backend, in a process of its own; None where it is not installed or fails."""
     if importlib.util.find_spec(backend) is None:
         return None
-    command = [sys.executable, "-c", "from tisim.doctor import pair_rate; print(pair_rate())"]
+    command = [sys.executable, "-c", "from tisim.backend.diagnostics import pair_rate; print(pair_rate())"]
     found = subprocess.run(
         command, env={**os.environ, "TISIM_BACKEND": backend}, capture_output=True, text=True, check=False
     )

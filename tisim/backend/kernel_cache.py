@@ -27,7 +27,7 @@ LOCKS = {
     "quadrants": ("QD_OFFLINE_CACHE_FILE_PATH", "kernel_compilation_manager/qdcache.lock"),
 }
 """The variable that names another folder, and the lock in it."""
-QUEUE = "tisim.files.lock"
+QUEUE = "tisim.lock"
 """The file that processes of tisim queue at, in the same folder: the system frees it when one dies."""
 
 

@@ -73,7 +73,7 @@ def memory() -> int:
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
-def start(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
+def init(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
     """Start Taichi with these settings, or keep it as it is when they have not changed.
 
     threads : CPU threads; 0 for all cores.
@@ -135,7 +135,7 @@ def restart() -> None:
 
 def current() -> Runtime:
     """The running settings; starts the defaults (cpu, f64, all cores) on first use."""
-    return _current or start()
+    return _current or init()
 
 
 def generation() -> int:

@@ -71,7 +71,7 @@ def cost(
     from tisim.accuracy.plot import save
 
     must(error is None or error > 0, "--error", "greater than 0", error)
-    runtime.start(device, "f64", threads)
+    runtime.init(device, "f64", threads)
     name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
     study = Study(
         scene,

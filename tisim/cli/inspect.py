@@ -71,7 +71,7 @@ def figures(
     found.size(chosen)
     if found.figures is None:
         raise InputError(f"case must be one with figures; received {case!r}")
-    runtime.start(device, precision, threads)
+    runtime.init(device, precision, threads)
     place = folder or Path("out") / f"{case}-figures"
     ownership.check_all(place, overwrite)
     ownership.take(place, (lock.LOCK,), overwrite)

@@ -12,7 +12,6 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from tisim import __version__
 from tisim.backend import runtime
 from tisim.backend.taichi import check_backend
 from tisim.cli import cost, inspect, scene_arguments, search
@@ -37,6 +36,7 @@ from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError
 from tisim.files import regular_file
 from tisim.interrupt import Interrupt, exit_code, handled, stop
+from tisim.version import __version__
 
 UsageError: Any = typer.BadParameter.__base__
 """What typer raises for words that no command knows."""
@@ -105,7 +105,7 @@ def run(
     from tisim.io.trajectory import asked, recorded
 
     scene_arguments.checkpoint_seconds()
-    runtime.start(device, precision, threads)
+    runtime.init(device, precision, threads)
     name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
     place = run_folder.Folder(folder or Path("out") / name)
     place.check(overwrite, resume)
@@ -218,7 +218,7 @@ def explain(
     """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
     from tisim.engine.explain import explain, render
 
-    runtime.start(device, precision)
+    runtime.init(device, precision)
     _, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
     with err().status("compiling"):
         explanation = explain(scene)
@@ -231,7 +231,7 @@ def check(case: CaseName, device: Device = "cpu", precision: Precision = "f64", 
     from cases.case import find
 
     checks = find(case).check()
-    runtime.start(device, precision, threads)
+    runtime.init(device, precision, threads)
     table = plain_table("check", "measured", "expected", "off by", "allowed", "")
     failed = 0
     with err().status("checking") as status:

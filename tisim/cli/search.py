@@ -56,9 +56,9 @@ def optimize(
     """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
     from cases.case import inverse
     from optimize.evaluation.executors import made
+    from optimize.search_folder import FILE, clear
     from optimize.session import session
     from optimize.settings import Settings, fit, followed, proposed
-    from optimize.storage.folder import FILE, clear
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
     problem, usual = inverse(case, size or "default", variant)
@@ -151,8 +151,8 @@ def cache(
     compact: Annotated[bool, typer.Option("--compact", help="Drop what is damaged or double.")] = False,
 ) -> None:
     """List the evaluations in a search's file; verify or compact it."""
+    from optimize.report.cache_summary import listing
     from optimize.storage import cache as store
-    from optimize.storage.summary import listing
 
     if compact:
         print(f"{store.compact(file)} evaluations kept")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from tisim.components.component import Spec
+    from tisim.components.component import Component
 
 
 def three_digits(value: float) -> float:
@@ -13,14 +13,15 @@ def three_digits(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-Part = TypeVar("Part", bound="Spec")
+Part = TypeVar("Part", bound="Component")
 
 
-class Knob:
+class AccuracyParameter:
     """Settings of a part that together ask for an error, each with its order.
 
-    ``Knob(error=1)``; ``Knob(dt=2)``: the error goes as dt^2; ``Knob(longest=2, tolerance=1)``: two settings
-    turned together. A part lists its own in ``knobs``, and ``tisim cost`` turns them.
+    ``AccuracyParameter(error=1)``; ``AccuracyParameter(dt=2)``: the error goes as dt^2;
+    ``AccuracyParameter(longest=2, tolerance=1)``: two settings turned together. A part lists its own in
+    ``accuracy_parameters``, and ``tisim cost`` turns them.
 
     converges : whether the error that the part makes vanishes with it; not so where a setting that is not
         turned bounds it too.

@@ -1,6 +1,6 @@
 """Validated plain data: the parts of a scene, their units, and their names in files.
 
-A ``Spec`` is a frozen pydantic model. Its name in a file is its class name in snake_case
+A ``Component`` is a frozen pydantic model. Its name in a file is its class name in snake_case
 (``StokesDrag`` is ``stokes_drag``), found by walking subclasses: nothing is registered anywhere.
 """
 
@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from tisim.backend.taichi import DEVICE_FUNCTION
-from tisim.components.accuracy_parameter import Knob
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.ranges import WHOLE, check_magnitude
 from tisim.errors import InputError, must, named, shown
 
@@ -55,7 +55,7 @@ class Checked(BaseModel):
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
 
-class Spec(Checked):
+class Component(Checked):
     """A part of a scene."""
 
     model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
@@ -94,12 +94,12 @@ class Spec(Checked):
                 yield name, info, 3
 
     @classmethod
-    def lists(cls) -> Iterator[tuple[str, type[Spec]]]:
+    def lists(cls) -> Iterator[tuple[str, type[Component]]]:
         """Name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a world may
         have any number of them."""
         for name, info in cls.model_fields.items():
             row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
-            if rest == [...] and isinstance(row, type) and issubclass(row, Spec):
+            if rest == [...] and isinstance(row, type) and issubclass(row, Component):
                 yield name, row
 
     @classmethod
@@ -134,13 +134,13 @@ class Spec(Checked):
 
     contract: ClassVar[bool] = False
     """Set by a class that is no part of a scene itself, only what parts are made after."""
-    requires: ClassVar[tuple[type[Spec], ...]] = ()
+    requires: ClassVar[tuple[type[Component], ...]] = ()
     """Effects without which this one means nothing."""
-    excludes: ClassVar[tuple[type[Spec], ...]] = ()
+    excludes: ClassVar[tuple[type[Component], ...]] = ()
     """Effects that cannot be in a scene with this one."""
-    unfit: ClassVar[tuple[type[Spec], ...]] = ()
-    """Step controls that do not see what this effect needs them to."""
-    knobs: ClassVar[tuple[Knob, ...]] = ()
+    incompatible_controls: ClassVar[tuple[str, ...]] = ()
+    """Kinds of step control that do not see what this effect needs them to."""
+    accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = ()
     """Settings that trade accuracy for time."""
 
 
@@ -155,8 +155,8 @@ def parameter(unit: str, default: Any = ..., **rules: Any) -> Any:
 
     A float or ``Vector`` parameter may differ in every world of a batch. A kernel reads it as
     ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile. A list of
-    parts, ``tuple[Row, ...]`` with Row a Spec of such parameters, is one bound Row there. Its parameters are
-    functions of the world and the row: ``self.rows.name(w, k)``, k below ``self.rows.size(w)``.
+    parts, ``tuple[Row, ...]`` with Row a Component of such parameters, is one bound Row there. Its parameters
+    are functions of the world and the row: ``self.rows.name(w, k)``, k below ``self.rows.size(w)``.
     """
     return Field(default, json_schema_extra={"unit": unit}, **rules)
 

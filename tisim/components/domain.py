@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.component import Spec, Vector, parameter
+from tisim.components.component import Component, Vector, parameter
 from tisim.errors import must
 
 
-class Domain(Spec):
+class Domain(Component):
     """Unbounded space; the contract of a domain."""
 
     contract: ClassVar[bool] = True

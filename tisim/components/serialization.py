@@ -11,16 +11,16 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any, TypeVar, get_args
 
-from tisim.components.component import Spec
+from tisim.components.component import Component
 from tisim.errors import InputError, must, named, shown
 
-Part = TypeVar("Part", bound=Spec)
+Part = TypeVar("Part", bound=Component)
 
 
 def load(package: ModuleType) -> None:
-    """Import every module of a package, so that its effects can be found by name."""
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{package.__name__}.{module.name}")
+    """Import every module of a package and its subpackages, so that its parts can be found by name."""
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        importlib.import_module(module.name)
 
 
 def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
@@ -48,19 +48,19 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
     return kind(**values)
 
 
-def _part(annotation: Any) -> type[Spec] | None:
+def _part(annotation: Any) -> type[Component] | None:
     """The kind of part that a field holds, also where it may hold none."""
     kinds = [
-        t for t in (get_args(annotation) or (annotation,)) if isinstance(t, type) and issubclass(t, Spec)
+        t for t in (get_args(annotation) or (annotation,)) if isinstance(t, type) and issubclass(t, Component)
     ]
     return kinds[0] if kinds else None
 
 
-def to_dict(part: Spec, named: bool = True) -> dict[str, Any]:
+def to_dict(part: Component, named: bool = True) -> dict[str, Any]:
     """Kind and parameters of a part and of those that it is made of, without what is left at None."""
     values = {key: value for key, value in part.model_dump(mode="json").items() if value is not None}
     for key in values:
-        if isinstance(inner := getattr(part, key), Spec):
+        if isinstance(inner := getattr(part, key), Component):
             values[key] = to_dict(inner)
     for key, _ in part.lists():
         values[key] = [to_dict(row, named=False) for row in getattr(part, key)]

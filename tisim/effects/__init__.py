@@ -1,1 +1,5 @@
-"""Forces and impact laws, one file each."""
+"""Laws of force and of impact, one file each, by family."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,26 +1,25 @@
 """The contract of an effect. One effect is one file: its law, its source, its parameters.
 
 Rules
-1. An effect is a frozen ``Spec``: validated data, its source and equation in the docstring.
+1. An effect is a frozen ``Component``: validated data, its source and equation in the docstring.
 2. Every float or Vector parameter may differ per world; in a kernel it is a function, ``self.name(w)``. So
    may a list of parts, in number too: ``self.list.name(w, k)``, k below ``self.list.size(w)``.
    Every other option (bool, int, text) is compiled in, and the same for all worlds of a batch.
-3. ``needs`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
+3. ``fields`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
    A field that no other effect has ever needed is declared by putting a ``Field`` there. Where the
-   effect's options decide, ``needed`` returns those of this one.
-4. ``counts`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
-   ``keeps`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them back.
+   effect's options decide, ``required_fields`` returns those of this one.
+4. ``counters`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
+   ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
+   back.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
    are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them by
    the driver, and changed by ``remember`` only, once a step.
-6. A ``Source`` is an external field of place and time; whoever feels it finds it with ``sources``, and
-   names in ``feels`` the quantities of which a scene must have at least one source.
-7. A ``Settled`` quantity of a particle follows from the rest of the state, such as a moment along the field
-   where the particle is; the driver settles it before forces are summed. A ``Mutual`` one depends on that of
-   all others too, such as an induced dipole.
-8. An ``Operator`` changes the state between steps: ``particle`` for each particle on its own (it may write
-   only that particle), then ``world`` once per world, serially (it may add particles and remove them). One
-   that defines no ``world`` leaves a stepper free to take each particle through many steps by itself.
+6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
+   ``requires_source`` the quantities of which a scene must have at least one source.
+7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field
+   where the particle is; the driver sets it before forces are summed. A ``SelfConsistentQuantity`` depends on
+   that of all others too, such as an induced dipole.
+8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
    exclusive access to both, earliest first (see collision_rounds.py); it may remove either.
 10. ``connect`` returns what an effect wants to know of the other bound effects; ``requires`` names the
@@ -28,8 +27,8 @@ Rules
 11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may
     ever live at once, given the start.
 12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
-    say with ``s.disturb(w)`` that they have moved or resized one. Indices move only between steps. Nothing
-    may depend on the order of parallel work: no float atomics.
+    say with ``s.invalidate_lists(w)`` that they have moved or resized one. Indices move only between steps.
+    Nothing may depend on the order of parallel work: no float atomics.
 """
 
 from __future__ import annotations
@@ -40,29 +39,34 @@ import numpy as np
 from pydantic import Field as Option
 
 from tisim.backend.taichi import ti
-from tisim.components.accuracy_parameter import Knob
-from tisim.components.component import Spec, parameter
+from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.component import Component, parameter
 from tisim.worlds.state import Field
 
 __all__ = [
-    "Effect", "Force", "Mutual", "Operator", "PairEvent", "PairForce", "Settled", "Source", "parameter",
-    "sources",
-]  # fmt: skip
+    "DerivedQuantity",
+    "Effect",
+    "Force",
+    "PairEvent",
+    "PairForce",
+    "SelfConsistentQuantity",
+    "parameter",
+]
 
 
-class Effect(Spec):
+class Effect(Component):
     """Anything physical that a scene can call for."""
 
     contract: ClassVar[bool] = True
 
-    needs: ClassVar[tuple[str | Field, ...]] = ()
-    counts: ClassVar[tuple[str, ...]] = ()
-    keeps: ClassVar[tuple[str, ...]] = ()
-    feels: ClassVar[tuple[str, ...]] = ()
+    fields: ClassVar[tuple[str | Field, ...]] = ()
+    counters: ClassVar[tuple[str, ...]] = ()
+    world_quantities: ClassVar[tuple[str, ...]] = ()
+    requires_source: ClassVar[tuple[str, ...]] = ()
 
-    def needed(self) -> tuple[str | Field, ...]:
-        """The particle fields that this one needs, given its options; all of ``needs`` by default."""
-        return self.needs
+    def required_fields(self) -> tuple[str | Field, ...]:
+        """The particle fields that this one needs, given its options; all of ``fields`` by default."""
+        return self.fields
 
     def at_start(self, masses: np.ndarray) -> Self:
         """With parameters left at None taken from the masses of the start (kg); itself by default."""
@@ -161,7 +165,7 @@ class PairForce(Pairwise):
         return past
 
 
-class Settled(Effect):
+class DerivedQuantity(Effect):
     """A quantity of each particle, the field ``quantity``, that follows from the rest of the state.
 
     Set before forces are summed, whenever they are; of several, in scene order.
@@ -172,11 +176,11 @@ class Settled(Effect):
 
     @ti.func
     def response(self, s, w, i, total, t):
-        """The value of i, given the sum of what the others do to it: zero unless it is ``Mutual``."""
+        """The value of i, given the sum of what the others do to it: zero unless it is self-consistent."""
         return total
 
 
-class Mutual(Settled, Pairwise):
+class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     """A quantity of each particle that depends on that of the others: q_i = response(sum_j influence(q_j)).
 
     Settled by sweeps over all particles at once (the method of Jacobi), each starting from the last values,
@@ -193,14 +197,14 @@ class Mutual(Settled, Pairwise):
     """
 
     contract: ClassVar[bool] = True
-    counts = ("mutual_sweeps",)
-    keeps = ("sweep_factor",)
+    counters = ("mutual_sweeps",)
+    world_quantities = ("sweep_factor",)
 
     tolerance: float = parameter("", 1e-8, gt=0)
     sweeps: int = Option(100, ge=0)
     relaxation: float = parameter("", 1.0, gt=0, le=1)
 
-    knobs = (Knob(tolerance=1),)
+    accuracy_parameters = (AccuracyParameter(tolerance=1),)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return (self.model_copy(update={"sweeps": 0}),) if self.sweeps else ()
@@ -209,53 +213,6 @@ class Mutual(Settled, Pairwise):
     def influence(self, s, w, i, j, separation, distance, t):
         """What j, with its present value, does at i."""
         return 0.0 * separation
-
-
-class Source(Effect):
-    """An external field of place and time, such as that of a magnet or a flow.
-
-    quantity : its standard name: "magnetic_flux_density" (T), "electric_field" (V/m), "flow_velocity" (m/s).
-    """
-
-    contract: ClassVar[bool] = True
-    quantity: ClassVar[str]
-
-    @ti.func
-    def value(self, w, r, t):
-        """The field at r (m) and time t (s)."""
-        return 0.0 * r
-
-    @ti.func
-    def gradient(self, w, r, t):
-        """Its gradient, [a, b] the derivative of component a along axis b; per metre."""
-        return r.outer_product(0.0 * r)
-
-    @ti.func
-    def value_and_gradient(self, w, r, t):
-        """Both, for who needs both: a source that makes them of the same numbers does so once."""
-        return self.value(w, r, t), self.gradient(w, r, t)
-
-
-def sources(peers: tuple[Any, ...], quantity: str) -> tuple[Any, ...]:
-    """The sources of a quantity among the bound effects of a scene, for ``connect``."""
-    return tuple(peer for peer in peers if isinstance(peer, Source) and peer.quantity == quantity)
-
-
-class Operator(Effect):
-    """A change of state between steps."""
-
-    contract: ClassVar[bool] = True
-
-    @ti.func
-    def particle(self, s, w, i, t, dt):
-        """Change particle i alone, after a step of dt seconds that ends at t (s, f64).
-
-        ``s.time[w]`` is not that of a particle that takes steps of its own.
-        """
-
-    @ti.func
-    def world(self, s, w):
-        """Change the world as a whole, serially, after pair events; may append and remove."""
 
 
 class PairEvent(Effect):

@@ -6,15 +6,17 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tisim.backend import memory, runtime
 from tisim.engine.result import Result, Status
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, must
-from tisim.io.trajectory import Trajectory
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from tisim.io.trajectory import Trajectory
 
 SLOTS = 300_000
 """Particles of all worlds of a batch together; keeps its memory to some hundred MB."""

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from tisim import effects, operators, sources
 from tisim.components import serialization
-from tisim.components.component import Spec, unit_of
+from tisim.components.component import Component, unit_of
 from tisim.effects.base import Effect
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
@@ -130,7 +130,7 @@ def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
 
 
 def _needs(kind: type[Effect]) -> list[str]:
-    return [need if isinstance(need, str) else need.name for need in kind.needs]
+    return [need if isinstance(need, str) else need.name for need in kind.fields]
 
 
 def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tuple[str, str]]:
@@ -143,11 +143,11 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
         yield name, ", ".join(kinds_)
 
 
-def _part(spec: Spec) -> Part:
+def _part(spec: Component) -> Part:
     return Part(spec.kind(), _summary(type(spec)), _source(type(spec)), tuple(_values(spec)))
 
 
-def _values(spec: Spec, within: str = "") -> Iterator[tuple[str, str, str]]:
+def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str]]:
     """(name, value, unit) of each parameter; of a long list, of its first rows."""
     lists = dict(spec.lists())
     for name, info in type(spec).model_fields.items():
@@ -157,7 +157,7 @@ def _values(spec: Spec, within: str = "") -> Iterator[tuple[str, str, str]]:
                 yield from _values(row, f"{within}{name}.{k}.")
             if not 0 < len(value) <= SHOWN:
                 yield f"{within}{name}", f"{len(value)} in all", ""
-        elif not isinstance(value, Spec):
+        elif not isinstance(value, Component):
             yield f"{within}{name}", _text(value), unit_of(info)
 
 

@@ -8,41 +8,28 @@ import numpy as np
 
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import Status
-from tisim.worlds.state import (
-    ASKED,
-    CROWDED,
-    ENDED,
-    FULL,
-    INDEFINITE,
-    LOST,
-    NOBODY,
-    NOT_FINITE,
-    RUNNING,
-    STEEP,
-    STUCK,
-    UNSETTLED,
-)
+from tisim.worlds.state import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tisim.engine.simulation import Simulation
 
-REASONS = {
-    RUNNING: "running",
-    ENDED: "reached its end",
-    NOT_FINITE: "a quantity is not finite",
-    FULL: "more fragments than there is room for",
-    CROWDED: "more simultaneous contacts than there is room for",
-    UNSETTLED: "a quantity that particles settle among themselves does not converge",
-    LOST: "a step so long or so fast that rounding loses the place in the box",
-    STUCK: "the implicit equations of a step cannot be solved even at the shortest step",
-    STEEP: "a force so strong that it asks for a step shorter than the shortest",
-    INDEFINITE: "the diffusion matrix is not positive definite",
+REASONS: dict[int, str] = {
+    WorldStatus.RUNNING: "running",
+    WorldStatus.ENDED: "reached its end",
+    WorldStatus.NOT_FINITE: "a quantity is not finite",
+    WorldStatus.OUT_OF_ROOM: "more fragments than there is room for",
+    WorldStatus.CONTACT_OVERFLOW: "more simultaneous contacts than there is room for",
+    WorldStatus.NOT_CONVERGED: "a quantity that particles settle among themselves does not converge",
+    WorldStatus.POSITION_LOST: "a step so long or so fast that rounding loses the place in the box",
+    WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",
+    WorldStatus.FORCE_TOO_STEEP: "a force so strong that it asks for a step shorter than the shortest",
+    WorldStatus.NOT_POSITIVE_DEFINITE: "the diffusion matrix is not positive definite",
 }
 
 
-class Watch:
+class Monitor:
     """The last good state of a loaded batch, and what has gone wrong in it.
 
     good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
@@ -63,7 +50,7 @@ class Watch:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
         now = self._snapshot()
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
-        wrong = ~self._sound(now) | ~np.isin(now["status"], (RUNNING, ENDED))
+        wrong = ~self._sound(now) | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
         known = ~wrong & (now["underway"] == 0)
         for name, kept in self.good.items():
             kept[known] = now[name][known]
@@ -76,7 +63,7 @@ class Watch:
         return self.s.snapshot((*self._told(), *self.s.columns))
 
     def _told(self) -> tuple[str, ...]:
-        return tuple(f.name for f in self.s.told)
+        return tuple(f.name for f in self.s.reported)
 
     def _stop(self, worlds: np.ndarray) -> None:
         """Put worlds that have failed where they were last good, from where a step fails again: so a
@@ -84,13 +71,13 @@ class Watch:
         live = self.s.image()
         try:
             good = self.replay.last_good(worlds, self._sound)
-            if (self.s.read("blame") == ASKED).any():
-                self.simulation.made.inquest.hold()
+            if (self.s.read("failing_effect") == ASKED).any():
+                self.simulation.made.failure_attribution.hold()
             then = self._snapshot()
             for name, values in live.items():
                 values[worlds] = good[name][worlds]
             failed = then["failed"][worlds]
-            live["status"][worlds] = np.where(failed > 0, failed, NOT_FINITE)
+            live["status"][worlds] = np.where(failed > 0, failed, WorldStatus.NOT_FINITE)
         finally:
             self.simulation.put(live)
         for w in map(int, worlds):
@@ -101,7 +88,7 @@ class Watch:
     def _spoilt(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
         """Each quantity with the live particles, (worlds, capacity), of which it is not finite."""
         live = np.arange(self.s.capacity) < now["count"][:, None]
-        for f in self.s.told:
+        for f in self.s.reported:
             yield f.name, live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
 
     def _sound(self, now: Image) -> np.ndarray:
@@ -116,7 +103,7 @@ class Watch:
         if w in self.faults:
             when, why = self.faults[w]
             return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
-        return Status(code == ENDED, REASONS[code])
+        return Status(code == WorldStatus.ENDED, REASONS[code])
 
     def _fault(self, w: int, then: Image) -> str:
         """What is wrong with a world: what the kernels have recorded of it, or what is not finite."""
@@ -125,11 +112,11 @@ class Watch:
             for name, spoilt in self._spoilt(then):
                 if spoilt[w].any():
                     return f"{name} of particle {then['id'][w][spoilt[w]].min()} is not finite"
-        blame, who = int(then["blame"][w]), int(then["culprit"][w])
+        failing_effect, who = int(then["failing_effect"][w]), int(then["failing_particle"][w])
         effects = self.simulation.scenes[w].effects
-        reason = REASONS[code or NOT_FINITE]
-        if code == UNSETTLED:
+        reason = REASONS[code or WorldStatus.NOT_FINITE]
+        if code == WorldStatus.NOT_CONVERGED:
             reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
-        if blame < len(effects):
-            reason += f", by effects.{effects[blame].kind()}"
-        return reason if who == NOBODY else f"{reason}, at particle {who}"
+        if failing_effect < len(effects):
+            reason += f", by effects.{effects[failing_effect].kind()}"
+        return reason if who == NO_ONE else f"{reason}, at particle {who}"

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tisim.worlds.state import ENDED, RUNNING
+from tisim.worlds.state import WorldStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,8 +106,8 @@ class Replay:
 
     def _after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
         """What an image becomes when only these worlds take a number of steps."""
-        image["status"][:] = ENDED
-        image["status"][worlds] = RUNNING
+        image["status"][:] = WorldStatus.ENDED
+        image["status"][worlds] = WorldStatus.RUNNING
         image["goal"] = image["steps"] + steps
         self.simulation.put(image)
         while self.simulation.going_on():

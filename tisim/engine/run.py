@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 from tisim.backend import runtime
 from tisim.engine.batches import Batches, Progress
 from tisim.engine.result import Result
-from tisim.io.trajectory import Recording, Trajectory
 from tisim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from tisim.io.trajectory import Recording
 
 _batches = Batches()
 
@@ -41,6 +43,6 @@ def run(
         if record is None:
             found = dict(_batches.run(scenes, progress))
         else:
-            with Trajectory(record, scenes, runtime.current().precision) as trajectory:
+            with record.begun(scenes, runtime.current().precision) as trajectory:
                 found = dict(_batches.run(scenes, progress, trajectory=trajectory))
     return [found[index] for index in range(len(scenes))]

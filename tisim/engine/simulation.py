@@ -11,16 +11,16 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected
 from tisim.backend.thread import in_taichi_thread
-from tisim.engine.assembly import Composition, declared, needed_fields
+from tisim.engine.assembly import Assembly, declared, needed_fields
 from tisim.engine.loading import check_start, laid_out, volume
-from tisim.engine.monitor import Watch
+from tisim.engine.monitor import Monitor
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.parameter_table import Table, connect
+from tisim.worlds.parameter_table import ParameterTable, connect
 from tisim.worlds.program import Nest, Program
-from tisim.worlds.state import ENDED, NEVER, NOBODY, RUNNING, State, resolve_fields
+from tisim.worlds.state import NEVER, NO_ONE, State, WorldStatus, resolve_fields
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
 """Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; steps of all
@@ -60,7 +60,7 @@ class Simulation:
         self.schedule = schedule or self._choose(capacity)
         self.program = Program(self.s, self.made.step, self.schedule)
         self.first = Program(self.s, self.made.first, self.schedule)
-        self.s.write("status", ENDED)
+        self.s.write("status", WorldStatus.ENDED)
         self.program.compile()
         if self.first.items:
             self.first.compile()
@@ -69,12 +69,14 @@ class Simulation:
     def _place(self, scene: Scene, worlds: int, capacity: int) -> None:
         asked = (scene.effects, scene.stepper)
         fields = resolve_fields(needed_fields(*asked))
-        self.s = State(worlds, capacity, fields, declared(*asked, "counts"), declared(*asked, "keeps"))
+        self.s = State(
+            worlds, capacity, fields, declared(*asked, "counters"), declared(*asked, "world_quantities")
+        )
         parts = self._parts(scene)
-        self.table = Table(parts, worlds, self.runtime.real)
+        self.table = ParameterTable(parts, worlds, self.runtime.real)
         *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
         connect(effects)
-        self.made = Composition(self.s, stepper, tuple(effects), domain, control)
+        self.made = Assembly(self.s, stepper, tuple(effects), domain, control)
 
     @staticmethod
     def _parts(scene: Scene) -> list[Any]:
@@ -111,11 +113,11 @@ class Simulation:
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.look: Callable[[], None] | None = None
-        self.s.fill({"hold": np.inf, "goal": NEVER})
+        self.s.fill({"pause_time": np.inf, "goal": NEVER})
         self.begin()
-        self.watch = Watch(self)
+        self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
-        self.watch.look()
+        self.monitor.look()
 
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
@@ -142,20 +144,20 @@ class Simulation:
         self.s.fill(
             {
                 # What worlds wait for is asked of them by others, and stays.
-                **dict.fromkeys((name for name in self.s.columns if name not in ("hold", "goal")), 0),
+                **dict.fromkeys((name for name in self.s.columns if name not in ("pause_time", "goal")), 0),
                 "frame": np.array(frame + [np.zeros(3)] * empty),
                 "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
                 "count": counts,
                 "next_id": counts,
                 "most": np.array([scene.capacity() for scene in scenes] + [0] * empty),
-                "status": np.array([RUNNING] * len(scenes) + [ENDED] * empty),
+                "status": np.array([WorldStatus.RUNNING] * len(scenes) + [WorldStatus.ENDED] * empty),
                 "end": np.array([scene.duration for scene in scenes] + [0.0] * empty),
                 "volume": np.array(
                     [volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty
                 ),
                 "approach_time": np.inf,
-                "culprit": NOBODY,
-                "blame": NOBODY,
+                "failing_particle": NO_ONE,
+                "failing_effect": NO_ONE,
             }
         )
 
@@ -172,7 +174,7 @@ class Simulation:
         """The same in stretches of some steps, about four a second: between them, whoever runs this may look
         at the state, save a checkpoint, or stop for good or for a while.
 
-        What a recorder has put in ``look`` is called there too; worlds wait at ``s.hold`` for it.
+        What a recorder has put in ``look`` is called there too; worlds wait at ``s.pause_time`` for it.
         """
         self.s.check()
         self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
@@ -181,7 +183,7 @@ class Simulation:
         while self.going_on():
             began = time.perf_counter()
             self.program.advance(chunk)
-            self.watch.look()
+            self.monitor.look()
             if self.look:
                 self.look()
             taken = time.perf_counter() - began
@@ -195,20 +197,20 @@ class Simulation:
     def going_on(self) -> bool:
         """Whether any world runs that has not taken all of the steps asked for."""
         now = self.s.snapshot(("status", "steps", "goal"))
-        return bool(((now["status"] == RUNNING) & (now["steps"] < now["goal"])).any())
+        return bool(((now["status"] == WorldStatus.RUNNING) & (now["steps"] < now["goal"])).any())
 
     def fraction(self) -> float:
         """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
         n = len(self.scenes)
         now = self.s.snapshot(("status", "time", "reached", "end"))
         done = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
-        return float(np.where(now["status"][:n] != RUNNING, 1.0, done).mean())
+        return float(np.where(now["status"][:n] != WorldStatus.RUNNING, 1.0, done).mean())
 
     def ahead(self) -> float:
         """Steps before the world that has most of them, if they go on as long as its last one; those that it
         takes at least where there was none."""
         n = len(self.scenes)
-        running = self.s.read("status")[:n] == RUNNING
+        running = self.s.read("status")[:n] == WorldStatus.RUNNING
         left, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
         fewest = [scene.stepper.fewest(scene.effects, scene.duration) for scene in self.scenes]
         steps = np.where(dt > 0, left / np.where(dt > 0, dt, 1.0), fewest)
@@ -217,13 +219,13 @@ class Simulation:
     def ended(self) -> list[int]:
         """The loaded worlds that run no more, for good or ill."""
         status = self.s.read("status")[: len(self.scenes)]
-        return [int(w) for w in np.flatnonzero(status != RUNNING)]
+        return [int(w) for w in np.flatnonzero(status != WorldStatus.RUNNING)]
 
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
         """Loaded worlds read back: those asked for, or all of them, in order."""
-        now, good = self.s.snapshot(self.s.columns), self.watch.good
+        now, good = self.s.snapshot(self.s.columns), self.monitor.good
         tallies = {name: now[name] for name in self.s.counters}
-        kept = {name: now[name] for e in self.scenes[0].effects for name in e.keeps}
+        kept = {name: now[name] for e in self.scenes[0].effects for name in e.world_quantities}
         status = now["status"]
         found = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
@@ -231,11 +233,11 @@ class Simulation:
             found.append(
                 Result(
                     scene=self.scenes[w],
-                    state={f.name: good[f.name][w, :n].copy() for f in self.s.told},
+                    state={f.name: good[f.name][w, :n].copy() for f in self.s.reported},
                     start=self.starts[w],
                     time=float(good["time"][w]),
                     work={name: int(tally[w]) for name, tally in tallies.items()},
-                    status=self.watch.status(w, int(status[w])),
+                    status=self.monitor.status(w, int(status[w])),
                     wall_s=self.wall_s / len(self.scenes),
                     settings=self.runtime.settings,
                     measures={name: float(values[w]) for name, values in kept.items()},

@@ -22,14 +22,18 @@ symmetric as the grains were: see docs/agglomeration.md.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import PairEvent
-from tisim.neighbours.pair_list import Neighbours
-from tisim.steppers.step_control import Controller
+from tisim.neighbours.pair_list import NeighbourList
 from tisim.worlds.program import PerParticle, Phase, Repeat
-from tisim.worlds.state import CROWDED, State
+from tisim.worlds.state import State, WorldStatus
+
+if TYPE_CHECKING:
+    from tisim.steppers.step_control import Controller
 
 CONTACTS_PER_PARTICLE = 8
 """Room for pairs that overlap. Spheres that only touch, of any sizes, touch fewer than 14.93 others in the
@@ -37,7 +41,7 @@ mean, and make half as many pairs (G. Kuperberg and O. Schramm, Math. Res. Lett.
 
 
 @ti.data_oriented
-class Contacts:
+class ContactList:
     """The pairs of this step in which something falls due."""
 
     def __init__(self, s: State, domain: Domain, events: tuple[PairEvent, ...]) -> None:
@@ -80,13 +84,13 @@ class Contacts:
     @ti.func
     def overflow(self, w):
         """Stop a world, and accuse no particle: whose pair is one too many is up to the order of threads."""
-        ti.atomic_max(self.s.failed[w], CROWDED)
+        ti.atomic_max(self.s.failed[w], WorldStatus.CONTACT_OVERFLOW)
 
 
-class Survey(PerParticle):
+class FindContacts(PerParticle):
     """Look at every near pair: enter those in contact, and ask the controller about all."""
 
-    def __init__(self, near: Neighbours, contacts: Contacts, controller: Controller) -> None:
+    def __init__(self, near: NeighbourList, contacts: ContactList, controller: Controller) -> None:
         super().__init__(near.s)
         self.near, self.contacts, self.controller = near, contacts, controller
         self.hard = any(event.hard for event in contacts.events)
@@ -116,12 +120,12 @@ class Survey(PerParticle):
             self.contacts.count(w, overlaps)
 
 
-class SurveyAgain(Survey):
+class FindContactsAgain(FindContacts):
     """After events: look at every near pair once more, for the controller only."""
 
     conditional = True
 
-    def __init__(self, near: Neighbours, contacts: Contacts, controller: Controller) -> None:
+    def __init__(self, near: NeighbourList, contacts: ContactList, controller: Controller) -> None:
         super().__init__(near, contacts, controller)
         # Those that overlap have been counted.
         self.hard = False
@@ -138,7 +142,7 @@ class SurveyAgain(Survey):
 class PerContact(Phase):
     """A loop over the contacts of this step."""
 
-    def __init__(self, contacts: Contacts) -> None:
+    def __init__(self, contacts: ContactList) -> None:
         self.c, self.s, self.extent = contacts, contacts.s, contacts.capacity
 
     @ti.func
@@ -146,7 +150,7 @@ class PerContact(Phase):
         return ti.min(self.c.size[w], self.c.capacity)
 
 
-class Open(PerContact):
+class OpenContacts(PerContact):
     """Forget earlier bids."""
 
     @ti.func
@@ -189,8 +193,8 @@ class Resolve(PerContact):
 class Rounds(Repeat):
     """Rounds of bidding until no pair waits."""
 
-    def __init__(self, contacts: Contacts) -> None:
-        super().__init__((Open(contacts), Bid(contacts), Resolve(contacts)))
+    def __init__(self, contacts: ContactList) -> None:
+        super().__init__((OpenContacts(contacts), Bid(contacts), Resolve(contacts)))
         self.c = contacts
 
     @ti.func
@@ -198,10 +202,10 @@ class Rounds(Repeat):
         return self.c.waiting[w]
 
 
-class Clear(Phase):
+class ClearContacts(Phase):
     """Empty the list before a survey: a step that has failed has left it as it was."""
 
-    def __init__(self, contacts: Contacts) -> None:
+    def __init__(self, contacts: ContactList) -> None:
         self.c = contacts
 
     @ti.func
@@ -214,7 +218,7 @@ class Clear(Phase):
 class Rearrange(Phase):
     """Let operators act on the world as a whole, and fill the slots of removed particles from the end."""
 
-    def __init__(self, s: State, domain: Domain, operators: tuple, near: Neighbours | None) -> None:
+    def __init__(self, s: State, domain: Domain, operators: tuple, near: NeighbourList | None) -> None:
         self.s, self.domain, self.near, self.lists = s, domain, near, near is not None
         self.operators = tuple(o for o in operators if o.offers("world"))
 

@@ -8,13 +8,13 @@ goes with the particle that carries it. A particle that changes size may start i
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import PairForce
-from tisim.neighbours.full_list import Halves
+from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.program import PerParticle
-from tisim.worlds.state import CROWDED, Field, State
+from tisim.worlds.state import Field, State, WorldStatus
 
-SLOTS = 16
+PARTNERS = 16
 """Pairs that a particle can keep. Thirteen spheres of its size or larger do not find room around it."""
-NOBODY, NOTHING, UNKNOWN = -1, -1, -2
+NO_PARTNER, NO_SLOT, UNKNOWN = -1, -1, -2
 """The id in a free slot; what a look at a pair gives when it is not to be kept, and when it is new."""
 
 
@@ -26,13 +26,13 @@ def memory_fields(effect: PairForce) -> tuple[Field, ...]:
         raise TypeError(f"{type(effect).__name__} must be short-ranged: pairs remember while they touch")
     name = effect.kind()
     return (
-        Field(f"{name}_partners", "", 1, "keep", integer=True, slots=SLOTS, default=NOBODY),
-        Field(f"{name}_past", "", 1, "keep", slots=SLOTS * effect.memory),
+        Field(f"{name}_partners", "", 1, "keep", integer=True, slots=PARTNERS, default=NO_PARTNER),
+        Field(f"{name}_past", "", 1, "keep", slots=PARTNERS * effect.memory),
     )
 
 
 @ti.data_oriented
-class History:
+class ContactHistory:
     """The memory of one effect; ``recall`` and ``sign`` are what the effect itself uses."""
 
     def __init__(self, s: State, effect: PairForce) -> None:
@@ -41,7 +41,7 @@ class History:
         self.partners, self.past = getattr(s, partners.name), getattr(s, past.name)
 
     @ti.func
-    def keeps(self, s, w, i, j):
+    def is_keeper(self, s, w, i, j):
         """Whether i is the one of the pair who remembers."""
         a, b = s.radius[w, i], s.radius[w, j]
         return a < b or (a == b and s.id[w, i] < s.id[w, j])
@@ -49,13 +49,13 @@ class History:
     @ti.func
     def sign(self, s, w, i, j):
         """1 when what the pair remembers is seen from i, -1 when it is seen from j."""
-        return ti.cast(ti.select(self.keeps(s, w, i, j), 1, -1), s.real)
+        return ti.cast(ti.select(self.is_keeper(s, w, i, j), 1, -1), s.real)
 
     @ti.func
     def find(self, w, i, other):
         """Slot in which i keeps what it knows of the particle with this id, or -1."""
         slot = -1
-        for k in range(SLOTS):
+        for k in range(PARTNERS):
             if self.partners[w, i, k] == other:
                 slot = k
         return slot
@@ -72,26 +72,26 @@ class History:
     def recall(self, s, w, i, j):
         """What the pair remembers, whoever keeps it; zero when they have just met."""
         keeper, other = i, j
-        if not self.keeps(s, w, i, j):
+        if not self.is_keeper(s, w, i, j):
             keeper, other = j, i
         return self.read(s, w, keeper, self.find(w, keeper, s.id[w, other]))
 
 
-class Remember(PerParticle):
+class UpdateContactHistory(PerParticle):
     """Bring up to date what each particle keeps for one effect: pairs that go on touching, then those that
     no longer do, which are forgotten, and last those that have just met."""
 
-    def __init__(self, s: State, domain: Domain, effect: PairForce, halves: Halves) -> None:
+    def __init__(self, s: State, domain: Domain, effect: PairForce, full_list: FullNeighbourList) -> None:
         super().__init__(s)
-        self.domain, self.effect, self.halves = domain, effect, halves
+        self.domain, self.effect, self.full_list = domain, effect, full_list
         self.history = effect.past
 
     @ti.func
     def run(self, w, i):
         met, known = self.visit(w, i, False)
-        for k in range(SLOTS):
+        for k in range(PARTNERS):
             if not (known >> k) & 1:
-                self.history.partners[w, i, k] = NOBODY
+                self.history.partners[w, i, k] = NO_PARTNER
         if met > 0:
             self.visit(w, i, True)
 
@@ -99,8 +99,8 @@ class Remember(PerParticle):
     def visit(self, w, i, new: ti.template()):  # type: ignore[valid-type]
         """Go through the pairs that i keeps; returns how many are new to it, and the slots of the others."""
         met, known = 0, 0
-        for k in range(self.halves.size(w, i)):
-            slot = self.look(w, i, self.halves.candidate(w, i, k), new)
+        for k in range(self.full_list.size(w, i)):
+            slot = self.look(w, i, self.full_list.candidate(w, i, k), new)
             met += ti.select(slot == UNKNOWN, 1, 0)
             known |= ti.select(slot >= 0, 1 << ti.max(slot, 0), 0)
         return met, known
@@ -109,8 +109,8 @@ class Remember(PerParticle):
     def look(self, w, i, j, new: ti.template()):  # type: ignore[valid-type]
         """Remember a pair that is known, or, when it is their turn, one that is new; where i keeps it."""
         s, h = self.s, self.history
-        place = NOTHING
-        if i != j and h.keeps(s, w, i, j):
+        place = NO_SLOT
+        if i != j and h.is_keeper(s, w, i, j):
             d = self.domain.separation(w, s.position[w, i], s.position[w, j])
             distance = d.norm()
             if self.effect.touching(s, w, i, j, d, distance):
@@ -118,7 +118,7 @@ class Remember(PerParticle):
                 place = ti.select(slot < 0, UNKNOWN, slot)
                 if ti.static(new):
                     if slot < 0:
-                        self.write(w, i, j, d, distance, h.find(w, i, NOBODY), h.read(s, w, i, NOTHING))
+                        self.write(w, i, j, d, distance, h.find(w, i, NO_PARTNER), h.read(s, w, i, NO_SLOT))
                 elif slot >= 0:
                     self.write(w, i, j, d, distance, slot, h.read(s, w, i, slot))
         return place
@@ -127,7 +127,7 @@ class Remember(PerParticle):
     def write(self, w, i, j, separation, distance, slot, past):
         s, h = self.s, self.history
         if slot < 0:
-            s.fail(w, CROWDED, i)
+            s.fail(w, WorldStatus.CONTACT_OVERFLOW, i)
         else:
             dt = ti.cast(s.dt[w], s.real)
             knows = self.effect.remember(s, w, i, j, separation, distance, past, dt)

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Settled
+from tisim.effects.base import DerivedQuantity
 from tisim.worlds.program import Item, PerParticle
 from tisim.worlds.state import State
 
@@ -34,14 +34,14 @@ def _same(vector):
 
 
 @ti.data_oriented
-class Settling:
+class DerivedSolver:
     """A quantity that follows from what a particle is and where: nothing of the others, and no memory."""
 
-    def __init__(self, s: State, effect: Settled) -> None:
+    def __init__(self, s: State, effect: DerivedQuantity) -> None:
         self.s, self.effect = s, effect
         declared = [f.components for f in s.fields if f.name == effect.quantity]
         if not declared:
-            raise TypeError(f"{type(effect).__name__}.needs must name its quantity, {effect.quantity!r}")
+            raise TypeError(f"{type(effect).__name__}.fields must name its quantity, {effect.quantity!r}")
         self.value, self.components = getattr(s, effect.quantity), declared[0]
         vector = self.components == 3
         self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)
@@ -50,7 +50,7 @@ class Settling:
     def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
         """Settle it; ``again``, only in worlds where events have changed who is where; ``trial``, in a state
         that may be far from any solution: what is not finite is then left to the forces to show."""
-        return ((SetAgain if again else Set)(self, trial),)
+        return ((SetDerivedAgain if again else SetDerived)(self, trial),)
 
     @ti.func
     def set(self, s, w, i, t):
@@ -59,10 +59,10 @@ class Settling:
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
 
-class Set(PerParticle):
+class SetDerived(PerParticle):
     """value_i = response(0)."""
 
-    def __init__(self, settling: Settling, trial: bool) -> None:
+    def __init__(self, settling: DerivedSolver, trial: bool) -> None:
         super().__init__(settling.s)
         self.settling, self.trial = settling, trial
 
@@ -80,7 +80,7 @@ class Set(PerParticle):
             self.s.fault(w, i, a.effect.index)
 
 
-class SetAgain(Set):
+class SetDerivedAgain(SetDerived):
     """The same after events."""
 
     conditional: ClassVar[bool] = True

@@ -12,7 +12,7 @@ from tisim.worlds.state import ASKED
 
 
 @ti.data_oriented
-class Inquest:
+class FailureAttribution:
     """Of the worlds of a batch that have failed by a force."""
 
     def __init__(self, summed: SumForces) -> None:
@@ -20,13 +20,14 @@ class Inquest:
 
     @in_taichi_thread
     def hold(self) -> None:
-        """Blame the effect whose force on the culprit is largest, or not finite, where it was when asked."""
+        """Name the effect whose force on the failing particle is largest, or not finite, where it was when
+        asked."""
         self._hold()
 
     @ti.kernel
     def _hold(self):
         for w in range(self.s.worlds):
-            if self.s.blame[w] == ASKED:
+            if self.s.failing_effect[w] == ASKED:
                 for i in range(self.s.count[w]):
-                    if self.s.id[w, i] == self.s.culprit[w]:
-                        self.s.blame[w] = self.summed.largest(w, i, self.s.asked_at[w])
+                    if self.s.id[w, i] == self.s.failing_particle[w]:
+                        self.s.failing_effect[w] = self.summed.largest(w, i, self.s.failure_time[w])

@@ -6,8 +6,8 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import Force, PairForce
 from tisim.interactions.pair_sum import PairSum
-from tisim.neighbours.full_list import Halves
-from tisim.worlds.state import NOT_FINITE, Field, State
+from tisim.neighbours.full_list import FullNeighbourList
+from tisim.worlds.state import Field, State, WorldStatus
 
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
@@ -43,11 +43,11 @@ class SumForces(PairSum):
         domain: Domain,
         forces: tuple[Force, ...],
         pair_forces: tuple[PairForce, ...],
-        halves: Halves | None,
-        settlings: tuple[Any, ...],
+        full_list: FullNeighbourList | None,
+        derived_solvers: tuple[Any, ...],
     ) -> None:
-        super().__init__(s, domain, pair_forces, halves)
-        self.forces, self.pair_forces, self.settlings = forces, pair_forces, settlings
+        super().__init__(s, domain, pair_forces, full_list)
+        self.forces, self.pair_forces, self.derived_solvers = forces, pair_forces, derived_solvers
         self.turning = turning(forces, pair_forces)
         self.fixes = any(field.name == "fixed" for field in s.fields)
         self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
@@ -65,7 +65,7 @@ class SumForces(PairSum):
     @ti.func
     def alone(self, w, i, t):
         """The force on i, at a time of its own, where particles do not feel each other."""
-        for settling in ti.static(self.settlings):
+        for settling in ti.static(self.derived_solvers):
             settling.set(self.s, w, i, t)
         self.write(w, i, self.singles(w, i, t))
 
@@ -99,7 +99,7 @@ class SumForces(PairSum):
     def check(self, w, i, total):
         # Not below infinity: also true of NaN.
         if not (total.norm_sqr() < ti.math.inf):
-            self.s.suspect(w, NOT_FINITE, i)
+            self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
     @ti.func
     def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
@@ -128,7 +128,7 @@ class SumForces(PairSum):
                 total += self.of((effect,), w, i, j, t)
             if most < ti.math.inf and not (total.norm() <= most):
                 most, found = total.norm(), effect.index
-        for settling in ti.static(self.settlings):
+        for settling in ti.static(self.derived_solvers):
             if not (settling.size(settling.value[w, i]) < ti.math.inf):
                 found = settling.effect.index
         return found

@@ -11,7 +11,7 @@ from typing import Any
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.neighbours.full_list import Halves
+from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.program import PerParticle
 from tisim.worlds.state import State
 
@@ -34,9 +34,11 @@ class PairSum(PerParticle):
 
     components: int = 3
 
-    def __init__(self, s: State, domain: Domain, effects: Sequence[Any], halves: Halves | None) -> None:
+    def __init__(
+        self, s: State, domain: Domain, effects: Sequence[Any], full_list: FullNeighbourList | None
+    ) -> None:
         super().__init__(s)
-        self.domain, self.halves = domain, halves
+        self.domain, self.full_list = domain, full_list
         self.long_ranged = tuple(e for e in effects if not e.short_ranged)
         self.short_ranged = tuple(e for e in effects if e.short_ranged)
         # A tile may reach past the particles alive, but not past the slots that there are.
@@ -103,8 +105,8 @@ class PairSum(PerParticle):
     def with_near(self, total, w, i, t):
         """``total`` and the terms of those that are near."""
         if ti.static(len(self.short_ranged) > 0):
-            for k in range(self.halves.size(w, i)):
-                total += self.of(self.short_ranged, w, i, self.halves.candidate(w, i, k), t)
+            for k in range(self.full_list.size(w, i)):
+                total += self.of(self.short_ranged, w, i, self.full_list.candidate(w, i, k), t)
         return total
 
     @ti.func

@@ -7,28 +7,30 @@ import numpy as np
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.effects.base import Mutual, Settled
-from tisim.interactions.derived import Settling
+from tisim.effects.base import DerivedQuantity, SelfConsistentQuantity
+from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.pair_sum import PairSum
-from tisim.neighbours.full_list import Halves
+from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
-from tisim.worlds.state import UNSETTLED, State
+from tisim.worlds.state import State, WorldStatus
 
 ROUNDING = 4.0
 """Changes of so many units in the last place are none: sweeps in f32 may go on with them for ever."""
 
 
-class MutualSettling(Settling):
+class SelfConsistentSolver(DerivedSolver):
     """A quantity that particles give each other: the values of the next sweep, and whether there is one.
 
     changes : the largest of a particle in this sweep, the last, and the one before.
     """
 
-    effect: Mutual
+    effect: SelfConsistentQuantity
 
-    def __init__(self, s: State, effect: Mutual, domain: Domain, halves: Halves | None) -> None:
+    def __init__(
+        self, s: State, effect: SelfConsistentQuantity, domain: Domain, full_list: FullNeighbourList | None
+    ) -> None:
         super().__init__(s, effect)
-        self.domain, self.halves = domain, halves
+        self.domain, self.full_list = domain, full_list
         self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
         self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
         self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
@@ -39,7 +41,7 @@ class MutualSettling(Settling):
         self.tree = Tree(builder)
 
     def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
-        return ((StartAgain if again else Start)(self), Sweeps(self, trial))
+        return ((BeginSweepsAgain if again else BeginSweeps)(self), SweepUntilConverged(self, trial))
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
@@ -47,12 +49,12 @@ class MutualSettling(Settling):
         return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12)
 
 
-class Start(PerParticle):
+class BeginSweeps(PerParticle):
     """There must be a sweep, from the last values, or from nothing where they have been lost."""
 
-    def __init__(self, settling: MutualSettling) -> None:
-        super().__init__(settling.s)
-        self.settling = settling
+    def __init__(self, solver: SelfConsistentSolver) -> None:
+        super().__init__(solver.s)
+        self.settling = solver
 
     @ti.func
     def run(self, w, i):
@@ -66,7 +68,7 @@ class Start(PerParticle):
             a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
 
 
-class StartAgain(Start):
+class BeginSweepsAgain(BeginSweeps):
     """The same after events."""
 
     conditional: ClassVar[bool] = True
@@ -76,25 +78,25 @@ class StartAgain(Start):
         return self.s.events[w]
 
 
-class Sweeps(Repeat):
+class SweepUntilConverged(Repeat):
     """Sweep until it has settled."""
 
-    def __init__(self, settling: MutualSettling, trial: bool) -> None:
-        super().__init__((Sweep(settling, trial), Take(settling, trial), Judge(settling)))
-        self.settling = settling
+    def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
+        super().__init__((JacobiSweep(solver, trial), TakeSweep(solver, trial), JudgeSweep(solver)))
+        self.settling = solver
 
     @ti.func
     def pending(self, w):
         return self.settling.pending[w]
 
 
-class Sweep(PairSum):
+class JacobiSweep(PairSum):
     """next_i = (1 - a) value_i + a response(sum_j influence(value_j))."""
 
-    def __init__(self, settling: MutualSettling, trial: bool) -> None:
-        super().__init__(settling.s, settling.domain, (settling.effect,), settling.halves)
-        self.settling, self.effect, self.trial = settling, settling.effect, trial
-        self.components = settling.components
+    def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
+        super().__init__(solver.s, solver.domain, (solver.effect,), solver.full_list)
+        self.settling, self.effect, self.trial = solver, solver.effect, trial
+        self.components = solver.components
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
@@ -119,16 +121,16 @@ class Sweep(PairSum):
             if self.settling.sweeps[w] == 0:
                 self.s.fault(w, i, self.effect.index)
             else:
-                unsettled(self.s, w, i, self.effect)
+                fail_to_converge(self.s, w, i, self.effect)
 
 
-class Take(PerParticle):
+class TakeSweep(PerParticle):
     """The new values take the place of the old, and are compared with them."""
 
-    def __init__(self, settling: MutualSettling, trial: bool) -> None:
-        super().__init__(settling.s)
-        self.settling, self.effect, self.trial = settling, settling.effect, trial
-        self.least = ROUNDING * float(np.finfo(np.float64 if settling.s.real == ti.f64 else np.float32).eps)
+    def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
+        super().__init__(solver.s)
+        self.settling, self.effect, self.trial = solver, solver.effect, trial
+        self.least = ROUNDING * float(np.finfo(np.float64 if solver.s.real == ti.f64 else np.float32).eps)
 
     @ti.func
     def run(self, w, i):
@@ -147,20 +149,20 @@ class Take(PerParticle):
                     # Forces that are not finite: the step is given up.
                     a.value[w, i] *= ti.math.inf
                 else:
-                    unsettled(s, w, i, self.effect)
+                    fail_to_converge(s, w, i, self.effect)
 
 
 @ti.func
-def unsettled(s, w, i, effect: ti.template()):  # type: ignore[valid-type]
-    s.fail(w, UNSETTLED, i)
-    ti.atomic_min(s.blame[w], effect.index)
+def fail_to_converge(s, w, i, effect: ti.template()):  # type: ignore[valid-type]
+    s.fail(w, WorldStatus.NOT_CONVERGED, i)
+    ti.atomic_min(s.failing_effect[w], effect.index)
 
 
-class Judge(Phase):
+class JudgeSweep(Phase):
     """One sweep more, or none."""
 
-    def __init__(self, settling: MutualSettling) -> None:
-        self.settling = settling
+    def __init__(self, solver: SelfConsistentSolver) -> None:
+        self.settling = solver
 
     @ti.func
     def run(self, w, _k):
@@ -176,6 +178,10 @@ class Judge(Phase):
         a.again[w], a.largest[w] = 0, 0.0
 
 
-def settling(s: State, effect: Settled, domain: Domain, halves: Halves | None) -> Any:
+def solver(s: State, effect: DerivedQuantity, domain: Domain, full_list: FullNeighbourList | None) -> Any:
     """What settles the quantity of an effect."""
-    return MutualSettling(s, effect, domain, halves) if isinstance(effect, Mutual) else Settling(s, effect)
+    return (
+        SelfConsistentSolver(s, effect, domain, full_list)
+        if isinstance(effect, SelfConsistentQuantity)
+        else DerivedSolver(s, effect)
+    )

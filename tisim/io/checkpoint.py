@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tisim.backend import runtime
-from tisim.engine.monitor import Watch
+from tisim.engine.monitor import Monitor
 from tisim.engine.simulation import Simulation
 from tisim.errors import must
 from tisim.files import checksum
@@ -48,7 +48,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
         for name, values in now.items():
             file[name] = values
         if now["underway"].any():
-            for name, values in simulation.watch.replay.whole().items():
+            for name, values in simulation.monitor.replay.whole().items():
                 file[f"{BEFORE}/{name}"] = values
 
 
@@ -68,8 +68,8 @@ def restore(simulation: Simulation, path: str | Path) -> None:
         before = {name: np.asarray(group[name]) for name in columns}
     simulation.put(columns)
     simulation.wall_s = wall_s
-    simulation.watch = Watch(simulation, before)
-    simulation.watch.look()
+    simulation.monitor = Monitor(simulation, before)
+    simulation.monitor.look()
 
 
 def _agree(name: str, value: Any, received: Any) -> None:

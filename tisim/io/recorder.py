@@ -10,7 +10,7 @@ import numpy as np
 
 from tisim.engine.simulation import Simulation
 from tisim.io.reader import Frame
-from tisim.worlds.state import RUNNING
+from tisim.worlds.state import WorldStatus
 
 if TYPE_CHECKING:
     from tisim.io.trajectory import Trajectory
@@ -40,8 +40,8 @@ class Recorder:
 
     def look(self) -> None:
         """Write what is due, and say when each world is due next."""
-        s, good = self.simulation.s, self.simulation.watch.good
-        running = s.read("status") == RUNNING
+        s, good = self.simulation.s, self.simulation.monitor.good
+        running = s.read("status") == WorldStatus.RUNNING
         steps = s.read("steps")
         for w, interval in enumerate(self.interval):
             time = float(good["time"][w])
@@ -53,7 +53,7 @@ class Recorder:
                 arrays = {f.name: good[f.name][w, :n] for f in self.trajectory.fields[self.indices[w]]}
                 self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
                 self.last[w] = time
-        s.write("hold", self.due)
+        s.write("pause_time", self.due)
 
 
 def _last(group: h5py.Group) -> float:

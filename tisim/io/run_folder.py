@@ -19,14 +19,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-import tisim
+from tisim import version
 from tisim.backend import runtime
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.files import checksum, lock, ownership, regular_file
 from tisim.files.atomic import replace_file
 from tisim.io.reader import RESULT
-from tisim.plotting import cloud
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.state import resolve_fields
@@ -88,7 +87,7 @@ class Folder:
 def versions() -> dict[str, str]:
     """What a result depends on beside its scene."""
     return {
-        "tisim": tisim.__version__,
+        "tisim": version.__version__,
         "backend": runtime.backend(),
         "numpy": np.__version__,
         "h5py": h5py.__version__,
@@ -99,6 +98,8 @@ def versions() -> dict[str, str]:
 
 def write(result: Result, folder: Folder) -> list[Path]:
     """Write all files of a run, in place of any before; returns their paths. RunError on a full disk."""
+    from tisim.plotting import cloud
+
     folder.result.unlink(missing_ok=True)
     paths = {name: folder.path / name for name in ("scene.toml", "versions.json", "cloud.png")}
     replace_file(paths["scene.toml"], result.scene.to_toml().encode())
@@ -128,7 +129,7 @@ def write_result(result: Result, path: Path) -> None:
 
 
 def _units(scene: Scene) -> dict[str, str]:
-    fields = resolve_fields(need for effect in scene.effects for need in effect.needed())
+    fields = resolve_fields(need for effect in scene.effects for need in effect.required_fields())
     return {field.name: field.unit for field in fields}
 
 

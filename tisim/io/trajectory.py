@@ -5,9 +5,9 @@ without a trajectory. The file has a group of particles for each scene: ``all``,
 Particles are in the order of their ids; a frame with fewer particles than another is filled up (see h5md.py).
 
 The file can be read after every single write, by any reader, so also after the run was killed (see
-growing_hdf5.py); one that comes in the midst of a write must come again, as reader.py does. ``step`` grows last,
-so what it counts is whole. The file is made under another name, with room for frames and none in it, and then
-put in its place.
+growing_hdf5.py); one that comes in the midst of a write must come again, as reader.py does. ``step`` grows
+last, so what it counts is whole. The file is made under another name, with room for frames and none in it,
+and then put in its place.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
-import tisim
+from tisim import version
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
@@ -65,6 +65,10 @@ class Recording:
         """Between wanted times, s."""
         return self.every if self.every is not None else scene.duration / (self.frames or 1)
 
+    def begun(self, scenes: Sequence[Scene], real: str = "f64") -> Trajectory:
+        """The file, made anew, for these scenes."""
+        return Trajectory(self, scenes, real)
+
 
 class Trajectory:
     """A file that frames are written to, for scenes that run one after another or side by side.
@@ -102,7 +106,7 @@ class Trajectory:
         """The file without frames."""
         image = io.BytesIO()
         with h5py.File(image, "w", libver=LIBRARY) as file:
-            h5md.metadata(file, tisim.__version__)
+            h5md.metadata(file, version.__version__)
             names = h5md.names(len(self.scenes))
             for name, scene, fields in zip(names, self.scenes, self.fields, strict=True):
                 group = file.create_group(f"particles/{name}")
@@ -212,7 +216,7 @@ def recorded(
         return
     real, scenes = simulation.runtime.precision, simulation.scenes
     if resume:
-        time = float(simulation.watch.good["time"][0])
+        time = float(simulation.monitor.good["time"][0])
         trajectory = Trajectory.going_on(recording, scenes[0], time, real)
     else:
         trajectory = Trajectory(recording, scenes, real)

@@ -1,22 +1,22 @@
 """Make pair lists anew: particles are sorted into cells, and each looks through the cells around it."""
 
 from tisim.backend.taichi import ti
-from tisim.neighbours.pair_list import Neighbours
+from tisim.neighbours.pair_list import NeighbourList
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import NOT_FINITE
+from tisim.worlds.state import WorldStatus
 
 
-def listing(neighbours: Neighbours) -> tuple[Phase, ...]:
+def list_phases(neighbours: NeighbourList) -> tuple[Phase, ...]:
     """Bring the list up to date where it is due."""
-    return (Bin(neighbours), Search(neighbours), Listed(neighbours))
+    return (BinParticles(neighbours), SearchCells(neighbours), DeclareFresh(neighbours))
 
 
-class Bin(Phase):
+class BinParticles(Phase):
     """Sort the particles of a world into cells, serially, so that the order in a cell is that of indices."""
 
     conditional = True
 
-    def __init__(self, neighbours: Neighbours) -> None:
+    def __init__(self, neighbours: NeighbourList) -> None:
         self.n = neighbours
 
     @ti.func
@@ -33,7 +33,7 @@ class Bin(Phase):
             smallest = ti.select(s.radius[w, i] < s.radius[w, smallest], i, smallest)
             # Not below infinity: also true of NaN, which belongs to no cell.
             if not (ti.abs(s.position[w, i]).sum() + s.radius[w, i] < ti.math.inf):
-                s.fail(w, NOT_FINITE, i)
+                s.fail(w, WorldStatus.NOT_FINITE, i)
         if ti.static(n.joined):
             low = n.domain.origin(w)
             high = low + n.domain.side(w)
@@ -42,7 +42,7 @@ class Bin(Phase):
         # Root by root: in f32 a volume of 7000 million km cubed is infinite.
         roots = ti.pow(extent, 1.0 / 3.0)
         spacing = roots[0] * roots[1] * roots[2] / ti.pow(ti.cast(count, s.real), 1.0 / 3.0)
-        n.skin[w] = ti.min(2.0 * n.ahead * ti.cast(s.axes(s.stride, w), s.real), spacing)
+        n.skin[w] = ti.min(2.0 * n.ahead * ti.cast(s.axes(s.displacement, w), s.real), spacing)
         n.gap[w] = n.horizon(w)
         width = ti.max(spacing, 2.0 * least + n.reach(w, smallest))
         dims = ti.max(1, ti.floor(ti.min(extent / width, 1e3), ti.i32))
@@ -70,12 +70,12 @@ class Bin(Phase):
             n.sorted_position[w, m], n.sorted_radius[w, m] = s.position[w, i], s.radius[w, i]
 
 
-class Search(PerParticle):
+class SearchCells(PerParticle):
     """Let each particle list the smaller ones near it."""
 
     conditional = True
 
-    def __init__(self, neighbours: Neighbours) -> None:
+    def __init__(self, neighbours: NeighbourList) -> None:
         super().__init__(neighbours.s)
         self.n = neighbours
 
@@ -123,12 +123,12 @@ class Search(PerParticle):
             n.listed[w, i] = found if found <= n.room else -1
 
 
-class Listed(Phase):
+class DeclareFresh(Phase):
     """Declare the list fresh, once every particle has searched."""
 
     conditional = True
 
-    def __init__(self, neighbours: Neighbours) -> None:
+    def __init__(self, neighbours: NeighbourList) -> None:
         self.n = neighbours
 
     @ti.func
@@ -139,4 +139,4 @@ class Listed(Phase):
     def run(self, w, _k):
         self.n.stale[w] = 0
         for k in ti.static(range(3)):
-            self.n.s.travel[w, k] = 0.0
+            self.n.s.displacement_since_list[w, k] = 0.0

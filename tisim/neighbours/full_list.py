@@ -7,16 +7,16 @@ sorted by index. A sum over neighbours then has the same order, and the same bit
 
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.neighbours.cell_list import listing
-from tisim.neighbours.pair_list import Neighbours
+from tisim.neighbours.cell_list import list_phases
+from tisim.neighbours.pair_list import NeighbourList
 from tisim.worlds.program import PerParticle, Phase
 
 
 @ti.data_oriented
-class Halves:
+class FullNeighbourList:
     """Both halves of the neighbours of every particle."""
 
-    def __init__(self, near: Neighbours) -> None:
+    def __init__(self, near: NeighbourList) -> None:
         self.near, self.s = near, near.s
         self.larger, self.found = ti.field(ti.i32), ti.field(ti.i32)
         builder = ti.FieldsBuilder()
@@ -28,8 +28,8 @@ class Halves:
 
     def phases(self) -> tuple[Phase, ...]:
         """Bring both halves up to date where it is due."""
-        *others, last = listing(self.near)
-        return (*others, Empty(self), Turn(self), Sort(self), last)
+        *others, last = list_phases(self.near)
+        return (*others, ClearReverseList(self), BuildReverseList(self), SortNeighbours(self), last)
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
@@ -72,21 +72,21 @@ class Halves:
         return j
 
 
-class Due(PerParticle):
+class WhenListIsDue(PerParticle):
     """Work on the lists of a world when they are due."""
 
     conditional = True
 
-    def __init__(self, halves: Halves) -> None:
-        super().__init__(halves.s)
-        self.m = halves
+    def __init__(self, full_list: FullNeighbourList) -> None:
+        super().__init__(full_list.s)
+        self.m = full_list
 
     @ti.func
     def when(self, w):
         return self.m.near.stale[w] > 0 and self.s.count[w] > self.m.near.small
 
 
-class Empty(Due):
+class ClearReverseList(WhenListIsDue):
     """Nobody has been listed yet."""
 
     @ti.func
@@ -94,7 +94,7 @@ class Empty(Due):
         self.m.found[w, i] = 0
 
 
-class Turn(Due):
+class BuildReverseList(WhenListIsDue):
     """Tell each listed particle who has listed it; those that look at all do so too."""
 
     @ti.func
@@ -108,7 +108,7 @@ class Turn(Due):
                     m.larger[w, j, slot] = i
 
 
-class Sort(Due):
+class SortNeighbours(WhenListIsDue):
     """Order both halves by index; mark those that are too many."""
 
     @ti.func

@@ -18,17 +18,17 @@ from tisim.worlds.state import State
 
 SMALL = 48
 """Worlds of at most this many particles look at all pairs."""
-LISTED = 24
-"""Neighbours a particle can list; one with more looks at all particles."""
+MOST_NEIGHBOURS = 24
+"""NeighbourList a particle can list; one with more looks at all particles."""
 HORIZON = 0.15
 """Gap within which every pair is sure to be offered, in mean distances between particles."""
-AHEAD = 2.0
+STEPS_OF_SKIN = 2.0
 """Steps that a list is meant to last: its skin along each axis is what particles move in them."""
 CELLS_PER_PARTICLE = 2
 
 
 @ti.data_oriented
-class Neighbours:
+class NeighbourList:
     """The pair list of every world."""
 
     def __init__(self, s: State, domain: Domain, short_ranged: tuple[PairForce, ...] = ()) -> None:
@@ -36,7 +36,7 @@ class Neighbours:
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
-        self.small, self.room, self.ahead = SMALL, LISTED, AHEAD
+        self.small, self.room, self.ahead = SMALL, MOST_NEIGHBOURS, STEPS_OF_SKIN
         builder = ti.FieldsBuilder()
         self.cell_start, self.cell_of, self.order, self.listed = (ti.field(ti.i32) for _ in range(4))
         self.other = ti.field(ti.i32)
@@ -114,10 +114,11 @@ class Neighbours:
 
     @ti.func
     def moved(self, w):
-        """Note that particles have moved by at most ``stride`` relative to the frame, along each axis."""
+        """Note that particles have moved by at most ``displacement`` relative to the frame, along each
+        axis."""
         for k in ti.static(range(3)):
-            self.s.travel[w, k] += self.s.stride[w, k]
-            if 2.0 * self.s.travel[w, k] > self.skin[w][k]:
+            self.s.displacement_since_list[w, k] += self.s.displacement[w, k]
+            if 2.0 * self.s.displacement_since_list[w, k] > self.skin[w][k]:
                 self.stale[w] = 1
 
     @ti.func

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Operator, PairEvent
+from tisim.effects.base import PairEvent
+from tisim.operators.base import Operator
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.worlds.state import Field
 
@@ -21,13 +22,13 @@ class Capture(Operator):
     are refused. Source: B16 section 6.3.
     """
 
-    needs: ClassVar = (
+    fields: ClassVar = (
         "radius",
         "fixed",
         Field("captured_by", "", 1, "keep", integer=True, default=-1),
         Field("captured_at", "s", 1, "keep", default=-1.0),
     )
-    counts: ClassVar = ("captures",)
+    counters: ClassVar = ("captures",)
     requires: ClassVar = (Magnets,)
     excludes: ClassVar = (PairEvent,)
 

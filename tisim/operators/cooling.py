@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, Operator, parameter
+from tisim.effects.base import Effect, parameter
 from tisim.effects.impact.heating import Heating
+from tisim.operators.base import Operator
 from tisim.worlds.state import Field
 
 STEFAN_BOLTZMANN = 5.670374419e-8
@@ -28,7 +29,7 @@ class Cooling(Operator):
     iteration converges to its one root, which lies between the old temperature and equilibrium.
     """
 
-    needs = ("temperature", "radius", Field("cooling_loss", "J", 1, "sum"))
+    fields = ("temperature", "radius", Field("cooling_loss", "J", 1, "sum"))
     requires: ClassVar[tuple[type[Effect], ...]] = (Heating,)
 
     emissivity: float = parameter("", 0.5, ge=0, le=1)

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Operator, parameter
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import Impact, ImpactLaw
-from tisim.worlds.state import FULL, Field
+from tisim.operators.base import Operator, parameter
+from tisim.worlds.state import Field, WorldStatus
 
 
 class Fragmentation(ImpactLaw, Operator):
@@ -28,13 +28,13 @@ class Fragmentation(ImpactLaw, Operator):
     Source: Z04 Eqs (5.1)-(5.3).
     """
 
-    needs = (
+    fields = (
         "radius",
         "mass",
         Field("pieces", "", 1, "keep", integer=True),
         Field("fracture_energy", "J", 1, "sum"),
     )
-    counts = ("fractures",)
+    counters = ("fractures",)
     requires: ClassVar = (Impact,)
 
     surface_energy: float = parameter("J/m^2", gt=0)
@@ -84,7 +84,7 @@ class Fragmentation(ImpactLaw, Operator):
             if n >= 2:
                 s.pieces[w, i] = 0
                 if n - 1 > s.room(w):
-                    s.fail(w, FULL, i)
+                    s.fail(w, WorldStatus.OUT_OF_ROOM, i)
                 else:
                     self.split(s, w, i, n)
 

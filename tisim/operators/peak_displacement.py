@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Operator
+from tisim.operators.base import Operator
 from tisim.worlds.state import Field
 
 
@@ -16,8 +16,8 @@ class PeakDisplacement(Operator):
     feel each other then take common steps. In a box with joined faces distances are those of open space.
     """
 
-    needs: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
-    keeps: ClassVar = ("peak_displacement",)
+    fields: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
+    world_quantities: ClassVar = ("peak_displacement",)
 
     @ti.func
     def world(self, s, w):

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import model_validator
 
-from tisim.components.component import Spec, Vector, parameter
+from tisim.components.component import Component, Vector, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_resolved
 from tisim.errors import InputError, must
@@ -16,7 +16,7 @@ from tisim.packing import region
 from tisim.packing.random_sequential import place
 
 
-class Placement(Spec):
+class Placement(Component):
     """Places for equal spheres; the contract of a placement."""
 
     contract: ClassVar[bool] = True

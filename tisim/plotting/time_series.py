@@ -18,7 +18,7 @@ COLOURS = ("#4477aa", "#cc6677", "#228833")
 
 
 @dataclass(frozen=True)
-class History:
+class TimeSeries:
     """What is drawn against time; a value for each frame.
 
     time : s. kinetic_energy : J. number : of particles.
@@ -33,7 +33,7 @@ class History:
     number: np.ndarray
 
 
-def history(found: Frames) -> History:
+def history(found: Frames) -> TimeSeries:
     """Of all frames, each read once."""
     energy, centre, drift, number = [], [], [], []
     for frame in found:
@@ -43,7 +43,7 @@ def history(found: Frames) -> History:
         drift.append(np.average(velocity, axis=0, weights=mass))
         number.append(len(mass))
     shift = np.array(centre) - centre[0]
-    return History(found.times, np.array(energy), shift, np.array(drift), np.array(number))
+    return TimeSeries(found.times, np.array(energy), shift, np.array(drift), np.array(number))
 
 
 def clouds(found: Frames) -> Figure:

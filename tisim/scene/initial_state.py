@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from tisim.components.component import Spec, Text, Vector, parameter
+from tisim.components.component import Component, Text, Vector, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
 from tisim.errors import InputError, must, shown
@@ -19,7 +19,7 @@ Arrays = dict[str, np.ndarray]
 """Particle quantities by field name: shape (n,) or (n, 3), SI."""
 
 
-class Start(Spec):
+class Start(Component):
     """A starting configuration."""
 
     contract: ClassVar[bool] = True

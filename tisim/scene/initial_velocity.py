@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from tisim.components.component import Spec, parameter
+from tisim.components.component import Component, parameter
 from tisim.errors import must
 
 
-class Pulse(Spec):
+class Pulse(Component):
     """A change of all velocities at the start; the contract of a pulse."""
 
     contract: ClassVar[bool] = True

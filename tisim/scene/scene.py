@@ -12,11 +12,12 @@ from pydantic import Field, field_validator, model_validator
 
 from tisim import effects, operators, sources, steppers
 from tisim.components import serialization
-from tisim.components.component import Spec, Text
+from tisim.components.component import Component, Text
 from tisim.components.domain import Box, Domain, Open
-from tisim.effects.base import Effect, Source
+from tisim.effects.base import Effect
 from tisim.errors import InputError, must, shown
 from tisim.scene.initial_state import Start
+from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.verlet import Verlet
 
@@ -26,7 +27,7 @@ PHYSICS_VERSION = 2
 __all__ = ["Box", "Open", "Scene"]
 
 
-class Scene(Spec):
+class Scene(Component):
     """Particles, the effects they are subject to, and for how long.
 
     particles : the start, ``Particles`` or ``Cloud``.
@@ -67,16 +68,16 @@ class Scene(Spec):
                 alone = not issubclass(other, kind.excludes)
                 must(alone, f"effects.{kind.kind()}", f"used without {other.kind()}", other.kind())
             must(
-                not isinstance(self.stepper.control, kind.unfit),
+                self.stepper.control.kind() not in kind.incompatible_controls,
                 "stepper.control",
                 f"one that suits {kind.kind()}, such as fixed_step or that of an implicit stepper",
                 self.stepper.control.kind(),
             )
             given = {other.quantity for other in present if issubclass(other, Source)}
             must(
-                not kind.feels or not given.isdisjoint(kind.feels),
+                not kind.requires_source or not given.isdisjoint(kind.requires_source),
                 f"effects.{kind.kind()}",
-                f"used together with a source of {' or '.join(kind.feels)}",
+                f"used together with a source of {' or '.join(kind.requires_source)}",
                 ", ".join(other.kind() for other in present),
             )
         self.stepper.suits(self.effects, self.domain)
@@ -203,7 +204,7 @@ def _step(place: Any, step: str, key: str) -> Any:
     return int(step) if listed else step
 
 
-def _names(kind: type[Spec]) -> list[str]:
+def _names(kind: type[Component]) -> list[str]:
     """Of an effect in files, or of those known that are made after a contract; its own if none are."""
     if not kind.__dict__.get("contract"):
         return [f"effects.{kind.kind()}"]

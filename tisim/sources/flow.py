@@ -6,7 +6,7 @@ from typing import Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Source, parameter
+from tisim.sources.base import Source, parameter
 
 
 class UniformFlow(Source):

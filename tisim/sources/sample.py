@@ -10,9 +10,10 @@ from tisim.backend import runtime
 from tisim.backend.memory import collected
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects.base import Effect, Source
+from tisim.effects.base import Effect
 from tisim.errors import must
-from tisim.worlds.parameter_table import Table, connect
+from tisim.sources.base import Source
+from tisim.worlds.parameter_table import ParameterTable, connect
 
 
 @ti.data_oriented
@@ -59,7 +60,7 @@ def sample(
 @in_taichi_thread
 def _sample(given: Sequence[Source], real: Any, time: float, places: np.ndarray, out: np.ndarray) -> None:
     with collected() as trees:
-        table = Table(given, 1, real)
+        table = ParameterTable(given, 1, real)
         bound = tuple(table.bind(source) for source in given)
         connect(bound)
         table.write([given])

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Source, parameter
+from tisim.sources.base import Source, parameter
 
 STILL: Vector = (0.0, 0.0, 0.0)
 

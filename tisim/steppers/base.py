@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
-from tisim.components.component import Spec
+from tisim.components.component import Component
 from tisim.components.domain import Domain
-from tisim.effects.base import Effect, Force, Mutual, Settled, Source
+from tisim.effects.base import DerivedQuantity, Effect, Force, SelfConsistentQuantity
 from tisim.errors import must
+from tisim.sources.base import Source
 from tisim.steppers.step_control import MOST_STEPS, StepControl
 from tisim.worlds.program import Item
 from tisim.worlds.state import Field, State
@@ -53,20 +54,22 @@ class Parts:
 
 def single(effect: Effect) -> bool:
     """Whether it is of each particle by itself."""
-    return isinstance(effect, Force | Source | Settled) and not isinstance(effect, Mutual)
+    return isinstance(effect, Force | Source | DerivedQuantity) and not isinstance(
+        effect, SelfConsistentQuantity
+    )
 
 
-class Stepper(Spec):
+class Stepper(Component):
     """How time advances. ``control`` chooses the length of the next step.
 
-    As with effects, ``counts`` names counters, ``keeps`` quantities of a world, and in a kernel a parameter
-    is a function of the world. Before the first step ``force`` and ``torque`` are those of
+    As with effects, ``counters`` names counters, ``world_quantities`` quantities of a world, and in a kernel
+    a parameter is a function of the world. Before the first step ``force`` and ``torque`` are those of
     the start. ``random`` says that it draws random numbers, so that only statistics converge.
     """
 
     contract: ClassVar[bool] = True
-    counts: ClassVar[tuple[str, ...]] = ()
-    keeps: ClassVar[tuple[str, ...]] = ()
+    counters: ClassVar[tuple[str, ...]] = ()
+    world_quantities: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
     control: StepControl
 
@@ -116,7 +119,7 @@ class Stepper(Spec):
         own = tuple(option for option in super().structure() if option != ("control", self.control))
         return (*own, *self.control.structure())
 
-    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         """Fields that it reads or writes, in a scene that has torques, or whose particles are independent."""
         return ()
 
@@ -126,7 +129,7 @@ class Stepper(Spec):
         They set ``dt`` and move ``time`` on, to ``end`` at most; count ``steps`` and ``particle_steps``; set
         ``events`` to 0; once the controller has been asked, set ``approach_time`` to infinity and ``fastest``
         to 0, for its notes on the next step; call ``particle`` of each operator; put back into the domain
-        what has left it; and say how far particles have moved: ``stride`` relative to the frame, then
+        what has left it; and say how far particles have moved: ``displacement`` relative to the frame, then
         ``near.moved(w)``, or simply ``near.stale[w] = 1``. Verlet is a pattern.
         """
         raise NotImplementedError(f"{type(self).__name__} must define step")

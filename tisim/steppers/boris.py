@@ -7,7 +7,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force
 from tisim.interactions.force_sum import FORCE
 from tisim.steppers.base import Parts, Stepper
-from tisim.steppers.common import Arrive, Clock, Listen, Operate, arrive
+from tisim.steppers.common import Arrive, BeginStep, Listen, Operate, apply_displacement
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.step_control import Controller, FixedStep
 from tisim.worlds.program import Item, PerParticle, Phase
@@ -28,23 +28,23 @@ class Boris(Stepper):
 
     control: Controller
 
-    keeps: ClassVar = ("time_before",)
+    world_quantities: ClassVar = ("time_before",)
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         linear = any(effect.offers("velocity_jacobian") for effect in effects if isinstance(effect, Force))
         return (cls(control=FixedStep(dt=dt)),) if linear else ()
 
-    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         return (FORCE,)
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
         s, near = parts.s, parts.near
         listen = (Listen(parts),) if near else ()
-        first, second = (Drift(parts), *listen), (Drift(parts), *listen)
-        kick = (*parts.lists, *parts.remember, *parts.forces, Rotate(parts))
+        first, second = (BorisDrift(parts), *listen), (BorisDrift(parts), *listen)
+        kick = (*parts.lists, *parts.remember, *parts.forces, BorisRotation(parts))
         operate = (Operate(parts), *listen) if parts.operators else ()
-        return (Clock(s, parts.control, near), Middle(s), *first, *kick, *second, *operate, Arrive(s))
+        return (BeginStep(s, parts.control, near), Middle(s), *first, *kick, *second, *operate, Arrive(s))
 
 
 class Middle(Phase):
@@ -60,7 +60,7 @@ class Middle(Phase):
         s.time[w] += 0.5 * s.dt[w]
 
 
-class Drift(PerParticle):
+class BorisDrift(PerParticle):
     """r += dt/2 v."""
 
     def __init__(self, parts) -> None:
@@ -72,10 +72,10 @@ class Drift(PerParticle):
         s = self.s
         moved = 0.5 * ti.cast(s.dt[w], s.real) * s.velocity[w, i]
         drift = ti.cast(moved, ti.f64) - 0.5 * s.dt[w] * s.axes(s.frame, w)
-        arrive(s, self.domain, w, i, s.position[w, i] + moved, drift, ti.cast(0.0, ti.f64))
+        apply_displacement(s, self.domain, w, i, s.position[w, i] + moved, drift, ti.cast(0.0, ti.f64))
 
 
-class Rotate(PerParticle):
+class BorisRotation(PerParticle):
     """v- to v+ to v', with the forces at the middle of the step."""
 
     def __init__(self, parts) -> None:

@@ -2,34 +2,34 @@
 
 from tisim.backend.taichi import ti
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import ENDED, LOST, NOT_FINITE
+from tisim.worlds.state import WorldStatus
 
 
 @ti.func
-def note_stride(s, w, moved):
+def note_displacement(s, w, moved):
     """Note that a particle has moved so far relative to the world's frame, for the pair lists. m, f64."""
     for k in ti.static(range(3)):
         far = ti.abs(moved[k])
-        if far > s.stride[w, k]:
-            ti.atomic_max(s.stride[w, k], far)
+        if far > s.displacement[w, k]:
+            ti.atomic_max(s.displacement[w, k], far)
 
 
 @ti.func
-def arrive(s, domain: ti.template(), w, i, r, moved, grown):  # type: ignore[valid-type]
+def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type: ignore[valid-type]
     """Put a particle at r, wherever that is in the domain; ``moved`` relative to the frame, and ``grown`` in
     radius: for pair lists a surface that grows is one that moves. m; the last two in f64."""
     stride = ti.abs(moved) + ti.abs(grown)
     # Not below infinity: also true of NaN.
     if not (stride.sum() < ti.math.inf):
-        s.fail(w, NOT_FINITE, i)
+        s.fail(w, WorldStatus.NOT_FINITE, i)
     elif domain.lost(w, r):
-        s.fail(w, LOST, i)
+        s.fail(w, WorldStatus.POSITION_LOST, i)
     else:
-        note_stride(s, w, stride)
+        note_displacement(s, w, stride)
         s.position[w, i] = domain.wrap(w, r)
 
 
-class Clock(Phase):
+class BeginStep(Phase):
     """Choose the step; the last one ends exactly on time."""
 
     def __init__(self, s, controller, near) -> None:
@@ -52,7 +52,7 @@ class Clock(Phase):
         s.steps[w] += 1
         s.particle_steps[w] += s.count[w]
         for k in ti.static(range(3)):
-            s.stride[w, k] = 0.0
+            s.displacement[w, k] = 0.0
         s.events[w] = 0
 
 
@@ -78,7 +78,7 @@ class Listen(Phase):
     def run(self, w, _k):
         self.near.moved(w)
         for k in ti.static(range(3)):
-            self.s.stride[w, k] = 0.0
+            self.s.displacement[w, k] = 0.0
 
 
 class Operate(PerParticle):
@@ -96,7 +96,7 @@ class Operate(PerParticle):
             operator.particle(s, w, i, s.time_before[w] + s.dt[w], ti.cast(s.dt[w], s.real))
         after = s.position[w, i]
         grown = ti.cast(s.radius[w, i] - size, ti.f64)
-        arrive(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)
+        apply_displacement(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)
 
 
 class Arrive(Phase):
@@ -111,7 +111,7 @@ class Arrive(Phase):
         advance_clock(self.s, w)
 
 
-class Finish(Phase):
+class FinishStep(Phase):
     """A world that has reached its end stops."""
 
     def __init__(self, s) -> None:
@@ -120,4 +120,4 @@ class Finish(Phase):
     @ti.func
     def run(self, w, _k):
         if self.s.time[w] >= self.s.end[w]:
-            ti.atomic_max(self.s.status[w], ENDED)
+            ti.atomic_max(self.s.status[w], WorldStatus.ENDED)

@@ -7,33 +7,34 @@ from typing import ClassVar, Self
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.accuracy_parameter import Knob
-from tisim.components.component import Spec, parameter
+from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.component import Component, parameter
 from tisim.errors import must
 
 TOUCH = 1.0 + 1e-6
 """Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
-LEAST = 1e-30
+SHORTEST_STEP = 1e-30
 """The shortest step that may be asked for, s: light goes 3e-22 m in it, and single precision holds it."""
 MOST_STEPS = 2.0**53
 """Steps that a run may take: with more, one is shorter than what the time at the end is rounded to."""
 
 
 @ti.func
-def told(s, w, shortest):
+def shortest_representable(s, w, shortest):
     """The shortest step (s, f64), where this one is asked for, that the time at the end still tells."""
     return ti.max(ti.cast(shortest, ti.f64), s.end[w] / MOST_STEPS)
 
 
-class StepControl(Spec):
+class StepControl(Component):
     """The contract of step control: ``pair`` sees every near pair, ``note`` every particle.
 
-    ``watches_pairs`` says whether it needs to see pairs at all; ``keeps`` names quantities of a world.
+    ``watches_pairs`` says whether it needs to see pairs at all; ``world_quantities`` names quantities of a
+    world.
     """
 
     contract: ClassVar[bool] = True
     watches_pairs: ClassVar[bool] = False
-    keeps: ClassVar[tuple[str, ...]] = ()
+    world_quantities: ClassVar[tuple[str, ...]] = ()
 
     @ti.func
     def pair(self, s, w, i, j, separation):
@@ -63,9 +64,9 @@ class Controller(StepControl):
 class FixedStep(Controller):
     """Steps of one length; the last one is cut to end on time."""
 
-    dt: float = parameter("s", ge=LEAST)
+    dt: float = parameter("s", ge=SHORTEST_STEP)
 
-    knobs = (Knob(dt=2),)
+    accuracy_parameters = (AccuracyParameter(dt=2),)
 
     def fewest(self, duration: float) -> float:
         return duration / self.dt
@@ -82,11 +83,15 @@ class ApproachTime(Controller):
     is not always the first to be met. Limits of Z04 section 8: 1e-6 s and 1e-3 s.
     """
 
-    shortest: float = parameter("s", 1e-6, ge=LEAST)
-    longest: float = parameter("s", 1e-3, ge=LEAST)
+    shortest: float = parameter("s", 1e-6, ge=SHORTEST_STEP)
+    longest: float = parameter("s", 1e-3, ge=SHORTEST_STEP)
     watches_pairs: ClassVar[bool] = True
 
-    knobs = (Knob(shortest=1, longest=1), Knob(shortest=1, converges=False), Knob(longest=1, converges=False))
+    accuracy_parameters = (
+        AccuracyParameter(shortest=1, longest=1),
+        AccuracyParameter(shortest=1, converges=False),
+        AccuracyParameter(longest=1, converges=False),
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -121,4 +126,6 @@ class ApproachTime(Controller):
         if horizon > 0.0:
             # Pairs not seen are farther apart than this, and close no faster than twice the fastest.
             dt = ti.min(dt, ti.cast(horizon, ti.f64) / (2.0 * s.fastest[w] + 1e-300))
-        return ti.max(told(s, w, self.shortest(w)), ti.min(dt, ti.cast(self.longest(w), ti.f64)))
+        return ti.max(
+            shortest_representable(s, w, self.shortest(w)), ti.min(dt, ti.cast(self.longest(w), ti.f64))
+        )

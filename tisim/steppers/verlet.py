@@ -10,7 +10,7 @@ from typing import Self
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairEvent
 from tisim.steppers.base import Parts, Stepper
-from tisim.steppers.common import Clock, advance_clock, arrive
+from tisim.steppers.common import BeginStep, advance_clock, apply_displacement
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
 from tisim.worlds.program import Item, PerParticle, Phase
 
@@ -32,7 +32,7 @@ class Verlet(Stepper):
         s, near, forced = parts.s, parts.near, parts.forced
         drift = Move(s, parts.domain, parts.operators, forced, parts.turning)
         kick = (Kick(s, parts.turning),) if forced else ()
-        start = (Clock(s, parts.control, near), drift, Advance(s, near))
+        start = (BeginStep(s, parts.control, near), drift, Advance(s, near))
         return (*start, *parts.lists, *parts.remember, *parts.forces, *kick)
 
 
@@ -66,7 +66,7 @@ class Move(PerParticle):
             s.position[w, i],
             ti.cast(s.position[w, i] - before, ti.f64) - s.axes(s.frame, w) * s.dt[w],
         )
-        arrive(s, self.domain, w, i, after, moved, ti.cast(s.radius[w, i] - size, ti.f64))
+        apply_displacement(s, self.domain, w, i, after, moved, ti.cast(s.radius[w, i] - size, ti.f64))
 
 
 class Kick(PerParticle):

@@ -1,7 +1,7 @@
 """From plain data to what kernels see: one parameter table for all worlds.
 
-A bound copy of a Spec has, in place of each parameter, a function of the world that reads the table. So a
-kernel written ``self.hardness(w)`` sees the value of world w, and loading other designs changes numbers in
+A bound copy of a Component has, in place of each parameter, a function of the world that reads the table. So
+a kernel written ``self.hardness(w)`` sees the value of world w, and loading other designs changes numbers in
 a table, not code.
 """
 
@@ -15,10 +15,10 @@ import numpy as np
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.components.component import Spec, room
+from tisim.components.component import Component, room
 from tisim.errors import must
 
-Part = TypeVar("Part", bound=Spec)
+Part = TypeVar("Part", bound=Component)
 
 
 def _reader(table: Any, slot: int, size: int) -> Any:
@@ -62,18 +62,18 @@ def _length_reader(table: Any, slot: int) -> Any:
     return read
 
 
-def _width(kind: type[Spec]) -> int:
+def _width(kind: type[Component]) -> int:
     return sum(size for _, size in kind.columns())
 
 
-def _slots(part: Spec) -> int:
+def _slots(part: Component) -> int:
     """In the table of a world: the part's own, and for each list its length and room for its rows."""
     return _width(type(part)) + sum(
         1 + _width(kind) * room(len(getattr(part, n))) for n, kind in part.lists()
     )
 
 
-def _entries(part: Spec, where: str) -> Iterator[tuple[str, float]]:
+def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
     """What stands in the slots of a part, in order, each with its dotted name."""
     names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
     yield from zip(names, part.values(), strict=True)
@@ -86,10 +86,10 @@ def _entries(part: Spec, where: str) -> Iterator[tuple[str, float]]:
         yield from [(f"{where}.{name}", 0.0)] * spare
 
 
-class Table:
+class ParameterTable:
     """The parameters of every part of a scene, for every world: ``table[world, slot]``."""
 
-    def __init__(self, parts: Sequence[Spec], worlds: int, real: Any) -> None:
+    def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
         self.slots = sum(_slots(part) for part in parts)
         self.field = ti.field(real)
         builder = ti.FieldsBuilder()
@@ -122,7 +122,7 @@ class Table:
         self.array_bytes += held.nbytes
         return column
 
-    def _bind_rows(self, kind: type[Spec], slot: int) -> Spec:
+    def _bind_rows(self, kind: type[Component], slot: int) -> Component:
         """The one bound row that stands for a list."""
         bound, first = kind.model_construct(), slot + 1
         bound.__dict__["size"] = _length_reader(self.field, slot)
@@ -131,7 +131,7 @@ class Table:
             first += size
         return bound
 
-    def write(self, rows: Sequence[Sequence[Spec]]) -> None:
+    def write(self, rows: Sequence[Sequence[Component]]) -> None:
         """Set the parameters of each world from its parts, in the order they were bound.
 
         InputError for one that the precision cannot hold, or that kernels would flush to zero.

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds.state import RUNNING, State
+from tisim.worlds.state import State, WorldStatus
 
 TASK = 512
 """Iterations that Taichi and Quadrants hand to a CPU thread at once, whatever block size is asked for
@@ -108,8 +108,8 @@ class Program:
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
-        """At most ``steps`` steps of every running world; none goes on past its ``hold`` or its ``goal``, or
-        after a launch that has left a step under way."""
+        """At most ``steps`` steps of every running world; none goes on past its ``pause_time`` or its
+        ``goal``, or after a launch that has left a step under way."""
         self.s.check()
         if self.schedule == "world":
             self._advance_worlds(steps)
@@ -152,20 +152,20 @@ class Program:
                 w = k // TASK
                 self._allow_world(w, steps)
                 step = 0
-                while self.s.status[w] == RUNNING and step < steps and not self._waits(w):
+                while self.s.status[w] == WorldStatus.RUNNING and step < steps and not self._waits(w):
                     self._run(self.items, w)
                     step += 1
 
     @ti.func
     def _run(self, items: ti.template(), w):  # type: ignore[valid-type]
         for item in ti.static(items):
-            if self.s.status[w] == RUNNING:
+            if self.s.status[w] == WorldStatus.RUNNING:
                 if ti.static(isinstance(item, Repeat)):
-                    while self.s.status[w] == RUNNING and item.pending(w) > 0:
+                    while self.s.status[w] == WorldStatus.RUNNING and item.pending(w) > 0:
                         self._run(item.items, w)
                 else:
                     self._loop(item, w)
-                    self._heed(w)
+                    self._stop_failed(w)
 
     @ti.func
     def _loop(self, phase: ti.template(), w):  # type: ignore[valid-type]
@@ -178,14 +178,14 @@ class Program:
                 phase.run(w, k)
 
     @ti.func
-    def _heed(self, w):
+    def _stop_failed(self, w):
         """Stop a world in which a phase has failed, once all of its items have been heard."""
         if self.s.failed[w] > 0:
             self.s.status[w] = self.s.failed[w]
 
     @ti.func
     def _waits(self, w):
-        return self.s.time[w] >= self.s.hold[w] or self.s.steps[w] >= self.s.until[w]
+        return self.s.time[w] >= self.s.pause_time[w] or self.s.steps[w] >= self.s.step_limit[w]
 
     @ti.kernel
     def _allow(self, steps: ti.i32):
@@ -194,11 +194,11 @@ class Program:
 
     @ti.func
     def _allow_world(self, w, steps):
-        self.s.until[w] = ti.min(self.s.steps[w] + steps, self.s.goal[w])
+        self.s.step_limit[w] = ti.min(self.s.steps[w] + steps, self.s.goal[w])
 
     @ti.func
     def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]
-        active = self.s.status[w] == RUNNING and self.s.held[w] == 0
+        active = self.s.status[w] == WorldStatus.RUNNING and self.s.paused[w] == 0
         for repeat in ti.static(nest.repeats):
             active = active and repeat.pending(w) > 0
         return active
@@ -209,14 +209,14 @@ class Program:
             if self._active(nest, w) and k < phase.size(w) and phase.when(w) > 0:
                 phase.run(w, k)
         for w in range(self.s.worlds):
-            self._heed(w)
+            self._stop_failed(w)
 
     @ti.kernel
     def _count_going_on(self) -> ti.i32:
         """Between two steps: which worlds wait, and how many do not."""
         n = 0
         for w in range(self.s.worlds):
-            self.s.held[w] = ti.cast(self._waits(w), ti.i32)
+            self.s.paused[w] = ti.cast(self._waits(w), ti.i32)
             if self._active(self.outside, w):
                 n += 1
         return n

@@ -6,6 +6,7 @@ which the compiler can vectorise over particles.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -72,26 +73,55 @@ SHARED = {
 }
 """Fields that several effects share by name."""
 
-RUNNING, ENDED, NOT_FINITE, FULL, CROWDED, UNSETTLED, LOST, STUCK, STEEP, INDEFINITE = range(10)
-"""Status of a world: going on; reached its end; a quantity is not finite; no free slot; contacts overflow;
-a quantity that particles settle among themselves does not settle; a particle has left the box so far that its
-place is lost; no step is short enough to be solved; a force asks for a step shorter than the shortest; a
-diffusion matrix is not positive definite."""
 
-NOBODY = 2**31 - 1
-"""For the particle that has stopped a world, and the index of the effect that is to blame: none."""
-ASKED = NOBODY - 1
+class WorldStatus(IntEnum):
+    """How a world is doing; of several failures in one phase, the one with the highest number counts."""
+
+    RUNNING = 0
+    ENDED = 1
+    """The world has reached its end."""
+    NOT_FINITE = 2
+    """A quantity of a particle is not finite."""
+    OUT_OF_ROOM = 3
+    """There is no free slot for another particle."""
+    CONTACT_OVERFLOW = 4
+    """There are more simultaneous contacts than there is room for."""
+    NOT_CONVERGED = 5
+    """A self-consistent quantity of the particles does not converge."""
+    POSITION_LOST = 6
+    """A particle has left the box so far that rounding loses its position."""
+    STEP_TOO_SHORT = 7
+    """The implicit equations of a step cannot be solved even at the shortest step."""
+    FORCE_TOO_STEEP = 8
+    """A force asks for a step shorter than the shortest."""
+    NOT_POSITIVE_DEFINITE = 9
+    """A diffusion matrix is not positive definite."""
+
+
+NO_ONE = 2**31 - 1
+"""For the particle that has stopped a world, and the index of the effect that is to failing_effect: none."""
+ASKED = NO_ONE - 1
 """The same: a force, not yet known which."""
 
 NEVER = 2**62
 """A number of steps that no world gets to."""
 
 CLOCK = (
-    *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "asked_at"),
+    *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
     *("reached", "cut"),
 )
-BOOKS = ("count", "status", "failed", "culprit", "blame", "changed", "events", "next_id", "underway")
-MOTION = ("frame", "stride", "travel")
+BOOKS = (
+    "count",
+    "status",
+    "failed",
+    "failing_particle",
+    "failing_effect",
+    "changed",
+    "events",
+    "next_id",
+    "underway",
+)
+MOTION = ("frame", "displacement", "displacement_since_list")
 TALLIES = ("steps", "particle_steps")
 
 
@@ -124,16 +154,16 @@ class State:
         capacity: int,
         fields: tuple[Field, ...],
         counters: tuple[str, ...],
-        keeps: tuple[str, ...] = (),
+        world_quantities: tuple[str, ...] = (),
     ) -> None:
         self.worlds, self.capacity = worlds, capacity
-        self.fields, self.counters, self.keeps = fields, (*TALLIES, *counters), keeps
-        self.told = tuple(field for field in fields if not field.scratch)
+        self.fields, self.counters, self.world_quantities = fields, (*TALLIES, *counters), world_quantities
+        self.reported = tuple(field for field in fields if not field.scratch)
         self.real = runtime.current().real
         builder = ti.FieldsBuilder()
         for field in fields:
             setattr(self, field.name, self._place(builder, field))
-        for names, dtype in (((*CLOCK, *keeps), ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
+        for names, dtype in (((*CLOCK, *world_quantities), ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
             for name in names:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
@@ -143,11 +173,11 @@ class State:
         # Particles that its scene may ever have; the capacity may be that of a larger one.
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)
-        # No part of what a run is: a world waits at the first end of a step at or after ``hold`` (s), at
-        # ``goal`` steps, and for the next launches at ``until`` steps.
-        self.hold, self.held = ti.field(ti.f64), ti.field(ti.i32)
-        self.goal, self.until = ti.field(ti.i64), ti.field(ti.i64)
-        builder.dense(ti.i, worlds).place(self.hold, self.held, self.goal, self.until)
+        # No part of what a run is: a world waits at the first end of a step at or after ``pause_time`` (s),
+        # at ``goal`` steps, and for the next launches at ``step_limit`` steps.
+        self.pause_time, self.paused = ti.field(ti.f64), ti.field(ti.i32)
+        self.goal, self.step_limit = ti.field(ti.i64), ti.field(ti.i64)
+        builder.dense(ti.i, worlds).place(self.pause_time, self.paused, self.goal, self.step_limit)
         for name in MOTION:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
             column = ti.field(ti.f64)
@@ -155,8 +185,8 @@ class State:
             setattr(self, name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
-        own = ("seed", "most", "hold", "held", "goal", "until")
-        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *keeps, *own)
+        own = ("seed", "most", "pause_time", "paused", "goal", "step_limit")
+        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *world_quantities, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -223,7 +253,7 @@ class State:
     def saved(self) -> tuple[str, ...]:
         """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
         fields = (field.name for field in self.fields)
-        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.keeps, "frame", "seed", "goal")
+        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.world_quantities, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
         """A copy of all worlds as they are, by the names that are saved."""
@@ -276,7 +306,7 @@ class State:
         ti.atomic_max(self.changed[w], 1)
 
     @ti.func
-    def disturb(self, w):
+    def invalidate_lists(self, w):
         """Say that a particle has been moved or resized other than by a step: it is put back into the domain,
         and pair lists are made anew."""
         ti.atomic_max(self.changed[w], 1)
@@ -305,10 +335,10 @@ class State:
         """Stop a world, after this phase: all of its items are heard, and of several particles at fault the
         lowest id is recorded, whatever the order of parallel work."""
         ti.atomic_max(self.failed[w], status)
-        ti.atomic_min(self.culprit[w], self.id[w, i])
+        ti.atomic_min(self.failing_particle[w], self.id[w, i])
 
     @ti.func
-    def suspect(self, w, status, i):
+    def fail_by_force(self, w, status, i):
         """Stop a world by a force on i; which of them, failure_attribution.py finds out."""
         self.fail(w, status, i)
         self.ask(w, self.time[w])
@@ -316,17 +346,17 @@ class State:
     @ti.func
     def ask(self, w, t):
         """Which force it was at t (s), as the world is now."""
-        ti.atomic_min(self.blame[w], ASKED)
-        self.asked_at[w] = t
+        ti.atomic_min(self.failing_effect[w], ASKED)
+        self.failure_time[w] = t
 
     @ti.func
     def fault(self, w, i, effect):
         """Stop a world in which an effect, by its index in the scene, has made something not finite."""
-        self.fail(w, NOT_FINITE, i)
-        ti.atomic_min(self.blame[w], effect)
+        self.fail(w, WorldStatus.NOT_FINITE, i)
+        ti.atomic_min(self.failing_effect[w], effect)
 
     @ti.func
     def spoilt(self, w, effect):
         """The same of a quantity of the world, which is of no particle."""
-        ti.atomic_max(self.failed[w], NOT_FINITE)
-        ti.atomic_min(self.blame[w], effect)
+        ti.atomic_max(self.failed[w], WorldStatus.NOT_FINITE)
+        ti.atomic_min(self.failing_effect[w], effect)

@@ -22,7 +22,7 @@ def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 
     must(kind in ("batch", "processes", "dask"), "executor", RULE, name)
     if kind == "batch":
         must(name == "batch", "executor", RULE, name)
-        runtime.start(device, precision, threads)
+        runtime.init(device, precision, threads)
         return Evaluator()
     # Imported late: nobody needs the one for the other, and Dask may not be there at all.
     from optimize.evaluation.executors.remote import Remote

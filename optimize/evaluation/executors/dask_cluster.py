@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from optimize.evaluation.executors import handshake, worker
 from optimize.evaluation.executors.worker import Answer, Wanted
-from tisim.errors import InputError, RunError, must
-from tisim.scene.scene import Scene
+from tisim import InputError, RunError, Scene
+from tisim.errors import must
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -11,9 +11,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from textwrap import shorten
 
-from tisim import __version__
+from tisim import InputError, __version__
 from tisim.backend import runtime
-from tisim.errors import InputError, must
+from tisim.errors import must
 from tisim.scene.scene import PHYSICS_VERSION
 
 PACKAGES = ("tisim", "optimize", "cases")

@@ -13,9 +13,8 @@ from multiprocessing import resource_tracker
 from optimize.evaluation.executors import worker
 from optimize.evaluation.executors.remote import Lost
 from optimize.evaluation.executors.worker import Answer, Wanted
+from tisim import RunError, Scene
 from tisim.backend import runtime
-from tisim.errors import RunError
-from tisim.scene.scene import Scene
 
 LEAVE_S = 10.0
 """Time that a worker without work has to end by itself, seconds."""

@@ -8,9 +8,7 @@ from typing import Any, Protocol
 
 from optimize.evaluation.executors import handshake
 from optimize.evaluation.executors.worker import Answer, Wanted
-from tisim.engine.result import Result
-from tisim.errors import RunError
-from tisim.scene.scene import Scene
+from tisim import Result, RunError, Scene
 
 UNITS = 2
 """Units of work per worker and call. More even out runs of different length; fewer are larger, and a batch
@@ -51,7 +49,8 @@ class Pool(Protocol):
 
 
 class Remote:
-    """An evaluator (optimize.evaluation.runs.Evaluator) on a pool of workers; bit for bit the in-process one's results.
+    """An evaluator (optimize.evaluation.runs.Evaluator) on a pool of workers; bit for bit
+    the in-process one's results.
 
     What has been yielded stands, whatever happens to a worker; what has not is run again by another one. The
     cache is written by this process only, so nothing can be counted twice.

@@ -13,10 +13,8 @@ from multiprocessing.connection import Connection
 
 from optimize.evaluation.evaluator import Evaluator
 from optimize.evaluation.executors import handshake
+from tisim import InputError, Result, RunError, Scene
 from tisim.backend import runtime
-from tisim.engine.result import Result
-from tisim.errors import InputError, RunError
-from tisim.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def _run_pickled(question: bytes, share: int) -> Answer:
 
 def _run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
     before = runtime.generation()
-    runtime.start(wanted.device, wanted.precision, wanted.threads or share)
+    runtime.init(wanted.device, wanted.precision, wanted.threads or share)
     if not _evaluator or runtime.generation() != before:
         _evaluator[:] = [Evaluator()]
     results = dict(_evaluator[0].evaluate(scenes))

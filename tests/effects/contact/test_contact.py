@@ -5,12 +5,7 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, pairs
 from tests.scenes import scene
-from tisim.effects.contact.bond import ContactBond
-from tisim.effects.contact.dissipation import ContactDissipation
-from tisim.effects.contact.friction import ContactFriction
-from tisim.effects.contact.hertz import Hertz
-from tisim.effects.contact.power_law import Contact
-from tisim.effects.contact.softening import ContactSoftening
+from tisim.effects import Contact, ContactBond, ContactDissipation, ContactFriction, ContactSoftening, Hertz
 
 GRAINS, DT = 12, 1e-3
 

@@ -3,14 +3,9 @@
 import pytest
 
 from tests.scenes import scene
-from tisim.effects.contact.bond import ContactBond
-from tisim.effects.contact.dissipation import ContactDissipation
-from tisim.effects.contact.friction import ContactFriction
-from tisim.effects.contact.hertz import Hertz
-from tisim.effects.contact.power_law import Contact
-from tisim.effects.contact.softening import ContactSoftening
-from tisim.errors import InputError
-from tisim.steppers.verlet import Verlet
+from tisim import InputError
+from tisim.effects import Contact, ContactBond, ContactDissipation, ContactFriction, ContactSoftening, Hertz
+from tisim.steppers import Verlet
 
 WRONG = {
     "contact.stiffness must be greater than 0.0; received 0": lambda: Contact(stiffness=0),

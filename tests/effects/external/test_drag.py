@@ -5,11 +5,12 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, close, cloud, jacobians, loads, vector
 from tests.scenes import scene
+from tisim import InputError
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Source, parameter
-from tisim.effects.external.drag import ChowDrag, ConstantDrag, StokesDrag
-from tisim.errors import InputError
+from tisim.effects import ChowDrag, ConstantDrag, StokesDrag
+from tisim.sources import Source
+from tisim.sources.base import parameter
 
 
 class Shear(Source):

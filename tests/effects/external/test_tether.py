@@ -5,9 +5,8 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, close, cloud, fields_beside_the_core, loads, vector
 from tests.scenes import scene, simulate
-from tisim.effects.external.gravity import Gravity
-from tisim.effects.external.tether import Tether
-from tisim.errors import InputError
+from tisim import InputError
+from tisim.effects import Gravity, Tether
 
 
 def stiffnesses(rng):

@@ -4,11 +4,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tests.scenes import HEAT_CAPACITY, scene
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import DeformationWork, Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.effects.impact.softening import Softening
+from tisim.effects import DeformationWork, Friction, Heating, Impact, Reaction, Softening
 
 PAIRS = 300
 

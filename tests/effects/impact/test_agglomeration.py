@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import RADIUS, SOFT, energy, head_on, laws, momentum, scene, simulate
-from tisim.effects.impact.impact import Impact
+from tisim.effects import Impact
 
 
 def run(scenes):

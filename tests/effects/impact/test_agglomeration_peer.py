@@ -17,13 +17,12 @@ import pytest
 from cases.agglomeration import BEST, DURATION, cost, scene
 from tisim import Simulation
 from tisim.backend import runtime
-from tisim.steppers.step_control import ApproachTime
-from tisim.steppers.verlet import Verlet
+from tisim.steppers import ApproachTime, Verlet
 
 numba = pytest.importorskip("numba")
 # Small parallel loops get slow where tbb is installed and numba prefers it.
 numba.config.THREADING_LAYER_PRIORITY = ["omp", "workqueue", "tbb"]
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 peer = pytest.importorskip("agglomeration_numba")
 
 GRAINS, WORLDS = 60, 16

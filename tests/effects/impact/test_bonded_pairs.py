@@ -6,12 +6,8 @@ import pytest
 from tests.scenes import HEAT_CAPACITY, momentum, scene, simulate
 from tisim import Box
 from tisim.backend import runtime
-from tisim.effects.external.gravity import Gravity
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.operators.fragmentation import Fragmentation
+from tisim.effects import Friction, Gravity, Heating, Impact, Reaction
+from tisim.operators import Fragmentation
 
 PAIRS = 24
 ALPHA, AREA = 10.0, 0.3
@@ -107,6 +103,6 @@ def summaries():
 
 @pytest.mark.slow
 def test_nor_does_it_in_single_precision(single):
-    counted = np.array(single("test_bonded_pairs", "summaries"))
+    counted = np.array(single("effects.impact.test_bonded_pairs", "summaries"))
     assert (counted[..., 0] == 1).all()
     np.testing.assert_allclose(counted[..., 1], 1, rtol=1e-5)

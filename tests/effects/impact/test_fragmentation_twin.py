@@ -10,9 +10,8 @@ import pytest
 
 from tests.scenes import GRAIN, HEAT_CAPACITY, RADIUS, check_sums, compiled, scene
 from tisim.backend import runtime
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.operators.fragmentation import Fragmentation
+from tisim.effects import Heating, Impact
+from tisim.operators import Fragmentation
 
 DT, STEPS, WORLDS = 1e-6, 200, 6
 HARDNESS, GAMMA, THRESHOLD = 6e6, 2.0, 0.7

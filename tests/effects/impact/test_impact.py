@@ -5,9 +5,7 @@ import pytest
 
 from tests.effects.impact.impact_twin import COMBINATIONS, DT, PAIRS, as_scene, draw, twin
 from tests.scenes import energy, momentum, simulate
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import DeformationWork, Heating
-from tisim.effects.impact.reaction import Reaction
+from tisim.effects import DeformationWork, Friction, Heating, Reaction
 
 QUICK = ("all",)
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.effects.impact.impact_twin import COMBINATIONS, PAIRS, draw, effects
 from tests.scenes import head_on, scene, simulate
-from tisim.effects.impact.impact import Impact
+from tisim.effects import Impact
 
 
 def restitution(result, speed):

@@ -4,17 +4,8 @@ import numpy as np
 import pytest
 
 from tests.scenes import HEAT_CAPACITY, energy, fixed, momentum, scene, simulate
-from tisim.effects.impact.friction import Friction
-from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact
-from tisim.effects.impact.reaction import Reaction
-from tisim.effects.pair.near_field import NearField
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import ApproachTime
-from tisim.steppers.verlet import Verlet
+from tisim.effects import Friction, Heating, Impact, NearField, Reaction
+from tisim.steppers import ApproachTime, Collocation, IterationControl, StageControl, Trapezoid, Verlet
 
 RADIUS, MASS, DURATION = 1e-3, 1e-5, 1e-4
 ALPHA, FRICTION = 10.0, 0.1

@@ -4,7 +4,8 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.effects.base import Source, parameter
+from tisim.sources import Source
+from tisim.sources.base import parameter
 
 MU_0 = 1.25663706127e-6
 """N/A^2 (CODATA 2022)."""

@@ -6,13 +6,17 @@ import pytest
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, vector
 from tests.effects.magnetic.magnets import K_B, MU_0, Quadrupole, dipole_field, flux_density
 from tests.scenes import scene
-from tisim import Box
-from tisim.effects.magnetic.dipole_dipole import DipoleDipole, TruncatedDipoleDipole
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment
-from tisim.effects.magnetic.mutual_moment import MutualInducedMoment, MutualLangevinMoment
-from tisim.errors import InputError
-from tisim.sources.uniform import MagneticField
+from tisim import Box, InputError
+from tisim.effects import (
+    DipoleDipole,
+    InducedMoment,
+    LangevinMoment,
+    Magnetophoresis,
+    MutualInducedMoment,
+    MutualLangevinMoment,
+    TruncatedDipoleDipole,
+)
+from tisim.sources import MagneticField
 
 SIDE = 3.0
 

@@ -8,17 +8,10 @@ import pytest
 from tests.effects.contact.loads import WORLDS, close, cloud, fields_beside_the_core, loads, vector
 from tests.effects.magnetic.magnets import K_B, MU_0, Quadrupole, flux_density, gradient
 from tests.scenes import scene, simulate
-from tisim.effects.magnetic.magnetophoresis import Magnetophoresis
-from tisim.effects.magnetic.moment import FixedMoment, InducedMoment, LangevinMoment
-from tisim.errors import InputError
-from tisim.sources.uniform import MagneticField
-from tisim.steppers.boris import Boris
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
-from tisim.steppers.verlet import Verlet
+from tisim import InputError
+from tisim.effects import FixedMoment, InducedMoment, LangevinMoment, Magnetophoresis
+from tisim.sources import MagneticField
+from tisim.steppers import Boris, Collocation, ErrorControl, FixedStep, StageControl, Trapezoid, Verlet
 
 
 def langevin(x):

@@ -5,9 +5,8 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, pairs
 from tests.scenes import scene
-from tisim import Scene
-from tisim.effects.pair.mie import Mie
-from tisim.errors import InputError
+from tisim import InputError, Scene
+from tisim.effects import Mie
 
 
 def crowd(rng, law, n=12, spread=1.0):

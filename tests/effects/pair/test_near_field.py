@@ -7,9 +7,8 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, pairs
 from tests.scenes import scene
-from tisim import Box
-from tisim.effects.pair.near_field import NearField, TruncatedNearField
-from tisim.errors import InputError
+from tisim import Box, InputError
+from tisim.effects import NearField, TruncatedNearField
 
 COULOMB = 8.9875517873681764e9
 """1/(4 pi epsilon_0), N m^2/C^2."""

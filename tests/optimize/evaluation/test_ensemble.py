@@ -2,14 +2,14 @@ import math
 
 import numpy as np
 import pytest
-from fake_runs import FakeEvaluator, FakeScene, fake_problem
 
 from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
 from optimize.evaluation.estimate import settled_after
 from optimize.evaluation.runs import start_seed
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
-from tisim.errors import InputError, RunError
+from tests.optimize.fake_runs import FakeEvaluator, FakeScene, fake_problem
+from tisim import InputError, RunError
 
 DESIGNS = [{"x0": 0.1, "x1": 0.2}, {"x0": 0.9, "x1": 0.2}, {"x0": 0.5, "x1": 0.5}]
 

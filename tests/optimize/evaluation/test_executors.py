@@ -14,11 +14,8 @@ from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
-import light_worker
 import numpy as np
 import pytest
-from cache_files import worker
-from drift_case import problem, scene
 
 from optimize.evaluation import executors
 from optimize.evaluation.evaluator import Evaluator
@@ -29,12 +26,14 @@ from optimize.evaluation.executors.worker import Answer, Wanted
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache, verify
-from tisim import Cloud, __version__
+from tests.optimize.cache_files import worker
+from tests.optimize.drift_case import problem, scene
+from tests.optimize.evaluation import light_worker
+from tisim import Cloud, InputError, RunError, __version__
 from tisim.backend import runtime
-from tisim.effects.impact.impact import Impact
-from tisim.errors import InputError, RunError
+from tisim.effects import Impact
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCENES = [scene({"speed": 3.0 + k, "rise": 5.0}, seed=k) for k in range(9)]
 LONG = [s.model_copy(update={"duration": 150.0}) for s in SCENES]
 """The same for 150,000 steps: seconds rather than milliseconds."""

@@ -2,11 +2,11 @@ import random
 
 import numpy as np
 import pytest
-from fake_runs import bowl
 
-from optimize.methods.breeding import Breeder, Breeding, Operator
+from optimize.methods.breeding import Breeder, Breeding, GeneticOperator
 from optimize.methods.individual import Individual
-from tisim.errors import InputError
+from tests.optimize.fake_runs import bowl
+from tisim import InputError
 
 GENES = 5
 
@@ -78,7 +78,7 @@ OPTIONS = {
     ("kind", "name"), [(kind, name) for kind, names in OPERATORS.items() for name in names]
 )
 def test_deap_operators_breed_within_the_box(kind, name):
-    chosen = {kind: Operator(name=name, options=OPTIONS.get(name, {}))}
+    chosen = {kind: GeneticOperator(name=name, options=OPTIONS.get(name, {}))}
     settings = Breeding(breeding="deap", offspring=12, mutation_probability=1.0, **chosen)
     breeder = Breeder(GENES, settings, seed=1)
     population = rated(breeder.first())

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 
 from optimize.evaluation.ensemble import EnsembleSettings
-from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.base import every, find
 from optimize.methods.cma_es import reflected
 from optimize.methods.individual import Individual
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
-from tisim.errors import InputError
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from tisim import InputError
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
 METHODS = sorted(every())
@@ -43,7 +43,7 @@ def worth(strings, function=quiet):
     for string in strings:
         cost = function(dict(enumerate(string)), 0)
         reason = "" if np.isfinite(cost) else "failed"
-        string.know((Estimate(cost, 0.0, 0.0, 1, True, reason),))
+        string.know((FitnessEstimate(cost, 0.0, 0.0, 1, True, reason),))
     return sorted((s for s in strings if not s.failed), key=lambda s: s.fitness.values)
 
 
@@ -185,7 +185,7 @@ def test_restart_draws_anew_around_the_best_when_it_has_stalled():
             best = worth(strings)[0]
         for string in strings:
             if string is not best:
-                string.know((Estimate(9.0, 0.0, 0.0, 1, True),))  # never better than the first
+                string.know((FitnessEstimate(9.0, 0.0, 0.0, 1, True),))  # never better than the first
         method.tell(strings, [best])
     assert widths == [0.5, 0.25, 1.0, 0.5, 0.25, 1.0]
 

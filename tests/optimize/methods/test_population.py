@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from fake_runs import fake_problem
 
 from cases import case as catalogue
 from optimize.methods.base import every, find
 from optimize.methods.breeding import Breeding
 from optimize.settings import Settings, followed, proposed
+from tests.optimize.fake_runs import fake_problem
+from tisim import InputError
 from tisim.cli.scene_arguments import nested
-from tisim.errors import InputError
 
 GENES = 3
 POPULATIONS = range(2, 101)

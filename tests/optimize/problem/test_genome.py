@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from optimize.problem.genome import Box, Gene, Genome
-from tisim.errors import InputError
+from optimize.problem.genome import Gene, Genome, SearchBox
+from tisim import InputError
 
 GENOME = Genome((Gene("v", "m/s", 20.0, 200.0), Gene("H0", "Pa", 1e5, 1e6, "log"), Gene("mu", "", 0.01, 0.1)))
 
@@ -30,8 +30,8 @@ def test_log_scale_is_uniform_in_the_exponent():
         (lambda: GENOME.decode([0, 0, 1.01]), "within 0..1"),
         (lambda: GENOME.decode([0, 0, float("nan")]), "within 0..1"),
         (lambda: GENOME.decode([0, 0]), "of shape"),
-        (lambda: Box.full(2).recentre([0.5, 0.5], 0.0), "recentre factor must be"),
-        (lambda: Box.full(2).recentre([0.5, 1.5], 0.5), "best point must be"),
+        (lambda: SearchBox.full(2).recentre([0.5, 0.5], 0.0), "recentre factor must be"),
+        (lambda: SearchBox.full(2).recentre([0.5, 1.5], 0.5), "best point must be"),
     ],
 )
 def test_bad_input_is_named(make, message):
@@ -42,7 +42,7 @@ def test_bad_input_is_named(make, message):
 def test_recentre_contains_best_stays_in_range_and_shrinks():
     rng = np.random.default_rng(2)
     for _ in range(200):
-        box = Box.full(3)
+        box = SearchBox.full(3)
         for step in range(1, 12):
             best = np.where(rng.random(3) < 0.3, rng.integers(0, 2, 3), rng.random(3))
             factor = rng.uniform(0.2, 1.0)
@@ -58,5 +58,5 @@ def test_recentre_contains_best_stays_in_range_and_shrinks():
 
 
 def test_recentre_is_central_away_from_the_edges():
-    box = Box.full(2).recentre([0.5, 0.9], 0.5)
+    box = SearchBox.full(2).recentre([0.5, 0.9], 0.5)
     np.testing.assert_allclose([box.low, box.high], [[0.25, 0.5], [0.75, 1.0]])

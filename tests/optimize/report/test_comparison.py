@@ -5,18 +5,18 @@ import io
 
 import numpy as np
 import pytest
-from drift_case import CASE
-from fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from rich.console import Console
-from test_several import OBJECTIVES
 
 from cases import case as catalogue
 from optimize.evaluation.runs import start_seed
 from optimize.problem.objective import Objective
 from optimize.report import comparison
 from optimize.report.comparison import FRESH, compare, settings_of
+from tests.optimize.drift_case import CASE
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
+from tests.optimize.test_several import OBJECTIVES
+from tisim import InputError
 from tisim.cli.main import main
-from tisim.errors import InputError
 
 BASE = {
     "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,

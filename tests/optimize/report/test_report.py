@@ -2,20 +2,20 @@ import csv
 import io
 
 import pytest
-from fake_runs import FakeEvaluator, bowl, fake_problem
 from matplotlib.image import imread
 from rich.console import Console
 
 from cases import agglomeration
-from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
 from optimize.report import report
-from optimize.report.tables import best_columns
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
-from tisim.errors import RunError
+from optimize.tables import best_columns
+from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
+from tisim import RunError
 
 N = 1000
 DERIVED = {
@@ -104,7 +104,7 @@ def agglomerations(number):
     made = Outcome(agglomeration.problem("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
         string = Individual([0.851234 + k / 200] * 10)
-        string.estimates = (Estimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)
+        string.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)
         string.confirmed = string.estimates
         made.hall.append(string)
     return made

@@ -1,12 +1,12 @@
 import multiprocessing
 
 import pytest
-from cache_files import journal_of, payloads
-from fake_runs import fake_record
 
 from optimize.storage import cache as cache_module
 from optimize.storage.cache import Cache, compact, existing, verify
-from tisim.errors import InputError
+from tests.optimize.cache_files import journal_of, payloads
+from tests.optimize.fake_runs import fake_record
+from tisim import InputError
 
 
 def test_round_trip_through_journal_and_hdf5(path):

@@ -3,12 +3,12 @@ import re
 
 import h5py
 import pytest
-from cache_files import hurt, journal_of, lock_of, payloads
-from fake_runs import fake_record
 
 from optimize.storage.cache import Cache, compact, existing, verify
 from optimize.storage.journal import Journal, frame, scan
-from tisim.errors import InputError
+from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
+from tests.optimize.fake_runs import fake_record
+from tisim import InputError
 from tisim.files.framing import MAGIC
 
 

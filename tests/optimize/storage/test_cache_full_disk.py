@@ -4,12 +4,12 @@ import threading
 
 import h5py
 import pytest
-from cache_files import journal_of, payloads
-from fake_runs import fake_record
 
 from optimize.storage.cache import Cache, verify
 from optimize.storage.hdf5_store import image
-from tisim.errors import RunError
+from tests.optimize.cache_files import journal_of, payloads
+from tests.optimize.fake_runs import fake_record
+from tisim import RunError
 from tisim.files import atomic
 from tisim.files.atomic import replace_file
 

@@ -2,10 +2,10 @@ import random
 import time
 
 import pytest
-from cache_files import worker
-from fake_runs import fake_record
 
 from optimize.storage.cache import Cache, verify
+from tests.optimize.cache_files import worker
+from tests.optimize.fake_runs import fake_record
 
 
 @pytest.mark.slow

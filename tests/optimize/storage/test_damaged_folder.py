@@ -4,12 +4,12 @@ import os
 
 import h5py
 import pytest
-from cache_files import journal_of
-from fake_runs import FakeEvaluator, fake_problem, fake_record
 
 from cases import case as catalogue
 from cases.case import Case, Size
 from optimize.storage.cache import Cache
+from tests.optimize.cache_files import journal_of
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim.cli.main import main
 from tisim.files.framing import MAGIC, frame
 from tisim.files.lock import LOCK

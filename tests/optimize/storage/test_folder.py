@@ -5,14 +5,14 @@ import tomllib
 from dataclasses import replace
 
 import pytest
-from fake_runs import FakeEvaluator, fake_problem
 
 from cases import case as catalogue
 from cases.case import Case, Size
+from optimize.search_folder import NAMES, clear
 from optimize.storage.cache import Cache
-from optimize.storage.folder import NAMES, clear
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
+from tisim import InputError
 from tisim.cli.main import main
-from tisim.errors import InputError
 from tisim.files.ownership import MARKER
 
 BOWL = Case(

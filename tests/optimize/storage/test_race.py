@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from fake_runs import FakeCache, FakeEvaluator, fake_problem
 from scipy import stats
 
 from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
@@ -10,6 +9,7 @@ from optimize.evaluation.runs import start_seed
 from optimize.problem.objective import Objective
 from optimize.search import search
 from optimize.settings import Settings
+from tests.optimize.fake_runs import FakeCache, FakeEvaluator, fake_problem
 
 DESIGNS = [{"x0": x} for x in (0.10, 0.12, 0.5, 0.9)]
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.sources.fields import WORLDS, fields, relative, steepness
 from tests.sources.published import anywhere, by_quadrature, field_and_gradient, from_rim
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim.sources import Cylinder, MagneticCylinders
 from tisim.sources.magnetic.cylinder_frame import split_magnetisation
 
 M = (0.3e6, -0.5e6, 0.8e6)

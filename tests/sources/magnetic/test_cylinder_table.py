@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.sources.fields import fields, relative, steepness
-from tisim.errors import InputError
+from tisim import InputError
+from tisim.sources import Cylinder, MagneticCylinders
 from tisim.sources.magnetic import cylinder_table
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
 
 LENGTHS = (1.0, 2.0, 40.0, 300.0)
 

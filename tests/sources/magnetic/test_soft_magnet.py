@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import mu_0
 
-from tisim.errors import InputError
+from tisim import InputError
 from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.sources.magnetic.stoner_wohlfarth import demagnetising_factor
 

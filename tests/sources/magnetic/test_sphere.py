@@ -5,7 +5,7 @@ import numpy as np
 from scipy.constants import mu_0
 
 from tests.sources.fields import fields, relative
-from tisim.sources.magnetic.sphere import MagneticSpheres, Sphere
+from tisim.sources import MagneticSpheres, Sphere
 
 
 def test_field_and_gradient(rng):

@@ -5,8 +5,8 @@ import pytest
 from scipy.constants import mu_0
 
 from tests.sources.fields import fields
-from tisim.errors import InputError
-from tisim.sources.magnetic.cylinder import Cylinder, MagneticCylinders
+from tisim import InputError
+from tisim.sources import Cylinder, MagneticCylinders
 from tisim.sources.magnetic.stoner_wohlfarth import demagnetising_factor, magnetisation
 
 SATURATION = 985e3

@@ -7,10 +7,10 @@ from tests.throwaway import SoftShellOfAll, Trap
 from tisim import Particles, Scene
 from tisim.backend.taichi import ti
 from tisim.components.component import parameter
-from tisim.effects.base import Operator, Source
-from tisim.effects.external.gravity import Gravity
-from tisim.steppers.brownian.brownian import Brownian
-from tisim.steppers.brownian.drift_limit import DriftLimit
+from tisim.effects import Gravity
+from tisim.operators import Operator
+from tisim.sources import Source
+from tisim.steppers import Brownian, DriftLimit
 from tisim.worlds.state import Field
 
 RADIUS, TEMPERATURE, VISCOSITY = 1e-7, 298.0, 1e-3
@@ -40,8 +40,8 @@ class Shear(Source):
 class Stop(Operator):
     """Fixes what has got beyond a place along x, and notes when."""
 
-    needs = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
-    counts = ("stops",)
+    fields = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
+    counters = ("stops",)
     place: float = parameter("m")
 
     @ti.func

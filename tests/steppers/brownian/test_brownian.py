@@ -9,13 +9,8 @@ from scipy import stats
 
 from tests.scenes import compiled, simulate
 from tests.steppers.brownian.colloids import DIFFUSIVITY, RADIUS, SIGMAS, Stop, colloids, run
-from tisim import Box, Open, Simulation
-from tisim.effects.base import Force
-from tisim.effects.contact.dissipation import ContactDissipation
-from tisim.effects.contact.hertz import Hertz
-from tisim.effects.external.drag import StokesDrag
-from tisim.effects.impact.impact import Impact
-from tisim.errors import InputError
+from tisim import Box, InputError, Open, Simulation
+from tisim.effects import ContactDissipation, Force, Hertz, Impact, StokesDrag
 from tisim.io.checkpoint import restore, save
 from tisim.steppers.brownian import brownian
 from tisim.steppers.brownian.independent import Wander
@@ -173,7 +168,7 @@ def test_same_bits_on_both_schedules_alone_in_a_batch_and_in_portions(together):
 class Pinned(Force):
     """None, for particles some of which may be fixed."""
 
-    needs = ("fixed",)
+    fields = ("fixed",)
 
 
 @pytest.mark.long
@@ -214,9 +209,9 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
 ELSEWHERE = """
 import sys
 import numpy as np
-from tests.steppers import test_brownian
-from tisim import runtime
-runtime.start(threads=1)
+from tests.steppers.brownian import test_brownian
+from tisim.backend import runtime
+runtime.init(threads=1)
 np.save(sys.argv[1], test_brownian.PLACES[sys.argv[2]]())
 """
 

@@ -16,15 +16,13 @@ from tests.steppers.brownian.colloids import (
     colloids,
 )
 from tests.steppers.brownian.mobility_twin import expansion, matrix, oseen, rotne_prager
-from tisim import Box
+from tisim import Box, InputError, Simulation
 from tisim.accuracy.quantity import usual
 from tisim.accuracy.reference import attempts
 from tisim.accuracy.sweep import methods
 from tisim.backend.runtime import memory
-from tisim.engine.simulation import Simulation
-from tisim.errors import InputError
 from tisim.io.checkpoint import restore, save
-from tisim.steppers.brownian.brownian import Brownian
+from tisim.steppers import Brownian
 
 WORLDS, CAPACITY = 8, 40
 SOFTNESS = 1 / (6 * np.pi * VISCOSITY)
@@ -321,7 +319,11 @@ def test_cost_sets_exact_and_fast_noise_side_by_side():
     compared is a statistic."""
     made = make(lattice(0), trap=20.0)
     found = methods(made, 1e-4, 1e-6, (1.0, 0.0), ("f64",), 8)
-    turned = {(type(m.base.stepper), m.base.stepper.noise, *m.knob.orders) for m in found if m.knob}
+    turned = {
+        (type(m.base.stepper), m.base.stepper.noise, *m.accuracy_parameter.orders)
+        for m in found
+        if m.accuracy_parameter
+    }
     assert {(Brownian, noise, "longest", "drift") for noise in ("exact", "fast")} <= turned
     assert {kind for kind, *_ in turned} == {Brownian}
     assert [attempt.method.base.stepper.noise for attempt in attempts(found, 0.0)] == ["exact"] * 2

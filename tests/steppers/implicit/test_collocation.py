@@ -12,11 +12,10 @@ from tests.steppers.charged import equal_steps as trapezoidal_steps
 from tests.steppers.implicit.test_trapezoid import with_stepper
 from tests.throwaway import SoftShell
 from tisim import Box
-from tisim.effects.pair.near_field import NearField
+from tisim.effects import NearField
 from tisim.io.checkpoint import restore, save
-from tisim.steppers.implicit.collocation import Collocation
+from tisim.steppers import Collocation, StageControl
 from tisim.steppers.implicit.lobatto import highest, integrals, nodes
-from tisim.steppers.implicit.stage_control import StageControl
 
 DURATION = 4.0
 DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}

@@ -7,10 +7,9 @@ from tests.scenes import compiled, scene
 from tests.steppers.charged import accurate, charged
 from tisim.backend.taichi import ti
 from tisim.components.component import parameter
-from tisim.effects.base import Force
+from tisim.effects import Force
 from tisim.io.checkpoint import restore, save
-from tisim.steppers.implicit.step_control import IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
+from tisim.steppers import IterationControl, Trapezoid
 
 DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}
 

@@ -8,16 +8,10 @@ from tests.interactions.test_short_ranged import grains, shells
 from tests.scenes import scene, simulate
 from tests.steppers.charged import PUSH, W, charged, equal_steps, final
 from tests.throwaway import SoftShell, SoftShellOfAll, Trap
-from tisim import Simulation
+from tisim import InputError, Simulation
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter
-from tisim.effects.external.gravity import Gravity
-from tisim.errors import InputError
-from tisim.steppers.implicit.collocation import Collocation
-from tisim.steppers.implicit.stage_control import StageControl
-from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid import Trapezoid
-from tisim.steppers.step_control import FixedStep
+from tisim.effects import Force, Gravity, parameter
+from tisim.steppers import Collocation, ErrorControl, FixedStep, IterationControl, StageControl, Trapezoid
 
 
 def with_stepper(made, stepper, **more):

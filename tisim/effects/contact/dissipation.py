@@ -18,7 +18,7 @@ class ContactDissipation(PairForce):
     """
 
     short_ranged: ClassVar[bool] = True
-    needs = ("radius", "velocity")
+    fields = ("radius", "velocity")
     requires: ClassVar = (NormalContact,)
 
     damping: float = parameter("N s/m^3", ge=0)

@@ -20,7 +20,6 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import PairForce
-from tisim.steppers.step_control import ApproachTime
 
 
 @ti.func
@@ -66,8 +65,8 @@ class NormalContact(PairForce):
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
-    unfit: ClassVar = (ApproachTime,)
-    needs = ("radius",)
+    incompatible_controls = ("approach_time",)
+    fields = ("radius",)
 
     @ti.func
     def compression(self, s, w, i, j, distance):

@@ -18,7 +18,7 @@ class ContactSoftening(ContactLaw):
     Source: Z16 Eqs (7.18)-(7.20). Section 9 prints the exponent as (a T/T* - 1), the same only for its a = 1.
     """
 
-    needs = ("temperature",)
+    fields = ("temperature",)
     requires: ClassVar = (Contact,)
 
     sensitivity: float = parameter("", ge=0)

@@ -12,7 +12,7 @@ class SurfaceContact(PairForce):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
-    needs = ("radius", "velocity", "spin")
+    fields = ("radius", "velocity", "spin")
     requires: ClassVar = (NormalContact,)
 
     @ti.func

@@ -20,7 +20,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter, sources
+from tisim.effects.base import Force, parameter
+from tisim.sources.base import sources
 
 LEAST_SPEED = 1e-30
 """m/s. Stands for a speed of zero where a direction is needed that then has no effect."""
@@ -30,7 +31,7 @@ class Drag(Force):
     """F = g u, where g is a multiple of a power of |u|."""
 
     contract: ClassVar[bool] = True
-    needs = ("radius",)
+    fields = ("radius",)
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"flow": sources(peers, "flow_velocity")}

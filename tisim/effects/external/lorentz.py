@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, sources
+from tisim.effects.base import Force
+from tisim.sources.base import sources
 
 
 class Lorentz(Force):
@@ -16,11 +17,11 @@ class Lorentz(Force):
     Source: Z13 Eqs (1)-(5).
     """
 
-    needs = ("charge",)
-    feels = ("electric_field", "magnetic_flux_density")
+    fields = ("charge",)
+    requires_source = ("electric_field", "magnetic_flux_density")
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        return {name: sources(peers, name) for name in self.feels}
+        return {name: sources(peers, name) for name in self.requires_source}
 
     @ti.func
     def flux_density(self, s, w, i, t):

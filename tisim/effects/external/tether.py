@@ -20,7 +20,7 @@ class Tether(Force):
     Source: Z13 Eqs (11), (34). The minus sign is missing in (34) as printed; (11) has it.
     """
 
-    needs = (Field("anchor", "m", 3, "mean", default="position"),)
+    fields = (Field("anchor", "m", 3, "mean", default="position"),)
 
     stiffness: Vector = parameter("N/m")
 

@@ -15,7 +15,7 @@ class Agglomeration(ImpactLaw):
     radius follows from the volume, b = (b_i^3 + b_j^3)^(1/3). Source: Z04 remark 2.1.
     """
 
-    counts = ("merges",)
+    counters = ("merges",)
     requires: ClassVar = (Impact,)
 
     @ti.func

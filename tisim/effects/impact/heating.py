@@ -16,7 +16,7 @@ class Heating(ImpactLaw):
     heat_capacity : C, per mass. Source: Z04 Eqs (6.5)-(6.8).
     """
 
-    needs = ("temperature",)
+    fields = ("temperature",)
     requires: ClassVar = (Impact,)
 
     heat_capacity: float = parameter("J/(kg K)", gt=0)
@@ -35,7 +35,7 @@ class DeformationWork(ImpactLaw):
     in the books as ``deformation_work``. A scene without this effect conserves energy without it.
     """
 
-    needs = ("temperature", Field("deformation_work", "J", 1, "sum"))
+    fields = ("temperature", Field("deformation_work", "J", 1, "sum"))
     requires: ClassVar = (Heating,)
 
     @ti.func

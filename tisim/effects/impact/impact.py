@@ -99,8 +99,8 @@ class Impact(PairEvent):
     """
 
     hard: ClassVar[bool] = True
-    needs = ("radius", "mass", "velocity")
-    counts = ("impacts", "contacts", "bonds", "iterations", "unsettled")
+    fields = ("radius", "mass", "velocity")
+    counters = ("impacts", "contacts", "bonds", "iterations", "unsettled")
     forced: ClassVar[bool] = False
 
     hardness: float = parameter("Pa", gt=0)

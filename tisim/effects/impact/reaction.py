@@ -17,7 +17,7 @@ class Reaction(ImpactLaw):
     energy_density : alpha, energy released per contact area. Source: Z04 Eq. (6.9).
     """
 
-    needs = ("temperature", Field("reaction_heat", "J", 1, "sum"))
+    fields = ("temperature", Field("reaction_heat", "J", 1, "sum"))
     requires: ClassVar = (Heating,)
 
     energy_density: float = parameter("J/m^2", ge=0)

@@ -22,7 +22,7 @@ class Softening(ImpactLaw):
     temperature (the paper calls it the hardness at absolute zero, where its formula is infinite).
     """
 
-    needs = ("temperature",)
+    fields = ("temperature",)
     requires: ClassVar = (Heating,)
 
     activation_energy: float = parameter("J/mol", ge=0)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, parameter, sources
+from tisim.effects.base import Force, parameter
+from tisim.sources.base import sources
 
 
 class MagneticBodyForce(Force):
@@ -16,7 +17,7 @@ class MagneticBodyForce(Force):
     Source: Z16 Eq. (7.24).
     """
 
-    feels = ("magnetic_flux_density",)
+    requires_source = ("magnetic_flux_density",)
 
     gamma: float = parameter("J/T^2")
 

@@ -24,7 +24,7 @@ class DipoleDipole(PairForce):
     Source: B16 Eqs (6.21), (6.23).
     """
 
-    needs = (MOMENT,)
+    fields = (MOMENT,)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return tuple(TruncatedDipoleDipole(cutoff=radii) for radii in CUTS)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force, sources
+from tisim.effects.base import Force
 from tisim.effects.magnetic.moment import MOMENT
+from tisim.sources.base import sources
 
 
 class Magnetophoresis(Force):
@@ -17,8 +18,8 @@ class Magnetophoresis(Force):
     each other is DipoleDipole. Source: B16 Eqs (6.20), (7.1).
     """
 
-    needs = (MOMENT,)
-    feels = ("magnetic_flux_density",)
+    fields = (MOMENT,)
+    requires_source = ("magnetic_flux_density",)
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}

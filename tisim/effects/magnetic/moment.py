@@ -12,8 +12,9 @@ from typing import Any, ClassVar
 from scipy.constants import Boltzmann, mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Settled, parameter, sources
+from tisim.effects.base import DerivedQuantity, parameter
 from tisim.numerics.langevin import langevin_ratio
+from tisim.sources.base import sources
 from tisim.worlds.state import Field
 
 MOMENT = Field("moment", "A m^2", 3, "sum")
@@ -21,12 +22,12 @@ SATURATION = Field("saturation_moment", "A m^2", 1, "sum", default=None, minimum
 DOMAIN = Field("domain_moment", "A m^2", 1, "mean", default="saturation_moment", minimum=0.0)
 
 
-class Moment(Settled):
+class Moment(DerivedQuantity):
     """m = law(B)."""
 
     contract: ClassVar[bool] = True
     quantity = "moment"
-    feels = ("magnetic_flux_density",)
+    requires_source = ("magnetic_flux_density",)
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}
@@ -52,7 +53,7 @@ class FixedMoment(Moment):
     the mean over all of them is 0. Source: B16 section 6.2.4, table 6.1.
     """
 
-    needs = (MOMENT, SATURATION)
+    fields = (MOMENT, SATURATION)
 
     @ti.func
     def law(self, s, w, i, b):
@@ -68,7 +69,7 @@ class LangevinMoment(Moment):
     For x << 1 it is the linear m_s mu_d B / (3 k T) (B16 7.7). Source: B16 Eqs (6.22), (7.5).
     """
 
-    needs = (MOMENT, SATURATION, DOMAIN)
+    fields = (MOMENT, SATURATION, DOMAIN)
 
     temperature: float = parameter("K", gt=0)
 
@@ -85,7 +86,7 @@ class InducedMoment(Moment):
     -M/3, is taken into account. -1 excludes all field. Source: L21 Eq. (2.4).
     """
 
-    needs = (MOMENT, "radius")
+    fields = (MOMENT, "radius")
 
     susceptibility: float = parameter("", ge=-1)
 

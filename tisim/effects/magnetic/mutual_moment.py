@@ -7,11 +7,11 @@ from typing import ClassVar
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, Mutual
+from tisim.effects.base import Effect, SelfConsistentQuantity
 from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment, Moment
 
 
-class MutualMoment(Mutual, Moment):
+class MutualMoment(SelfConsistentQuantity, Moment):
     """m_i = law(B(r_i) + sum_j B_j(r_i)), B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j), a dipole's field.
 
     A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,

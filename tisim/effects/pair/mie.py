@@ -28,7 +28,7 @@ class Mie(PairForce):
     Source: B16 Eqs (6.18), (6.19), after Mie (1903).
     """
 
-    needs = ("radius",)
+    fields = ("radius",)
     short_ranged = True
 
     epsilon: float = parameter("J", gt=0)

@@ -37,7 +37,7 @@ class NearField(PairForce):
     In a periodic box only the nearest image of a particle acts. Source: Z16 Eq. (7.23), Z13 Eq. (24).
     """
 
-    needs = ("charge", Field("polarity", "", 1, "keep", integer=True, default=None))
+    fields = ("charge", Field("polarity", "", 1, "keep", integer=True, default=None))
 
     alpha1: float = parameter("N m^beta1", 0.0, ge=0)
     beta1: Exponent = Option(1, ge=0)
@@ -50,8 +50,8 @@ class NearField(PairForce):
         own = {name: getattr(self, name) for name in NearField.model_fields}
         return tuple(TruncatedNearField(**own, cutoff=three_digits(part * extent)) for part in CUTS)
 
-    def needed(self) -> tuple[str | Field, ...]:
-        charge, polarity = self.needs
+    def required_fields(self) -> tuple[str | Field, ...]:
+        charge, polarity = self.fields
         return (charge,) * (self.strength == "charge") + (polarity,) * self.signed
 
     @ti.func

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.component import Spec, Vector
-from tisim.effects.base import Source, parameter
+from tisim.components.component import Component, Vector
+from tisim.sources.base import Source, parameter
 
 
-class Body(Spec):
+class Body(Component):
     """A solid body that may be magnetised. Bound, its functions are of the world and the row of the list."""
 
     contract: ClassVar[bool] = True

@@ -7,11 +7,12 @@ from typing import Any, ClassVar, Literal
 
 from tisim.components.component import parameter
 from tisim.components.domain import Domain
-from tisim.effects.base import Effect, Force, Operator, PairEvent, PairForce
+from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
 from tisim.interactions.force_sum import FORCE
+from tisim.operators.base import Operator
 from tisim.steppers.base import Parts, Stepper, single
-from tisim.steppers.brownian.coupled import Drift, Proceed, Scatter, Separate
+from tisim.steppers.brownian.coupled import BrownianDrift, Proceed, Scatter, Separate
 from tisim.steppers.brownian.drift_limit import DriftLimit
 from tisim.steppers.brownian.exact_noise import GAUSS, Exact
 from tisim.steppers.brownian.fast_noise import SUMS, Fast
@@ -19,7 +20,7 @@ from tisim.steppers.brownian.fluid import Fluid
 from tisim.steppers.brownian.independent import OWN, EndWandering, Wander
 from tisim.steppers.brownian.mobility import Mobility, Oseen, RotnePrager
 from tisim.steppers.brownian.vectorised import Abreast, abreast
-from tisim.steppers.common import Clock
+from tisim.steppers.common import BeginStep
 from tisim.steppers.implicit.independent import KEEPS, Stretch
 from tisim.worlds.program import Item
 from tisim.worlds.state import Field
@@ -56,7 +57,7 @@ class Brownian(Stepper):
     noise: Literal["exact", "fast"] = "exact"
 
     random: ClassVar = True
-    keeps: ClassVar = (*KEEPS, "beta")
+    world_quantities: ClassVar = (*KEEPS, "beta")
 
     @property
     def order(self) -> int:
@@ -69,7 +70,7 @@ class Brownian(Stepper):
             turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
             must(not turns, name, "without torques in a scene stepped by brownian", name)
             drags = isinstance(effect, Force) and effect.offers("velocity_jacobian")
-            drags = drags or isinstance(effect, PairEvent) or "velocity" in effect.needed()
+            drags = drags or isinstance(effect, PairEvent) or "velocity" in effect.required_fields()
             rule = "one that does not depend on velocity in a scene stepped by brownian"
             must(not drags, name, rule, name)
         fits = self.hydrodynamics == "none" or not domain.periodic()
@@ -88,7 +89,7 @@ class Brownian(Stepper):
             return ()
         return (self.model_copy(update={"noise": "fast" if self.noise == "exact" else "exact"}),)
 
-    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         if independent:
             return (FORCE, *OWN)
         if self.hydrodynamics == "none":
@@ -101,8 +102,8 @@ class Brownian(Stepper):
             wander = Abreast if abreast(parts) else Wander
             return (Stretch(s, parts.control), wander(parts, fluid), EndWandering(parts))
         interaction = self._interaction(parts, fluid)
-        drift = (*interaction.phases(), Drift(fluid, interaction, parts.control))
-        move = (Clock(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
+        drift = (*interaction.phases(), BrownianDrift(fluid, interaction, parts.control))
+        move = (BeginStep(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
         return (*drift, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
 
     def _interaction(self, parts: Parts, fluid: Fluid) -> Any:

@@ -2,7 +2,7 @@
 
 from tisim.backend.taichi import ti
 from tisim.steppers.brownian.drift_limit import fault
-from tisim.steppers.common import advance_clock, arrive
+from tisim.steppers.common import advance_clock, apply_displacement
 from tisim.worlds.program import PerParticle, Phase
 
 
@@ -28,7 +28,7 @@ class Separate:
         return ti.sqrt(self.fluid.diffusivity(w, i)) * self.fluid.normals(w, i, self.s.steps[w])
 
 
-class Drift(PerParticle):
+class BrownianDrift(PerParticle):
     """The velocity of drift at the start of a step, and the step that it allows."""
 
     def __init__(self, fluid, interaction, control) -> None:
@@ -43,7 +43,7 @@ class Drift(PerParticle):
             pushed = self.interaction.pushed(w, i)
             rate = self.control.rate(s, w, i, pushed)
             if self.control.hopeless(w, rate):
-                s.suspect(w, fault(rate), i)
+                s.fail_by_force(w, fault(rate), i)
             elif rate > s.steepest[w]:
                 ti.atomic_max(s.steepest[w], rate)
             velocity = self.fluid.flow(w, i, s.time[w]) + pushed
@@ -70,7 +70,7 @@ class Scatter(PerParticle):
             operator.particle(s, w, i, s.time[w] + s.dt[w], dt)
         after = s.position[w, i]
         moved, grown = ti.cast(after - before, ti.f64), ti.cast(s.radius[w, i] - size, ti.f64)
-        arrive(s, self.domain, w, i, after, moved, grown)
+        apply_displacement(s, self.domain, w, i, after, moved, grown)
 
 
 class Proceed(Phase):

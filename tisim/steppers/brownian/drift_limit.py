@@ -7,20 +7,20 @@ from typing import ClassVar, Self
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.accuracy_parameter import Knob
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.errors import must
-from tisim.steppers.step_control import LEAST, Controller
-from tisim.worlds.state import NOT_FINITE, STEEP
+from tisim.steppers.step_control import SHORTEST_STEP, Controller
+from tisim.worlds.state import WorldStatus
 
-MOST = 1e9
+LARGEST_DRIFT = 1e9
 """Steps of one longest step at most: a particle by itself numbers them with 32 bits."""
 
 
 @ti.func
 def fault(rate):
     """What is wrong with a force that asks for steps of 1/rate which are too short."""
-    return ti.select(rate < ti.math.inf, STEEP, NOT_FINITE)
+    return ti.select(rate < ti.math.inf, WorldStatus.FORCE_TOO_STEEP, WorldStatus.NOT_FINITE)
 
 
 class DriftLimit(Controller):
@@ -38,18 +38,21 @@ class DriftLimit(Controller):
     that asks for less stops its world, with time and particle.
     """
 
-    longest: float = parameter("s", ge=LEAST)
-    shortest: float = parameter("s", 1e-12, ge=LEAST)
+    longest: float = parameter("s", ge=SHORTEST_STEP)
+    shortest: float = parameter("s", 1e-12, ge=SHORTEST_STEP)
     drift: float = parameter("", 0.05, gt=0)
 
-    keeps: ClassVar = ("steepest",)
-    knobs: ClassVar[tuple[Knob, ...]] = (Knob(longest=1, drift=1), Knob(longest=1, converges=False))
+    world_quantities: ClassVar = ("steepest",)
+    accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = (
+        AccuracyParameter(longest=1, drift=1),
+        AccuracyParameter(longest=1, converges=False),
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         must(self.longest >= self.shortest, "drift_limit.longest", "at least shortest", self.longest)
-        allowed = f"at least longest/{MOST:.0e}"
-        must(self.shortest * MOST >= self.longest, "drift_limit.shortest", allowed, self.shortest)
+        allowed = f"at least longest/{LARGEST_DRIFT:.0e}"
+        must(self.shortest * LARGEST_DRIFT >= self.longest, "drift_limit.shortest", allowed, self.shortest)
         return self
 
     def fewest(self, duration: float) -> float:

@@ -9,7 +9,7 @@ from tisim.backend.taichi import ti
 from tisim.errors import must
 from tisim.interactions.pair_sum import PairSum
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import INDEFINITE, Field
+from tisim.worlds.state import Field, WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)
 """Three standard normal numbers of a particle in a step."""
@@ -157,7 +157,7 @@ class Factor(Phase):
         pivot = matrix[w, column, column]
         # Not above: also true of NaN.
         if not (pivot > -self.m.least):
-            self.s.fail(w, INDEFINITE, j)
+            self.s.fail(w, WorldStatus.NOT_POSITIVE_DEFINITE, j)
         scale = ti.select(pivot > self.m.least, 1.0 / ti.sqrt(ti.max(pivot, self.m.least)), 0.0)
         for row in range(column, n):
             matrix[w, column, row] *= scale

@@ -17,7 +17,7 @@ from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import PairSum
 from tisim.steppers.brownian.exact_noise import GAUSS, Draw
 from tisim.worlds.program import Phase
-from tisim.worlds.state import INDEFINITE, Field
+from tisim.worlds.state import Field, WorldStatus
 
 SUMS = (
     GAUSS,
@@ -92,7 +92,7 @@ class Couple(PairSum):
         s.coupling[w, i] = ti.sqrt(size) * total[9]
         for k in ti.static(range(10, self.components)):
             if total[k] > 0.0:
-                s.fail(w, INDEFINITE, i)
+                s.fail(w, WorldStatus.NOT_POSITIVE_DEFINITE, i)
 
 
 class Weigh(Phase):

@@ -3,8 +3,8 @@
 import scipy.constants
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import sources
 from tisim.numerics import philox
+from tisim.sources.base import sources
 
 STREAM = 1
 """Of the random numbers (philox.py)."""

@@ -1,8 +1,8 @@
 """Brownian particles that do not feel each other: each takes its own steps, many of them in one go.
 
 They meet at every multiple of the longest step, a window, which is what counts as a step of the world (see
-independent.py). A step of a particle is numbered by its window and within it, so that how many windows or steps a
-launch takes them through makes no difference to the noise either.
+implicit/independent.py). A step of a particle is numbered by its window and within it, so that how many
+windows or steps a launch takes them through makes no difference to the noise either.
 """
 
 from tisim.backend.taichi import ti
@@ -10,7 +10,7 @@ from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.implicit.independent import LITTLE, PLACE, EndStretch, beginning, duration
 from tisim.steppers.implicit.registers import Registers
 from tisim.worlds.program import PerParticle
-from tisim.worlds.state import LOST, NOT_FINITE, Field
+from tisim.worlds.state import Field, WorldStatus
 
 OWN = (
     *PLACE,
@@ -147,9 +147,9 @@ class Wander(PerParticle):
         r = s.position[w, i]
         # Not below infinity: also true of NaN.
         if not (r.norm_sqr() < ti.math.inf):
-            self.stop(w, i, NOT_FINITE)
+            self.stop(w, i, WorldStatus.NOT_FINITE)
         elif self.domain.lost(w, r):
-            self.stop(w, i, LOST)
+            self.stop(w, i, WorldStatus.POSITION_LOST)
         else:
             s.position[w, i] = self.domain.wrap(w, r)
 

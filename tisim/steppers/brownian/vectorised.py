@@ -16,7 +16,7 @@ from tisim.steppers.implicit.registers import Registers
 def abreast(parts) -> bool:
     """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
     as what settles and what operators do."""
-    simple = not parts.operators and not parts.summed.settlings
+    simple = not parts.operators and not parts.summed.derived_solvers
     return simple and runtime.current().device == "cpu" and parts.s.capacity >= LANES
 
 

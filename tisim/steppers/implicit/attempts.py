@@ -1,10 +1,10 @@
 """What implicit steppers have in common: attempts at a step, until one is accepted or all hope is lost."""
 
 from tisim.backend.taichi import ti
-from tisim.steppers.common import note_stride
+from tisim.steppers.common import note_displacement
 from tisim.steppers.implicit.saved_state import Kept
 from tisim.worlds.program import PerParticle, Phase, Repeat
-from tisim.worlds.state import STUCK
+from tisim.worlds.state import WorldStatus
 
 TRIED, ACCEPTED, HOPELESS = range(3)
 """Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
@@ -30,10 +30,10 @@ class Begin(Phase):
         s.steps[w] += 1
         s.particle_steps[w] += s.count[w]
         for k in ti.static(range(3)):
-            s.stride[w, k] = 0.0
+            s.displacement[w, k] = 0.0
 
 
-class Keep(PerParticle):
+class SaveState(PerParticle):
     """Keep the state at the beginning of the step."""
 
     def __init__(self, kept: Kept) -> None:
@@ -45,7 +45,7 @@ class Keep(PerParticle):
         self.kept.keep(w, i)
 
 
-class Attempt(Repeat):
+class StepAttempt(Repeat):
     """Attempts at a step, until one is accepted or all hope is lost."""
 
     def __init__(self, s, items) -> None:
@@ -70,19 +70,21 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 @ti.func
 def accuse(s, w):
-    """The particle whose last iterate changed most; which force on it is at fault, failure_attribution.py finds out."""
+    """The particle whose last iterate changed most; which force on it is at fault, see
+    failure_attribution.py."""
     worst, most = 0, s.iterate_change[w, 0]
     for i in range(s.count[w]):
         if s.iterate_change[w, i] > most:
             worst, most = i, s.iterate_change[w, i]
-    s.culprit[w] = s.id[w, worst]
+    s.failing_particle[w] = s.id[w, worst]
     s.ask(w, s.time[w])
 
 
-class GiveUp(PerParticle):
+class RestoreState(PerParticle):
     """An attempt that has failed leaves everything as it was, for the next one.
 
-    One that is hopeless is left as it is: there, which force it was can still be seen (failure_attribution.py).
+    One that is hopeless is left as it is: there, which force it was can still be seen (see
+    failure_attribution.py).
     """
 
     conditional = True
@@ -99,7 +101,7 @@ class GiveUp(PerParticle):
     def run(self, w, i):
         s = self.s
         back = self.kept.domain.nearest(w, s.position[w, i], s.position_before[w, i])
-        note_stride(s, w, ti.cast(back, ti.f64))
+        note_displacement(s, w, ti.cast(back, ti.f64))
         self.kept.give_up(w, i)
 
 
@@ -116,5 +118,5 @@ class Decide(Phase):
             s.rejections[w] += 1
             s.time[w] = s.time_before[w]
         if s.verdict[w] == HOPELESS:
-            s.failed[w] = STUCK
+            s.failed[w] = WorldStatus.STEP_TOO_SHORT
         s.attempting[w] = ti.select(s.verdict[w] == TRIED, 1.0, 0.0)

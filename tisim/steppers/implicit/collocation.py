@@ -10,9 +10,17 @@ from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.force_sum import FORCE
 from tisim.steppers.base import Parts, Stepper
 from tisim.steppers.common import Arrive, Listen, Operate
-from tisim.steppers.implicit.attempts import Attempt, Begin, Decide, GiveUp, Keep
-from tisim.steppers.implicit.collocation_phases import Conclude, Forget, Place, Predict, Sweep, Take, Try
-from tisim.steppers.implicit.collocation_verdict import Judge
+from tisim.steppers.implicit.attempts import Begin, Decide, RestoreState, SaveState, StepAttempt
+from tisim.steppers.implicit.collocation_phases import (
+    ChooseCollocationStep,
+    Conclude,
+    Forget,
+    Place,
+    PredictStages,
+    StageSweep,
+    TakeStages,
+)
+from tisim.steppers.implicit.collocation_verdict import JudgeStages
 from tisim.steppers.implicit.saved_state import CHANGE, kept
 from tisim.steppers.implicit.span import Went, spans
 from tisim.steppers.implicit.stage_control import StageControl
@@ -43,8 +51,8 @@ class Collocation(Stepper):
     stages: int = Option(5, ge=3, le=8)
     control: StageControl = StageControl()
 
-    counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
-    keeps: ClassVar = (
+    counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
+    world_quantities: ClassVar = (
         "time_before", "attempting", "verdict", "next_dt", "last_dt", "sweeping", "sweep", "stage", "unsound",
         "sweep_change", "last_change", "contraction", "measured_dt",
     )  # fmt: skip
@@ -62,7 +70,7 @@ class Collocation(Stepper):
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"]
 
-    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         return (
             FORCE,
             *kept(turning),
@@ -76,12 +84,19 @@ class Collocation(Stepper):
         parts.owned.append((stages, "coefficients of the stages", self.kind()))
         parts.owned.append((sums, "sums of the stages", self.kind()))
         listen = (Listen(parts),) if parts.near else ()
-        take = Take(parts, sums, stages)
-        judge = Judge(parts, sums, stages)
-        sweep = Sweep(s, (Place(stages), *listen, *parts.lists, *parts.trial_forces, take, judge))
-        attempt = (Try(parts, stages), Predict(stages), sweep, Conclude(stages), GiveUp(stages), *listen)
+        take = TakeStages(parts, sums, stages)
+        judge = JudgeStages(parts, sums, stages)
+        sweep = StageSweep(s, (Place(stages), *listen, *parts.lists, *parts.trial_forces, take, judge))
+        attempt = (
+            ChooseCollocationStep(parts, stages),
+            PredictStages(stages),
+            sweep,
+            Conclude(stages),
+            RestoreState(stages),
+            *listen,
+        )
         operate = (Operate(parts), *listen) if parts.operators else ()
-        begin = (Forget(s), Begin(s), Keep(stages))
+        begin = (Forget(s), Begin(s), SaveState(stages))
         note = (Went(stages),) if self.control.at_end else ()
-        step = (Attempt(s, (*attempt, Decide(parts))), *note, *parts.remember, *operate, Arrive(s))
+        step = (StepAttempt(s, (*attempt, Decide(parts))), *note, *parts.remember, *operate, Arrive(s))
         return (*begin, *step)

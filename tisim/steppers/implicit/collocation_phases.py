@@ -3,7 +3,7 @@
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.steppers.common import note_stride
+from tisim.steppers.common import note_displacement
 from tisim.steppers.implicit.attempts import ACCEPTED, length
 from tisim.worlds.block_sum import PerBlock
 from tisim.worlds.program import PerParticle, Phase, Repeat
@@ -21,7 +21,7 @@ class Forget(Phase):
             self.s.last_dt[w] = 0.0
 
 
-class Try(Phase):
+class ChooseCollocationStep(Phase):
     """Choose the step, and begin at the first stage after its beginning."""
 
     def __init__(self, parts, stages) -> None:
@@ -46,7 +46,7 @@ class OfStages(PerParticle):
         self.stages = stages
 
 
-class Predict(OfStages):
+class PredictStages(OfStages):
     """The rates at all stages, from the polynomial of the last step; at the first they are known."""
 
     @ti.func
@@ -65,7 +65,7 @@ class Predict(OfStages):
                 stages.put(now, w, i, j, rate)
 
 
-class Sweep(Repeat):
+class StageSweep(Repeat):
     """Stage after stage, again and again, until there is a verdict."""
 
     def __init__(self, s, items) -> None:
@@ -88,7 +88,7 @@ class Place(OfStages):
         if stages.sound(w, r):
             here = stages.domain.wrap(w, r)
             moved = stages.domain.nearest(w, s.position[w, i], here)
-            note_stride(s, w, ti.cast(moved, ti.f64))
+            note_displacement(s, w, ti.cast(moved, ti.f64))
             s.position[w, i], s.velocity[w, i] = here, stages.velocity(w, i, stage, dt)
             if ti.static(stages.turning):
                 s.spin[w, i] = stages.spin(w, i, stage, dt)
@@ -96,7 +96,7 @@ class Place(OfStages):
             ti.atomic_max(s.unsound[w], 1.0)
 
 
-class Take(PerBlock):
+class TakeStages(PerBlock):
     """The rates that the forces at the stage give; sums of their change, as displacements (m), and at the
     last stage of the error, of what both are compared with, and of what displacements are rounded to."""
 

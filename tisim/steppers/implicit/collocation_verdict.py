@@ -10,7 +10,7 @@ DIVERGED = 0.5
 """The longest that a second attempt may be where sweeps did not converge, in lengths of the first."""
 
 
-class Judge(Phase):
+class JudgeStages(Phase):
     """To the next stage; after the last one: is the step solved, to be swept again, or to be given up?"""
 
     def __init__(self, parts, sums, stages) -> None:

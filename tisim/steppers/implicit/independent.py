@@ -12,7 +12,7 @@ from tisim.steppers.implicit.registers import Registers
 from tisim.steppers.implicit.saved_state import kept
 from tisim.steppers.implicit.span import went
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import ENDED, STUCK, Field
+from tisim.worlds.state import Field, WorldStatus
 
 LAUNCH = 2**20
 """Windows of a launch at most, of all particles together, where more than WINDOWS of them; and attempts at a
@@ -47,9 +47,9 @@ class Stretch(Phase):
         if going == 0:
             going = s.count[w]
             window = ti.cast(self.control.longest(w), ti.f64)
-            until = ti.min(s.hold[w], s.end[w])
+            until = ti.min(s.pause_time[w], s.end[w])
             wanted = ti.ceil(until / window - LITTLE) - s.windows[w]
-            allowed = ti.cast(ti.min(s.until[w] - s.steps[w], self.most), ti.f64)
+            allowed = ti.cast(ti.min(s.step_limit[w] - s.steps[w], self.most), ti.f64)
             s.stretch_windows[w], s.stuck[w] = ti.max(1.0, ti.min(wanted, allowed)), 0.0
         s.allowance[w] = ti.max(WINDOWS, LAUNCH // (s.worlds * ti.max(1, going)))
         s.underway[w] = 0
@@ -217,12 +217,12 @@ class EndStretch(Phase):
         if s.underway[w] > 0:
             s.reached[w] = own_time(s, self.control, w, self.slowest(w))
             # Whoever asks for more may look first.
-            s.until[w] = s.steps[w]
+            s.step_limit[w] = s.steps[w]
         elif s.stuck[w] > 0.0:
             self.accuse(w)
         elif s.cut[w] > 0.0:
             s.time[w] = beginning(s, self.control, w, s.windows[w]) + s.cut[w]
-            s.status[w], s.cut[w] = ENDED, 0.0
+            s.status[w], s.cut[w] = WorldStatus.ENDED, 0.0
         else:
             s.windows[w] += s.stretch_windows[w]
             before, s.time[w] = s.time[w], beginning(s, self.control, w, s.windows[w])
@@ -242,7 +242,7 @@ class EndStretch(Phase):
     @ti.func
     def accuse(self, w):
         """The particle that got stuck first, and when."""
-        self.stop(w, self.slowest(w), STUCK)
+        self.stop(w, self.slowest(w), WorldStatus.STEP_TOO_SHORT)
         self.s.ask(w, self.s.time[w])
 
     @ti.func
@@ -251,4 +251,4 @@ class EndStretch(Phase):
         s = self.s
         s.steps[w] += ti.cast(s.own_window[w, i] - s.windows[w], ti.i64)
         s.time[w], s.cut[w] = own_time(s, self.control, w, i), s.own_elapsed[w, i]
-        s.failed[w], s.culprit[w] = fault, s.id[w, i]
+        s.failed[w], s.failing_particle[w] = fault, s.id[w, i]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pydantic import Field
 
 from tisim.backend.taichi import ti
-from tisim.components.accuracy_parameter import Knob
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.steppers.implicit.span import Per, compared
 from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
-from tisim.steppers.step_control import LEAST
+from tisim.steppers.step_control import SHORTEST_STEP
 
 CONTRACTION = 0.25
 """What a sweep is to multiply the error by, at most, where convergence limits the step."""
@@ -40,10 +40,10 @@ class StageControl(ImplicitControl):
     safety: float = parameter("", 0.85, ge=LEAST_SAFETY, lt=1)
     resolution: float = parameter("", 1e-3, ge=0)
     per: Per = "step"
-    first: float = parameter("s", 1e-6, ge=LEAST)
-    longest: float = parameter("s", 1.0, ge=LEAST)
+    first: float = parameter("s", 1e-6, ge=SHORTEST_STEP)
+    longest: float = parameter("s", 1.0, ge=SHORTEST_STEP)
 
-    knobs = (Knob(error=1),)
+    accuracy_parameters = (AccuracyParameter(error=1),)
 
     @property
     def at_end(self) -> bool:

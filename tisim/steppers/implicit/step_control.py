@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.accuracy_parameter import Knob
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.errors import must
 from tisim.steppers.implicit.span import Per, compared
-from tisim.steppers.step_control import LEAST, StepControl, told
+from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
 
 LEAST_SAFETY = 0.01
 """The least part of an error asked for that steps may aim at. Where that is below what rounding makes of an
@@ -27,9 +27,9 @@ class ImplicitControl(StepControl):
     """
 
     contract: ClassVar[bool] = True
-    first: float = parameter("s", 1e-5, ge=LEAST)
-    longest: float = parameter("s", 2.5e-4, ge=LEAST)
-    shortest: float = parameter("s", 1e-12, ge=LEAST)
+    first: float = parameter("s", 1e-5, ge=SHORTEST_STEP)
+    longest: float = parameter("s", 2.5e-4, ge=SHORTEST_STEP)
+    shortest: float = parameter("s", 1e-12, ge=SHORTEST_STEP)
     most: float = parameter("", 4.0, ge=1)
     least: float = parameter("", 0.1, gt=0, lt=1)
 
@@ -60,12 +60,12 @@ class ImplicitControl(StepControl):
         """The step (s, f64) where this one was wanted; 0 for the first of all."""
         longest = ti.cast(self.longest(w), ti.f64)
         step = ti.min(ti.select(wanted > 0.0, wanted, ti.cast(self.first(w), ti.f64)), longest)
-        return ti.max(told(s, w, self.shortest(w)), step)
+        return ti.max(shortest_representable(s, w, self.shortest(w)), step)
 
     @ti.func
     def hopeless(self, s, w, dt):
         """Whether a step of this length (s) that has failed must not be made shorter."""
-        return dt <= told(s, w, self.shortest(w)) * (1.0 + 1e-9)
+        return dt <= shortest_representable(s, w, self.shortest(w)) * (1.0 + 1e-9)
 
     @ti.func
     def limited(self, w, wanted, reached):
@@ -97,10 +97,10 @@ class IterationControl(ImplicitControl):
     iterations: int = Field(10, ge=2)
     order: float = parameter("", 2.0, gt=0)
 
-    knobs: ClassVar[tuple[Knob, ...]] = (
-        Knob(longest=2, tolerance=1),
-        Knob(longest=2, converges=False),
-        Knob(tolerance=1, converges=False),
+    accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = (
+        AccuracyParameter(longest=2, tolerance=1),
+        AccuracyParameter(longest=2, converges=False),
+        AccuracyParameter(tolerance=1, converges=False),
     )
 
     @ti.func
@@ -159,7 +159,7 @@ class ErrorControl(IterationControl):
     resolution: float = parameter("", 1e-3, ge=0)
     per: Per = "step"
 
-    knobs = (Knob(error=1, tolerance=1),)
+    accuracy_parameters = (AccuracyParameter(error=1, tolerance=1),)
 
     @property
     def at_end(self) -> bool:

@@ -10,13 +10,19 @@ from tisim.interactions.force_sum import FORCE
 from tisim.steppers.base import Parts, Stepper
 from tisim.steppers.common import Arrive, Listen, Operate
 from tisim.steppers.implicit.anderson import accelerated, memory_of_iterates
-from tisim.steppers.implicit.attempts import Attempt, Begin, Decide, GiveUp, Keep
+from tisim.steppers.implicit.attempts import Begin, Decide, RestoreState, SaveState, StepAttempt
 from tisim.steppers.implicit.independent import KEEPS, PLACE, Alone, EndStretch, Stretch
 from tisim.steppers.implicit.one_particle import Solve
 from tisim.steppers.implicit.saved_state import CHANGE, kept
 from tisim.steppers.implicit.span import Went, spans
 from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
-from tisim.steppers.implicit.trapezoid_phases import Correct, Iteration, Judge, Predict, Try
+from tisim.steppers.implicit.trapezoid_phases import (
+    ChooseTrapezoidStep,
+    Correct,
+    Iteration,
+    JudgeIteration,
+    PredictEnd,
+)
 from tisim.worlds.block_sum import BlockSums
 from tisim.worlds.program import Item
 from tisim.worlds.state import Field
@@ -46,8 +52,8 @@ class Trapezoid(Stepper):
     control: IterationControl = IterationControl()
     acceleration: Literal["none", "anderson"] = "none"
 
-    counts: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
-    keeps: ClassVar = (
+    counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
+    world_quantities: ClassVar = (
         *("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt"),
         *KEEPS,
     )
@@ -70,7 +76,7 @@ class Trapezoid(Stepper):
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"] / (particles if independent else 1)
 
-    def needs(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
+    def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         if independent:
             return (FORCE, *OWN, *spans(self.control.at_end))
         accelerated = self.acceleration == "anderson"
@@ -87,8 +93,24 @@ class Trapezoid(Stepper):
         forces = (*parts.lists, *parts.trial_forces)
         if self.acceleration == "anderson":
             forces = accelerated(parts, forces)
-        iteration = Iteration(s, (*forces, Correct(parts, sums, solve), *listen, Judge(parts, sums)))
-        attempt = (Try(parts), Predict(solve), *listen, iteration, GiveUp(solve), *listen, Decide(parts))
+        iteration = Iteration(s, (*forces, Correct(parts, sums, solve), *listen, JudgeIteration(parts, sums)))
+        attempt = (
+            ChooseTrapezoidStep(parts),
+            PredictEnd(solve),
+            *listen,
+            iteration,
+            RestoreState(solve),
+            *listen,
+            Decide(parts),
+        )
         operate = (Operate(parts), *listen) if parts.operators else ()
         note = (Went(solve),) if self.control.at_end else ()
-        return (Begin(s), Keep(solve), Attempt(s, attempt), *note, *parts.remember, *operate, Arrive(s))
+        return (
+            Begin(s),
+            SaveState(solve),
+            StepAttempt(s, attempt),
+            *note,
+            *parts.remember,
+            *operate,
+            Arrive(s),
+        )

@@ -1,7 +1,7 @@
 """The phases of an attempt at a step of the trapezoidal rule: an iteration, and the verdict on it."""
 
 from tisim.backend.taichi import ti
-from tisim.steppers.common import note_stride
+from tisim.steppers.common import note_displacement
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse, length
 from tisim.worlds.block_sum import PerBlock
 from tisim.worlds.program import PerParticle, Phase, Repeat
@@ -19,7 +19,7 @@ class Iteration(Repeat):
         return ti.cast(self.s.iterating[w], ti.i32)
 
 
-class Try(Phase):
+class ChooseTrapezoidStep(Phase):
     """Choose the step; the last one ends exactly on time. Forces will be those of the end of the step."""
 
     def __init__(self, parts) -> None:
@@ -34,7 +34,7 @@ class Try(Phase):
         s.iterating[w], s.solver_iteration[w] = 1.0, 1.0
 
 
-class Predict(PerParticle):
+class PredictEnd(PerParticle):
     """The first iterate, K = 1, with the force at the beginning of the step."""
 
     def __init__(self, solve) -> None:
@@ -50,7 +50,7 @@ class Predict(PerParticle):
             v = s.velocity_before[w, i]
         solve.advance(w, i, v, dt)
         moved = ti.cast(solve.displacement(w, i, v, dt), ti.f64)
-        note_stride(s, w, moved - s.axes(s.frame, w) * s.dt[w])
+        note_displacement(s, w, moved - s.axes(s.frame, w) * s.dt[w])
 
 
 class Correct(PerBlock):
@@ -70,14 +70,14 @@ class Correct(PerBlock):
         if solve.bearable(w, i, v, dt):
             step = solve.phi(w) * dt * (v - last)
             change = step.norm() + solve.advance(w, i, v, dt)
-            note_stride(s, w, ti.cast(step, ti.f64))
+            note_displacement(s, w, ti.cast(step, ti.f64))
         s.iterate_change[w, i] = change
         moved = solve.displacement(w, i, v, dt).norm()
         error, scale = solve.error(w, i, dt), self.control.scale(s, w, i, moved, dt)
         return ti.cast(ti.Vector([change, moved, error, scale]), ti.f64)
 
 
-class Judge(Phase):
+class JudgeIteration(Phase):
     """Is the iteration solved, to go on, or to be given up?"""
 
     def __init__(self, parts, sums) -> None:

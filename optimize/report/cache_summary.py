@@ -9,9 +9,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from optimize.search_records import searches
 from optimize.storage.cache import existing
 from optimize.storage.record import Record
-from optimize.storage.search_records import searches
 from tisim.console import plain_table
 
 SHOWN = 5

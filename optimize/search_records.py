@@ -9,9 +9,9 @@ from typing import Any
 import deap
 
 from optimize.outcome import Outcome
-from optimize.report.tables import best_columns, logbook_columns
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
+from optimize.tables import best_columns, logbook_columns
 from tisim.io.run_folder import versions
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from deap import tools
 
-from optimize.evaluation.estimate import Estimate
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.problem.problem import Problem
 
@@ -34,7 +34,7 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
 
 
 def _objectives(
-    problem: Problem, estimates: Sequence[tuple[Estimate, ...]], after: str
+    problem: Problem, estimates: Sequence[tuple[FitnessEstimate, ...]], after: str
 ) -> Mapping[str, list[Any]]:
     columns: dict[str, list[Any]] = {}
     for k, objective in enumerate(problem.objectives):

@@ -17,11 +17,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from optimize.search_records import searches
 from optimize.settings import FORMAT, search_name
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
-from optimize.storage.search_records import searches
-from tisim.errors import InputError, must
+from tisim import InputError
+from tisim.errors import must
 from tisim.files import lock, ownership
 from tisim.files.atomic import locked
 from tisim.files.regular_file import status

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import tisim
+from tisim import version
 from tisim.accuracy.quantity import Quantity, usual
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row, decades, tied
@@ -74,7 +74,7 @@ class Study:
     def identity(self) -> dict[str, Any]:
         """What must agree for rows of an earlier study to be of use."""
         return {
-            "tisim": tisim.__version__,
+            "tisim": version.__version__,
             "scene": self.scene.digest(),
             "quantities": [quantity.name for quantity in self.quantities],
             "finest": self.levels[-1],
@@ -97,7 +97,7 @@ class Study:
             try:
                 Run(self, progress or (lambda fraction, what: None), finished or (lambda: None)).all()
             finally:
-                runtime.start(before.device, before.precision, before.threads)
+                runtime.init(before.device, before.precision, before.threads)
 
     def cheapest(self, error: float, quantity: str | None = None) -> Row:
         """The cheapest setting whose error is at most this; of those that timings do not tell apart, the one

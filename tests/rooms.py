@@ -1,0 +1,105 @@
+"""The picture of the house: which room uses which, and how high the modules stand on each other.
+
+    python tests/rooms.py [FOLDER]
+
+A room is a package or a module of tisim, optimize or cases, the longest name in ``ROOMS`` that a module's
+begins with. A module imports from its own room and from those that stand before it; what a function imports
+when it is called may come from above only where ``LATE`` names it. Imports for type checkers do not count.
+"""
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOMS = (
+    "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.console", "tisim.files", "tisim.backend",
+    "tisim.numerics", "tisim.components", "tisim.worlds", "tisim.packing", "tisim.effects.base",
+    "tisim.neighbours", "tisim.interactions", "tisim.sources", "tisim.effects", "tisim.operators",
+    "tisim.steppers", "tisim.scene", "tisim.engine", "tisim.io", "tisim.plotting", "tisim.analysis", "tisim",
+    "tisim.accuracy",
+    "optimize.problem", "optimize.storage", "optimize.evaluation", "optimize.methods",
+    "optimize.hall_of_fame", "optimize.generation_log", "optimize.tables", "optimize.settings",
+    "optimize.outcome", "optimize.search_records", "optimize.search_folder", "optimize.search",
+    "optimize.report", "optimize.session", "optimize",
+    "cases", "tisim.cli",
+)  # fmt: skip
+"""From the ground up."""
+LATE = {("tisim.io.run_folder", "tisim.plotting.cloud")}
+"""A module, and what one of its functions imports from above."""
+Imports = dict[str, set[str]]
+
+
+def modules(folder: Path) -> dict[str, Path]:
+    """All modules of the three packages by name."""
+    files = [file for package in ("tisim", "optimize", "cases") for file in (folder / package).rglob("*.py")]
+    names = (".".join(file.relative_to(folder).with_suffix("").parts) for file in files)
+    return {name.removesuffix(".__init__"): file for name, file in zip(names, files, strict=True)}
+
+
+def room(module: str) -> int:
+    """The place in ``ROOMS`` of the room of a module."""
+    homes = [name for name in ROOMS if module == name or module.startswith(f"{name}.")]
+    return ROOMS.index(max(homes, key=len))
+
+
+def imports(folder: Path) -> tuple[Imports, Imports]:
+    """What each module imports of the others: with itself, and when its functions are called."""
+    known = modules(folder)
+    early: Imports = {name: set() for name in known}
+    late: Imports = {name: set() for name in known}
+    for name, file in known.items():
+        for node, later in _statements(ast.parse(file.read_text(encoding="utf-8")), False):
+            found = {one for one in _named(node, known) if one != name}
+            (late if later else early)[name] |= found
+    return early, late
+
+
+def _statements(node: ast.AST, later: bool) -> Iterator[tuple[ast.AST, bool]]:
+    """The imports below a node, and whether they stand in a function; without those for type checkers."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import | ast.ImportFrom):
+            yield child, later
+        typing = isinstance(child, ast.If) and getattr(child.test, "id", "") == "TYPE_CHECKING"
+        if not typing:
+            yield from _statements(child, later or isinstance(child, ast.FunctionDef | ast.Lambda))
+
+
+def _named(node: ast.AST, known: dict[str, Path]) -> Iterator[str]:
+    if isinstance(node, ast.ImportFrom) and node.module:
+        for alias in node.names:
+            whole = f"{node.module}.{alias.name}"
+            yield from [name for name in (whole, node.module) if name in known][:1]
+    elif isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names if alias.name in known)
+
+
+def floors(early: Imports) -> list[str]:
+    """The longest chain of imports, from the top down; ValueError naming a circle where there is one."""
+    chains: dict[str, list[str]] = {}
+
+    def chain(name: str, above: tuple[str, ...]) -> list[str]:
+        if name in above:
+            raise ValueError(f"circle: {' > '.join((*above[above.index(name) :], name))}")
+        if name not in chains:
+            below = [chain(other, (*above, name)) for other in sorted(early[name])]
+            chains[name] = [name, *max(below, key=len, default=[])]
+        return chains[name]
+
+    return max((chain(name, ()) for name in sorted(early)), key=len)
+
+
+def main() -> None:
+    """Print modules and lines of each room, and the longest chain."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
+    early, _ = imports(folder)
+    for k, name in enumerate(ROOMS):
+        inside = [module for module in early if room(module) == k]
+        below = sorted({ROOMS[room(o)] for m in inside for o in early[m]} - {name}, key=ROOMS.index)
+        print(f"{name:26s} {len(inside):3d} modules, on {', '.join(below) or 'nothing'}")
+    longest = floors(early)
+    print(f"longest chain of imports: {len(longest)} modules: {' > '.join(longest)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,36 @@
+"""The order of the rooms holds: nothing is known to what it stands on."""
+
+from pathlib import Path
+
+import pytest
+
+from tests import rooms
+
+EARLY, LATE = rooms.imports(Path(__file__).parents[1])
+
+
+def above(found):
+    """(module, what it imports) where that stands above it."""
+    pairs = {(module, other) for module, others in found.items() for other in others}
+    return {(module, other) for module, other in pairs if rooms.room(other) > rooms.room(module)}
+
+
+def test_nothing_is_imported_from_above():
+    assert above(EARLY) == set()
+
+
+def test_late_imports_from_above_are_those_listed():
+    assert above(LATE) == rooms.LATE
+
+
+def test_every_room_is_there():
+    assert {rooms.room(module) for module in EARLY} == set(range(len(rooms.ROOMS)))
+
+
+def test_no_imports_go_in_circles():
+    assert rooms.floors(EARLY)
+
+
+def test_a_circle_is_found():
+    with pytest.raises(ValueError, match=r"circle: a > b > a"):
+        rooms.floors({"a": {"b"}, "b": {"a"}})

@@ -1,0 +1,49 @@
+from . import (
+    accuracy as accuracy,
+)
+from . import (
+    analysis as analysis,
+)
+from . import (
+    effects as effects,
+)
+from . import (
+    operators as operators,
+)
+from . import (
+    packing as packing,
+)
+from . import (
+    sources as sources,
+)
+from . import (
+    steppers as steppers,
+)
+from .backend.runtime import init as init
+from .engine.result import Result as Result
+from .engine.result import Status as Status
+from .engine.run import run as run
+from .engine.simulation import Simulation as Simulation
+from .errors import InputError as InputError
+from .errors import RunError as RunError
+from .io.trajectory import Recording as Recording
+from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
+from .packing.placement import (
+    Lattice as Lattice,
+)
+from .packing.placement import (
+    RandomInBall as RandomInBall,
+)
+from .packing.placement import (
+    RandomInBox as RandomInBox,
+)
+from .packing.placement import (
+    RandomInDomain as RandomInDomain,
+)
+from .scene.initial_state import Cloud as Cloud
+from .scene.initial_state import Particles as Particles
+from .scene.initial_velocity import Blast as Blast
+from .scene.scene import Box as Box
+from .scene.scene import Open as Open
+from .scene.scene import Scene as Scene
+from .version import __version__ as __version__

@@ -1,0 +1,81 @@
+from .base import (
+    DerivedQuantity as DerivedQuantity,
+)
+from .base import (
+    Effect as Effect,
+)
+from .base import (
+    Force as Force,
+)
+from .base import (
+    PairEvent as PairEvent,
+)
+from .base import (
+    PairForce as PairForce,
+)
+from .base import (
+    SelfConsistentQuantity as SelfConsistentQuantity,
+)
+from .base import (
+    parameter as parameter,
+)
+from .contact.bond import ContactBond as ContactBond
+from .contact.dissipation import ContactDissipation as ContactDissipation
+from .contact.friction import ContactFriction as ContactFriction
+from .contact.hertz import Hertz as Hertz
+from .contact.normal import NormalContact as NormalContact
+from .contact.power_law import Contact as Contact
+from .contact.power_law import ContactLaw as ContactLaw
+from .contact.softening import ContactSoftening as ContactSoftening
+from .contact.surface import SurfaceContact as SurfaceContact
+from .external.drag import (
+    ChowDrag as ChowDrag,
+)
+from .external.drag import (
+    ConstantDrag as ConstantDrag,
+)
+from .external.drag import (
+    Drag as Drag,
+)
+from .external.drag import (
+    StokesDrag as StokesDrag,
+)
+from .external.gravity import Gravity as Gravity
+from .external.lorentz import Lorentz as Lorentz
+from .external.tether import Tether as Tether
+from .impact.agglomeration import Agglomeration as Agglomeration
+from .impact.friction import Friction as Friction
+from .impact.heating import DeformationWork as DeformationWork
+from .impact.heating import Heating as Heating
+from .impact.impact import Impact as Impact
+from .impact.impact import ImpactLaw as ImpactLaw
+from .impact.reaction import Reaction as Reaction
+from .impact.softening import Softening as Softening
+from .magnetic.body_force import MagneticBodyForce as MagneticBodyForce
+from .magnetic.dipole_dipole import DipoleDipole as DipoleDipole
+from .magnetic.dipole_dipole import TruncatedDipoleDipole as TruncatedDipoleDipole
+from .magnetic.magnetophoresis import Magnetophoresis as Magnetophoresis
+from .magnetic.moment import (
+    FixedMoment as FixedMoment,
+)
+from .magnetic.moment import (
+    InducedMoment as InducedMoment,
+)
+from .magnetic.moment import (
+    LangevinMoment as LangevinMoment,
+)
+from .magnetic.moment import (
+    Moment as Moment,
+)
+from .magnetic.mutual_moment import (
+    MutualInducedMoment as MutualInducedMoment,
+)
+from .magnetic.mutual_moment import (
+    MutualLangevinMoment as MutualLangevinMoment,
+)
+from .magnetic.mutual_moment import (
+    MutualMoment as MutualMoment,
+)
+from .pair.mie import Mie as Mie
+from .pair.near_field import NearField as NearField
+from .pair.near_field import TruncatedNearField as TruncatedNearField

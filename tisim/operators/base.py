@@ -1,0 +1,33 @@
+"""The contract of an operator: what changes the state between steps.
+
+An operator is an effect (see tisim/effects/base.py). ``particle`` is called for each particle on its own, and
+may write only that particle; then ``world`` is called once per world, serially, and may add particles and
+remove them. One that defines no ``world`` leaves a stepper free to take each particle through many steps by
+itself.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, parameter
+
+__all__ = ["Operator", "parameter"]
+
+
+class Operator(Effect):
+    """A change of state between steps."""
+
+    contract: ClassVar[bool] = True
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        """Change particle i alone, after a step of dt seconds that ends at t (s, f64).
+
+        ``s.time[w]`` is not that of a particle that takes steps of its own.
+        """
+
+    @ti.func
+    def world(self, s, w):
+        """Change the world as a whole, serially, after pair events; may append and remove."""

@@ -1,0 +1,20 @@
+from .base import Source as Source
+from .base import sources as sources
+from .flow import (
+    DarcyFlow as DarcyFlow,
+)
+from .flow import (
+    UniformFlow as UniformFlow,
+)
+from .flow import (
+    kozeny_carman as kozeny_carman,
+)
+from .magnetic.cylinder import Cylinder as Cylinder
+from .magnetic.cylinder import MagneticCylinders as MagneticCylinders
+from .magnetic.magnets import Body as Body
+from .magnetic.magnets import Magnets as Magnets
+from .magnetic.sphere import MagneticSpheres as MagneticSpheres
+from .magnetic.sphere import Sphere as Sphere
+from .sample import sample as sample
+from .uniform import ElectricField as ElectricField
+from .uniform import MagneticField as MagneticField

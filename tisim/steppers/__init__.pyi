@@ -1,0 +1,29 @@
+from .base import Stepper as Stepper
+from .boris import Boris as Boris
+from .brownian.brownian import Brownian as Brownian
+from .brownian.drift_limit import DriftLimit as DriftLimit
+from .implicit.collocation import Collocation as Collocation
+from .implicit.stage_control import StageControl as StageControl
+from .implicit.step_control import (
+    ErrorControl as ErrorControl,
+)
+from .implicit.step_control import (
+    ImplicitControl as ImplicitControl,
+)
+from .implicit.step_control import (
+    IterationControl as IterationControl,
+)
+from .implicit.trapezoid import Trapezoid as Trapezoid
+from .step_control import (
+    ApproachTime as ApproachTime,
+)
+from .step_control import (
+    Controller as Controller,
+)
+from .step_control import (
+    FixedStep as FixedStep,
+)
+from .step_control import (
+    StepControl as StepControl,
+)
+from .verlet import Verlet as Verlet
