@@ -1,4 +1,8 @@
-"""The contract of a case: a module of this package with a ``CASE``. Found by looking; registered nowhere."""
+"""The contract of a case: a package in ``cases`` with a ``CASE``. Found by looking; registered nowhere.
+
+What a ``CASE`` names imports figures, checks and the inverse problem when it is called, so that listing the
+cases stays quick.
+"""
 
 from __future__ import annotations
 
@@ -54,11 +58,17 @@ class Size:
     search: Mapping[str, Any] | None = None
 
 
+def size_named(name: str, sizes: Mapping[str, Size]) -> Size:
+    """A size by name; InputError when there is none of that name."""
+    must(name in sizes, "size", f"one of {', '.join(sizes)}", name)
+    return sizes[name]
+
+
 @dataclass(frozen=True)
 class Case:
     """A runnable scenario, and the inverse problem on it where there is one.
 
-    name : of the module. title, source : for people. sizes : by name; "default" is among them.
+    name : of the package. title, source : for people. sizes : by name; "default" is among them.
     scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
     quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
     problem : (size, variant) -> Problem; variants : its names, the first the default.
@@ -80,8 +90,7 @@ class Case:
 
     def size(self, name: str) -> Size:
         """A size by name; InputError when there is none of that name."""
-        must(name in self.sizes, "size", f"one of {', '.join(self.sizes)}", name)
-        return self.sizes[name]
+        return size_named(name, self.sizes)
 
 
 def every() -> dict[str, Case]:

@@ -121,7 +121,7 @@ def scenes() -> dict[str, dict[str, Any]]:
     """Plain data by name: a scene of each effect, source and operator, and those of each stepper."""
     serialization.load(steppers)
     found = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
-    for name in sorted(CONTROLLED):
+    for name in sorted(Stepper.known()):
         needed = FLUID if name == "brownian" else {}
         for k, (control, options, effects) in enumerate(CONTROLLED[name]):
             stepper = {"kind": name, **needed, **options, "control": control}

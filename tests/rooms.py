@@ -22,7 +22,9 @@ ROOMS = (
     "optimize.hall_of_fame", "optimize.generation_log", "optimize.tables", "optimize.settings",
     "optimize.outcome", "optimize.search_records", "optimize.search_folder", "optimize.search",
     "optimize.report", "optimize.session", "optimize",
-    "cases", "tisim.cli",
+    "cases", "cases.statistics", "cases.case", "cases.vibration", "cases.agglomeration", "cases.blast",
+    "cases.capture", "cases.cascade", "cases.concentration",
+    "tisim.cli",
 )  # fmt: skip
 """From the ground up."""
 LATE = {("tisim.io.run_folder", "tisim.plotting.cloud")}

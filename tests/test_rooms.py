@@ -31,6 +31,26 @@ def test_no_imports_go_in_circles():
     assert rooms.floors(EARLY)
 
 
+CASES = {name for name in EARLY if name.startswith("cases.") and f"{name}.scene" in EARLY}
+
+
+def test_modules_of_a_case_do_not_import_its_package():
+    """Its CASE names what is below it; they import from each other."""
+    assert len(CASES) == 6
+    homes = {module: module.rpartition(".")[0] for module in EARLY}
+    assert not [m for m, home in homes.items() if home in CASES and home in EARLY[m] | LATE[m]]
+
+
+def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
+    reached, ahead = set(), set(CASES)
+    while ahead:
+        reached |= ahead
+        ahead = set().union(*(EARLY[module] for module in ahead)) - reached
+    assert "cases.case" in reached
+    inside = [module for module in reached if module.startswith("cases.")]
+    assert not [module for module in inside if module.endswith((".figures", ".checks", ".problem"))]
+
+
 def test_a_circle_is_found():
     with pytest.raises(ValueError, match=r"circle: a > b > a"):
         rooms.floors({"a": {"b"}, "b": {"a"}})

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from cases import agglomeration, blast, vibration
-from cases.case import every
+from cases.agglomeration import scene as agglomeration
+from cases.blast import scene as blast
+from cases.case import every, find
+from cases.vibration import scene as vibration
 from tests.scenes import simulate
 from tisim import Box, Particles
 from tisim.accuracy.quantity import estimate
@@ -23,16 +25,16 @@ def test_every_size_of_every_case_says_what_is_compared(name):
 
 
 def test_paths_that_are_chaotic_are_not_compared():
-    assert [q.random for q in blast.CASE.quantities(blast.scene())] == [False]
-    assert [q.random for q in blast.CASE.quantities(blast.scene(contact=True))] == [True]
-    assert [q.random for q in agglomeration.CASE.quantities(agglomeration.scene_for("small", 0))] == [True]
+    assert [q.random for q in find("blast").quantities(blast.scene())] == [False]
+    assert [q.random for q in find("blast").quantities(blast.scene(contact=True))] == [True]
+    assert [q.random for q in find("agglomeration").quantities(agglomeration.scene_for("small", 0))] == [True]
 
 
 @pytest.mark.long
 def test_the_array_follows_its_closed_form():
     """Of a single particle, and of the array's centre whatever the near field."""
     scene = vibration.scene(near_field="none", sites=2, duration=0.004)
-    positions, centre = vibration.CASE.quantities(scene)
+    positions, centre = find("vibration").quantities(scene)
     (result,) = simulate([scene], capacity=8)
     for quantity in (positions, centre):
         truth = closed_form(quantity, result)
@@ -45,7 +47,7 @@ def test_the_array_follows_its_closed_form():
 
 def test_a_closed_form_is_claimed_only_where_it_holds():
     def known(scene):
-        return [q.exact is not None for q in vibration.CASE.quantities(scene)]
+        return [q.exact is not None for q in find("vibration").quantities(scene)]
 
     assert known(vibration.scene(near_field="none")) == [True, True]
     assert known(vibration.scene()) == [False, True]

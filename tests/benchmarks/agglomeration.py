@@ -26,8 +26,9 @@ import agglomeration_numba as peer
 import numba
 import numpy as np
 
-from cases.agglomeration import DURATION, cost, scene
-from cases.agglomeration_strings import designs
+from cases.agglomeration.problem import cost
+from cases.agglomeration.published_strings import designs
+from cases.agglomeration.scene import DURATION, scene
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 from tisim.scene.initial_state import Arrays

@@ -18,7 +18,7 @@ import blast_numba as peer
 import numba
 import numpy as np
 
-from cases.blast import AIR, FLUX, VISCOSITY, scene
+from cases.blast.scene import AIR, FLUX, VISCOSITY, scene
 from tisim import Scene, Simulation
 from tisim.backend import runtime
 

@@ -13,7 +13,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from cases import capture_design
+from cases.capture.problem import captured, problem
 from cases.statistics import Mean
 from optimize.evaluation.runs import start_seed
 from optimize.report.comparison import FRESH
@@ -44,10 +44,10 @@ CHANGES = {
 def main(starts):
     seeds = [start_seed(FRESH, k) for k in range(starts)]
     for variant, (found, changes) in CHANGES.items():
-        problem = capture_design.problem(variant)
+        filters = problem(variant)
         designs = [found, *({**found, **change} for change in changes.values())]
-        results = run([problem.scene(design, seed) for design in designs for seed in seeds])
-        part = np.reshape([capture_design.captured(result) for result in results], (len(designs), starts))
+        results = run([filters.scene(design, seed) for design in designs for seed in seeds])
+        part = np.reshape([captured(result) for result in results], (len(designs), starts))
         print(f"{variant}: {Mean.of(part[0])} captured, {starts} starts, 95 % confidence")
         for name, other in zip(changes, part[1:], strict=True):
             print(f"  {name:30s} {Mean.of(other)}, by {Mean.of(other - part[0])} more")

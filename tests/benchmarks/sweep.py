@@ -17,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from cases import capture, vibration
+from cases.capture import scene as capture
+from cases.vibration import scene as vibration
 from tisim import Result, Scene, Simulation
 from tisim.backend import runtime
 

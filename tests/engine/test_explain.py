@@ -5,9 +5,9 @@ import io
 import pytest
 from rich.console import Console
 
-from cases.agglomeration import BEST
-from cases.agglomeration import scene as agglomeration
-from cases.vibration import scene as vibration
+from cases.agglomeration.scene import BEST
+from cases.agglomeration.scene import scene as agglomeration
+from cases.vibration.scene import scene as vibration
 from tisim import Simulation
 from tisim.engine.explain import explain, known_effects, render
 

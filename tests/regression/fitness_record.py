@@ -44,10 +44,11 @@ def fingerprint() -> str:
 def measure() -> dict[str, list[float]]:
     """Fitness of every design from every start, with the settings of the runtime. Shape (designs, starts)."""
     import tisim
-    from cases import agglomeration
+    from cases.agglomeration.problem import cost
+    from cases.agglomeration.scene import scene
 
-    scenes = [agglomeration.scene(d, seed, grains=GRAINS) for d in DESIGNS.values() for seed in range(STARTS)]
-    values = [agglomeration.cost(result) for result in tisim.run(scenes)]
+    scenes = [scene(d, seed, grains=GRAINS) for d in DESIGNS.values() for seed in range(STARTS)]
+    values = [cost(result) for result in tisim.run(scenes)]
     return {name: values[k * STARTS : (k + 1) * STARTS] for k, name in enumerate(DESIGNS)}
 
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import tisim
-from cases import capture_design
-from cases.capture_design import HEIGHT, NUMBER, SPEED, WIDTH
+from cases.capture.problem import GENES, HEIGHT, NUMBER, SPEED, WIDTH, problem
 from tisim.backend import runtime
 
 CAUGHT = {
@@ -40,7 +39,7 @@ CAUGHT = {
 
 
 def names(variant):
-    return [gene.name for gene in capture_design.GENES[variant]]
+    return [gene.name for gene in GENES[variant]]
 
 
 def test_designs_of_the_record_are_in_the_order_of_the_genes():
@@ -54,12 +53,12 @@ def caught(**changed):
     """Particles caught by variant, shape (designs, starts), and the throughput (m^3/s) of the first."""
     scenes = []
     for variant, designs in CAUGHT.items():
-        problem = capture_design.problem(variant)
+        filters = problem(variant)
         for values in designs:
             design = {**dict(zip(names(variant), values, strict=True)), **changed}
-            scenes += [problem.scene(design, seed) for seed in (0, 1)]
+            scenes += [filters.scene(design, seed) for seed in (0, 1)]
     results = tisim.run(scenes)
-    fraction, flow = capture_design.problem("throughput").objectives
+    fraction, flow = problem("throughput").objectives
     counts = np.reshape([NUMBER * fraction.of(result) for result in results], (-1, 2))
     ends = np.cumsum([len(designs) for designs in CAUGHT.values()])
     return dict(zip(CAUGHT, np.split(counts, ends[:-1]), strict=True)), flow.of(results[0])

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import tisim
-from cases import blast_design, vibration_design
+from cases.blast import problem as blast
+from cases.vibration import problem as vibration
 from tisim.backend import runtime
 
 VIBRATION = {
@@ -38,8 +39,8 @@ def tolerance():
 
 def values(scale=1.0):
     """Of both, with all fields scaled."""
-    wave = vibration_design.problem()
-    shape = blast_design.problem("small")
+    wave = vibration.problem()
+    shape = blast.problem("small")
     waves = [wave.scene({"flux": scale * b, "stiffness": k}, 0) for b, k in VIBRATION]
     shapes = [
         shape.scene({f"flux_{axis}": scale * b for axis, b in zip("xyz", field, strict=True)}, seed)

@@ -41,14 +41,15 @@ def test_same_settings_give_the_same_fitness_to_the_last_bit(values):
 
 @pytest.mark.slow
 def test_the_other_schedule_gives_the_same_fitness_to_the_last_bit(values):
-    from cases import agglomeration
+    from cases.agglomeration.problem import cost
+    from cases.agglomeration.scene import scene
 
     design = fitness_record.DESIGNS["fragile"]
-    scenes = [agglomeration.scene(design, seed, grains=fitness_record.GRAINS) for seed in range(4)]
+    scenes = [scene(design, seed, grains=fitness_record.GRAINS) for seed in range(4)]
     simulation = tisim.Simulation(scenes[0], worlds=4, schedule="particle")
     simulation.load(scenes)
     simulation.run()
-    assert [agglomeration.cost(result) for result in simulation.results()] == values["fragile"][:4]
+    assert [cost(result) for result in simulation.results()] == values["fragile"][:4]
     simulation.close()
 
 
@@ -78,15 +79,16 @@ def test_the_bound_would_notice_a_change_of_physics(values):
 
     A quarter is seen too (19), by the design whose starts differ least.
     """
-    from cases import agglomeration
+    from cases.agglomeration.problem import cost
+    from cases.agglomeration.scene import scene
 
     names = ("published", "hard and slow", "fragile")
     scenes = [
-        agglomeration.scene({**design, "hardness": 1.5 * design["hardness"]}, seed, fitness_record.GRAINS)
+        scene({**design, "hardness": 1.5 * design["hardness"]}, seed, fitness_record.GRAINS)
         for design in (fitness_record.DESIGNS[name] for name in names)
         for seed in range(fitness_record.STARTS)
     ]
-    costs = [agglomeration.cost(result) for result in tisim.run(scenes)]
+    costs = [cost(result) for result in tisim.run(scenes)]
     harder = dict(zip(names, np.reshape(costs, (len(names), -1)).tolist(), strict=True))
     moved = fitness_record.deviations(harder, {"values": values})
     assert min(moved.values()) > STANDARD_ERRORS

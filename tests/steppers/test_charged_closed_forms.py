@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases.charged_closed_forms import driven, static_field, tethered
+from cases.vibration.closed_forms import driven, static_field, tethered
 from tests.scenes import simulate
 from tests.steppers.charged import PUSH, W, accurate, boris, charged, equal_steps, final, order
 

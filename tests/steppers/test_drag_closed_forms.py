@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases.charged_closed_forms import quadratic_drag, stokes_drag
+from cases.vibration.closed_forms import quadratic_drag, stokes_drag
 from tests.scenes import scene, simulate
 from tests.steppers.charged import boris, equal_steps, order
 from tisim.effects import ConstantDrag, StokesDrag

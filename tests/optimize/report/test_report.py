@@ -5,7 +5,7 @@ import pytest
 from matplotlib.image import imread
 from rich.console import Console
 
-from cases import agglomeration
+from cases.agglomeration.problem import problem as agglomeration
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
@@ -101,7 +101,7 @@ def test_terminal_table_shows_the_best_designs(outcome):
 
 def agglomerations(number):
     """Designs of Z04's ten genes; values such as 1.234e15 among them."""
-    made = Outcome(agglomeration.problem("paper"), Settings(), {"problem": "agglomeration"})
+    made = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
         string = Individual([0.851234 + k / 200] * 10)
         string.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)

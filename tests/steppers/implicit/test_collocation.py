@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cases.charged_closed_forms import driven
+from cases.vibration.closed_forms import driven
 from tests.interactions.test_short_ranged import grains, shells
 from tests.scenes import compiled, scene, simulate
 from tests.steppers.charged import PUSH, W, charged, final, order

@@ -1,0 +1,87 @@
+"""The six best strings that Z04 publishes (tables 1-3), run here, beside the values it gives them.
+
+    python -m cases.agglomeration.published [--grains 1000] [--starts 48] [--sensitivity]
+
+With ``--sensitivity`` the first string is run again with one assumption changed at a time.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import tisim
+from cases.agglomeration.problem import cost
+from cases.agglomeration.published_strings import PUBLISHED, designs
+from cases.agglomeration.scene import scene
+from tisim import Scene
+from tisim.numerics.statistics import half_width
+from tisim.steppers import ApproachTime, Verlet
+
+
+def changed(control: ApproachTime) -> Callable[[Scene], Scene]:
+    """Another step control."""
+    return lambda s: s.model_copy(update={"stepper": Verlet(control=control)})
+
+
+def setting(key: str, value: float | bool) -> Callable[[Scene], Scene]:
+    """One setting changed."""
+    return lambda s: s.replace({key: value})
+
+
+CHANGES: Mapping[str, Callable[[Scene], Scene]] = {
+    "as published": lambda s: s,
+    "steps of at least 1e-7 s": changed(ApproachTime(shortest=1e-7)),
+    "steps of at least 1e-5 s": changed(ApproachTime(shortest=1e-5)),
+    "steps of at least 1e-4 s": changed(ApproachTime(shortest=1e-4)),
+    "grains meet across the faces too": setting("domain.images", True),
+    "friction ten times": setting("effects.friction.coefficient", 0.13456),
+    "no work of deformation": lambda s: s.without("deformation_work"),
+    "no reaction": lambda s: s.without("reaction"),
+    "no softening": lambda s: s.without("softening"),
+    "hardness a quarter": setting("effects.impact.hardness", 0.25 * 0.26548e6),
+    "four times as long": lambda s: s.model_copy(update={"duration": 4 * s.duration}),
+}  # fmt: skip
+
+
+def estimate(scenes: list[Scene]) -> tuple[float, float]:
+    """Mean Pi and half of its 95 % confidence interval."""
+    values = np.array([cost(result) for result in tisim.run(scenes)])
+    return float(values.mean()), float(half_width(values))
+
+
+def main() -> None:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--grains", type=int, default=1000)
+    parser.add_argument("--starts", type=int, default=48)
+    parser.add_argument("--sensitivity", action="store_true")
+    options = parser.parse_args()
+    console = Console()
+
+    table = Table(
+        "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published strings"
+    )
+    for rank, (design, published) in enumerate(zip(designs(), PUBLISHED, strict=True), start=1):
+        mean, half = estimate([scene(design, seed, options.grains) for seed in range(options.starts)])
+        table.add_row(
+            str(rank), f"{published:.3f}", f"{mean:.4f} ± {half:.4f}",
+            f"{1000 * (1 - published) ** 3:.1f}", f"{options.grains * (1 - mean) ** 3:.1f}",
+        )  # fmt: skip
+    console.print(table)
+
+    if options.sensitivity:
+        table = Table("string 1 with", "Pi, 95 % CI", title="One assumption changed at a time")
+        for name, change in CHANGES.items():
+            scenes = [change(scene(designs()[0], seed, options.grains)) for seed in range(options.starts)]
+            mean, half = estimate(scenes)
+            table.add_row(name, f"{mean:.4f} ± {half:.4f}")
+        console.print(table)
+
+
+if __name__ == "__main__":
+    main()

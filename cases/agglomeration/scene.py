@@ -1,0 +1,82 @@
+"""Agglomeration in thermochemically reacting granular flow (Z04).
+
+Z04 is T. I. Zohdi, A computational framework for agglomeration in thermochemically reacting granular flows,
+Proc. R. Soc. Lond. A 460 (2004) 3421-3445. Equal grains with random velocities collide, heat, soften, react,
+bond and break.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cases.agglomeration.published_strings import designs
+from cases.case import Size, size_named
+from tisim import Box, Cloud, Scene
+from tisim.effects import Agglomeration, DeformationWork, Friction, Heating, Impact, Reaction, Softening
+from tisim.operators import Cooling, Fragmentation
+
+TITLE = "Agglomeration in thermochemically reacting granular flow"
+
+HALF_SIDE = 0.01
+"""D, half the side of the control volume, m (Z04 section 8)."""
+DURATION = 0.01
+"""s (Z04 section 8)."""
+MEAN_VELOCITY = (100.0, 10.0, 10.0)
+"""m/s (Z04 section 7)."""
+
+BEST = designs()[0]
+"""The string of rank 1 of Z04."""
+
+SIZES = {
+    "small": Size(
+        "60 grains; a look in seconds",
+        {"grains": 60},
+        {
+            "options": {"population": 10, "parents": 4},
+            "generations": 3,
+            "ensemble": {"tolerance": 5e-3, "max_starts": 12, "confirm": 12},
+        },
+    ),
+    "default": Size(
+        "250 grains, 8 generations of 20; about a minute on 2 cores",
+        {"grains": 250},
+        {"generations": 8, "ensemble": {"tolerance": 1e-3, "min_starts": 8, "block": 8, "confirm": 24}},
+    ),
+    "paper": Size(
+        "1000 grains, 25 generations of 20, as Z04 section 8; under 10 minutes on 2 cores",
+        {"grains": 1000},
+        {"generations": 25, "ensemble": {"tolerance": 5e-4, "min_starts": 12, "block": 12, "confirm": 48}},
+    ),
+}
+
+
+def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: float = DURATION) -> Scene:
+    """The flow of a design from one random start."""
+    radius = design["length_ratio"] * HALF_SIDE / grains ** (1 / 3)
+    v = design["relative_velocity"]
+    return Scene(
+        name="agglomeration",
+        particles=Cloud(
+            number=grains, radius=radius, density=design["density"], mean_velocity=MEAN_VELOCITY,
+            deviation=(v, 0.1 * v, 0.1 * v), temperature=design["temperature"],
+        ),
+        effects=(
+            Impact(hardness=design["hardness"]),
+            Friction(coefficient=design["friction"]),
+            Heating(heat_capacity=design["heat_capacity"]),
+            DeformationWork(),
+            Softening(activation_energy=design["activation_energy"]),
+            Reaction(energy_density=design["reaction"]),
+            Fragmentation(surface_energy=design["surface_energy"]),
+            Agglomeration(),
+            Cooling(),
+        ),
+        domain=Box(low=(-HALF_SIDE,) * 3, high=(HALF_SIDE,) * 3, images=False),
+        duration=duration,
+        seed=seed,
+    )  # fmt: skip
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """The flow of the paper's best string."""
+    return scene(BEST, seed, **size_named(size, SIZES).scene)

@@ -1,0 +1,216 @@
+"""Figures of the case blast: of one run, and of the runs of Z16 side by side."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cases.blast import scene as blast
+from cases.blast.accuracy import half_axes
+from cases.blast.shape import contacts, extents
+from cases.case import size_named
+from tisim import Recording, RunError, run
+from tisim.engine.batches import Progress, share
+from tisim.io.reader import Frame, Frames, frames
+from tisim.plotting.cloud import SEEN, corners, panel, view
+from tisim.plotting.style import empty, plain
+from tisim.plotting.time_series import COLOURS
+from tisim.scene.initial_state import Arrays
+
+SHOWN = 6
+"""Frames of a sequence."""
+PATHS = 40
+"""Particles whose paths are drawn."""
+RUNS = {
+    "no_field": "no field (Z16 Fig. 7)",
+    "default": "in the field, no interaction (Fig. 5)",
+    "contact": "contact (Fig. 8)",
+    "near_field": "contact and near field as printed (Fig. 9)",
+    "clumps": "contact and near field of neighbours",
+}
+"""Set side by side, by size."""
+
+
+@dataclass(frozen=True)
+class BlastHistory:
+    """A run in time (s, (frames,)): half axes along x, y and z (m, (frames, 3)), pairs that touch, paths of
+    some particles (m) and their velocities (m/s), shape (frames, PATHS, 3)."""
+
+    time: np.ndarray
+    axes: np.ndarray
+    touching: np.ndarray
+    paths: np.ndarray
+    velocities: np.ndarray
+
+    @classmethod
+    def of(cls, found: Frames) -> BlastHistory:
+        """Of all frames, each read once; particles are in the order of their ids in all of them."""
+        axes, touching, paths, velocities = [], [], [], []
+        for frame in found:
+            state = frame.arrays
+            axes.append(half_axes(state))
+            touching.append(contacts(state))
+            paths.append(state["position"][:PATHS])
+            velocities.append(state["velocity"][:PATHS])
+        return cls(found.times, np.array(axes), np.array(touching), np.array(paths), np.array(velocities))
+
+    def dense(self, k: int) -> bool:
+        """Whether frames of a particle are so near in time that a line may join them: 8 a circle or more."""
+        v = self.velocities[:, k, 1] + 1j * self.velocities[:, k, 2]
+        return bool(np.median(np.abs(np.angle(v[1:] * v[:-1].conj()))) < np.pi / 4)
+
+
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """sequence.png: the cloud at six times; velocities.png: its velocities then; envelope.png: half axes,
+    velocities of one particle, and paths.
+
+    None of a file with fewer frames than SHOWN, such as a result.h5.
+    """
+    if len(found) < SHOWN:
+        return {}
+    chosen = [found[k] for k in np.linspace(0, len(found) - 1, SHOWN).round().astype(int)]
+    return {
+        "sequence.png": sequence(chosen),
+        "velocities.png": velocities(chosen),
+        "envelope.png": envelope(BlastHistory.of(found)),
+    }
+
+
+def sequence(chosen: Sequence[Frame]) -> Figure:
+    """The cloud from its start on, all on one scale, as in Z16 figures 5 to 9."""
+    figure = empty(10.4, 7.2)
+    square = common([frame.arrays for frame in chosen])
+    for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
+        snapshot(axis, frame.arrays, square)
+        axis.set_title(f"t = {1e3 * frame.time:.0f} ms", fontsize=10)
+    return figure
+
+
+def velocities(chosen: Sequence[Frame]) -> Figure:
+    """Velocity vectors at the places of the particles, all on one scale (Z16 Fig. 6, left)."""
+    figure = empty(10.4, 7.2)
+    left, bottom, side = common([frame.arrays for frame in chosen])
+    fastest = max(np.linalg.norm(frame.arrays["velocity"], axis=1).max() for frame in chosen)
+    # The longest arrow is an eighth of the picture, and finds room at its edge.
+    left, bottom, side = left - side / 8, bottom - side / 8, 1.25 * side
+    scale = 8.0 * fastest / side
+    for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
+        (x, y), (u, v) = ((frame.arrays[name] @ SEEN)[:, :2].T for name in ("position", "velocity"))
+        axis.quiver(
+            x, y, u, v, angles="xy", scale_units="xy", scale=scale, color=COLOURS[0], width=0.0025, alpha=0.6
+        )
+        axis.set(xlim=(left, left + side), ylim=(bottom, bottom + side), aspect="equal", xticks=[], yticks=[])
+        axis.set_title(f"t = {1e3 * frame.time:.0f} ms", fontsize=10)
+    return figure
+
+
+def common(states: Sequence[Arrays]) -> tuple[float, float, float]:
+    """A square that all of them are seen in."""
+    both = {name: np.concatenate([s[name] for s in states]) for name in ("position", "radius")}
+    return view(both, corners(None, None))
+
+
+def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
+    panel(axis, state, square, corners(None, None), None)
+
+
+def envelope(history: BlastHistory) -> Figure:
+    """Half axes of the cloud in time; velocities across the field (Z16 Fig. 6); paths along and across it."""
+    figure = empty(10.4, 7.4)
+    (left, right), (along, across) = figure.subplots(2, 2)
+    for k, colour in enumerate(COLOURS):
+        left.plot(history.time, history.axes[:, k], "--" if k == 2 else "-", color=colour, label="xyz"[k])
+    left.set(xlabel="time (s)", ylabel="half axes of the cloud (m)", ylim=(0, None))
+    left.legend(frameon=False, ncols=3)
+    fastest = int(np.linalg.norm(history.velocities[0, :, 1:], axis=1).argmax())
+    line = "-" if history.dense(fastest) else "."
+    for k in (1, 2):
+        speed = history.velocities[:, fastest, k]
+        right.plot(history.time, speed, line, ms=3, color=COLOURS[k], lw=1.0, label="xyz"[k])
+    right.set(xlabel="time (s)", ylabel="velocity of one particle (m/s)")
+    right.legend(frameon=False, ncols=2, loc="upper right")
+    along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=COLOURS[0], lw=0.7)
+    along.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"paths of {PATHS} particles")
+    # The one that starts fastest across the field, from near: its circle is far smaller than the cloud.
+    across.plot(
+        history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=COLOURS[0], lw=0.8
+    )
+    across.set(xlabel="y (m)", ylabel="z (m)", title="path of one particle")
+    across.set_aspect("equal", "datalim")
+    for axis in (left, right, along, across):
+        plain(axis)
+    return figure
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """blast.png, blast.csv: the runs of Z16 side by side, of 500 particles at size small, else of 2000."""
+    number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
+    histories, ends = {}, {}
+    for done, name in enumerate(RUNS):
+        settings = {**size_named(name, blast.SIZES).scene, "number": number}
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "trajectory.h5"
+            result = run(
+                blast.scene(**settings),
+                share(progress, done, len(RUNS)),
+                Recording(path, frames=50),
+            )
+            if not result.status.ok:
+                raise RunError(f"{name}: {result.status.reason}")
+            with frames(path) as found:
+                histories[name], ends[name] = BlastHistory.of(found), found[-1]
+    return {"blast.png": beside(histories, ends), "blast.csv": table(histories)}
+
+
+def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> Figure:
+    """The clouds at the end on one scale, and their half axes and contacts in time."""
+    figure = empty(10.4, 5.8)
+    grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
+    square = common([frame.arrays for frame in ends.values()])
+    for k, (name, frame) in enumerate(ends.items()):
+        axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
+        snapshot(axis, frame.arrays, square)
+        axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"), fontsize=8)
+    along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
+    colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
+    for (name, history), colour in zip(histories.items(), colours, strict=False):
+        for axis, values in (
+            (along, history.axes[:, 0]),
+            (across, np.sqrt((history.axes[:, 1:] ** 2).mean(axis=1))),
+            (touching, history.touching),
+        ):
+            axis.plot(history.time, values, color=colour, lw=1.4, label=RUNS[name].split(" (")[0])
+    number = len(next(iter(ends.values())).arrays["mass"])
+    start = float(next(iter(histories.values())).axes[0].mean())
+    time = np.linspace(0.0, 1.0, 400)
+    for axis, moment in zip(
+        (along, across), extents(blast.SPECIFIC_CHARGE * blast.FLUX, time, start), strict=True
+    ):
+        axis.plot(time, np.sqrt(5 * moment), ":", color="k", lw=1.2, label="closed form, no interaction")
+        axis.set(xlabel="time (s)", ylim=(0, 3.4))
+    along.set_ylabel("half axis along x, the field (m)")
+    across.set_ylabel("half axis across (m)")
+    touching.set(xlabel="time (s)", ylabel=f"pairs that touch, of {number} particles", yscale="symlog")
+    across.legend(frameon=False, fontsize=7, loc="upper left")
+    for axis in (along, across, touching):
+        plain(axis)
+    return figure
+
+
+def table(histories: Mapping[str, BlastHistory]) -> str:
+    """All of it as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["run", "time_s", "half_axis_x_m", "half_axis_y_m", "half_axis_z_m", "pairs_that_touch"])
+    for name, history in histories.items():
+        for time, axes, pairs in zip(history.time, history.axes, history.touching, strict=True):
+            writer.writerow([name, float(time), *map(float, axes), int(pairs)])
+    return text.getvalue()

@@ -1,0 +1,152 @@
+"""Captured fractions of the case capture in time and at the end, by angle, particle size and aspect ratio."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cases.capture import scene as capture
+from cases.capture.statistics import (
+    ANGLES,
+    ASPECTS,
+    Settings,
+    even,
+    fraction,
+    fractions,
+    isotropic,
+    mean,
+    results,
+)
+from cases.statistics import Mean
+from tisim import Result
+from tisim.engine.batches import Progress, share
+from tisim.plotting.style import empty, plain
+
+REPEATS = 10
+"""Of a setting; the checks take more."""
+TIMES = np.linspace(0.0, capture.DURATION, 101)
+"""s, of the curves."""
+SOME = (50, 125, 212)
+"""nm, for which the aspect ratio is varied."""
+
+Row = tuple[Settings, Sequence[Result]]
+"""A setting, and what has come of it."""
+
+
+def figures(progress: Progress) -> Mapping[str, Figure | str]:
+    """capture.png, capture.csv."""
+    angles: list[Settings] = [
+        {"nanometres": n, "angle": a, "aspect": 20.0, "part": part}
+        for n in (75, 212) for part in ("top", "side") for a in ANGLES
+    ]  # fmt: skip
+    sizes: list[Settings] = [
+        {"nanometres": n, "angle": a, "aspect": 20.0} for n in capture.MOMENT for a in ANGLES
+    ]
+    aspects: list[Settings] = [
+        {"nanometres": n, "angle": a, "aspect": r} for n in SOME for r in ASPECTS for a in ANGLES
+    ]
+    parts = []
+    for done, settings in enumerate((angles, sizes, aspects)):
+        found = results(settings, REPEATS, share(progress, done, 3))
+        parts.append(list(zip(settings, found, strict=True)))
+    return {"capture.png": captured(*parts), "capture.csv": table([row for part in parts for row in part])}
+
+
+def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]) -> Figure:
+    """Fraction in time by angle, TOP and SIDE (B16 Fig. 6.4), by size, and by aspect ratio; at the end by
+    angle and size (6.6a), and by aspect ratio and size (6.6b)."""
+    figure = empty(10.4, 11.4)
+    grid = figure.subplots(4, 2)
+    for k, axis in enumerate(grid[:2].flat):
+        in_time_by_angle(axis, angles[k * len(ANGLES) : (k + 1) * len(ANGLES)])
+    grid[0, 0].legend(frameon=False, fontsize=8, ncols=2, title="axis to field", title_fontsize=8)
+    in_time_by_size(grid[2, 0], [row for row in sizes if row[0]["angle"] == 90.0])
+    in_time_by_aspect(grid[2, 1], [row for row in aspects if row[0]["nanometres"] == 125])
+    by_size(grid[3, 0], sizes)
+    by_aspect(grid[3, 1], aspects)
+    for axis in grid[:3].flat:
+        axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02))
+    for axis in grid.flat:
+        plain(axis)
+    return figure
+
+
+def curve(found: Iterable[Result]) -> np.ndarray:
+    """Captured fraction at TIMES, the mean over repeats."""
+    return np.mean([[fraction(result.state, t) for t in TIMES] for result in found], axis=0)
+
+
+def in_time_by_angle(axis: Axes, rows: Sequence[Row]) -> None:
+    for (settings, found), colour in zip(rows, _colours("viridis", len(rows)), strict=True):
+        axis.plot(TIMES, curve(found), color=colour, lw=1.4, label=f"{settings['angle']:.0f}°")
+    settings = rows[0][0]
+    axis.set_title(f"{settings['nanometres']} nm, {str(settings['part']).upper()}, L/D = 20", fontsize=10)
+
+
+def in_time_by_size(axis: Axes, rows: Sequence[Row]) -> None:
+    for (settings, found), colour in zip(rows, _colours("plasma", len(rows)), strict=True):
+        axis.plot(TIMES, curve(found), color=colour, lw=1.4, label=f"{settings['nanometres']} nm")
+    axis.set_title("transverse, L/D = 20", fontsize=10)
+    axis.legend(frameon=False, fontsize=8, ncols=2)
+
+
+def in_time_by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
+    for aspect, colour in zip(ASPECTS, _colours("cividis", len(ASPECTS)), strict=True):
+        curves = [curve(found) for settings, found in rows if settings["aspect"] == aspect]
+        axis.plot(TIMES, even(np.array(curves)), color=colour, lw=1.4, label=f"L/D = {aspect:.3g}")
+    axis.set_title("125 nm, even mean over angles", fontsize=10)
+    axis.legend(frameon=False, fontsize=8)
+
+
+def by_size(axis: Axes, rows: Sequence[Row]) -> None:
+    for n, colour in zip(capture.MOMENT, _colours("plasma", len(capture.MOMENT)), strict=True):
+        means = [mean(found) for settings, found in rows if settings["nanometres"] == n]
+        bars(axis, ANGLES, means, colour, f"{n} nm")
+    axis.set(xlabel="angle of the axis to the field (°)", ylabel="captured in 50 s, L/D = 20", ylim=(0, 1.02))
+    axis.legend(frameon=False, fontsize=8, ncols=2)
+
+
+def by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
+    for n, colour in zip(SOME, ("#228833", "#4477aa", "#cc6677"), strict=True):
+        groups = [
+            np.array([fractions(found) for s, found in rows if (s["nanometres"], s["aspect"]) == (n, aspect)])
+            for aspect in ASPECTS
+        ]
+        bars(axis, ASPECTS, [Mean.of(even(group)) for group in groups], colour, f"{n} nm")
+        axis.plot(ASPECTS, [isotropic(group).mean() for group in groups], ":", color=colour, lw=1.2)
+    axis.set(xlabel="L/D", ylabel="captured in 50 s", ylim=(0.4, 1.0), xscale="log")
+    axis.set_xticks([2, 5, 10, 20], ["2", "5", "10", "20"])
+    axis.minorticks_off()
+    axis.set_title("even mean over angles; dotted: all directions equally likely", fontsize=9)
+    axis.legend(frameon=False, fontsize=8)
+
+
+def bars(axis: Axes, x: Sequence[float], means: Sequence[Mean], colour: object, label: str) -> None:
+    """Means with their confidence intervals."""
+    axis.errorbar(
+        x, [m.value for m in means], [m.half for m in means], color=colour, lw=1.3, marker="o", ms=3,
+        capsize=2, label=label,
+    )  # fmt: skip
+
+
+def table(rows: Sequence[Row]) -> str:
+    """What is captured at the end, as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"])
+    for settings, found in rows:
+        m = mean(found)
+        part = settings.get("part", "all")
+        writer.writerow([settings["nanometres"], settings["angle"], settings["aspect"], part, len(found),
+                         m.value, m.half])  # fmt: skip
+    return text.getvalue()
+
+
+def _colours(name: str, number: int) -> np.ndarray:
+    return colormaps[name](np.linspace(0.0, 0.88, number))

@@ -1,0 +1,131 @@
+"""What fraction of the particles of the case capture is caught: sweeps over its settings, many repeats each.
+
+All runs of a sweep are the worlds of one batch. A run knows when each of its particles was captured, so the
+fraction at any earlier time needs no run of its own. Start k is the same for all settings, up to what they
+change: fractions of one start are not independent of each other, so settings are compared and averaged start
+by start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cases.capture import scene as capture
+from cases.case import Check
+from cases.statistics import Claim, Mean
+from tisim import Result, RunError, Scene, run
+from tisim.engine.batches import Progress
+from tisim.scene.initial_state import Arrays
+
+ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
+"""Of the cylinder to the field, degrees (B16 section 6.4.2)."""
+ASPECTS = (5 / 3, 10 / 3, 20 / 3, 20.0)
+REPEATS = 30
+"""As B16 section 6.3."""
+MICRO = 1e-6
+
+Settings = Mapping[str, Any]
+
+
+def results(
+    settings: Sequence[Settings], repeats: int, progress: Progress | None = None
+) -> list[list[Result]]:
+    """Of the scene of capture with each of the settings, from as many starts; RunError when one fails."""
+    scenes = [capture.scene(**given, seed=seed) for given in settings for seed in range(repeats)]
+    return grouped(scenes, repeats, progress)
+
+
+def grouped(scenes: Sequence[Scene], repeats: int, progress: Progress | None = None) -> list[list[Result]]:
+    """Results of scenes, repeats of one thing after the other; RunError when one fails."""
+    found = run(scenes, progress)
+    for result in found:
+        if not result.status.ok:
+            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    return [found[k : k + repeats] for k in range(0, len(found), repeats)]
+
+
+def fraction(state: Arrays, time: float = np.inf) -> float:
+    """Of the particles, captured by a time (s)."""
+    at = state["captured_at"]
+    return float(((at >= 0) & (at <= time)).mean())
+
+
+def fractions(found: Sequence[Result], time: float = np.inf) -> np.ndarray:
+    """Captured fraction by a time of each start."""
+    return np.array([fraction(result.state, time) for result in found])
+
+
+def mean(found: Sequence[Result], time: float = np.inf) -> Mean:
+    """Captured fraction by a time, over repeats."""
+    return Mean.of(fractions(found, time))
+
+
+def isotropic(by_angle: np.ndarray) -> np.ndarray:
+    """The mean over directions that are all equally likely, of each start, from those at ANGLES, (angles,
+    starts): weights sin(alpha)."""
+    weights = np.sin(np.radians(ANGLES))
+    weights[[0, -1]] /= 2
+    return np.average(by_angle, axis=0, weights=weights)
+
+
+def even(by_angle: np.ndarray) -> np.ndarray:
+    """The mean over angles that are all equally likely, as over the curves of B16 Fig. 6.7, of each start."""
+    return by_angle.mean(axis=0)
+
+
+def check(repeats: int = REPEATS) -> Iterator[Check | Claim]:
+    """What B16 concludes of one cylinder, each with its confidence interval."""
+    yield from of_orientation(repeats)
+    yield from of_aspect(repeats)
+    yield from of_size(repeats)
+
+
+def of_orientation(repeats: int) -> Iterator[Claim]:
+    """Section 6.4.2: transverse captures more than longitudinal; TOP and SIDE behave in opposite ways."""
+    sizes, parts = (75, 212), ("top", "side")
+    settings = [
+        {"nanometres": size, "part": part, "angle": angle, "aspect": 20.0}
+        for size in sizes
+        for part in ("all", *parts)
+        for angle in (0.0, 90.0)
+    ]
+    found = iter(results(settings, repeats))
+    for size in sizes:
+        for part, name in (("all", "both regions"), ("top", "TOP"), ("side", "SIDE")):
+            along, across = fractions(next(found)), fractions(next(found))
+            limits = {"most": 0.0} if part == "top" else {"least": 0.0}
+            gain = Mean.of(across - along)
+            yield Claim(f"{size} nm, {name}: transverse minus longitudinal", gain, **limits)
+
+
+def of_aspect(repeats: int) -> Iterator[Claim]:
+    """Section 6.4.3: shorter cylinders capture a little more, averaged over angles; which is their inactive
+    lateral surface when they lie along the field. Averaged over directions it is the other way round, and
+    across the field too. Section 6.4.4: "relatively small" is L/D < 6."""
+    settings = [
+        {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in ASPECTS for angle in ANGLES
+    ]
+    found = np.array([fractions(group) for group in results(settings, repeats)])
+    shortest, short, medium, long = found.reshape(len(ASPECTS), len(ANGLES), repeats)
+    gain = shortest - long
+    yield Claim("125 nm, L/D 5/3 minus 20, longitudinal", Mean.of(gain[0]), least=0.0)
+    yield Claim("125 nm, L/D 5/3 minus 20, transverse", Mean.of(gain[-1]), most=0.0)
+    yield Claim("125 nm, L/D 5/3 minus 20, even mean over angles", Mean.of(even(gain)), least=0.0)
+    yield Claim("the same, all directions equally likely", Mean.of(isotropic(gain)), most=0.0)
+    yield Claim("125 nm, L/D 10/3 minus 20, even mean over angles", Mean.of(even(short - long)), least=0.0)
+    yield Claim("125 nm, L/D 20/3 minus 20, even mean over angles", Mean.of(even(medium - long)), most=0.02)
+
+
+def of_size(repeats: int) -> Iterator[Claim]:
+    """Sections 6.4.2 and 6.4.4: from 50 nm on captured within 50 s, 25 nm not."""
+    sizes = tuple(capture.MOMENT)
+    settings = [{"nanometres": size, "angle": 90.0, "aspect": 5 / 3} for size in sizes]
+    found = dict(zip(sizes, results(settings, repeats), strict=True))
+    for size in sizes[1:]:
+        yield Claim(f"{size} nm captured within 50 s, transverse, L/D 5/3", mean(found[size]), least=0.7)
+    yield Claim("25 nm", mean(found[25]), most=0.5)
+    late = Mean.of([fraction(r.state) - fraction(r.state, 25.0) for r in found[25]])
+    yield Claim("25 nm: part captured in the second half of the time", late, least=0.05)

@@ -1,0 +1,128 @@
+"""Figures of the case cascade."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cases.cascade.capture_times import SHARE, captured_at, time_to
+from cases.cascade.scene import STAGE, Cascade, Orientation
+from cases.cascade.statistics import OFF, ORIENTATIONS, PUBLISHED, RANDOM
+from cases.statistics import Mean
+from tisim.engine.batches import Progress
+from tisim.plotting.style import empty, plain
+
+SHOWN = 0.97
+"""Share of the particles up to which curves go."""
+FEW = 20
+"""Repeats."""
+STAGES = (0.1, 0.5, 2.0, 10.0)
+"""s, of 125 nm (B16 Fig. 6.11b)."""
+COLOURS = {25: "#cc6677", 125: "#4477aa"}
+LINES: dict[Orientation, str] = {"optimal": "-", "directions": ":", "angles": "--"}
+
+Found = Mapping[Cascade, np.ndarray]
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """cascade.png, cascade.csv: all cascades whatever ``size`` is."""
+    runs = [
+        Cascade(n, STAGE[n], how, aspect, gap=gap)
+        for gap, aspect in ((OFF, 20.0), (0.0, 20.0), (0.0, 5 / 3))
+        for n in PUBLISHED
+        for how in LINES
+    ]  # fmt: skip
+    stages = [
+        Cascade(125, stage, how, gap=OFF) for stage in STAGES for how in ORIENTATIONS[:2]
+    ]  # fmt: skip
+    wanted = list(dict.fromkeys([*runs, *stages]))
+    times = captured_at(wanted, FEW, SHOWN, progress=progress)
+    found = dict(zip(wanted, times, strict=True))
+    figure = empty(10.4, 7.6)
+    (a, b), (c, d) = figure.subplots(2, 2)
+    of_size(a, found, 125)
+    of_size(b, found, 25)
+    of_stage(c, found)
+    of_ratio(d, found)
+    return {"cascade.png": figure, "cascade.csv": table(found)}
+
+
+def curve(axis: Axes, times: np.ndarray, label: str, **style: Any) -> None:
+    """Captured fraction in time, the mean over repeats."""
+    when = np.sort(times[np.isfinite(times)])
+    share = np.arange(1, len(when) + 1) / times.size
+    shown = share <= SHOWN
+    axis.plot(when[shown], share[shown], label=label, lw=1.4, **style)
+
+
+def of_size(axis: Axes, found: Found, nanometres: int) -> None:
+    """Random and optimal cascade of a size (B16 Fig. 6.11a), and its times to 90 %."""
+    for how, line in LINES.items():
+        one = Cascade(nanometres, STAGE[nanometres], how, gap=OFF)
+        label = {"optimal": "optimal", "directions": "random direction", "angles": "random angle"}[how]
+        curve(axis, found[one], label, color=COLOURS[nanometres], linestyle=line)
+    axis.axhline(SHARE, color="0.6", lw=0.8)
+    for time, name in zip(PUBLISHED[nanometres], ("B16, random", "B16, optimal"), strict=True):
+        axis.plot(time, SHARE, "o" if name.endswith("optimal") else "s", color="0.3", ms=5, label=name, ls="")
+    axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02), xlim=(0, None))
+    axis.set_title(f"{nanometres} nm, stages of {STAGE[nanometres]:g} s", fontsize=10)
+    axis.legend(frameon=False, fontsize=8)
+    plain(axis)
+
+
+def of_stage(axis: Axes, found: Found) -> None:
+    """125 nm with stages of different lengths (B16 Fig. 6.11b)."""
+    for stage, colour in zip(STAGES, ("#aa3377", "#4477aa", "#228833", "#ccbb44"), strict=True):
+        for how in ORIENTATIONS[:2]:
+            label = f"{stage:g} s" if how == "optimal" else ""
+            curve(axis, found[Cascade(125, stage, how, gap=OFF)], label, color=colour, linestyle=LINES[how])
+    axis.axhline(SHARE, color="0.6", lw=0.8)
+    axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02), xlim=(0, 40))
+    axis.set_title("125 nm by length of a stage; dotted: random direction", fontsize=10)
+    axis.legend(frameon=False, fontsize=8)
+    plain(axis)
+
+
+def of_ratio(axis: Axes, found: Found) -> None:
+    """Time to 90 % of random cascades over that of the optimal ones, by L/D, layer and what random means."""
+    bases = [one for one in found if one.orientation == "optimal" and one.stage == STAGE[one.nanometres]]
+    names = {(r.aspect, r.gap): f"L/D {r.aspect:.3g},\n{r.gap:g} R off" for r in bases}
+    places = {key: k for k, key in enumerate(names)}
+    for base in bases:
+        for how, mark, shift in zip(RANDOM, "oD", (-0.08, 0.08), strict=True):
+            m = ratio(found, replace(base, orientation=how))
+            x = places[base.aspect, base.gap] + shift + (0.2 if base.nanometres == 25 else -0.2)
+            axis.errorbar(x, m.value, m.half, color=COLOURS[base.nanometres], marker=mark, ms=4, capsize=2)
+    for nanometres, (random, best) in PUBLISHED.items():
+        label = f"B16, {nanometres} nm"
+        axis.axhline(random / best, color=COLOURS[nanometres], lw=0.9, ls="--", label=label)
+    axis.set_xticks(list(places.values()), list(names.values()))
+    axis.set(ylabel="time to 90 %, random over optimal", ylim=(0.8, 3.6))
+    axis.set_title("circles: all directions alike; diamonds: all angles alike", fontsize=10)
+    axis.legend(frameon=False, fontsize=8)
+    plain(axis)
+
+
+def ratio(found: Found, one: Cascade) -> Mean:
+    """Of the time to 90 % over that of the optimal cascade."""
+    best = found[replace(one, orientation="optimal")]
+    return Mean.of(time_to(SHARE, found[one])).over(Mean.of(time_to(SHARE, best)))
+
+
+def table(found: Found) -> str:
+    """Time to 90 % of each cascade, as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    names = [field.name for field in fields(Cascade)]
+    writer.writerow([*names, "repeats", "s_to_90_percent", "half_width_95"])
+    for one, times in found.items():
+        m = Mean.of(time_to(SHARE, times))
+        writer.writerow([*(getattr(one, name) for name in names), len(times), m.value, m.half])
+    return text.getvalue()

@@ -1,0 +1,81 @@
+"""Capture by one fibre after the other: the cascade of B16 section 6.4.5.
+
+N particles spend ``stage`` seconds about one cylinder; those it has not captured are placed anew around a
+cylinder of another orientation, and so on. "optimal": every cylinder lies across the field. "directions":
+each has a random direction, all equally likely. "angles": its angle to the field is random, all angles from
+0 to 90 degrees equally likely, as B16 averages elsewhere (section 6.4.3).
+
+B16 says neither which of the two its random orientation is, nor L/D, nor where particles are placed: here in
+a layer ``thickness`` wide and ``gap`` away from the cylinder, both in radii of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cases.capture import scene as capture
+from cases.case import Size, size_named
+from tisim import RandomAroundCylinder, Scene
+from tisim.sources import MagneticCylinders
+
+Orientation = Literal["optimal", "directions", "angles"]
+STAGE = {25: 10.0, 125: 0.5}
+"""Delta t_run, s, by radius in nm (B16 section 6.4.5)."""
+
+SIZES = {
+    "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}),
+    "optimal": Size("the same about a transverse one", {"orientation": "optimal"}),
+    "25nm": Size("100 particles of 25 nm, 10 s", {"nanometres": 25, "stage": 10.0}),
+}
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """One kind of cascade. nanometres : of the particles; stage : s about each cylinder; see above."""
+
+    nanometres: int = 125
+    stage: float = 0.5
+    orientation: Orientation = "directions"
+    aspect: float = 20.0
+    thickness: float = 1.0
+    gap: float = 0.0
+    number: int = capture.NUMBER
+
+    def angle(self, generator: np.random.Generator) -> float:
+        """Of the next cylinder to the field, degrees."""
+        drawn = generator.uniform()
+        return {
+            "optimal": 90.0,
+            "directions": float(np.degrees(np.arccos(drawn))),
+            "angles": 90.0 * drawn,
+        }[self.orientation]
+
+    def scene(self, number: int, generator: np.random.Generator) -> Scene:
+        """The stage of ``number`` particles about the next cylinder."""
+        made = capture.scene(
+            nanometres=self.nanometres,
+            angle=self.angle(generator),
+            aspect=self.aspect,
+            number=number,
+            duration=self.stage,
+            seed=int(generator.integers(2**62)),
+        )
+        (body,) = next(e for e in made.effects if isinstance(e, MagneticCylinders)).cylinders
+        away = self.gap * body.radius
+        layer = RandomAroundCylinder(
+            axis=body.axis,
+            radius=body.radius + away,
+            length=body.length + 2 * away,
+            thickness=self.thickness * body.radius,
+        )
+        cloud = made.particles.model_copy(update={"placement": layer})
+        return made.model_copy(update={"name": "cascade", "particles": cloud})
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """The first stage of the cascade of a size."""
+    one = Cascade(**size_named(size, SIZES).scene)
+    return one.scene(one.number, np.random.default_rng(seed))

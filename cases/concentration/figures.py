@@ -1,0 +1,137 @@
+"""Figures of the case concentration."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+
+from cases.concentration import scene as concentration
+from cases.concentration.scene import coupling
+from cases.concentration.statistics import CAPTURE, chain, held
+from tisim import Recording, run
+from tisim.analysis import head_to_tail, labels
+from tisim.engine.batches import Progress, share
+from tisim.io.reader import Frames, frames
+from tisim.plotting.style import empty, plain
+from tisim.scene.initial_state import Arrays
+
+MICRO = 1e-6
+SHOWN: dict[str, Any] = {"number": 125, "duration": 2e-3}
+"""What snapshots are of."""
+CONCENTRATIONS = (0.005, 0.5, 2.0)
+"""g/mL, of the curves."""
+SPAN = 0.6
+"""s, of the curves."""
+FEW, FRAMES = 2, 90
+"""Repeats of a curve, and its points."""
+
+
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """chains.png: the particles at the end, and mean chain length and captured part in time."""
+    every = list(found)
+    last = every[-1].arrays
+    if "moment" not in last:
+        return {}
+    figure = empty(10.4, 4.6)
+    left, right = figure.subplots(1, 2)
+    snapshot(left, last)
+    times = 1e3 * found.times
+    moment = last["moment"]
+    right.plot(times, [chain(frame.arrays, moment) for frame in every], color="#4477aa", label="mean chain")
+    right.set(xlabel="time (ms)", ylabel="particles of a chain", ylim=(0, None))
+    plain(right)
+    return {"chains.png": figure}
+
+
+def snapshot(axis: Axes, state: Arrays) -> None:
+    """Particles as seen along y, to scale; white those that are single, coloured by chain the others."""
+    position, moment, radius = state["position"], state["moment"], float(state["radius"][0])
+    chains = labels(len(position), head_to_tail(position, moment, 2 * radius))
+    alone = np.bincount(chains)[chains] == 1
+    places = (position - position.mean(axis=0))[:, [0, 2]] / MICRO
+    order = np.argsort(-position[:, 1])
+    size = np.full(len(position), 2 * radius / MICRO)
+    discs = EllipseCollection(size, size, np.zeros(len(position)), units="x", offsets=places[order],
+                              offset_transform=axis.transData, edgecolor="0.3", lw=0.4)  # fmt: skip
+    colour = np.ma.masked_array(chains * 7 % 20, alone)[order]
+    discs.set(cmap=colormaps["tab20"].with_extremes(bad="white"), clim=(0, 19), array=colour)
+    axis.add_collection(discs)
+    axis.autoscale_view()
+    reach = np.abs(places).max() + 2 * radius / MICRO
+    axis.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    axis.set(xlabel="x, along the field (um)", ylabel="z (um)")
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """snapshots.png (B16 Fig. 6.12); captured.png, captured.csv (Fig. 6.13), for all whatever ``size`` is."""
+    keys = [(size, c) for c in (0.5, 2.0) for size in (25, 75)]
+    scenes = [concentration.scene(nanometres=n, concentration=c, **SHOWN) for n, c in keys]
+    figure = empty(8.8, 8.4)
+    found = run(scenes, share(progress, 0, 2))
+    for axis, (n, c), result in zip(figure.subplots(2, 2).flat, keys, found, strict=True):
+        snapshot(axis, result.state)
+        length = chain(result.state, result.state["moment"])
+        axis.set_title(f"{n} nm, {c:g} g/mL, Γ = {coupling(n):.3g}: chains of {length:.1f}", fontsize=10)
+    curves = captured(share(progress, 1, 2))
+    return {"snapshots.png": figure, "captured.png": drawn(curves), "captured.csv": table(curves)}
+
+
+Curves = Mapping[tuple[float, float], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def captured(progress: Progress) -> Curves:
+    """Times (s), part that touched the cylinder and part held by it, by angle (degrees) and g/mL."""
+    keys = [(angle, c) for angle in (0.0, 90.0) for c in CONCENTRATIONS]
+    scenes = [
+        concentration.scene(angle=angle, concentration=c, seed=seed, **{**CAPTURE, "duration": SPAN})
+        for angle, c in keys for seed in range(FEW)
+    ]  # fmt: skip
+    curves = {}
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "runs.h5"
+        run(scenes, progress, Recording(path, frames=FRAMES))
+        for k, key in enumerate(keys):
+            touched, hanging = [], []
+            for world in range(k * FEW, (k + 1) * FEW):
+                with frames(path, world) as found:
+                    every = [frame.arrays for frame in found]
+                    touched.append([float((state["captured_at"] >= 0).mean()) for state in every])
+                    hanging.append([held(state) for state in every])
+                    times = found.times
+            curves[key] = (times, np.mean(touched, axis=0), np.mean(hanging, axis=0))
+    return curves
+
+
+def drawn(curves: Curves) -> Figure:
+    """Longitudinal and transverse side by side."""
+    figure = empty(10.4, 4.2)
+    for axis, angle in zip(figure.subplots(1, 2, sharey=True), (0.0, 90.0), strict=True):
+        for c, colour in zip(CONCENTRATIONS, ("#cc6677", "#4477aa", "#228833"), strict=True):
+            times, touched, hanging = curves[angle, c]
+            axis.plot(times, hanging, color=colour, lw=1.5, label=f"{1e3 * c:g} mg/mL")
+            axis.plot(times, touched, color=colour, lw=1.0, ls=":")
+        axis.set(xlabel="time (s)", ylim=(0, 1.02), title=f"axis at {angle:.0f}° to the field")
+        axis.legend(frameon=False, fontsize=8)
+        plain(axis)
+        axis.set_ylabel("captured, or in a chain that is" if angle == 0 else "")
+    return figure
+
+
+def table(curves: Curves) -> str:
+    """The curves as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["angle_deg", "g_per_mL", "time_s", "touched", "held"])
+    for (angle, c), parts in curves.items():
+        writer.writerows([angle, c, *row] for row in zip(*parts, strict=True))
+    return text.getvalue()

@@ -1,0 +1,137 @@
+"""Magnetic colloids so concentrated that they form chains, drawn to a fibre (B16 section 6.4.6).
+
+Particles of B16 table 6.1 start in a cube 100 um beyond the end of a cylinder of L/D = 20, above its rim.
+Beside the pull of the cylinder they feel the dipole-dipole force of each other within 30 radii, Mie(30, 15)
+repulsion for hard spheres with eps = 100 k T, and, where the size asks for it, each other's flow.
+
+The paper's side of the cube, cbrt(rho V_p / c), leaves out N; here it is cbrt(N rho V_p / c), in which N
+particles have the concentration c. It gives c in g/mL, and in the caption of Fig. 6.13 in mg/L; here it is
+g/mL. At 2 g/mL that is a volume fraction of 0.4; centres, not whole spheres, lie within the cube.
+
+Steps are as short as contacts ask for, not the cylinder: noise moves a particle by DIFFUSION radii in one,
+and forces by DRIFT. The distance of two of 75 nm that are bound then spreads by 0.03 of a diameter; it is
+0.008 with steps of a third of that, and 0.09 with three times as much, at which chains hold together all the
+same and are captured no later (``coarse``).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.constants import Boltzmann, mu_0
+
+from cases.capture import scene as capture
+from cases.case import Size, size_named
+from tisim import Cloud, RandomInBox, Scene
+from tisim.effects import FixedMoment, Magnetophoresis, Mie, TruncatedDipoleDipole
+from tisim.operators import Capture
+from tisim.sources import MagneticCylinders, MagneticField
+from tisim.steppers import Brownian, DriftLimit
+
+DENSITY = 5000.0
+"""kg/m^3 (B16 section 6.4.6)."""
+ASPECT, DISTANCE, CUTOFF = 20.0, 100e-6, 30.0
+"""L/D; m from the end of the cylinder to the cube; radii within which dipoles act on each other."""
+WELL = 100 * Boltzmann * capture.TEMPERATURE
+"""J: eps of the Mie potential."""
+DRIFT, DIFFUSION = 0.05, 0.03
+"""Radii that forces, and noise (its standard deviation), move a particle in a step at most."""
+DIGITS = 5
+"""Of the cylinder's field, from its table."""
+
+SIZES = {
+    "default": Size("64 particles of 75 nm at 0.5 g/mL above a transverse cylinder, 10 ms", {}),
+    "25nm": Size("the same of 25 nm, which form no chains", {"nanometres": 25, "duration": 2e-3}),
+    "flow": Size(
+        "24 particles of 75 nm that feel each other's flow, until some are captured",
+        {"number": 24, "hydrodynamics": "rotne-prager", "duration": 0.3, "coarse": 3.0},
+    ),
+    "paper": Size(
+        "500 of them, 1 s, as B16: days",
+        {"number": 500, "hydrodynamics": "rotne-prager", "duration": 1.0, "coarse": 3.0},
+    ),
+}
+
+
+def side(number: int, radius: float, concentration: float) -> float:
+    """d = cbrt(N rho V_p / c) of the cube (m), for spheres of a radius (m) at c g/mL, 1000 kg/m^3."""
+    volume = 4 / 3 * np.pi * radius**3
+    return float(np.cbrt(number * DENSITY * volume / (1e3 * concentration)))
+
+
+def coupling(nanometres: int) -> float:
+    """Gamma = mu_0 mu^2 / (2 pi d^3 k T), d the diameter (B16 Eq. 6.25)."""
+    moment, diameter = capture.MOMENT[nanometres], 2e-9 * nanometres
+    return float(mu_0 * moment**2 / (2 * np.pi * diameter**3 * Boltzmann * capture.TEMPERATURE))
+
+
+def chain_length(nanometres: int, concentration: float) -> float:
+    """n = sqrt(phi e^(Gamma - 1)), phi = c / rho: particles of a chain in equilibrium (B16 Eq. 6.26)."""
+    return float(np.sqrt(1e3 * concentration / DENSITY) * np.exp((coupling(nanometres) - 1) / 2))
+
+
+def longest(radius: float, coarse: float = 1.0) -> float:
+    """Step (s) in which a sphere of a radius (m) diffuses by ``coarse`` DIFFUSION radii.
+
+    What is at contact is not pushed far into the other before it feels that: with ``coarse`` of 5, 25 nm
+    particles at 2 g/mL soon lie so deep in each other that no step is short enough; with 3 they do not.
+    """
+    drag = 6 * np.pi * capture.VISCOSITY * radius
+    return float((coarse * DIFFUSION * radius) ** 2 * drag / (2 * Boltzmann * capture.TEMPERATURE))
+
+
+def scene(
+    nanometres: int = 75,
+    concentration: float = 0.5,
+    angle: float = 90.0,
+    number: int = 64,
+    duration: float = 0.01,
+    hydrodynamics: str = "none",
+    distance: float = DISTANCE,
+    coarse: float = 1.0,
+    seed: int = 0,
+) -> Scene:
+    """A cube of particles at c g/mL, ``distance`` (m) beyond the end of a cylinder at an angle (degrees).
+
+    coarse : noise and forces move a particle so many times as far in a step.
+    """
+    body = capture.fibre(capture.axis(angle), ASPECT)
+    radius = nanometres * 1e-9
+    half = side(number, radius, concentration) / 2
+    axis = np.asarray(body.direction)
+    # Above the rim where it is nearest to the direction of the field.
+    outward = np.array([axis[2], 0.0, -axis[0]])
+    centre = (body.length / 2 + distance + half) * axis + body.radius * outward
+    low, high = centre - half - radius, centre + half + radius
+    return Scene(
+        name="concentration",
+        particles=Cloud(
+            number=number,
+            radius=radius,
+            density=DENSITY,
+            placement=RandomInBox(low=tuple(low.tolist()), high=tuple(high.tolist())),
+            quantities={"saturation_moment": capture.MOMENT[nanometres]},
+        ),
+        effects=(
+            MagneticField(constant=(capture.FLUX, 0.0, 0.0)),
+            MagneticCylinders(cylinders=(body,), table_digits=DIGITS),
+            FixedMoment(),
+            Magnetophoresis(),
+            TruncatedDipoleDipole(cutoff=CUTOFF),
+            Mie(epsilon=WELL),
+            Capture(),
+        ),
+        stepper=Brownian(
+            temperature=capture.TEMPERATURE,
+            viscosity=capture.VISCOSITY,
+            hydrodynamics=hydrodynamics,
+            noise="exact" if hydrodynamics == "none" else "fast",
+            control=DriftLimit(longest=longest(radius, coarse), shortest=1e-12, drift=coarse * DRIFT),
+        ),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """The scene of a size."""
+    return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -1,0 +1,156 @@
+"""Figures of the case vibration: of one run, and of many."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
+
+from cases.case import size_named
+from cases.vibration import scene as vibration
+from cases.vibration.accuracy import constants
+from cases.vibration.closed_forms import resonances, response
+from cases.vibration.response import (
+    DRIVE,
+    FAST,
+    SLOW,
+    CentreOfGravityHistory,
+    Sweep,
+    beats,
+    fast_scenes,
+    slow_scenes,
+)
+from tisim.engine.batches import Progress, share
+from tisim.io.reader import Frames
+from tisim.plotting.style import empty, plain
+
+LEAST = 9
+"""Frames that make a spectrum."""
+FOUND, EXACT, MARK, OTHER = "#4477aa", "0.25", "#cc6677", "#228833"
+
+
+def pictures(found: Frames) -> Mapping[str, Figure]:
+    """response.png: the centre of gravity of a run in time, beside its closed form, and its spectrum.
+
+    None of a file with fewer frames than LEAST, such as a result.h5.
+    """
+    if len(found) < LEAST:
+        return {}
+    history, known = CentreOfGravityHistory.of(found), constants(found.scene)
+    figure = empty(7.2, 6.8)
+    above, below = figure.subplots(2, 1)
+    for part, name, colour in ((np.real, "x", FOUND), (np.imag, "y", MARK)):
+        above.plot(history.time, part(history.place), color=colour, lw=1.6, label=f"{name}, as run")
+        if known:
+            closed = part(response(history.time, **known))
+            label = "closed form" if name == "x" else None
+            above.plot(history.time, closed, ":", color=EXACT, lw=1.4, label=label)
+    above.set_ylabel("centre of gravity")
+    above.legend(frameon=False, ncols=3, loc="upper left", fontsize=9)
+    above.margins(y=0.18)
+    engineering(above, "s", "m")
+    above.set_xlabel("time")
+    spectrum(below, history, known)
+    return {"response.png": figure}
+
+
+def spectrum(axis: Axes, history: CentreOfGravityHistory, known: Mapping[str, float] | None) -> None:
+    """Amplitudes of circular motion against its angular frequency, with the lines that are to be expected."""
+    omega, lines = history.spectrum()
+    axis.semilogy(omega, lines, color=FOUND, lw=1.4)
+    reach = omega.max()
+    if known:
+        slow, fast = resonances(known["w"], known["k_m"])
+        marks = (
+            (slow, "resonances", OTHER), (-fast, None, OTHER),
+            (known["omega"], r"$\pm\Omega$", MARK), (-known["omega"], None, MARK),
+        )  # fmt: skip
+        for at, label, colour in marks:
+            axis.axvline(at, color=colour, ls="--" if colour == MARK else ":", lw=1.2, label=label, zorder=0)
+        axis.legend(frameon=False, fontsize=9, loc="upper right")
+        reach = min(reach, 3.0 * max(fast, known["omega"]))
+    axis.set_xlim(-reach, reach)
+    shown = lines[np.abs(omega) <= reach]
+    axis.set_ylim(max(shown.min(), 1e-5 * shown.max()) / 2, 6 * shown.max())
+    axis.set_xlabel("angular frequency (1/s), anticlockwise > 0")
+    axis.set_ylabel("amplitude (m)")
+    plain(axis)
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """resonance.png, resonance.csv: the resonance curve and beats. Circles of the size's near field."""
+    settings = size_named(size, vibration.SIZES).scene
+    near = str(settings.get("near_field", "printed"))
+    ratios = np.linspace(0.04, 2.0, 99)
+    around = np.linspace(0.9, 1.1, 41)
+    lots = (
+        fast_scenes(np.unique(np.round(np.concatenate([ratios, around]), 6))),
+        slow_scenes(np.linspace(0.05, 1.0, 96)),
+        fast_scenes(vibration.RATIOS, near, sites=3),
+    )
+    fast, slow, arrays = (
+        Sweep.of(scenes, share(progress, done, len(lots))) for done, scenes in enumerate(lots)
+    )
+    return {
+        "resonance.png": drawn(slow, fast, arrays, near, beats()),
+        "resonance.csv": table(
+            ("one particle", slow), ("one particle", fast), (f"27, near field {near}", arrays)
+        ),
+    }
+
+
+def table(*sweeps: tuple[str, Sweep]) -> str:
+    """All of the sweeps as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(["particles", "duration_s", "omega_1_s", "omega_over_w", "peak_m", "closed_form_m"])
+    for what, sweep in sweeps:
+        for row in zip(sweep.omega, sweep.omega / vibration.CYCLOTRON, sweep.found, sweep.exact, strict=True):
+            writer.writerow([what, sweep.duration, *map(float, row)])
+    return text.getvalue()
+
+
+def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, history: CentreOfGravityHistory) -> Figure:
+    """Resonance curves over both resonances, beats beside their closed form, and their spectrum."""
+    figure = empty(10.4, 7.4)
+    (left, right), (below, lines) = figure.subplots(2, 2)
+    known = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
+             "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
+    for axis, sweep, at, name in ((left, slow, SLOW, "slow"), (right, fast, FAST, "fast")):
+        axis.semilogy(sweep.omega, sweep.exact, color=EXACT, lw=1.0, label="closed form")
+        axis.semilogy(sweep.omega, sweep.found, ".", color=FOUND, ms=5, label="one particle, as run")
+        axis.axvline(at, color=OTHER, ls=":", lw=1.2, label=f"{name} resonance, {at:.4g} 1/s", zorder=0)
+        axis.set_title(f"largest displacement within {sweep.duration:g} s", fontsize=10)
+        axis.set_xlabel(r"drive frequency $\Omega$ (1/s)")
+        axis.set_ylabel("centre of gravity (m)")
+        plain(axis)
+    label = f"27 particles, near field {near}:\nthe ratios of Z13 Fig. 3"
+    right.semilogy(arrays.omega, arrays.found, "o", mfc="none", color=MARK, ms=8, label=label)
+    for axis in (left, right):
+        axis.legend(framealpha=1, edgecolor="none", fontsize=8)
+    below.plot(1e3 * history.time, np.abs(history.velocity), color=FOUND, lw=0.9)
+    expected, period = 2 * np.pi / (FAST * (1 - DRIVE)), history.beat_period()
+    for k in range(int(history.time[-1] / expected + 0.5) + 1):
+        below.axvline(1e3 * k * expected, color=OTHER, ls=":", lw=1.2, zorder=0)
+    below.set_title(
+        rf"beats at $\Omega$ = {DRIVE:g} of the fast resonance: {1e3 * period:.2f} ms as run;"
+        f"\ndotted, $2\\pi/|\\Omega - \\omega|$ = {1e3 * expected:.2f} ms", fontsize=10,
+    )  # fmt: skip
+    below.set_ylabel("speed (m/s)")
+    below.set_xlabel("time (ms)")
+    plain(below)
+    spectrum(lines, history, {**known, "omega": DRIVE * FAST})
+    lines.set_title("its spectrum", fontsize=10)
+    return figure
+
+
+def engineering(axis: Axes, x: str, y: str) -> None:
+    """Units with prefixes."""
+    axis.xaxis.set_major_formatter(EngFormatter(x))
+    axis.yaxis.set_major_formatter(EngFormatter(y))
+    plain(axis)

@@ -1,0 +1,91 @@
+"""The inverse problem of vibration: the field and the binder that answer a given drive the most, or least.
+
+The centre of gravity moves as one particle does (see ``scene``), so one particle is what is run. Where
+the answer must lie is known: a drive at Omega is in resonance with the fast or the slow motion when
+k/m = Omega^2 -+ w Omega, so the best designs lie on these two lines of the plane of B and k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cases.vibration import scene as vibration
+from cases.vibration.closed_forms import resonances
+from cases.vibration.response import peak
+from cases.vibration.scene import CHARGE, FIELD, MASS
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
+from tisim import Result, Scene
+from tisim.errors import must
+
+VARIANTS = ("resonate", "avoid")
+"""The inverse problems: the largest response to a given drive, and the smallest."""
+DRIVE = 0.8 * vibration.CYCLOTRON
+"""Omega of Z13 figure 3(d), 1/s: far from resonance with the paper's field and binder."""
+DURATION = 0.2
+"""s, 24 periods of the drive."""
+
+GENES = (
+    Gene("flux", "T", 0.2, 2.0),
+    Gene("stiffness", "N/m", 1.0, 1000.0, "log"),
+)
+"""About the paper's 1 T, and from twice its 0.5 N/m on: sqrt(k/m) is 31 to 977 1/s."""
+
+
+def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> Scene:
+    """One particle with the field and the binder of a design. Nothing in it is random."""
+    return vibration.scene(
+        drive / vibration.CYCLOTRON, "none", duration, sites=1, error=1e-5,
+        flux=design["flux"], stiffness=design["stiffness"], observed=True,
+    )  # fmt: skip
+
+
+def displacement(result: Result) -> float:
+    """Largest of the centre of gravity, m."""
+    return result.measures["peak_displacement"]
+
+
+def closed_form(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> float:
+    """The same without a run, m."""
+    w, k_m = CHARGE * design["flux"] / MASS, design["stiffness"] / MASS
+    return peak(duration, w, k_m, CHARGE * FIELD / MASS, drive)
+
+
+def nearest(design: Mapping[str, float], drive: float = DRIVE) -> float:
+    """The resonance of a design that is nearest to the drive, 1/s."""
+    both = resonances(CHARGE * design["flux"] / MASS, design["stiffness"] / MASS)
+    return min(both, key=lambda omega: abs(np.log(omega / drive)))
+
+
+def problem(size: str = "default", variant: str = "resonate") -> Problem:
+    """The field and binder that answer DRIVE the most ("resonate") or the least ("avoid") in DURATION.
+
+    Of size "default" only: a search runs one particle.
+    """
+    must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
+    aim, sign = ("largest", -1e3) if variant == "resonate" else ("smallest", 1e3)
+    return Problem(
+        name=f"vibration-{variant}",
+        title=f"{vibration.TITLE}: the {aim} response to {DRIVE:.1f} 1/s within {DURATION} s",
+        description=f"the {aim} response to a drive of {DRIVE:.1f} 1/s",
+        genome=Genome(GENES),
+        scene=lambda design, seed: scene(design),
+        objective=lambda result: sign * displacement(result),
+        symbol="-peak (mm)" if sign < 0 else "peak (mm)",
+        details=details,
+    )
+
+
+def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
+    """The design's resonance beside the drive, and its response beside the closed form."""
+    slow, fast = resonances(CHARGE * design["flux"] / MASS, design["stiffness"] / MASS)
+    return {
+        "drive frequency, 1/s": DRIVE,
+        "fast resonance of the design, 1/s": fast,
+        "slow resonance of the design, 1/s": slow,
+        "nearest resonance over drive": nearest(design) / DRIVE,
+        "largest displacement, m": displacement(result),
+        "the same in closed form, m": closed_form(design),
+    }

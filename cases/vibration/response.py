@@ -1,0 +1,165 @@
+"""The centre of gravity of the case vibration: its sweep over drive frequencies, its beats and its spectrum.
+
+Z13 shows eight drive frequencies Omega, over w = q B/m. Here as many as one likes run as the worlds of one
+batch, and each has an observer of the largest displacement. With a tether along x and y there are two
+resonances, sqrt(w^2/4 + k/m) +- w/2: the fast one of Z13's figure 3(e), and a slow one, a drift about the
+anchor with a period of 12.6 s, of which Z13's runs are far too short to show anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from cases.vibration import scene as vibration
+from cases.vibration.closed_forms import resonances, response
+from cases.vibration.scene import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS
+from tisim import Recording, RunError, Scene, run
+from tisim.engine.batches import Progress
+from tisim.io.reader import Frames, frames
+from tisim.plotting.time_series import history
+from tisim.sources import ElectricField
+
+SLOW, FAST = resonances(CYCLOTRON, STIFFNESS / MASS)
+"""0.49974 and 955.429 1/s."""
+DRIVE = 0.9
+"""Omega over the fast resonance, of the beats: their period is a tenth of that, 2 pi/|Omega - FAST|."""
+
+
+def peak(t_end: float, w: float, k_m: float, push: float, omega: float) -> float:
+    """Largest |x + i y| (m) of the closed form up to a time, s.
+
+    Looked at 160 times a circle, which misses 2e-4 of its radius at most; and in 200,000 instants at most: in
+    so long a time, circles are far smaller than the drift that they go with.
+    """
+    circles = max(omega, resonances(w, k_m)[1]) * t_end / (2 * np.pi)
+    times = np.linspace(0.0, t_end, min(256 + int(160 * circles), 200_000))
+    return float(np.abs(response(times, w, k_m, push, omega)).max())
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Largest displacements (m) within a time (s) at drive frequencies (1/s): as run, and in closed form."""
+
+    duration: float
+    omega: np.ndarray
+    found: np.ndarray
+    exact: np.ndarray
+
+    @classmethod
+    def of(cls, scenes: Sequence[Scene], progress: Progress | None = None) -> Sweep:
+        """Run scenes of the case with an observer, which differ in their drive frequency only."""
+        results = run(scenes, progress)
+        for result in results:
+            if not result.status.ok:
+                raise RunError(f"{result.scene.name}: {result.status.reason}")
+        omega = np.array([drive(scene) for scene in scenes])
+        duration = scenes[0].duration
+        exact = [peak(duration, CYCLOTRON, STIFFNESS / MASS, CHARGE * FIELD / MASS, o) for o in omega]
+        found = np.array([result.measures["peak_displacement"] for result in results])
+        return cls(duration, omega, found, np.array(exact))
+
+    @property
+    def deviation(self) -> float:
+        """Largest relative difference of the two."""
+        return float(np.abs(self.found / self.exact - 1).max())
+
+    def top(self, above: float = 0.0) -> float:
+        """Drive frequency (1/s) of the largest response as run, of a parabola through the three largest."""
+        k = int(np.where(self.omega > above, self.found, 0.0)[:-1].argmax())
+        return vertex(self.omega[k - 1 : k + 2], self.found[k - 1 : k + 2])
+
+
+def drive(scene: Scene) -> float:
+    """Omega of a scene of the case, 1/s."""
+    return next(effect.omega[0] for effect in scene.effects if isinstance(effect, ElectricField))
+
+
+def vertex(x: np.ndarray, y: np.ndarray) -> float:
+    """Where the parabola through three points has its summit."""
+    a, b, _ = np.polyfit(x - x[1], y, 2)
+    return float(x[1] - b / (2 * a))
+
+
+def fast_scenes(ratios: Iterable[float], near_field: str = "none", sites: int = 1) -> list[Scene]:
+    """About the fast resonance: 0.1 s, 15 of its periods."""
+    error = 1e-6 if sites == 1 else 1e-5
+    return [vibration.scene(r, near_field, 0.1, sites, error, observed=True) for r in ratios]
+
+
+def slow_scenes(omega: Iterable[float]) -> list[Scene]:
+    """About the slow one: 60 s, 5 of its periods, in which a particle drifts through 9000 circles.
+
+    In steps of a seventh of a circle, so that circles are only counted; the drift has errors of 1e-6.
+    """
+    return [vibration.scene(o / CYCLOTRON, "none", 60.0, 1, 1e-2, longest=1e-3, observed=True) for o in omega]
+
+
+@dataclass(frozen=True)
+class CentreOfGravityHistory:
+    """The centre of gravity in time (s, evenly): place z = x + i y (m), velocity (m/s)."""
+
+    time: np.ndarray
+    place: np.ndarray
+    velocity: np.ndarray
+
+    @classmethod
+    def of(cls, found: Frames) -> CentreOfGravityHistory:
+        """Of a trajectory, at even times: between frames along the cubic of their places and velocities."""
+        seen = history(found)
+        x, v = (a[:, 0] + 1j * a[:, 1] for a in (seen.shift, seen.drift))
+        even = np.linspace(seen.time[0], seen.time[-1], len(seen.time))
+        k = np.clip(np.searchsorted(seen.time, even, side="right") - 1, 0, len(even) - 2)
+        h = np.diff(seen.time)[k]
+        u = (even - seen.time[k]) / h
+        # Hermite's cubic, and its derivative.
+        p0, p1, m0, m1 = x[k], x[k + 1], h * v[k], h * v[k + 1]
+        place = p0 + u * m0 + u**2 * (3 * (p1 - p0) - 2 * m0 - m1) + u**3 * (2 * (p0 - p1) + m0 + m1)
+        slope = m0 + 2 * u * (3 * (p1 - p0) - 2 * m0 - m1) + 3 * u**2 * (2 * (p0 - p1) + m0 + m1)
+        return cls(even, place, slope / h)
+
+    def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
+        """Angular frequencies (1/s, both signs: the sense of rotation) and amplitudes (m) of the place.
+
+        Of |FFT| with Hann's window, so that a line of amplitude A stands at A; filled up with zeros, so that
+        the curve is smooth.
+        """
+        window = np.hanning(len(self.time))
+        n = 8 * len(window)
+        lines = np.abs(np.fft.fft(self.place * window, n)) / window.sum()
+        omega = 2 * np.pi * np.fft.fftfreq(n, self.time[1] - self.time[0])
+        order = np.argsort(omega)
+        return omega[order], lines[order]
+
+    def beat_period(self) -> float:
+        """Of the speed, whose square is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two circular motions. s.
+
+        From the highest line of its spectrum below half of the fast resonance.
+        """
+        power = np.abs(self.velocity) ** 2
+        n = 16 * len(power)
+        lines = np.abs(np.fft.rfft((power - power.mean()) * np.hanning(len(power)), n))
+        omega = 2 * np.pi * np.fft.rfftfreq(n, self.time[1] - self.time[0])
+        k = int(np.where(omega < FAST / 2, lines, 0.0).argmax())
+        return 2 * np.pi / vertex(omega[k - 1 : k + 2], lines[k - 1 : k + 2])
+
+
+def beats(periods: float = 6.0, frames_a_period: int = 20) -> CentreOfGravityHistory:
+    """One particle, driven at DRIVE times the fast resonance for some beats."""
+    duration = periods * 2 * np.pi / (FAST * (1 - DRIVE))
+    made = vibration.scene(DRIVE * FAST / CYCLOTRON, "none", duration, sites=1, observed=True)
+    count = int(frames_a_period * duration * FAST / (2 * np.pi))
+    return recorded(made, count)
+
+
+def recorded(scene: Scene, count: int) -> CentreOfGravityHistory:
+    """Run a scene, look so many times."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "trajectory.h5"
+        run(scene, record=Recording(path, frames=count))
+        with frames(path) as found:
+            return CentreOfGravityHistory.of(found)

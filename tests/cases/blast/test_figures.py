@@ -1,0 +1,36 @@
+"""What pictures of a blast show of its run."""
+
+import numpy as np
+import pytest
+
+from cases.blast.figures import SHOWN, BlastHistory, beside, pictures, table
+from cases.blast.scene import scene
+from tisim import Recording, run
+from tisim.io.reader import frames
+from tisim.plotting.cloud import SEEN
+
+
+@pytest.mark.slow
+def test_pictures_of_a_run(tmp_path):
+    path = tmp_path / "trajectory.h5"
+    made = scene(number=60, duration=0.06)
+    run(made, record=Recording(path, frames=3))
+    with frames(path) as found:
+        assert pictures(found) == {}
+    run(made, record=Recording(path, frames=24))
+    with frames(path) as found:
+        figures, history = pictures(found), BlastHistory.of(found)
+        last = found[-1]
+    assert len(figures["sequence.png"].axes) == SHOWN
+    arrows = figures["velocities.png"].axes[-1].collections[0]
+    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ SEEN)[:, 0])
+    left, right, *_ = figures["envelope.png"].axes
+    np.testing.assert_array_equal(left.lines[0].get_ydata(), history.axes[:, 0])
+    assert history.axes[-1, 0] > 1.1 * history.axes[0, 0]
+    assert right.lines[0].get_linestyle() == "-"
+    assert not BlastHistory(
+        history.time, history.axes, history.touching, history.paths[::6], history.velocities[::6]
+    ).dense(0)
+    figure = beside({"default": history}, {"default": last})
+    np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), history.axes[:, 0])
+    assert len(table({"default": history}).splitlines()) == 1 + len(history.time)

@@ -1,0 +1,63 @@
+"""The case of Z16: numbers of its start, and what the field does to the cloud, on a small ball."""
+
+import numpy as np
+import pytest
+
+from cases.blast.accuracy import half_axes
+from cases.blast.scene import ENERGY, FLUX, NEIGHBOURS, NUMBER, SPECIFIC_CHARGE, SPEED, scene
+from cases.blast.shape import contacts
+from tests.scenes import simulate
+
+SMALL = 200
+
+
+def test_start_has_the_speed_and_the_energy_of_the_paper():
+    made = scene(number=SMALL)
+    start = made.particles.arrays(made.domain, 0)
+    speed = np.linalg.norm(start["velocity"], axis=1)
+    np.testing.assert_allclose(speed, SPEED, rtol=1e-12)
+    assert (start["mass"] * speed**2).sum() / 2 == pytest.approx(ENERGY * SMALL / NUMBER)
+    np.testing.assert_allclose(start["charge"], SPECIFIC_CHARGE * start["mass"])
+
+
+@pytest.mark.long
+def test_the_field_makes_an_ellipsoid_of_the_sphere():
+    """Across the field particles circle and get nowhere; along it they fly as if there were none."""
+    still, field = simulate(
+        [scene(flux, number=SMALL, duration=0.3) for flux in (0.0, FLUX)], worlds=2, capacity=SMALL
+    )
+    assert still.status.ok
+    assert field.status.ok
+    a, b = half_axes(still.state), half_axes(field.state)
+    assert a.max() / a.min() < 1.15
+    assert b[0] == pytest.approx(a[0], rel=1e-3)
+    assert b[0] > 1.4 * b[1:].max()
+    across = np.linalg.norm((field.state["position"] - field.start["position"])[:, 1:], axis=1)
+    rate = SPECIFIC_CHARGE * FLUX
+    assert across.max() == pytest.approx(2 * SPEED / rate * abs(np.sin(rate * 0.3 / 2)), rel=2e-3)
+
+
+@pytest.mark.slow
+def test_contact_conserves_momentum_and_takes_energy():
+    """Without air and field: touching spheres exchange momentum, and dissipate."""
+    made = scene(0.0, contact=True, number=60, duration=0.02)
+    (result,) = simulate([made.without("chow_drag")], worlds=1, capacity=60)
+    assert result.status.ok, result.status.reason
+    start, end = result.start, result.state
+    impulse = (start["mass"][:, None] * (end["velocity"] - start["velocity"])).sum(axis=0)
+    assert np.abs(impulse).max() < 1e-9 * start["mass"].sum() * SPEED
+    energy = [(s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum() / 2 for s in (start, end)]
+    assert energy[1] <= energy[0] * (1 + 1e-6)
+
+
+@pytest.mark.slow
+def test_neighbours_agglomerate_where_contact_alone_does_not():
+    """Z16 Fig. 9: clumps, while the cloud goes on growing along the field."""
+    made = scene(number=100, duration=0.1, contact=True, near=True, cutoff=NEIGHBOURS)
+    law = "effects.truncated_near_field"
+    without = made.replace({f"{law}.alpha1": 0.0, f"{law}.alpha2": 0.0})
+    alone, clumped = simulate([without, made], worlds=2, capacity=100)
+    assert clumped.status.ok, clumped.status.reason
+    assert contacts(clumped.state) > 5 * contacts(alone.state)
+    assert contacts(clumped.state) > 40
+    assert half_axes(clumped.state)[0] > 1.1 * half_axes(clumped.start)[0]

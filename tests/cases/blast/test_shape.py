@@ -1,0 +1,101 @@
+"""The ellipsoid of a blast in closed form, and the inverse problem that asks for one."""
+
+import numpy as np
+import pytest
+
+from cases.blast import CASE
+from cases.blast import scene as blast
+from cases.blast.problem import DURATION, FLUX, details, field, misfit, problem, start
+from cases.blast.shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
+from optimize.evaluation.evaluator import Evaluator
+from optimize.search import search
+from optimize.settings import Settings
+from optimize.storage.cache import Cache
+from tisim import InputError, Result, Status
+
+
+def shell(rng, number=200_000):
+    """Start of an evenly filled ball of 1 m: place and unit direction."""
+    n = rng.standard_normal((number, 3))
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    return n * np.cbrt(rng.random((number, 1))), n
+
+
+def flown(r, n, flux, t):
+    """Where those particles are at t without drag: Rodrigues' turn of what is across the field."""
+    w, v = blast.SPECIFIC_CHARGE * np.linalg.norm(flux), blast.SPEED * n
+    b = flux / np.linalg.norm(flux)
+    along = (v @ b)[:, None] * b
+    across = v - along
+    return r + along * t + across * np.sin(w * t) / w + np.cross(across, b) * (1 - np.cos(w * t)) / w
+
+
+@pytest.mark.parametrize("t", [0.1, 0.3, 0.7])
+def test_ellipsoid_is_that_of_particles_that_circle(rng, t):
+    r, n = shell(rng)
+    state = {"position": flown(r, n, FLUX, t), "mass": np.ones(len(r))}
+    exact = ellipsoid(FLUX, t, 1.0)
+    assert misfit(moments(state), exact) < 5e-3
+    axes, directions = principal_half_axes(exact), np.linalg.eigh(exact)[1]
+    assert axes[0] > 1.005 * axes[1]
+    assert abs(directions[:, -1] @ FLUX) / np.linalg.norm(FLUX) == pytest.approx(1.0, abs=1e-12)
+    along, across = extents(blast.SPECIFIC_CHARGE * np.linalg.norm(FLUX), t, 1.0)
+    np.testing.assert_allclose(axes, np.sqrt(5 * np.array([along, across, across])), rtol=1e-12)
+
+
+@pytest.mark.parametrize("size", ["small", "default"])
+def test_wanted_ellipsoid_begins_as_the_starts_of_its_number_do(size):
+    """Starts that it has not been measured on: their mean, which varies by 1 part in 1000 with 500."""
+    number = CASE.size(size).scene.get("number", blast.NUMBER)
+    made = [blast.scene(number=number, seed=100 + k) for k in range(8)]
+    found = [ball(moments(one.particles.arrays(one.domain, one.seed))) for one in made]
+    assert np.mean(found) == pytest.approx(start(number), rel=4e-3)
+    target = ellipsoid(FLUX, DURATION, start(number))
+    shown = ", ".join(f"{a:.3f}" for a in principal_half_axes(target))
+    assert f"half axes of {shown} m" in problem(size).title
+
+
+def test_moments_weigh_by_mass_and_contacts_count_pairs():
+    state = {
+        "position": np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 0.3, 0]]),
+        "mass": np.array([2.0, 1.0, 1.0]), "radius": np.full(3, 0.16),
+    }  # fmt: skip
+    np.testing.assert_allclose(moments(state)[0, 0], 0.25)
+    np.testing.assert_allclose(moments(state)[0, 1], (2 * 0.5 * 0.075 - 0.5 * 0.075 + 0.5 * 0.225) / 4)
+    assert contacts(state) == 1
+
+
+def test_details_say_what_was_wanted_and_reached(rng):
+    r, n = shell(rng, 2000)
+    state = {"position": flown(r, n, FLUX, DURATION), "mass": np.ones(2000)}
+    result = Result(None, state, state, DURATION, {}, Status(True, ""), 0.0)
+    for sign in (1.0, -1.0):
+        turned = dict(zip(("flux_x", "flux_y", "flux_z"), sign * FLUX, strict=True))
+        shown = details(turned, result, ellipsoid(FLUX, DURATION, 1.0))
+        assert shown["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
+    assert shown["strength of the field, T"] == pytest.approx(0.7)
+    for k in (1, 2, 3):
+        assert shown[f"half axis {k} reached, m"] == pytest.approx(
+            shown[f"half axis {k} wanted, m"], rel=0.05
+        )
+
+
+def test_no_other_variant_than_the_ellipsoid():
+    with pytest.raises(InputError, match="variant must be one of ellipsoid; received 'torus'"):
+        CASE.problem("default", "torus")
+
+
+@pytest.mark.slow
+def test_search_recovers_the_field_up_to_sign(tmp_path):
+    """500 particles, 10 generations: within 5 % of 0.7 T, and 4 degrees."""
+    evaluator = Evaluator()
+    with Cache(tmp_path / "search.h5") as cache:
+        outcome = search(problem("small"), evaluator, cache, Settings(**{**blast.SEARCH, "generations": 10}))
+    evaluator.close()
+    best = outcome.logbook.select("best")
+    assert best[-1] < best[0] / 2
+    found = field(outcome.problem.genome.decode(outcome.best))
+    strength = np.linalg.norm(found)
+    assert strength == pytest.approx(np.linalg.norm(FLUX), rel=0.05)
+    cosine = abs(found @ FLUX) / strength / np.linalg.norm(FLUX)
+    assert np.degrees(np.arccos(cosine)) < 4.0

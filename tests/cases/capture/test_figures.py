@@ -1,0 +1,72 @@
+"""What figures of capture show, of results that are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cases.capture import curves, figures
+from cases.capture import scene as capture
+from cases.capture.curves import TIMES
+from cases.capture.statistics import ANGLES, ASPECTS
+
+
+def mean_of(n):
+    """Captured fraction of particles of size n in time, see below."""
+    return 0.5 * np.heaviside(TIMES - n / 20, 1.0) + 0.25 * np.heaviside(TIMES - n / 10, 1.0)
+
+
+def caught(*times):
+    """A run in which as many particles were captured at these times, s; -1 for never."""
+    return SimpleNamespace(state={"captured_at": np.array(times, float)})
+
+
+def test_captured_fraction_in_time_and_at_the_end():
+    """One of two particles of size n is caught at n/10 s in one start; both, at n/20 s, in the other."""
+
+    def rows(settings):
+        return [
+            ({**s}, [caught(s["nanometres"] / 10, -1.0), caught(*[s["nanometres"] / 20] * 2)])
+            for s in settings
+        ]
+
+    def swept(sizes, aspects, parts=("all",)):
+        return [
+            {"nanometres": n, "angle": a, "aspect": r, "part": p}
+            for n in sizes for p in parts for r in aspects for a in ANGLES
+        ]  # fmt: skip
+
+    angles = rows(swept((75, 212), (20.0,), ("top", "side")))
+    sizes, aspects = rows(swept(capture.MOMENT, (20.0,))), rows(swept(curves.SOME, ASPECTS))
+    axes = curves.captured(angles, sizes, aspects).axes
+    for axis, n in zip(axes[:4], (75, 75, 212, 212), strict=True):
+        assert len(axis.lines) == len(ANGLES)
+        np.testing.assert_allclose(axis.lines[-1].get_ydata(), mean_of(n))
+    by_size = {line.get_label(): line.get_ydata() for line in axes[4].lines}
+    assert list(by_size) == [f"{n} nm" for n in capture.MOMENT]
+    np.testing.assert_allclose(by_size["50 nm"], mean_of(50))
+    assert [line.get_label() for line in axes[5].lines] == [f"L/D = {r:.3g}" for r in ASPECTS]
+    np.testing.assert_allclose(axes[5].lines[0].get_ydata(), mean_of(125))
+    for axis, x in zip(axes[6:], (ANGLES, ASPECTS), strict=True):
+        line = axis.containers[0].lines[0]
+        assert list(line.get_xdata()) == list(x)
+        assert set(line.get_ydata()) == {0.75}
+    assert curves.table(sizes).splitlines()[1].startswith("25,0.0,20.0,all,2,0.75,")
+
+
+@pytest.mark.slow
+def test_pictures_of_the_magnet(monkeypatch):
+    """A shorter cylinder has more capture volume for its own (B16 6.4.1), and most of it across the field."""
+    monkeypatch.setattr(figures, "PLANE", 41)
+    monkeypatch.setattr(figures, "SPACE", 40)
+    short, *_, long = (
+        [figures.capture_volume(capture.scene(nanometres=50, angle=a, aspect=r)) for a in (0.0, 90.0)]
+        for r in (5 / 3, 20 / 3)
+    )
+    assert short[0] > 2 * long[0]
+    assert short[1] > 1.1 * long[1]
+    titles = [axis.get_title() for axis in figures.volume().axes]
+    assert titles[2] == f"L/D = 1.67, 90°: {short[1]:.1f} times its volume"
+    field = figures.field().axes[2].collections[0]
+    # |B| at the edge of the picture is hardly that of the magnet, 1 T along x.
+    assert field.get_array().reshape(41, 41)[0, 0] == pytest.approx(capture.FLUX, rel=0.1)

@@ -1,0 +1,78 @@
+"""The case capture: its scene, its statistics and its figures."""
+
+import numpy as np
+import pytest
+
+from cases.capture import CASE, curves, figures, statistics
+from cases.capture import scene as capture
+from cases.statistics import Claim, Mean
+from tisim import Recording, run
+from tisim.io.reader import frames
+
+
+def test_cylinder_lies_at_its_angle_and_is_saturated_along_the_field():
+    body = capture.fibre(capture.axis(30.0), 20.0)
+    assert np.degrees(np.arccos(body.axis[0])) == pytest.approx(30.0)
+    assert np.linalg.norm(body.magnetisation) == pytest.approx(capture.SATURATION)
+    # Between the axis of a long cylinder and the field.
+    turned = np.degrees(np.arccos(np.dot(body.axis, body.magnetisation) / capture.SATURATION))
+    assert 0.0 < turned < 30.0
+    across = capture.fibre(capture.axis(90.0), 5 / 3).magnetisation
+    np.testing.assert_allclose(across, (capture.SATURATION, 0, 0), atol=1e-6 * capture.SATURATION)
+
+
+@pytest.mark.long
+def test_transverse_captures_more_and_pictures_show_it(tmp_path):
+    settings = [{"angle": angle, "number": 40, "duration": 2.0} for angle in (0.0, 90.0)]
+    along, across = statistics.results(settings, 16)
+    gain = statistics.fractions(across) - statistics.fractions(along)
+    assert Claim("", Mean.of(gain), least=0.02).ok
+    # The fraction at an earlier time is that of a shorter run from the same start.
+    (short,) = statistics.results([{**settings[1], "duration": 1.0}], 16)
+    early = [statistics.fraction(r.state, 1.0) for r in across]
+    assert early == [statistics.fraction(r.state) for r in short]
+    assert statistics.mean(across, 1.0).value < statistics.mean(across).value
+    group = [({"nanometres": 125, "angle": 90.0, "aspect": 5 / 3}, across)]
+    text = curves.table(group).splitlines()
+    assert text[1].startswith("125,90.0,1.666")
+    path = tmp_path / "trajectory.h5"
+    run(capture.scene(number=40, duration=2.0), record=Recording(path, frames=8))
+    with frames(path) as found:
+        drawn = figures.pictures(found)["trajectories.png"]
+        last = found[-1].arrays
+    curve = drawn.axes[1].lines[0].get_ydata()
+    assert curve[-1] == pytest.approx((last["captured_at"] >= 0).mean())
+    assert len(drawn.axes[0].collections[0].get_segments()) == 40 * (len(found.times) - 1)
+
+
+def test_force_towards_a_cylinder():
+    body = capture.fibre(capture.axis(90.0), 2.0)
+    r, half = body.radius, body.length / 2
+    points = np.array([[2 * r, 0, 0], [0, 0, 2 * half], [2 * r, 0, 2 * half], [0.0, 0.0, 0.0]])
+    force = np.array([[-3.0, 1, 0], [1.0, 0, 2], [-1.0, 0, -1], [1.0, 0, 0]])
+    over, beyond = r, half
+    corner = (over + beyond) / np.hypot(over, beyond)
+    np.testing.assert_allclose(figures.attraction(force, points, body), [3, -2, corner, 0], atol=1e-12)
+
+
+def test_weights_of_directions():
+    flat = np.array([[0.2, 0.4]] * 7)
+    np.testing.assert_allclose(statistics.isotropic(flat), [0.2, 0.4])
+    # The mean of cos^2 of the angle to the field, over directions, is 1/3.
+    squares = np.cos(np.radians(statistics.ANGLES))[:, None] ** 2
+    np.testing.assert_allclose(statistics.isotropic(squares), 1 / 3, atol=0.01)
+    np.testing.assert_allclose(statistics.even(squares), 0.5, atol=0.01)
+
+
+@pytest.mark.slow
+def test_interval_of_a_mean_over_angles_knows_that_starts_are_shared():
+    """Fractions at neighbouring angles rise and fall together, start by start."""
+    settings = [{"angle": angle, "number": 20, "duration": 10.0} for angle in (45.0, 50.0)]
+    one, other = (statistics.fractions(group) for group in statistics.results(settings, 40))
+    assert np.corrcoef(one, other)[0, 1] > 0.4
+
+
+@pytest.mark.slow
+def test_what_b16_concludes():
+    failed = [item.name for item in CASE.check() if not item.ok]
+    assert failed == []

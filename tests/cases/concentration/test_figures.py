@@ -1,0 +1,44 @@
+"""What figures of concentrated samples show, of results that are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from cases.concentration import figures
+
+
+def test_curves_of_concentrated_samples():
+    when = np.linspace(0.0, 0.6, 4)
+    curves = {
+        (angle, c): (when, c * np.arange(4.0), c * np.arange(4.0) + angle)
+        for angle in (0.0, 90.0) for c in figures.CONCENTRATIONS
+    }  # fmt: skip
+    right = figures.drawn(curves).axes[1]
+    held, touched = right.lines[2:4]
+    assert held.get_label() == "500 mg/mL"
+    np.testing.assert_allclose(held.get_ydata(), 0.5 * np.arange(4.0) + 90.0)
+    np.testing.assert_allclose(touched.get_ydata(), 0.5 * np.arange(4.0))
+    assert figures.table(curves).splitlines()[2] == f"0.0,0.005,{when[1]},0.005,0.005"
+
+
+def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
+    """Two pairs along the field and one particle by itself, which all were single at the start."""
+
+    class Seen(list):
+        times = np.array([0.0, 1e-3])
+
+    def frame(position):
+        moment = np.tile([1.0, 0.0, 0.0], (5, 1))
+        arrays = {"position": position, "radius": np.full(5, 7.5e-8), "moment": moment}
+        return SimpleNamespace(arrays=arrays)
+
+    pairs = 1.5e-7 * np.array([[0, 0, 0], [1, 0, 0], [0, 0, 9], [1, 0, 9], [0, 9, 0.0]])
+    found = Seen([frame(10 * pairs), frame(pairs)])
+    left, right = figures.pictures(found)["chains.png"].axes
+    np.testing.assert_allclose(right.lines[0].get_xdata(), [0.0, 1.0])
+    np.testing.assert_allclose(right.lines[0].get_ydata(), [1.0, 5 / 3])
+    discs = left.collections[0]
+    # Drawn from the farthest, the single one, on; places in um, seen along y.
+    assert discs.get_array().mask.tolist() == [True, False, False, False, False]
+    middle = pairs.mean(axis=0)
+    np.testing.assert_allclose(discs.get_offsets()[0], 1e6 * (pairs[4] - middle)[[0, 2]])

@@ -1,0 +1,30 @@
+"""Means, claims and checks: what they hold, and what is shown of them."""
+
+import numpy as np
+import pytest
+
+from cases.case import Check
+from cases.statistics import Claim, Mean
+
+
+def test_mean_and_its_interval():
+    # Student's t for 3 degrees of freedom is 3.18245; the standard error of 1, 2, 3, 4 is sqrt(5/12).
+    mean = Mean.of([1.0, 2.0, 3.0, 4.0])
+    assert mean.value == 2.5
+    assert mean.half == pytest.approx(3.182446 * np.sqrt(5 / 12), rel=1e-6)
+    # The error of a ratio, by drawing.
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(4.0, 0.1, 200_000), rng.normal(2.0, 0.03, 200_000)
+    assert Mean(4.0, 0.1).over(Mean(2.0, 0.03)).half == pytest.approx((a / b).std(), rel=0.02)
+
+
+def test_claim_holds_when_all_of_the_interval_does():
+    assert Claim("", Mean(0.5, 0.1), least=0.39).ok
+    assert not Claim("", Mean(0.5, 0.1), least=0.41).ok
+    assert Claim("", Mean(0.5, 0.1), most=0.61).ok
+    assert not Claim("", Mean(0.5, 0.1), most=0.59).ok
+    assert Claim("", Mean(0.5, 0.1), most=0.6).cells[:2] == ("0.5 ± 0.1", "below 0.6")
+
+
+def test_checks_are_checks():
+    assert Check("", 1.0, 1.0, 0.0).cells[3] == "0.0e+00"

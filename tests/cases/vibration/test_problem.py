@@ -1,0 +1,84 @@
+"""The inverse problem of vibration: its fitness, its search, and that it lands on the resonance."""
+
+import numpy as np
+import pytest
+
+import tisim
+from cases.vibration.problem import (
+    DRIVE,
+    VARIANTS,
+    closed_form,
+    details,
+    displacement,
+    nearest,
+    problem,
+    scene,
+)
+from cases.vibration.scene import CHARGE, MASS, SEARCH
+from optimize.evaluation.evaluator import Evaluator
+from optimize.search import search
+from optimize.settings import Settings
+from optimize.storage.cache import Cache
+from tisim import InputError
+
+DESIGNS = {
+    "far": {"flux": 1.0, "stiffness": 1.0},
+    "fast resonance": {"flux": 0.785, "stiffness": 11.8},
+    "no field to speak of": {"flux": 0.2, "stiffness": 480.0},
+    "stiff": {"flux": 2.0, "stiffness": 630.0},
+}
+
+
+@pytest.fixture(scope="module")
+def evaluator():
+    """One, so that both searches share what it compiles."""
+    made = Evaluator()
+    yield made
+    made.close()
+
+
+@pytest.mark.long
+def test_fitness_is_the_closed_form():
+    results = tisim.run([scene(design, duration=0.2) for design in DESIGNS.values()])
+    found = [problem().objective(result) for result in results]
+    exact = [-1e3 * closed_form(design) for design in DESIGNS.values()]
+    np.testing.assert_allclose(found, exact, rtol=2e-3)
+    opposite = [problem(variant="avoid").objective(result) for result in results]
+    np.testing.assert_array_equal(opposite, -np.array(found))
+    shown = details(DESIGNS["far"], results[0])
+    assert shown["nearest resonance over drive"] == pytest.approx(1.0 / 0.8, rel=2e-3)
+    assert shown["largest displacement, m"] == displacement(results[0])
+
+
+def test_resonance_nearest_to_the_drive():
+    """k/m = Omega^2 -+ w Omega, the fast and the slow one."""
+    for flux, sign in ((0.3, -1), (0.1, 1)):
+        w = CHARGE * flux / MASS
+        stiffness = MASS * (DRIVE**2 + sign * w * DRIVE)
+        assert nearest({"flux": flux, "stiffness": stiffness}) == pytest.approx(DRIVE, rel=1e-12)
+
+
+def test_nothing_is_random_and_other_variants_are_refused():
+    made = problem()
+    assert made.scene(DESIGNS["far"], 1).digest() == made.scene(DESIGNS["far"], 2).digest()
+    with pytest.raises(InputError, match="variant must be one of resonate, avoid; received 'sing'"):
+        problem(variant="sing")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_search_improves_and_lands_on_the_resonance_or_far_from_it(variant, evaluator, tmp_path):
+    wished = {**SEARCH, "generations": 6}
+    with Cache(tmp_path / "search.h5") as cache:
+        outcome = search(problem(variant=variant), evaluator, cache, Settings(**wished))
+    best = outcome.logbook.select("best")
+    design = outcome.problem.genome.decode(outcome.best)
+    assert best[-1] < best[0]
+    if variant == "resonate":
+        assert nearest(design) / DRIVE == pytest.approx(1.0, abs=0.01)
+        # 0.2 s at resonance: within a tenth of the best of a fine grid, 12.37 mm.
+        assert best[-1] < -11.1
+    else:
+        assert not 0.5 < nearest(design) / DRIVE < 2.0
+        # The least of a fine grid is 0.131 mm.
+        assert best[-1] < 0.15

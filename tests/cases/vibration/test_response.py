@@ -1,0 +1,90 @@
+"""Resonance, beats and spectrum of vibration, and what is drawn of them."""
+
+import numpy as np
+import pytest
+
+from cases.vibration import scene as vibration
+from cases.vibration.accuracy import constants
+from cases.vibration.closed_forms import response
+from cases.vibration.figures import drawn, table
+from cases.vibration.response import (
+    FAST,
+    SLOW,
+    CentreOfGravityHistory,
+    Sweep,
+    fast_scenes,
+    peak,
+    slow_scenes,
+    vertex,
+)
+from tisim.effects import Gravity
+
+CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
+             "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
+
+
+def history(ratio, duration, number):
+    """The closed form, as a history."""
+    t = np.linspace(0.0, duration, number)
+    h = 1e-8
+    z = response(t, omega=ratio * FAST, **CONSTANTS)
+    ahead = response(t + h, omega=ratio * FAST, **CONSTANTS)
+    return CentreOfGravityHistory(t, z, (ahead - z) / h)
+
+
+def test_beat_period_and_spectrum_of_the_closed_form():
+    seen = history(0.9, 0.4, 1200)
+    assert seen.beat_period() == pytest.approx(2 * np.pi / (0.1 * FAST), rel=3e-4)
+    omega, lines = seen.spectrum()
+    # Free motion turns clockwise; the drive is a line on both sides.
+    for expected in (-FAST, 0.9 * FAST):
+        near = np.abs(omega - expected) < 40
+        assert omega[near][lines[near].argmax()] == pytest.approx(expected, abs=3.0)
+    plus = CONSTANTS["push"] / 2 / abs(CONSTANTS["k_m"] - (0.9 * FAST) ** 2 - CONSTANTS["w"] * 0.9 * FAST)
+    assert lines[np.abs(omega - 0.9 * FAST) < 40].max() == pytest.approx(plus, rel=1e-2)
+
+
+def test_vertex_of_a_parabola_and_peak_of_a_long_time():
+    x = np.array([1.0, 2.5, 3.0])
+    assert vertex(x, 5 - 2 * (x - 2.1) ** 2) == pytest.approx(2.1)
+    t = np.linspace(0, 0.1, 400_001)
+    exact = np.abs(response(t, omega=0.8 * FAST, **CONSTANTS)).max()
+    assert peak(0.1, omega=0.8 * FAST, **CONSTANTS) == pytest.approx(exact, rel=3e-4)
+
+
+def test_constants_are_those_of_the_scene_or_none():
+    made = vibration.scene(0.3, "none", sites=2, flux=0.7, stiffness=30.0)
+    found = constants(made)
+    assert found["w"] == pytest.approx(0.7 * vibration.CYCLOTRON)
+    assert found["k_m"] == pytest.approx(30.0 / vibration.MASS)
+    assert found["push"] == pytest.approx(CONSTANTS["push"])
+    assert found["omega"] == pytest.approx(0.3 * vibration.CYCLOTRON)
+    assert constants(made.replace({"effects.magnetic_field.constant": [0.1, 0.0, 1.0]})) is None
+    assert constants(made.without("tether")) is None
+    # Also what a picture could overlook.
+    assert constants(made.replace({"effects.electric_field.phase": [1.0, 0.0, 0.0]})) is None
+    assert constants(made.replace({"effects.electric_field.constant": [0.1, 0.0, 0.0]})) is None
+    assert constants(made.replace({"effects.magnetic_field.amplitude": [0.0, 0.0, 0.1]})) is None
+    falling = made.model_copy(update={"effects": (*made.effects, Gravity())})
+    assert constants(falling) is None
+    assert constants(made.replace({"particles.mean_velocity": [1.0, 0.0, 0.0]})) is None
+
+
+@pytest.mark.slow
+def test_resonance_curve_of_runs_is_that_of_the_closed_form():
+    """Both resonances; that of the fast one a little below, as in so short a time."""
+    fast = Sweep.of(fast_scenes(np.linspace(0.9, 1.1, 9)))
+    slow = Sweep.of(slow_scenes(np.linspace(0.3, 0.7, 9)))
+    assert fast.deviation < 2e-4
+    assert slow.deviation < 1e-5
+    assert fast.top() == pytest.approx(FAST, rel=1e-2)
+    assert slow.top() == pytest.approx(SLOW, rel=3e-2)
+    figure = drawn(slow, fast, fast, "none", history(0.9, 0.4, 1200))
+    left, right, beats, lines = figure.axes
+    np.testing.assert_array_equal(left.lines[1].get_ydata(), slow.found)
+    np.testing.assert_array_equal(right.lines[1].get_ydata(), fast.found)
+    assert "65.7" in beats.get_title()
+    assert lines.get_xlabel().startswith("angular frequency")
+    rows = table(("one", slow), ("two", fast)).splitlines()
+    assert len(rows) == 1 + 9 + 9
+    assert rows[1].split(",")[0] == "one"

@@ -1,0 +1,55 @@
+"""The case of Z13: a cloud's centre of gravity follows the closed form whatever its particles do."""
+
+import numpy as np
+import pytest
+
+from cases.vibration.checks import deviation
+from cases.vibration.scene import RATIOS, SPACING, near_fields, scene
+from tests.scenes import simulate
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "near_field",
+    [
+        pytest.param("none", marks=pytest.mark.slow),
+        "printed",
+        pytest.param("equilibrium", marks=pytest.mark.slow),
+    ],
+)
+def test_centre_of_gravity_follows_the_closed_form(near_field):
+    """27 particles at every ratio of Fig. 3; the printed near field throws them apart meanwhile."""
+    results = simulate(
+        [scene(r, near_field, duration=0.004, sites=3, error=1e-5) for r in RATIOS], worlds=8, capacity=27
+    )
+    assert all(result.status.ok for result in results)
+    assert deviation(results) < 1e-3
+    spread = np.array([np.ptp(result.state["position"], axis=0).max() for result in results])
+    if near_field == "printed":
+        assert (spread > 2 * SPACING * 1.5).all()
+    elif near_field == "equilibrium":
+        # Alike in a uniform field: they move as one, and the near field does nothing.
+        moved = [result.state["position"] - result.start["position"] for result in results]
+        assert max(np.ptp(m, axis=0).max() for m in moved) < 1e-12
+        assert min(np.abs(m).max() for m in moved) > 1e-5
+    if near_field != "printed":
+        assert (spread < 2 * SPACING * 1.1).all()
+
+
+def test_error_falls_and_work_rises_with_the_accuracy_asked_for():
+    """The printed near field, before chaos: the paths of a reference two orders tighter."""
+    asked = (1e-4, 1e-5, 1e-6, 1e-8)
+    results = simulate(
+        [scene(0.8, "printed", duration=0.001, sites=3, error=e) for e in asked], worlds=8, capacity=27
+    )
+    *found, reference = (result.state["position"] for result in results)
+    errors = np.array([np.abs(position - reference).max() for position in found])
+    work = np.array([result.work["force_evaluations"] for result in results])
+    assert (np.diff(errors) < 0).all()
+    assert (np.diff(work) > 0).all()
+    assert errors[-1] < errors[0] / 30
+
+
+def test_near_field_in_equilibrium_exerts_no_force_at_the_start():
+    (field,) = near_fields("equilibrium")
+    assert field.alpha1 / SPACING**field.beta1 == pytest.approx(field.alpha2 / SPACING**field.beta2)
