@@ -35,7 +35,6 @@ from tisim.effects.magnetic.moment import MOMENT
 from tisim.engine.assembly import needed_fields
 from tisim.engine.explain import known_effects
 from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Source
-from tisim.steppers import Stepper
 
 MAGNITUDES = (
     5e-324, 2.3e-308, 1e-300, 1e-155, 1e-100, 1e-60, 1e-30, 1e-15, 1e-9, 1e-3, 0.5, math.nextafter(1.0, 0.0),
@@ -121,7 +120,7 @@ def scenes() -> dict[str, dict[str, Any]]:
     """Plain data by name: a scene of each effect, source and operator, and those of each stepper."""
     serialization.load(steppers)
     found = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
-    for name in sorted(Stepper.known()):
+    for name in sorted(CONTROLLED):
         needed = FLUID if name == "brownian" else {}
         for k, (control, options, effects) in enumerate(CONTROLLED[name]):
             stepper = {"kind": name, **needed, **options, "control": control}
