@@ -92,6 +92,19 @@ class Case:
         """A size by name; InputError when there is none of that name."""
         return size_named(name, self.sizes)
 
+    def inverse(self, size: str, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
+        """The inverse problem (its first variant for None), and the settings of its search.
+
+        InputError when the case has none, or not of that size.
+        """
+        search = self.size(size).search
+        if self.problem is None:
+            raise InputError(f"case must be one with an inverse problem; received {self.name!r}")
+        if search is None:
+            sizes = ", ".join(key for key, one in self.sizes.items() if one.search is not None)
+            raise InputError(f"size must be one of {sizes} for the inverse problem; received {size!r}")
+        return self.problem(size, variant or next(iter(self.variants), "")), search
+
 
 def every() -> dict[str, Case]:
     """All cases by name."""
@@ -104,18 +117,3 @@ def find(name: str) -> Case:
     known = every()
     must(name in known, "case", f"one of {', '.join(known)}", name)
     return known[name]
-
-
-def inverse(name: str, size: str, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
-    """The inverse problem of a case (its first variant for None), and the settings of its search.
-
-    InputError when the case has none, or not of that size.
-    """
-    case = find(name)
-    search = case.size(size).search
-    if case.problem is None:
-        raise InputError(f"case must be one with an inverse problem; received {name!r}")
-    if search is None:
-        sizes = ", ".join(key for key, one in case.sizes.items() if one.search is not None)
-        raise InputError(f"size must be one of {sizes} for the inverse problem; received {size!r}")
-    return case.problem(size, variant or case.variants[0]), search

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from deap import tools
 
@@ -12,6 +12,11 @@ from optimize.hall_of_fame import compromise
 from optimize.methods.individual import Individual
 from optimize.problem.problem import Problem
 from optimize.settings import Settings, search_name
+from optimize.tables import best_columns, logbook_columns
+from tisim import InputError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Stopped = Literal["", "generations", "target", "patience", "evaluations", "wall clock", "interrupted"]
 
@@ -32,6 +37,21 @@ class Progress:
     evaluations: int
     hits: int
     elapsed_s: float
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design that a search has found.
+
+    genes : the value of each gene, by name, in its unit. values : of each objective, by name, in its unit:
+    the mean over random starts, the fresh ones where there are any. intervals : half-widths of their 95 %
+    confidence intervals. starts : how many there were.
+    """
+
+    genes: dict[str, float]
+    values: dict[str, float]
+    intervals: dict[str, float]
+    starts: int
 
 
 @dataclass
@@ -70,6 +90,49 @@ class Outcome:
         if self.hall and self.problem.several:
             return compromise(self.hall)
         return self.hall[0] if self.hall else None
+
+    @property
+    def designs(self) -> list[Design]:
+        """The hall of fame by name and in physical units, in its order."""
+        return [self._design(string) for string in self.hall]
+
+    def _design(self, string: Individual) -> Design:
+        estimates = string.confirmed or string.estimates
+        names = [objective.name for objective in self.problem.objectives]
+        means = self.problem.costs([estimate.mean for estimate in estimates])
+        return Design(
+            genes=self.problem.genome.decode(string),
+            values=dict(zip(names, means, strict=True)),
+            intervals={name: e.half_width for name, e in zip(names, estimates, strict=True)},
+            starts=estimates[0].starts,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, such as json writes: units, designs, logbook by column, counts and settings."""
+        units = {gene.name: gene.unit for gene in self.problem.genome.genes}
+        units |= {objective.name: objective.unit for objective in self.problem.objectives}
+        return {
+            "problem": self.problem.name,
+            "stopped": self.stopped,
+            "evaluations": self.evaluations,
+            "hits": self.hits,
+            "elapsed_s": self.elapsed_s,
+            "units": units,
+            "designs": [vars(design) for design in self.designs],
+            "logbook": logbook_columns(self.problem, self.logbook),
+            "settings": self.settings.model_dump(mode="json"),
+        }
+
+    def to_frame(self) -> DataFrame:
+        """The hall of fame as a pandas data frame, a row for each design, with the columns of best.csv.
+
+        InputError where pandas is not installed.
+        """
+        try:
+            from pandas import DataFrame
+        except ImportError as missing:
+            raise InputError(f"pandas must be installed for a data frame; received {missing}") from None
+        return DataFrame(best_columns(self.problem, self.hall))
 
     @property
     def interrupted(self) -> bool:

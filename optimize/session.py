@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
+from optimize.evaluation.executors import made
 from optimize.evaluation.runs import Evaluator, start_seed
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress
@@ -15,12 +19,47 @@ from optimize.report import report
 from optimize.report.display import Display
 from optimize.search import search
 from optimize.search_folder import FILE, HOW, NAMES, check
-from optimize.settings import Settings, identity
+from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
+from tisim.backend import runtime
+from tisim.console import err, stopping
+from tisim.console import out as standard_output
 from tisim.files import lock
 from tisim.files.atomic import replace_file
 from tisim.files.ownership import take
 from tisim.interrupt import Interrupt
+
+
+def run(
+    problem: Problem,
+    *,
+    out: str | Path | None = None,
+    executor: str = "batch",
+    verbose: bool = False,
+    **settings: Any,
+) -> Outcome:
+    """Search for the best design of a problem, or the front of several objectives.
+
+    settings : fields of Settings, such as ``generations=10``, ``seed=1``, ``options={"population": 12}``,
+    ``ensemble={"max_starts": 8}``. out : folder for what ``tisim optimize`` leaves; a search that was stopped
+    goes on there when it is run again. Without one nothing is kept but what is returned. executor : "batch"
+    (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
+
+    Device and precision are those of ``tisim.init``. Ctrl-C ends the search, which says so in
+    ``Outcome.stopped``. InputError for settings that cannot be, before anything runs.
+    """
+    wished = Settings(**proposed(problem, settings, settings.get("method")))
+    fit(problem, wished)
+    running = runtime.current()
+    threads = running.threads if executor == "batch" else 0
+    with closing(made(executor, running.device, running.precision, threads)) as evaluator:
+        if out is not None:
+            say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
+            return session(problem, wished, evaluator, Path(out), say, bar, stopping)
+        with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / FILE) as cache:
+            return _shown(
+                problem, wished, evaluator, cache, err() if verbose else Console(quiet=True), stopping
+            )
 
 
 def session(

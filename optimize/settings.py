@@ -73,6 +73,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
         "format": FORMAT,
         "problem": problem.name,
         "problem_version": problem.version,
+        **({"problem_code": problem.identity} if problem.identity else {}),
         "search": settings.model_dump(mode="json", exclude=left_out),
         "evaluator": dict(evaluator),
     }

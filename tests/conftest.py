@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tisim.backend import runtime
+from tisim.files import python_file
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -22,6 +23,22 @@ def the_runtime():
 def rng():
     """A generator that gives a test the same numbers in every run."""
     return np.random.Generator(np.random.Philox(20040101))
+
+
+@pytest.fixture
+def own_file(tmp_path, monkeypatch):
+    """Writes a file into a fresh folder, which one works in; what was loaded is forgotten at the end."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(name, text):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path.relative_to(tmp_path)
+
+    yield write
+    for file in python_file.loaded():
+        python_file.forget(file.name)
 
 
 ELSEWHERE = """

@@ -77,7 +77,7 @@ class Runs:
         self, problem: Problem, evaluator: Evaluator, cache: Cache, seed: int, common: bool = True
     ) -> None:
         self.problem, self.evaluator, self.cache = problem, evaluator, cache
-        self.seed, self.common = seed, common
+        self.seed, self.common, self.code = seed, common, problem.identity
         self.evaluations = 0
         self.hits = 0
         self._asked: set[str] = set()
@@ -101,9 +101,8 @@ class Runs:
                 except InputError as error:
                     sample.reason = sample.reason or f"infeasible: {error}"
                     break
-                key = evaluation_key(
-                    scene.digest(), self.evaluator.settings, self.problem.name, self.problem.version
-                )
+                objective = self.problem.name, self.problem.version, self.code
+                key = evaluation_key(scene.digest(), self.evaluator.settings, *objective)
                 found.append((sample, start, seed, key))
                 if self.cache.get(key) is None:
                     missing.setdefault(key, (scene, sample, seed))

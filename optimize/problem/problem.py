@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from optimize.problem.genome import Genome
 from optimize.problem.objective import Objective
 from tisim.errors import must
+from tisim.files import python_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +33,8 @@ class Problem:
     derived : extra report columns computed from the fitness, heading -> function; for one objective only.
     picture : (Scene, Result) -> figure of a run, for the report.
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
+    code : what tells its code from that of another problem of this name and version; by default a checksum of
+        the files, outside of this package, that define scene and objectives. Part of the cache key.
     Raises InputError for an empty name, and for objectives that are none or not told apart by their names.
     """
 
@@ -46,6 +49,7 @@ class Problem:
     derived: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
     picture: Callable[[Scene, Result], Figure] | None = None
     details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
+    code: str = ""
 
     def __post_init__(self) -> None:
         must(
@@ -64,6 +68,12 @@ class Problem:
         if callable(self.objective):
             return (Objective(self.symbol, self.objective),)
         return tuple(self.objective)
+
+    @property
+    def identity(self) -> str:
+        """See ``code``; empty for a problem of this package, whose ``version`` says what it means."""
+        files = python_file.checksums(self.scene, *(objective.of for objective in self.objectives))
+        return self.code or "-".join(checksum[:12] for checksum in files.values())
 
     @property
     def several(self) -> bool:

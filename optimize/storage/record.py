@@ -20,10 +20,13 @@ def canonical(value: Any) -> bytes:
     return text.encode("ascii")
 
 
-def evaluation_key(scene_digest: str, settings: Mapping[str, Any], problem: str, version: int) -> str:
+def evaluation_key(
+    scene_digest: str, settings: Mapping[str, Any], problem: str, version: int, code: str = ""
+) -> str:
     """SHA-256 (hex) of all that decides a fitness: the scene's digest (physics, parameters, seed), the
-    evaluator's settings (precision, device kind) and the objective (the problem's name and version)."""
-    return hashlib.sha256(canonical([scene_digest, dict(settings), problem, version])).hexdigest()
+    evaluator's settings (precision, device kind) and the objective (the problem's name, version and code)."""
+    objective = [problem, version, *([code] if code else [])]
+    return hashlib.sha256(canonical([scene_digest, dict(settings), *objective])).hexdigest()
 
 
 @dataclass(frozen=True)

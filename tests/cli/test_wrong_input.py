@@ -27,7 +27,7 @@ WRONG = [
     (["run", "FLOW", "--resume"], "output folder must be one that an interrupted run has left"),
     (["run", "agglomeration", "--size", "huge"], "size must be one of small, default, paper; received"),
     (["explain", "nosuch"], "case must be one of"),
-    (["check", "nosuch"], f"case must be one of {CASES}; received 'nosuch'"),
+    (["check", "nosuch"], f"case must be one of {CASES}, or your own NAME.py with a CASE; received 'nosuch'"),
     (["optimize", "agglomeration", "--population", "1"], "options.population must be at least 2; received 1"),
     (["optimize", "agglomeration", "--variant", "x"], "variant must be one of paper, fragmenting; received"),
     (["optimize", "agglomeration", "--set", "block=2"], "--set must be of the form search.KEY=VALUE"),

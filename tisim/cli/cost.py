@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tisim.backend import runtime
-from tisim.cli import scene_arguments
+from tisim.cli import scene_arguments, targets
 from tisim.cli.options import Changes, Device, Out, Overwrite, Seed, Size, Target, Threads
 from tisim.console import err, out, progress_bar, stopping
 from tisim.errors import must
@@ -106,11 +106,9 @@ def cost(
 
 
 def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:
-    """What the case compares; nothing for a file."""
-    from cases.case import every
-
-    case = every().get(target)
-    return case.quantities(scene) if case and case.quantities else ()
+    """What the case compares; nothing for a scene file."""
+    quantities = None if target.endswith(".toml") else targets.case(target).quantities
+    return quantities(scene) if quantities else ()
 
 
 def _numbers(text: str) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tisim.backend import runtime
+from tisim.cli import targets
 from tisim.cli.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads, nameable
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
@@ -63,16 +64,15 @@ def figures(
     device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
 ) -> None:  # fmt: skip
     """Make the figures of a case that take many runs, and the numbers in them."""
-    from cases.case import find
     from tisim.files.atomic import replace_file
 
-    found = find(case)
+    found = targets.case(case)
     chosen = size or "default"
     found.size(chosen)
     if found.figures is None:
         raise InputError(f"case must be one with figures; received {case!r}")
     runtime.init(device, precision, threads)
-    place = folder or Path("out") / f"{case}-figures"
+    place = folder or Path("out") / f"{found.name}-figures"
     ownership.check_all(place, overwrite)
     ownership.take(place, (lock.LOCK,), overwrite)
     with lock.held(place):

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from tisim.backend import runtime
 from tisim.backend.taichi import check_backend
-from tisim.cli import cost, inspect, scene_arguments, search
+from tisim.cli import cost, inspect, scene_arguments, search, targets
 from tisim.cli.options import (
     CaseName,
     Changes,
@@ -228,9 +228,7 @@ def explain(
 @app.command()
 def check(case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0) -> None:
     """Run a case's own checks; exit code 1 when one fails."""
-    from cases.case import find
-
-    checks = find(case).check()
+    checks = targets.case(case).check()
     runtime.init(device, precision, threads)
     table = plain_table("check", "measured", "expected", "off by", "allowed", "")
     failed = 0

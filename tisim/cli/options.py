@@ -27,9 +27,15 @@ def nameable(path: Path | None) -> Path | None:
 
 
 Target = Annotated[
-    str, typer.Argument(metavar="CASE_OR_TOML", help="A case of 'tisim cases', or a scene file.")
+    str,
+    typer.Argument(
+        metavar="CASE_OR_FILE",
+        help="A case of 'tisim cases', a scene file, or your own NAME.py with a CASE.",
+    ),
 ]
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case of 'tisim cases'.")]
+CaseName = Annotated[
+    str, typer.Argument(metavar="CASE", help="A case of 'tisim cases', or your own NAME.py with a CASE.")
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

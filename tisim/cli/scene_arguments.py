@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tisim.cli import targets
 from tisim.components import serialization
 from tisim.errors import InputError, must, named, shown
 from tisim.scene.scene import Scene
@@ -21,7 +22,7 @@ def scene(
     absent: Sequence[str] = (),
     changes: Sequence[str] = (),
 ) -> tuple[str, Scene]:
-    """Name and scene of a case, or of a file that ends in .toml; InputError when there is none.
+    """Name and scene of a case, or of a file that ends in .toml or .py; InputError when there is none.
 
     absent : effects to leave out. changes : key=value texts, of what is then there.
     """
@@ -31,11 +32,7 @@ def scene(
         if seed is not None:
             made = made.replace({"seed": seed})
     else:
-        from cases.case import every
-
-        known = every()
-        must(target in known, "case", f"one of {', '.join(known)}, or a scene file ending in .toml", target)
-        case = known[target]
+        case = targets.case(target, f"or a scene file ending in .toml, {targets.OWN}")
         case.size(size or "default")
         name, made = case.name, case.scene(size or "default", seed or 0)
     return name, made.without(*absent).replace(assignments(changes))

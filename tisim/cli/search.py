@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from tisim.cli import scene_arguments
-from tisim.cli.options import CaseName, Device, Out, Overwrite, Precision, Seed, Size, Threads, nameable
+from tisim.cli import scene_arguments, targets
+from tisim.cli.options import Device, Out, Overwrite, Precision, Seed, Size, Threads, nameable
 from tisim.console import err, out, stopping
 from tisim.errors import RunError, must
 from tisim.files import ownership
@@ -20,6 +20,12 @@ from tisim.interrupt import Interrupt
 Executor = Annotated[
     str, typer.Option(help="Where runs are made: batch (this process), processes:N or dask://HOST:PORT.")
 ]
+Inverse = Annotated[
+    str,
+    typer.Argument(
+        metavar="CASE_OR_FILE", help="A case of 'tisim cases', or your own NAME.py with a PROBLEM or a CASE."
+    ),
+]
 SearchChanges = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
@@ -27,7 +33,7 @@ SearchChanges = Annotated[
 
 
 def optimize(
-    case: CaseName,
+    case: Inverse,
     size: Size = None,
     folder: Out = None,
     seed: Seed = None,
@@ -53,15 +59,17 @@ def optimize(
     threads: Threads = 0,
     executor: Executor = "batch",
 ) -> None:
-    """Search for the best design of a case. All goes to search.h5; running again goes on from there."""
-    from cases.case import inverse
+    """Search for the best design of a case, or of your own problem in a Python file.
+
+    All goes to search.h5; running again goes on from there.
+    """
     from optimize.evaluation.executors import made
     from optimize.search_folder import FILE, clear
     from optimize.session import session
     from optimize.settings import Settings, fit, followed, proposed
 
     must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
-    problem, usual = inverse(case, size or "default", variant)
+    problem, usual = targets.inverse(case, size, variant)
     wishes = {
         "seed": seed,
         "generations": generations,
@@ -89,7 +97,7 @@ def optimize(
 
 
 def compare(
-    case: CaseName,
+    case: Inverse,
     methods: Annotated[
         str, typer.Option(help="Names with commas between.")
     ] = "random,genetic,restart,cma-es",
@@ -106,14 +114,16 @@ def compare(
     threads: Threads = 0,
     executor: Executor = "batch",
 ) -> None:
-    """Compare search methods on a case at equal numbers of runs. Given again, it goes on."""
-    from cases.case import inverse
+    """Compare search methods on a case, or on your own problem, at equal numbers of runs.
+
+    Given again, it goes on.
+    """
     from optimize.evaluation.executors import made
     from optimize.report import comparison
     from optimize.settings import followed
     from optimize.storage.cache import Cache
 
-    problem, usual = inverse(case, size or "default", variant)
+    problem, usual = targets.inverse(case, size, variant)
     given = scene_arguments.below("search", scene_arguments.assignments(changes or ()))
     base = scene_arguments.nested(followed(usual, given), given)
     names = [name.strip() for name in methods.split(",") if name.strip()]

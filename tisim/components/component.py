@@ -20,6 +20,7 @@ from tisim.backend.taichi import DEVICE_FUNCTION
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.ranges import WHOLE, check_magnitude
 from tisim.errors import InputError, must, named, shown
+from tisim.files import python_file
 
 Vector = tuple[float, float, float]
 """Three Cartesian components."""
@@ -82,7 +83,26 @@ class Component(Checked):
     @classmethod
     def known(cls) -> dict[str, type[Self]]:
         """Every part made after this contract that has been imported, by name; itself too if it is none."""
-        return {kind.kind(): kind for kind in (cls, *_descendants(cls)) if not kind.__dict__.get("contract")}
+        return {kind.kind(): kind for kind in cls.kinds()}
+
+    @classmethod
+    def kinds(cls) -> Iterator[type[Self]]:
+        """The same, without their names; not those of a file of which another version has been loaded."""
+        for kind in (cls, *_descendants(cls)):
+            if not kind.__dict__.get("contract") and not python_file.superseded(kind):
+                yield kind
+
+    def parts(self) -> Iterator[Component]:
+        """Itself and the parts that it is made of, also those in lists."""
+        yield self
+        for name in type(self).model_fields:
+            value = getattr(self, name)
+            inner = (
+                value if isinstance(value, tuple) and value and isinstance(value[0], Component) else (value,)
+            )
+            for part in inner:
+                if isinstance(part, Component):
+                    yield from part.parts()
 
     @classmethod
     def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:

@@ -16,6 +16,7 @@ from tisim.components.component import Component, Text
 from tisim.components.domain import Box, Domain, Open
 from tisim.effects.base import Effect
 from tisim.errors import InputError, must, shown
+from tisim.files import python_file
 from tisim.scene.initial_state import Start
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
@@ -101,9 +102,12 @@ class Scene(Component):
         return max([len(masses), *(effect.capacity(masses) for effect in self.effects)])
 
     def digest(self) -> str:
-        """Hex hash of everything that decides the result: physics version, every parameter, the seed."""
+        """Hex hash of everything that decides the result: physics version, every parameter, the seed, and the
+        files that define parts of the scene that are not tisim's own."""
         order = [effect.kind() for effect in self.effects]
-        text = json.dumps([PHYSICS_VERSION, order, self.to_dict()], sort_keys=True)
+        files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
+        described = [PHYSICS_VERSION, order, self.to_dict(), *([files] if files else [])]
+        text = json.dumps(described, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:

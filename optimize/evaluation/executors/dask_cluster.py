@@ -69,7 +69,7 @@ class DaskCluster:
     def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
         self._check()
         self._answered = time.monotonic()
-        return self._executor.submit(_run, scenes, wanted)
+        return self._executor.submit(_run, worker.packed(scenes), wanted)
 
     def outcome(self, future: cf.Future[Answer]) -> Answer:
         from distributed import KilledWorker
@@ -142,7 +142,7 @@ def _scheduler_lost() -> RunError:
     return RunError("Dask scheduler was lost; what had finished is kept")
 
 
-def _run(scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+def _run(scenes: bytes, wanted: Wanted) -> Answer:
     from distributed import get_worker
 
     return worker.run(scenes, wanted, get_worker().state.nthreads)

@@ -60,13 +60,14 @@ class Processes:
             one.process.join()
 
     def _ask(self, scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+        question = worker.packed(scenes)
         with self._changing:
             if self._stopped:
                 raise Lost("workers have been stopped")
             asked = self._idle.pop() if self._idle else _Worker(max(1, runtime.cores() // self.workers))
             self._crew.add(asked)
         try:
-            answer = asked.answer(scenes, wanted)
+            answer = asked.answer(question, wanted)
         except (EOFError, OSError):
             asked.process.join()
             self._crew.remove(asked)
@@ -89,7 +90,7 @@ class _Worker:
                 raise RunError(f"worker process could not be started: {failure}") from failure
         end.close()  # or it would not be closed when the process ends
 
-    def answer(self, scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+    def answer(self, scenes: bytes, wanted: Wanted) -> Answer:
         """EOFError or OSError when the process ends before it has answered."""
         self.connection.send((scenes, wanted))
         answer: Answer = self.connection.recv()

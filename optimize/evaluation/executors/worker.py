@@ -15,15 +15,21 @@ from optimize.evaluation.evaluator import Evaluator
 from optimize.evaluation.executors import handshake
 from tisim import InputError, Result, RunError, Scene
 from tisim.backend import runtime
+from tisim.files import python_file
+from tisim.files.python_file import PythonFile
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """How a worker is to run: see tisim.backend.runtime; threads 0 for its share of the cores."""
+    """How a worker is to run: see tisim.backend.runtime; threads 0 for its share of the cores.
+
+    files : Python files of the user's that define what scenes are made of; those loaded here by default.
+    """
 
     device: str = "cpu"
     precision: str = "f64"
     threads: int = 0
+    files: tuple[PythonFile, ...] = field(default_factory=python_file.loaded)
 
     def __post_init__(self) -> None:
         runtime.Runtime(self.device, self.precision, self.threads)
@@ -41,6 +47,10 @@ class Wanted:
         return {**handshake.program(), "precision": self.precision, "device": self.device}
 
 
+def _name() -> str:
+    return f"worker (process {os.getpid()} of {platform.node()})"
+
+
 @dataclass(frozen=True)
 class Answer:
     """The results of the scenes, in order, or the error instead; what they were made by, and where."""
@@ -48,7 +58,7 @@ class Answer:
     made_by: dict[str, str]
     results: list[Result]
     error: BaseException | None = None
-    worker: str = field(default_factory=lambda: f"worker (process {os.getpid()} of {platform.node()})")
+    worker: str = field(default_factory=_name)
 
 
 _work = cf.ThreadPoolExecutor(1)
@@ -56,13 +66,23 @@ _work = cf.ThreadPoolExecutor(1)
 _evaluator: list[Evaluator] = []
 
 
-def run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
+def packed(scenes: Sequence[Scene]) -> bytes:
+    """Scenes as they are sent: a worker imports the files that define their parts before it reads them."""
+    try:
+        return pickle.dumps(scenes)
+    except (pickle.PicklingError, AttributeError) as error:
+        raise InputError(
+            f"scene must be made of classes that a worker can import; received {error}"
+        ) from None
+
+
+def run(scenes: bytes, wanted: Wanted, share: int) -> Answer:
     """The answer of a worker whose share of the cores that is."""
     return _answered(_work.submit(_run, scenes, wanted, share))
 
 
 def serve(connection: Connection, share: int) -> None:
-    """Answer pickled (scenes, wanted) until the other end is closed: the whole life of a worker process.
+    """Answer pickled (packed scenes, wanted) until the other end is closed: the whole life of the process.
 
     This thread does nothing but listen. When the searching process is gone, however it went, the system
     closes its end, and what is being run for it ends here and now.
@@ -85,7 +105,8 @@ def _run_pickled(question: bytes, share: int) -> Answer:
     return _run(scenes, wanted, share)
 
 
-def _run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
+def _run(sent: bytes, wanted: Wanted, share: int) -> Answer:
+    scenes = _unpacked(sent, wanted)
     before = runtime.generation()
     runtime.init(wanted.device, wanted.precision, wanted.threads or share)
     if not _evaluator or runtime.generation() != before:
@@ -93,6 +114,20 @@ def _run(scenes: Sequence[Scene], wanted: Wanted, share: int) -> Answer:
     results = dict(_evaluator[0].evaluate(scenes))
     made_by = {**handshake.program(), **runtime.current().settings}
     return Answer(made_by, [results[index] for index in range(len(scenes))])
+
+
+def _unpacked(sent: bytes, wanted: Wanted) -> Sequence[Scene]:
+    """InputError, in a line, when what they are made of cannot be imported here."""
+    try:
+        for file in wanted.files:
+            python_file.install(file)
+        scenes: Sequence[Scene] = pickle.loads(sent)
+    except InputError as error:
+        raise InputError(f"{_name()}: {error}") from None
+    except (ImportError, AttributeError) as error:
+        rule = "able to import what the scenes are made of (give your own files with --plugin)"
+        raise InputError(f"{_name()} must be {rule}; received {error}") from None
+    return scenes
 
 
 def _answered(made: cf.Future[Answer]) -> Answer:

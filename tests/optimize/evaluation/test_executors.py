@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,6 +21,7 @@ import pytest
 from optimize.evaluation import executors
 from optimize.evaluation.evaluator import Evaluator
 from optimize.evaluation.executors import dask_cluster, handshake
+from optimize.evaluation.executors import worker as working
 from optimize.evaluation.executors.processes import Processes
 from optimize.evaluation.executors.remote import Lost, Remote, units
 from optimize.evaluation.executors.worker import Answer, Wanted
@@ -29,9 +31,11 @@ from optimize.storage.cache import Cache, verify
 from tests.optimize.cache_files import worker
 from tests.optimize.drift_case import problem, scene
 from tests.optimize.evaluation import light_worker
-from tisim import Cloud, InputError, RunError, __version__
+from tests.own_files import LAW
+from tisim import Cloud, InputError, RunError, Scene, __version__
 from tisim.backend import runtime
 from tisim.effects import Impact
+from tisim.files import python_file
 
 ROOT = Path(__file__).parents[3]
 SCENES = [scene({"speed": 3.0 + k, "rise": 5.0}, seed=k) for k in range(9)]
@@ -96,6 +100,44 @@ def test_results_are_those_of_one_process_to_the_bit_and_so_are_failures(away, h
     assert len(pids()) == 2
     assert os.getpid() not in pids()
     assert evaluator.settings == {**runtime.current().settings, "backend": runtime.backend()}
+
+
+@pytest.mark.long
+def test_effects_of_the_users_own_act_in_workers(away, own_file):
+    """Each worker is given the file; one that has another version of it takes the new one."""
+    evaluator, _ = away
+    for factor in ("", "2.0 * "):
+        law = python_file.load(own_file("own_law.py", LAW.replace("-self", f"-{factor}self")))
+        scenes = [s.model_copy(update={"effects": (law.Pull(strength=1e-9),)}) for s in SCENES[:2]]
+        with closing(Evaluator()) as local:
+            same(dict(Remote(evaluator.pool, Wanted()).evaluate(scenes)), dict(local.evaluate(scenes)))
+
+
+def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
+    law = python_file.load(own_file("own_law.py", LAW))
+    sent = working.packed([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
+    here = Wanted()
+    python_file.forget("own_law")
+    with pytest.raises(
+        InputError, match=r"^worker \(process .* must be able to import .* --plugin\); received No"
+    ):
+        working._unpacked(sent, Wanted())
+    (file,) = here.files
+    broken = replace(here, files=(replace(file, text=b"import no_such_module"),))
+    with pytest.raises(
+        InputError, match=r"^worker \(process .*own_law.py must be .* line 1: ModuleNotFoundError"
+    ):
+        working._unpacked(sent, broken)
+    (scene,) = working._unpacked(sent, here)
+    assert scene.effects[0].strength == 1e-9
+
+
+def test_scenes_that_cannot_be_sent_are_told_in_a_line():
+    class Hidden(Scene):
+        pass
+
+    with pytest.raises(InputError, match="scene must be made of classes that a worker can import; received"):
+        working.packed([Hidden(**dict(SCENES[0]))])
 
 
 @pytest.mark.long
@@ -464,7 +506,7 @@ def without(folder, *gone):
     """Packages as of another version: without some modules, and with another number."""
     for name in ("tisim", "optimize", "cases"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", *gone))
-    text = folder / "tisim" / "__init__.py"
+    text = folder / "tisim" / "version.py"
     text.write_text(text.read_text().replace(f'"{__version__}"', '"0.0.9"'))
 
 

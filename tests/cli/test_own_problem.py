@@ -1,0 +1,128 @@
+"""tisim optimize and compare on a Python file of the user's; a case of the user's in all commands."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from optimize.storage.cache import Cache
+from tests.own_files import LAW, PROBLEM
+
+SEARCH = ["optimize", "my_drift.py", "--out", "s"]
+
+
+def runs(path="s/search.h5"):
+    return {record.key for record in Cache(path).records()}
+
+
+@pytest.mark.long
+def test_a_problem_is_searched_and_gone_on_with(tisim, own_file):
+    own_file("my_drift.py", PROBLEM)
+    more = ["--set", "search.ensemble.block=2", "--population", "8", "--seed", "3"]
+    code, out, err = tisim(*SEARCH, *more)
+    assert code == 0, err
+    assert "R" in out
+    heading, *rows = csv.reader(Path("s/best.csv").read_text().splitlines())
+    assert heading[:3] == ["rank", "speed (m/s)", "R"]
+    assert all(1 <= float(row[1]) <= 20 for row in rows)
+    made = runs()
+    assert tisim(*SEARCH, *more, "--generations", "2")[0] == 0
+    assert made < runs()
+
+
+@pytest.mark.long
+def test_another_objective_in_the_file_is_another_search(tisim, own_file):
+    """Evaluations of the old one are not taken for those of the new one."""
+    own_file("my_drift.py", PROBLEM)
+    assert tisim(*SEARCH)[0] == 0
+    made = runs()
+    own_file("my_drift.py", PROBLEM.replace(".mean()", ".max()"))
+    code, _, err = tisim(*SEARCH)
+    assert code == 2
+    assert "problem_code = " in err
+    assert tisim(*SEARCH, "--out", "t")[0] == 0
+    assert not made & runs("t/search.h5")
+
+
+@pytest.mark.long
+def test_another_law_in_the_file_is_other_physics(tisim, own_file):
+    text = LAW + PROBLEM.replace("duration=2e-3", "duration=2e-3,\n        effects=(Pull(strength=1e-9),)")
+    own_file("my_drift.py", text)
+    assert tisim(*SEARCH, "--generations", "0")[0] == 0
+    digest = _digest()
+    own_file("my_drift.py", text.replace("-self.strength(w)", "-2.0 * self.strength(w)"))
+    assert tisim(*SEARCH, "--generations", "0", "--out", "t")[0] == 0
+    assert _digest() != digest
+
+
+def _digest():
+    import my_drift
+
+    return my_drift.scene({"speed": 2.0}, 1).digest()
+
+
+@pytest.mark.long
+def test_methods_are_compared_on_a_problem(tisim, own_file):
+    own_file("my_drift.py", PROBLEM)
+    options = ["--methods", "random,genetic", "--evaluations", "12", "--repeats", "2", "--fresh-starts", "2"]
+    code, out, err = tisim("compare", "my_drift.py", *options)
+    assert code == 0, err
+    assert "genetic" in out
+
+
+CASE = """
+from cases.case import Case, Check, Size
+
+
+def check():
+    yield Check("two and two", 2.0 + 2.0, 4.0, 0.0)
+
+
+CASE = Case(
+    "drift", "Free grains", "none", {"default": Size("5 grains", {}, SEARCH)},
+    scene=lambda size, seed: scene({"speed": 5.0}, seed), check=check, problem=lambda size, variant: PROBLEM,
+)
+"""
+
+
+@pytest.mark.long
+def test_a_case_is_run_checked_and_searched(tisim, own_file):
+    own_file("my_case.py", PROBLEM + CASE)
+    code, out, err = tisim("run", "my_case.py", "--seed", "2", "--set", "duration=1e-3")
+    assert code == 0, err
+    assert "out/drift/result.h5" in out
+    assert tisim("check", "my_case.py")[:1] == (0,)
+    own_file(
+        "my_other_case.py",
+        (PROBLEM + CASE).replace("PROBLEM =", "_PROBLEM =").replace(": PROBLEM", ": _PROBLEM"),
+    )
+    assert tisim("optimize", "my_other_case.py", "--generations", "0")[0] == 0
+
+
+WRONG = {
+    "x = 1": "my_drift.py must be a file with a PROBLEM or a CASE; received ['x']",
+    "PROBLEM = 1": "PROBLEM of my_drift.py must be an optimize.Problem; received 1",
+    "CASE = 1": "CASE of my_drift.py must be a cases.case.Case; received 1",
+    PROBLEM + "SEARCH = 3": "SEARCH of my_drift.py must be settings of the search, by name; received 3",
+    PROBLEM + "SEARCH = {'seeds': 3}": "search.seeds must be a known key; received 3",
+    "1 / 0": "line 1: ZeroDivisionError: division by zero",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_wrong_with_a_file_is_a_line(tisim, own_file, text):
+    own_file("my_drift.py", text)
+    code, out, err = tisim(*SEARCH)
+    assert (code, out) == (2, "")
+    assert WRONG[text] in err
+    assert err.count("\n") == 1
+
+
+def test_size_and_variant_are_of_cases(tisim, own_file):
+    own_file("my_drift.py", PROBLEM)
+    for option in ("--size", "--variant"):
+        code, _, err = tisim(*SEARCH, option, "small")
+        assert (code, err) == (2, f"{option} must be given for a case only; received 'small'\n")
+    code, _, err = tisim("run", "my_drift.py")
+    assert code == 2
+    assert "my_drift.py must be a file with a CASE; received [" in err

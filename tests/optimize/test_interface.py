@@ -1,0 +1,125 @@
+"""What is public of optimize: a search in a few lines, and what it gives back by name and in units."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import optimize
+from tests.optimize.drift_case import distance, problem
+from tisim import InputError
+
+SMALL = {"generations": 1, "options": {"population": 6, "parents": 2}, "ensemble": {"max_starts": 4}}
+
+
+@pytest.fixture(scope="module")
+def drift():
+    """One search of the drift of free grains, kept nowhere."""
+    return optimize.run(problem("default", ""), seed=4, **SMALL)
+
+
+@pytest.mark.long
+def test_designs_have_their_genes_by_name_and_in_units(drift):
+    assert drift.stopped == "generations"
+    values = [design.values["R"] for design in drift.designs]
+    assert values == sorted(values)
+    for design in drift.designs:
+        assert list(design.genes) == ["speed", "rise"]
+        assert all(1 <= value <= 20 for value in design.genes.values())
+        assert design.intervals["R"] > 0
+        assert design.starts == 4
+    assert drift.designs[0].genes == drift.problem.genome.decode(drift.best)
+
+
+@pytest.mark.long
+def test_plain_data_go_through_json(drift):
+    data = json.loads(json.dumps(drift.to_dict()))
+    assert data["units"] == {"speed": "m/s", "rise": "m/s", "R": ""}
+    assert data["designs"][0]["genes"] == drift.designs[0].genes
+    assert data["logbook"]["best"][-1] == drift.designs[0].values["R"]
+    assert data["settings"]["options"]["population"] == 6
+
+
+@pytest.mark.long
+def test_a_frame_has_the_columns_of_the_table(drift):
+    pytest.importorskip("pandas")
+    frame = drift.to_frame()
+    assert list(frame["rank"]) == list(range(1, len(drift.designs) + 1))
+    assert frame["speed (m/s)"][0] == drift.designs[0].genes["speed"]
+
+
+@pytest.mark.long
+def test_pandas_is_optional(drift, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match="pandas must be installed for a data frame"):
+        drift.to_frame()
+
+
+@pytest.mark.long
+def test_a_folder_is_gone_on_with(drift, tmp_path, capsys):
+    """The same designs as without one; again, nothing is run; nothing is printed."""
+    first = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
+    again = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
+    assert first.designs == again.designs == drift.designs
+    assert (again.evaluations, again.hits) == (0, first.evaluations)
+    assert (tmp_path / "s/best.csv").exists()
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.long
+def test_several_objectives_give_a_front(tmp_path):
+    two = (
+        optimize.Objective("R", distance, "m"),
+        optimize.Objective(
+            "height", lambda r: float(np.abs(r.state["position"][:, 2]).mean()), "m", maximise=True
+        ),
+    )
+    front = optimize.run(
+        replace(problem("default", ""), objective=two), generations=1, options={"population": 8}
+    )
+    assert front.settings.method == "nsga2"
+    heights = [design.values["height"] for design in front.designs]
+    assert [design.values["R"] for design in front.designs] == sorted(d.values["R"] for d in front.designs)
+    assert heights == sorted(heights)
+    assert min(heights) > 0
+
+
+def test_wrong_settings_are_refused_before_anything_runs():
+    with pytest.raises(InputError, match=r"search.generation must be a known key; received 3"):
+        optimize.run(problem("default", ""), generation=3)
+    with pytest.raises(InputError, match="executor must be batch"):
+        optimize.run(problem("default", ""), executor="threads:2")
+
+
+def test_another_objective_has_another_identity():
+    """Of functions of one file nothing but the file tells them apart; of this package its version does."""
+    from cases.vibration_design import problem as built_in
+
+    assert problem("default", "").identity
+    assert not built_in().identity
+    assert replace(built_in(), scene=problem).identity == problem("default", "").identity
+    assert replace(built_in(), code="mine").identity == "mine"
+
+
+def test_importing_it_loads_nothing_heavy():
+    heavy = ("taichi", "quadrants", "numpy", "deap", "h5py", "pydantic", "pandas")
+    code = f"import optimize, sys; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_every_name_is_there():
+    assert set(optimize.__all__) >= {
+        "Design",
+        "Gene",
+        "Genome",
+        "Objective",
+        "Outcome",
+        "Problem",
+        "Settings",
+        "run",
+    }
+    assert all(getattr(optimize, name) is not None for name in optimize.__all__)

@@ -1,0 +1,78 @@
+"""What a command is about: a case of 'tisim cases', or one of the user's own in a Python file.
+
+Such a file is named NAME.py. Its CASE is used as those of the package ``cases`` are; instead of a CASE, or
+beside it, it may have a PROBLEM, an inverse problem by itself, and SEARCH, the settings of its search.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from tisim.errors import must
+from tisim.files import python_file
+
+if TYPE_CHECKING:
+    from cases.case import Case
+    from optimize.problem.problem import Problem
+
+
+OWN = "or your own NAME.py with a CASE"
+
+
+def case(target: str, besides: str = OWN) -> Case:
+    """The case of that name, or in that file; InputError where there is none.
+
+    besides : what may be given beside a name, for the message.
+    """
+    from cases.case import Case, every
+
+    if not is_file(target):
+        known = every()
+        must(target in known, "case", f"one of {', '.join(known)}, {besides}", target)
+        return known[target]
+    module = python_file.load(target)
+    must(hasattr(module, "CASE"), target, "a file with a CASE", _found(module))
+    must(isinstance(module.CASE, Case), f"CASE of {target}", "a cases.case.Case", module.CASE)
+    return module.CASE
+
+
+def inverse(target: str, size: str | None, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
+    """The inverse problem of a case or a file, and settings of its search; InputError where there is none."""
+    if not is_file(target):
+        return case(target).inverse(size or "default", variant)
+    module = python_file.load(target)
+    if hasattr(module, "PROBLEM"):
+        problem, settings = _problem(module, target, size, variant)
+    else:
+        must(hasattr(module, "CASE"), target, "a file with a PROBLEM or a CASE", _found(module))
+        problem, settings = case(target).inverse(size or "default", variant)
+    # The whole file, and those that it may have taken something from: an objective made elsewhere from
+    # numbers that stand here is another when they change.
+    checksums = [file.checksum[:12] for file in python_file.loaded()]
+    return dataclasses.replace(problem, code=problem.code or "-".join(checksums)), settings
+
+
+def is_file(target: str) -> bool:
+    """Whether it is a Python file by its name."""
+    return target.endswith(".py")
+
+
+def _problem(
+    module: ModuleType, target: str, size: str | None, variant: str | None
+) -> tuple[Problem, Mapping[str, Any]]:
+    from optimize.problem.problem import Problem
+
+    must(isinstance(module.PROBLEM, Problem), f"PROBLEM of {target}", "an optimize.Problem", module.PROBLEM)
+    must(size is None, "--size", "given for a case only", size)
+    must(variant is None, "--variant", "given for a case only", variant)
+    settings = getattr(module, "SEARCH", {})
+    must(isinstance(settings, Mapping), f"SEARCH of {target}", "settings of the search, by name", settings)
+    return module.PROBLEM, settings
+
+
+def _found(module: ModuleType) -> list[str]:
+    """Names that a file has, beside those that every module has."""
+    return [name for name in vars(module) if not name.startswith("__")]
