@@ -10,7 +10,7 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import scene_arguments, targets
-from tisim.cli.options import Changes, Device, Out, Overwrite, Seed, Size, Target, Threads
+from tisim.cli.options import Changes, Device, Out, Overwrite, Plugins, Seed, Size, Target, Threads
 from tisim.console import err, out, progress_bar, stopping
 from tisim.errors import must
 from tisim.files import lock, ownership
@@ -62,6 +62,7 @@ def cost(
     device: Device = "cpu",
     threads: Threads = 0,
     overwrite: Overwrite = False,
+    plugins: Plugins = None,
 ) -> None:
     """Measure error against time for every setting of a scene; write cost.csv, cost.h5 and cost.png.
 

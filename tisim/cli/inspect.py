@@ -13,7 +13,7 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import targets
-from tisim.cli.options import CaseName, Device, Out, Overwrite, Precision, Size, Threads, nameable
+from tisim.cli.options import CaseName, Device, Out, Overwrite, Plugins, Precision, Size, Threads, nameable
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
 from tisim.files import lock, ownership, regular_file
@@ -38,7 +38,9 @@ Into = Annotated[
 ]
 
 
-def plot(file: File, world: World = 0, folder: Into = None, overwrite: Overwrite = False) -> None:
+def plot(
+    file: File, world: World = 0, folder: Into = None, overwrite: Overwrite = False, plugins: Plugins = None
+) -> None:
     """Draw the cloud, energy, centre of gravity and number of particles in time, and what its case shows."""
     from cases.case import every
     from tisim.io.reader import frames
@@ -62,6 +64,7 @@ def plot(file: File, world: World = 0, folder: Into = None, overwrite: Overwrite
 def figures(
     case: CaseName, size: Size = None, folder: Out = None,
     device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
+    plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Make the figures of a case that take many runs, and the numbers in them."""
     from tisim.files.atomic import replace_file
@@ -96,6 +99,7 @@ def movie(
     rate: Annotated[int, typer.Option(help="Frames a second.")] = 20,
     world: World = 0,
     overwrite: Overwrite = False,
+    plugins: Plugins = None,
 ) -> None:
     """Draw a trajectory as a moving picture."""
     from tisim.io.reader import frames
@@ -118,6 +122,7 @@ def export(
     kind: Annotated[str, typer.Option("--format", help="vtk (ParaView), xyz (OVITO, ASE) or h5md.")] = "vtk",
     folder: Into = None,
     overwrite: Overwrite = False,
+    plugins: Plugins = None,
 ) -> None:
     """Write the frames of a run for other programs; h5md is a copy."""
     from tisim.io.export import check, names

@@ -23,6 +23,7 @@ from tisim.cli.options import (
     Frames,
     Out,
     Overwrite,
+    Plugins,
     Precision,
     Resume,
     Seed,
@@ -98,7 +99,7 @@ def run(
     target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
     threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
-    frames: Frames = None, every: Every = None,
+    frames: Frames = None, every: Every = None, plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
@@ -213,7 +214,7 @@ def cases() -> None:
 @app.command()
 def explain(
     target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
-    size: Size = None, device: Device = "cpu", precision: Precision = "f64",
+    size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
     from tisim.engine.explain import explain, render
@@ -226,7 +227,10 @@ def explain(
 
 
 @app.command()
-def check(case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0) -> None:
+def check(
+    case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
+    plugins: Plugins = None,
+) -> None:  # fmt: skip
     """Run a case's own checks; exit code 1 when one fails."""
     checks = targets.case(case).check()
     runtime.init(device, precision, threads)

@@ -26,6 +26,22 @@ def nameable(path: Path | None) -> Path | None:
     return path
 
 
+def _load_plugins(paths: list[str] | None) -> list[str] | None:
+    """Before anything else is done: what is read later may be made of what they define."""
+    from tisim.scene import plugins
+
+    for path in paths or ():
+        plugins.load(path)
+    return paths
+
+
+Plugins = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin", metavar="FILE.py", callback=_load_plugins, is_eager=True,
+        help="Your own effects, sources, operators or steppers. Repeatable.",
+    ),
+]  # fmt: skip
 Target = Annotated[
     str,
     typer.Argument(

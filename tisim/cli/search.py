@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tisim.cli import scene_arguments, targets
-from tisim.cli.options import Device, Out, Overwrite, Precision, Seed, Size, Threads, nameable
+from tisim.cli.options import Device, Out, Overwrite, Plugins, Precision, Seed, Size, Threads, nameable
 from tisim.console import err, out, stopping
 from tisim.errors import RunError, must
 from tisim.files import ownership
@@ -58,6 +58,7 @@ def optimize(
     precision: Precision = "f64",
     threads: Threads = 0,
     executor: Executor = "batch",
+    plugins: Plugins = None,
 ) -> None:
     """Search for the best design of a case, or of your own problem in a Python file.
 
@@ -113,6 +114,7 @@ def compare(
     precision: Precision = "f64",
     threads: Threads = 0,
     executor: Executor = "batch",
+    plugins: Plugins = None,
 ) -> None:
     """Compare search methods on a case, or on your own problem, at equal numbers of runs.
 

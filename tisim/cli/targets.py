@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tisim.errors import must
 from tisim.files import python_file
+from tisim.scene import plugins
 
 if TYPE_CHECKING:
     from cases.case import Case
@@ -33,7 +34,7 @@ def case(target: str, besides: str = OWN) -> Case:
         known = every()
         must(target in known, "case", f"one of {', '.join(known)}, {besides}", target)
         return known[target]
-    module = python_file.load(target)
+    module = plugins.load(target)
     must(hasattr(module, "CASE"), target, "a file with a CASE", _found(module))
     must(isinstance(module.CASE, Case), f"CASE of {target}", "a cases.case.Case", module.CASE)
     return module.CASE
@@ -43,7 +44,7 @@ def inverse(target: str, size: str | None, variant: str | None) -> tuple[Problem
     """The inverse problem of a case or a file, and settings of its search; InputError where there is none."""
     if not is_file(target):
         return case(target).inverse(size or "default", variant)
-    module = python_file.load(target)
+    module = plugins.load(target)
     if hasattr(module, "PROBLEM"):
         problem, settings = _problem(module, target, size, variant)
     else:

@@ -36,7 +36,12 @@ class PythonFile:
     @property
     def checksum(self) -> str:
         """SHA-256 of the text, hex."""
-        return hashlib.sha256(self.text).hexdigest()
+        return checksum(self.text)
+
+
+def checksum(text: bytes) -> str:
+    """SHA-256, hex."""
+    return hashlib.sha256(text).hexdigest()
 
 
 _modules: dict[PythonFile, ModuleType] = {}
@@ -126,7 +131,7 @@ def _checksum(module: str, thing: Any) -> str:
         text = Path(path).read_bytes() if path else inspect.getsource(thing).encode()
     except (OSError, TypeError):
         return ""
-    return hashlib.sha256(text).hexdigest()
+    return checksum(text)
 
 
 def _read(path: Path) -> bytes:

@@ -26,6 +26,7 @@ from tisim.errors import must
 from tisim.files import checksum, lock, ownership, regular_file
 from tisim.files.atomic import replace_file
 from tisim.io.reader import RESULT
+from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.state import resolve_fields
@@ -93,6 +94,7 @@ def versions() -> dict[str, str]:
         "h5py": h5py.__version__,
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
+        **plugins.versions(),
     }
 
 

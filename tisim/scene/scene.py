@@ -10,13 +10,13 @@ from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from tisim import effects, operators, sources, steppers
 from tisim.components import serialization
 from tisim.components.component import Component, Text
 from tisim.components.domain import Box, Domain, Open
 from tisim.effects.base import Effect
 from tisim.errors import InputError, must, shown
 from tisim.files import python_file
+from tisim.scene import plugins
 from tisim.scene.initial_state import Start
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
@@ -135,9 +135,7 @@ class Scene(Component):
         if "stepper" in rest:
             made["stepper"] = cls._stepper(rest.pop("stepper"))
         listed = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
-        serialization.load(effects)
-        serialization.load(operators)
-        serialization.load(sources)
+        plugins.load_parts()
         tables = {kind: serialization.table(values, f"effects.{kind}") for kind, values in listed.items()}
         made["effects"] = tuple(
             serialization.from_dict(Effect, {"kind": kind, **values}, f"effects.{kind}")
@@ -147,7 +145,7 @@ class Scene(Component):
 
     @staticmethod
     def _stepper(data: Any) -> Stepper:
-        serialization.load(steppers)
+        plugins.load_parts()
         return serialization.from_dict(
             Stepper, {"kind": Verlet.kind(), **serialization.table(data, "stepper")}, "stepper"
         )

@@ -14,6 +14,7 @@ from textwrap import shorten
 from tisim import InputError, __version__
 from tisim.backend import runtime
 from tisim.errors import must
+from tisim.scene import plugins
 from tisim.scene.scene import PHYSICS_VERSION
 
 PACKAGES = ("tisim", "optimize", "cases")
@@ -34,6 +35,7 @@ def program() -> dict[str, str]:
         "NumPy": version("numpy"),
         "SciPy": version("scipy"),
         "machine": platform.machine(),
+        **plugins.installed(),
     }
 
 
