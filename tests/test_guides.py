@@ -1,0 +1,48 @@
+"""The snippets of the guides run as they are printed, in the order in which they are printed."""
+
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tisim.cli.main import main
+
+GUIDES = sorted((Path(__file__).parents[1] / "docs/guides").glob("*.md"))
+SNIPPET = re.compile(r'^```(\w+)(?: title="([\w.]+)")?\n(.*?)^```$', re.M | re.S)
+
+
+def console(text):
+    """Give the commands of a snippet; all end well."""
+    for line in text.splitlines():
+        dollar, program, *arguments = shlex.split(line)
+        assert dollar == "$"
+        if program == "python":
+            subprocess.run([sys.executable, *arguments], check=True)
+            continue
+        assert program == "tisim"
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        assert end.value.code == 0, line
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("guide", GUIDES, ids=lambda path: path.stem)
+def test_snippets_run_as_printed(guide, own_file, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    snippets = SNIPPET.findall(guide.read_text(encoding="utf-8"))
+    assert len(snippets) == guide.read_text(encoding="utf-8").count("\n```") / 2
+    names = {"__name__": "__main__"}
+    for language, title, text in snippets:
+        if title:
+            own_file(title, text)
+            sys.modules.pop(Path(title).stem, None)
+        elif language == "console":
+            console(text)
+        else:
+            exec(compile(text, guide.name, "exec"), names)
+        if language == "toml":
+            assert tomllib.loads(text)
