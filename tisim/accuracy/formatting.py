@@ -31,11 +31,11 @@ def expression(part: Component) -> str:
 
 def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
     """Words that make ``tisim run`` run ``changed`` where it would have run ``scene``."""
-    old, new = ({effect.kind(): effect for effect in s.effects} for s in (scene, changed))
-    words = [word for kind in old if kind not in new for word in ("--without", kind)]
+    old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
+    words = [word for name in old if name not in new for word in ("--without", name)]
     settings = list(_differences(scene.stepper, changed.stepper, "stepper"))
-    for kind, effect in new.items():
-        settings += _differences(old.get(kind), effect, f"effects.{kind}")
+    for name, effect in new.items():
+        settings += _differences(old.get(name), effect, f"effects.{name}")
     for key, value in settings:
         words += ["--set", f"{key}={value}"]
     return words + (["--precision", precision] if precision != "f64" else [])
@@ -49,7 +49,7 @@ def pasted(words: list[str]) -> str:
 def _differences(old: Component | None, new: Component, path: str) -> Iterator[tuple[str, str]]:
     """Dotted key and TOML of all that is new; a part of another kind as a whole."""
     if type(old) is not type(new):
-        yield path, serialization.inline(_table(new, named=not path.startswith("effects.")))
+        yield path, serialization.inline(_table(new, named=path != f"effects.{new.kind()}"))
         return
     for name in type(new).model_fields:
         before, value = getattr(old, name), getattr(new, name)

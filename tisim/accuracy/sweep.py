@@ -11,6 +11,7 @@ from tisim.accuracy.formatting import given
 from tisim.components import serialization
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, unit_of
+from tisim.effects.base import Effect
 from tisim.errors import InputError
 from tisim.scene.scene import Scene
 from tisim.steppers.base import Stepper
@@ -59,7 +60,7 @@ class SettingSweep:
 def parts(scene: Scene) -> Iterator[tuple[str, Component]]:
     """Every part of a scene with its dotted place, as in its TOML file."""
     for effect in scene.effects:
-        yield from _within(f"effects.{effect.kind()}", effect)
+        yield from _within(f"effects.{effect.label}", effect)
     for name in ("particles", "domain", "stepper"):
         yield from _within(name, getattr(scene, name))
 
@@ -75,7 +76,7 @@ def exchanged(scene: Scene, path: str, part: Component) -> Scene:
     """A copy of a scene with another part in this place."""
     first, *rest = path.split(".")
     if first == "effects":
-        own = next(effect for effect in scene.effects if effect.kind() == rest[0])
+        own = next(effect for effect in scene.effects if effect.label == rest[0])
         new = _put(own, rest[1:], part)
         listed = tuple(new if effect is own else effect for effect in scene.effects)
         return scene.model_copy(update={"effects": listed})
@@ -137,7 +138,7 @@ def methods(
             # As accurate otherwise as anything here, so that what is seen is the error of the law.
             accurate = found[0].settings[-1] if found else Setting(scene, "")
             exact = (found[0].name, accurate.words) if found else None
-            found.append(_laws(accurate.scene, effect.kind(), laws, starts, exact))
+            found.append(_laws(accurate.scene, effect, laws, starts, exact))
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in _within("stepper", stepper):
@@ -198,9 +199,8 @@ def _turning(
 
 
 def _laws(
-    scene: Scene, kind: str, laws: Sequence[Component], starts: int, exact: tuple[str, str] | None
+    scene: Scene, own: Effect, laws: Sequence[Effect], starts: int, exact: tuple[str, str] | None
 ) -> SettingSweep:
-    own = next(effect for effect in scene.effects if effect.kind() == kind)
     settings = []
     for law in laws:
         differ = [
@@ -209,7 +209,8 @@ def _laws(
             if getattr(own, name, None) != getattr(law, name)
         ]
         words = ", ".join(differ) or type(law).__name__
-        settings.append(Setting(exchanged(scene, f"effects.{kind}", law), words, starts=starts))
+        named = law.model_copy(update={"name": own.name})
+        settings.append(Setting(exchanged(scene, f"effects.{own.label}", named), words, starts=starts))
     name = type(laws[0]).__name__
     return SettingSweep(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
 

@@ -48,7 +48,12 @@ class Checked(BaseModel):
         try:
             super().__init__(**data)
         except ValidationError as invalid:
-            raise InputError(explain_invalid(invalid, self.kind())) from None
+            raise InputError(explain_invalid(invalid, self.called(data))) from None
+
+    @classmethod
+    def called(cls, data: Mapping[str, Any]) -> str:
+        """What messages call the one that is made of these values."""
+        return cls.kind()
 
     @classmethod
     def kind(cls) -> str:
@@ -66,12 +71,17 @@ class Component(Checked):
         """Refuse magnitudes with which the arithmetic does not hold (see ranges.py)."""
         varying = {name for name, _, _ in self.parameters()}
         for name, info in type(self).model_fields.items():
-            value, where = getattr(self, name), f"{self.kind()}.{name}"
+            value, where = getattr(self, name), f"{self.label}.{name}"
             if name in varying and value is not None:
                 check_magnitude(where, unit_of(info), value)
             elif info.annotation in (int, int | None, int | float) and not _bounded(info):
                 must(value is None or abs(value) < WHOLE, where, f"less than {WHOLE}", value)
         return self
+
+    @property
+    def label(self) -> str:
+        """What files and messages call it."""
+        return self.called(vars(self))
 
     @classmethod
     def named(cls, kind: Any, where: str) -> type[Self]:
@@ -212,6 +222,7 @@ _RULES = {
     "bool_parsing": "true or false",
     "bool_type": "true or false",
     "string_type": "text",
+    "string_pattern_mismatch": "text of the form {pattern}",
     "missing": "given",
     "extra_forbidden": "a known key",
     "literal_error": "{expected}",

@@ -33,6 +33,7 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -55,14 +56,27 @@ __all__ = [
 
 
 class Effect(Component):
-    """Anything physical that a scene can call for."""
+    """Anything physical that a scene can call for.
+
+    name : what it is called in a scene, files and messages; its kind unless given. A scene has each name
+    once, so that it can hold two of a kind where ``repeatable`` says that they make sense: each then acts
+    with its own parameters, and what both count is added up.
+    """
 
     contract: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = False
+
+    name: str | None = Option(None, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
 
     fields: ClassVar[tuple[str | Field, ...]] = ()
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
     requires_source: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def called(cls, data: Mapping[str, Any]) -> str:
+        """Its name; its kind unless one is given."""
+        return str(data.get("name") or cls.kind())
 
     def required_fields(self) -> tuple[str | Field, ...]:
         """The particle fields that this one needs, given its options; all of ``fields`` by default."""
@@ -95,6 +109,7 @@ class Force(Effect):
     """A force on a particle by itself: of its state, its place and the time."""
 
     contract: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = True
 
     @ti.func
     def force(self, s, w, i, t):
@@ -141,6 +156,7 @@ class PairForce(Pairwise):
     """
 
     contract: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = True
     memory: ClassVar[int] = 0
     past: ClassVar[Any] = None
 

@@ -42,9 +42,9 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
     if turning(forces, pair_forces):
         needed += [(TORQUE, "torques"), ("spin", "torques")]
     for effect in effects:
-        needed += [(need, effect.kind()) for need in effect.required_fields()]
+        needed += [(need, effect.label) for need in effect.required_fields()]
         if isinstance(effect, PairForce):
-            needed += [(field, effect.kind()) for field in memory_fields(effect)]
+            needed += [(field, effect.label) for field in memory_fields(effect)]
     wanted = stepper.fields(turning(forces, pair_forces), stepper.independent(effects))
     needed += [(need, stepper.kind()) for need in wanted]
     users: dict[str | Field, list[str]] = {}
@@ -90,7 +90,7 @@ class Assembly:
                 (self.full_list, "other half of the pair list", "short-ranged forces"),
                 (contacts, "contact list", "impacts, step control"),
                 *(
-                    (a, f"sweeps of {a.effect.quantity}", a.effect.kind())
+                    (a, f"sweeps of {a.effect.quantity}", a.effect.label)
                     for a in self.derived_solvers
                     if isinstance(a.effect, SelfConsistentQuantity)
                 ),

@@ -144,7 +144,7 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
 
 
 def _part(spec: Component) -> Part:
-    return Part(spec.kind(), _summary(type(spec)), _source(type(spec)), tuple(_values(spec)))
+    return Part(spec.label, _summary(type(spec)), _source(type(spec)), tuple(_values(spec)))
 
 
 def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str]]:
@@ -152,6 +152,8 @@ def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str]]
     lists = dict(spec.lists())
     for name, info in type(spec).model_fields.items():
         value = getattr(spec, name)
+        if name == "name":
+            continue  # It stands at the head.
         if name in lists:
             for k, row in enumerate(value[:SHOWN]):
                 yield from _values(row, f"{within}{name}.{k}.")

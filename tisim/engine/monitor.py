@@ -118,5 +118,5 @@ class Monitor:
         if code == WorldStatus.NOT_CONVERGED:
             reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
         if failing_effect < len(effects):
-            reason += f", by effects.{effects[failing_effect].kind()}"
+            reason += f", by effects.{effects[failing_effect].label}"
         return reason if who == NO_ONE else f"{reason}, at particle {who}"

@@ -24,7 +24,7 @@ def memory_fields(effect: PairForce) -> tuple[Field, ...]:
         return ()
     if not effect.short_ranged:
         raise TypeError(f"{type(effect).__name__} must be short-ranged: pairs remember while they touch")
-    name = effect.kind()
+    name = effect.label
     return (
         Field(f"{name}_partners", "", 1, "keep", integer=True, slots=PARTNERS, default=NO_PARTNER),
         Field(f"{name}_past", "", 1, "keep", slots=PARTNERS * effect.memory),

@@ -56,30 +56,33 @@ class Scene(Component):
     @model_validator(mode="after")
     def _complete(self) -> Self:
         present = [type(effect) for effect in self.effects]
-        for kind in present:
-            must(present.count(kind) == 1, f"effects.{kind.kind()}", "given once", present.count(kind))
+        labels = [effect.label for effect in self.effects]
+        for kind, label in zip(present, labels, strict=True):
+            must(labels.count(label) == 1, f"effects.{label}", "given once", labels.count(label))
+            alone = (kind.repeatable and not kind.world_quantities) or present.count(kind) == 1
+            must(alone, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
             for needed in kind.requires:
                 must(
                     any(issubclass(other, needed) for other in present),
-                    f"effects.{kind.kind()}",
+                    f"effects.{label}",
                     f"used together with {' or '.join(_names(needed))}",
-                    ", ".join(other.kind() for other in present),
+                    ", ".join(labels),
                 )
-            for other in present:
-                alone = not issubclass(other, kind.excludes)
-                must(alone, f"effects.{kind.kind()}", f"used without {other.kind()}", other.kind())
+            for other, named in zip(present, labels, strict=True):
+                apart = not issubclass(other, kind.excludes)
+                must(apart, f"effects.{label}", f"used without {other.kind()}", named)
             must(
                 self.stepper.control.kind() not in kind.incompatible_controls,
                 "stepper.control",
-                f"one that suits {kind.kind()}, such as fixed_step or that of an implicit stepper",
+                f"one that suits {label}, such as fixed_step or that of an implicit stepper",
                 self.stepper.control.kind(),
             )
             given = {other.quantity for other in present if issubclass(other, Source)}
             must(
                 not kind.requires_source or not given.isdisjoint(kind.requires_source),
-                f"effects.{kind.kind()}",
+                f"effects.{label}",
                 f"used together with a source of {' or '.join(kind.requires_source)}",
-                ", ".join(other.kind() for other in present),
+                ", ".join(labels),
             )
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
@@ -104,7 +107,7 @@ class Scene(Component):
     def digest(self) -> str:
         """Hex hash of everything that decides the result: physics version, every parameter, the seed, and the
         files that define parts of the scene that are not tisim's own."""
-        order = [effect.kind() for effect in self.effects]
+        order = [effect.label for effect in self.effects]
         files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
         described = [PHYSICS_VERSION, order, self.to_dict(), *([files] if files else [])]
         text = json.dumps(described, sort_keys=True)
@@ -119,7 +122,7 @@ class Scene(Component):
             "particles": serialization.to_dict(self.particles),
             "domain": serialization.to_dict(self.domain),
             "stepper": serialization.to_dict(self.stepper),
-            "effects": {effect.kind(): serialization.to_dict(effect, named=False) for effect in self.effects},
+            "effects": {effect.label: _table(effect) for effect in self.effects},
         }
 
     @classmethod
@@ -136,11 +139,7 @@ class Scene(Component):
             made["stepper"] = cls._stepper(rest.pop("stepper"))
         listed = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
         plugins.load_parts()
-        tables = {kind: serialization.table(values, f"effects.{kind}") for kind, values in listed.items()}
-        made["effects"] = tuple(
-            serialization.from_dict(Effect, {"kind": kind, **values}, f"effects.{kind}")
-            for kind, values in tables.items()
-        )
+        made["effects"] = tuple(_effect(name, values) for name, values in listed.items())
         return cls(**made, **rest)
 
     @staticmethod
@@ -196,6 +195,22 @@ class Scene(Component):
             must(name in data["effects"], "effect to leave out", f"one of {known}", name)
         kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
         return type(self).from_dict({**data, "effects": kept})
+
+
+def _table(effect: Effect) -> dict[str, Any]:
+    """Parameters of an effect, with its kind where that is not the name of its table."""
+    values = serialization.to_dict(effect, named=effect.label != effect.kind())
+    return {key: value for key, value in values.items() if key != "name"}
+
+
+def _effect(name: str, values: Any) -> Effect:
+    """The effect of a table; the name of the table is its own, and its kind unless it has one."""
+    where = f"effects.{name}"
+    table = serialization.table(values, where)
+    own = table.pop("name", None)
+    must(own in (None, name), f"{where}.name", "left out, as it is that of the table", own)
+    given = {"name": name} if table.get("kind", name) != name else {}
+    return serialization.from_dict(Effect, {"kind": name, **table, **given}, where)
 
 
 def _step(place: Any, step: str, key: str) -> Any:

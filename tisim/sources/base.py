@@ -21,6 +21,7 @@ class Source(Effect):
     """
 
     contract: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = True
     quantity: ClassVar[str]
 
     @ti.func

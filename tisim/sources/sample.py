@@ -51,7 +51,7 @@ def sample(
     places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)
     must(places.ndim == 2 and places.shape[1] == 3, "points", "of shape (n, 3)", places.shape)
     given = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
-    must(bool(given), "effects", f"with a source of {quantity}", [effect.kind() for effect in effects])
+    must(bool(given), "effects", f"with a source of {quantity}", [effect.label for effect in effects])
     out = np.zeros((len(places), 4, 3), places.dtype)
     _sample(given, real, time, places, out)
     return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)

@@ -138,13 +138,13 @@ class ParameterTable:
         """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):
-            table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.kind())]
+            table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.label)]
         real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
         with np.errstate(over="ignore", under="ignore"):
             held = table.astype(real)
         flushed = (table != 0) & (np.abs(held) < np.finfo(real).tiny)
         for world, slot in np.argwhere(~np.isfinite(held) | flushed):
-            names = [name for part in rows[world] for name, _ in _entries(part, part.kind())]
+            names = [name for part in rows[world] for name, _ in _entries(part, part.label)]
             must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
         self._put(held)
 

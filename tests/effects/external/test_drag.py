@@ -58,7 +58,7 @@ def drags(rng, kind):
         "viscosity": rng.uniform(0.01, 0.02),
         "coefficient": rng.uniform(),
     }
-    return kind(**{name: options[name] for name in kind.model_fields})
+    return kind(**{name: value for name, value in options.items() if name in kind.model_fields})
 
 
 def at_reynolds(rng, law, n=12):

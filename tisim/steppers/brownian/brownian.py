@@ -65,7 +65,7 @@ class Brownian(Stepper):
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
         for effect in effects:
-            name = f"effects.{effect.kind()}"
+            name = f"effects.{effect.label}"
             turns = effect.offers("torque") if isinstance(effect, Force) else False
             turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
             must(not turns, name, "without torques in a scene stepped by brownian", name)

@@ -1,0 +1,150 @@
+"""Two effects of one kind in a scene, told apart by their names; without names nothing is another."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.effects.pair.test_mie import crowd, twin
+from tests.scenes import scene, simulate
+from tests.throwaway import RandomKicks, SoftShell, Trap
+from tisim import InputError, Scene
+from tisim.effects import Gravity, Impact, Lorentz, Mie, NearField
+from tisim.engine.assembly import needed_fields
+from tisim.operators import Cooling
+from tisim.sources import ElectricField
+from tisim.steppers import IterationControl, Trapezoid, Verlet
+
+CORE, SHELL = Mie(name="core", epsilon=1.0), Mie(name="shell", epsilon=0.3, n=9, m=4, cutoff=2.0)
+ONE = ([[0, 0, 0]], [[0, 0, 0]])
+
+
+class Remembering(SoftShell):
+    """One whose pairs remember two values."""
+
+    memory = 2
+
+
+def one(*effects, **more):
+    """A scene of one grain under these."""
+    return scene(*ONE, effects, mass=1.0, **more)
+
+
+@pytest.mark.long
+def test_each_acts_with_its_own_parameters(rng):
+    """The forces of two Mie pairs, one of them without a name, are the sum of their twins in NumPy."""
+    for other in (CORE, Mie(epsilon=2.0)):
+        made = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
+        (result,) = simulate([made])
+        expected = twin(other, result.state) + twin(SHELL, result.state)
+        alone = twin(SHELL, result.state)
+        assert np.abs(expected - alone).max() > 0.1 * np.abs(alone).max()
+        np.testing.assert_allclose(
+            result.state["force"], expected, rtol=0, atol=1e-7 * np.abs(expected).max()
+        )
+
+
+def test_files_name_them_by_their_tables():
+    made = one(CORE, Mie(epsilon=2.0), SHELL)
+    tables = made.to_dict()["effects"]
+    assert list(tables) == ["core", "mie", "shell"]
+    assert [table.get("kind") for table in tables.values()] == ["mie", None, "mie"]
+    assert not any("name" in table for table in tables.values())
+    again = Scene.from_dict(json.loads(json.dumps(made.to_dict())))
+    assert again == made
+    assert again.digest() == made.digest()
+    assert '[effects.core]\nkind = "mie"\n' in made.to_toml()
+
+
+def test_settings_and_leaving_out_go_by_name():
+    made = one(CORE, SHELL)
+    changed = made.replace({"effects.core.epsilon": 5.0})
+    assert [effect.epsilon for effect in changed.effects] == [5.0, 0.3]
+    assert changed.digest() != made.digest()
+    assert made.without("core").effects == (SHELL,)
+    with pytest.raises(InputError, match="effect to leave out must be one of core, shell; received 'mie'"):
+        made.without("mie")
+    with pytest.raises(InputError, match=r"^core.epsilon must be greater than 0.0; received -1"):
+        made.replace({"effects.core.epsilon": -1})
+    with pytest.raises(InputError, match=r"^effects.core.epsilon|^effects.core"):
+        made.replace({"effects.core.depth.x": 1})
+
+
+def test_a_name_is_part_of_the_digest_and_the_kind_is_no_name():
+    plain = one(Mie(epsilon=1.0))
+    assert list(plain.to_dict()["effects"]) == ["mie"]
+    assert "kind" not in plain.to_dict()["effects"]["mie"]
+    assert one(Mie(name="mie", epsilon=1.0)).digest() == plain.digest()
+    assert one(CORE).digest() != plain.digest()
+
+
+@pytest.mark.long
+def test_two_oscillating_fields_add_up():
+    """The force on a charge in both is that of the sum, with a frequency for each."""
+    slow = ElectricField(name="slow", amplitude=(1.0, 0, 0), omega=(3.0, 0, 0))
+    fast = ElectricField(name="fast", amplitude=(0, 2.0, 0), omega=(0, 50.0, 0), phase=(0, 0.3, 0))
+    made = one(slow, fast, Lorentz(), quantities={"charge": 1e-6}, dt=0.01, steps=7)
+    (result,) = simulate([made])
+    t = result.time
+    expected = 1e-6 * np.array([np.sin(3 * t), 2 * np.sin(50 * t + 0.3), 0])
+    np.testing.assert_allclose(result.state["force"][0], expected, rtol=1e-12)
+
+
+def test_what_touching_pairs_remember_is_kept_for_each_by_name():
+    two = (Remembering(stiffness=1.0, width=1e-3), Remembering(name="other", stiffness=1.0, width=1e-3))
+    users = needed_fields(two, Verlet())
+    kept = {
+        one.name: who for one, who in users.items() if not isinstance(one, str) and "_partners" in one.name
+    }
+    assert kept == {"remembering_partners": "remembering", "other_partners": "other"}
+
+
+REFUSED = {
+    "effects.mie must be given once; received 2": lambda: one(Mie(epsilon=1.0), Mie(epsilon=2.0)),
+    "effects.core must be given once; received 2": lambda: one(CORE, NearField(name="core")),
+    "effects of kind impact must be one in a scene; received 2": lambda: one(
+        Impact(hardness=1e5), Impact(name="soft", hardness=1e3)
+    ),
+    "effects of kind random_kicks must be one in a scene; received 2": lambda: one(
+        RandomKicks(sigma=1.0), RandomKicks(name="more", sigma=1.0)
+    ),
+    "effects.cold must be used together with effects.heating; received 'cold'": lambda: one(
+        Cooling(name="cold", **{n: 1.0 for n, i in Cooling.model_fields.items() if i.is_required()})
+    ),
+    "a.b.name must be text of the form ^[A-Za-z][A-Za-z0-9_]*$; received 'a.b'": lambda: Gravity(name="a.b"),
+    "effects.core.name must be left out, as it is that of the table; received 'x'": lambda: Scene.from_dict(
+        {**one().to_dict(), "effects": {"core": {"kind": "mie", "name": "x", "epsilon": 1.0}}}
+    ),
+    "effects.core.kind must be one of": lambda: Scene.from_dict(
+        {**one().to_dict(), "effects": {"core": {"epsilon": 1.0}}}
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_makes_no_sense_twice_and_wrong_names_are_refused(message):
+    with pytest.raises(InputError) as fault:
+        REFUSED[message]()
+    assert str(fault.value).startswith(message)
+
+
+@pytest.mark.long
+def test_a_failure_says_which_of_them():
+    control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
+    traps = (Trap(stiffness=1.0), Trap(name="stiff", stiffness=1e7))
+    made = scene([[1, 0, 0]], [[0, 0, 0]], traps, mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
+    (result,) = simulate([made])
+    assert "by effects.stiff, at particle 0" in result.status.reason
+
+
+@pytest.mark.long
+def test_explain_lists_them_by_name():
+    from tisim.engine.explain import explain
+
+    shells = SoftShell(stiffness=1.0, width=1e-3), SoftShell(name="outer", stiffness=0.1, width=2e-3)
+    found = explain(one(*shells))
+    assert [part.name for part in found.effects] == ["soft_shell", "outer"]
+    assert [dict((n, v) for n, v, _ in part.parameters)["width"] for part in found.effects] == [
+        "0.001",
+        "0.002",
+    ]
