@@ -8,7 +8,7 @@ from tisim.effects.base import Force, parameter
 class Pull(Force):
     """Towards the origin, F = -k r / |r|."""
 
-    strength: float = parameter("N")
+    strength: float = parameter("N", "strength")
 
     @ti.func
     def force(self, s, w, i, t):

@@ -17,7 +17,7 @@ class Coulomb(PairForce):
     """F_i = -k q_i q_j / d^2 n_ij, between all pairs; only this effect needs the charge."""
 
     fields = ("charge",)
-    constant: float = parameter("N m^2/C^2", K_E, gt=0)
+    constant: float = parameter("N m^2/C^2", "constant", K_E, gt=0)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
@@ -27,10 +27,10 @@ class Coulomb(PairForce):
 class Trap(Force):
     """F = -k (r - c) + m g cos(omega t): a spring to a place, and a force that depends on time."""
 
-    stiffness: float = parameter("N/m", ge=0)
-    centre: tuple[float, float, float] = parameter("m", (0.0, 0.0, 0.0))
-    shake: tuple[float, float, float] = parameter("m/s^2", (0.0, 0.0, 0.0))
-    omega: float = parameter("1/s", 0.0, ge=0)
+    stiffness: float = parameter("N/m", "stiffness", ge=0)
+    centre: tuple[float, float, float] = parameter("m", "centre", (0.0, 0.0, 0.0))
+    shake: tuple[float, float, float] = parameter("m/s^2", "shake", (0.0, 0.0, 0.0))
+    omega: float = parameter("1/s", "omega", 0.0, ge=0)
 
     @ti.func
     def force(self, s, w, i, t):
@@ -43,7 +43,7 @@ class RandomKicks(Operator):
 
     fields = (Field("kicked", "m/s", 3), "velocity")
     counters = ("kicks",)
-    sigma: float = parameter("m/s^1.5", ge=0)
+    sigma: float = parameter("m/s^1.5", "sigma", ge=0)
 
     @ti.func
     def particle(self, s, w, i, t, dt):
@@ -59,8 +59,8 @@ class SoftShell(PairForce):
     """Linear repulsion within a gap: what a contact law needs of the core. Listed pairs only."""
 
     short_ranged = True
-    stiffness: float = parameter("N/m", gt=0)
-    width: float = parameter("m", gt=0)
+    stiffness: float = parameter("N/m", "stiffness", gt=0)
+    width: float = parameter("m", "width", gt=0)
 
     @ti.func
     def reach(self, s, w, i):

@@ -27,7 +27,7 @@ LEVELS = (2.0, 1.0, 0.0)
 class Pace(FixedStep):
     """A step control with a setting of its own."""
 
-    error: float = parameter("", 1e-4, gt=0)
+    error: float = parameter("", "error", 1e-4, gt=0)
     accuracy_parameters = (AccuracyParameter(error=1),)
 
 
@@ -49,7 +49,7 @@ class Sharp(Stepper):
 class Patchy(Trap):
     """A force that is as good as its setting."""
 
-    grain: float = parameter("m", 1e-3, gt=0)
+    grain: float = parameter("m", "grain", 1e-3, gt=0)
     accuracy_parameters = (AccuracyParameter(grain=2),)
 
 

@@ -104,7 +104,7 @@ WRONG = {
     "PROBLEM = 1": "PROBLEM of my_drift.py must be an optimize.Problem; received 1",
     "CASE = 1": "CASE of my_drift.py must be a cases.case.Case; received 1",
     PROBLEM + "SEARCH = 3": "SEARCH of my_drift.py must be settings of the search, by name; received 3",
-    PROBLEM + "SEARCH = {'seeds': 3}": "search.seeds must be a known key; received 3",
+    PROBLEM + "SEARCH = {'seeds': 3}": "search.seeds must be a known key: seed, method, ",
     "1 / 0": "line 1: ZeroDivisionError: division by zero",
 }
 

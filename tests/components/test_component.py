@@ -6,25 +6,26 @@ import numpy as np
 import pytest
 
 from tisim import InputError
-from tisim.components.component import ROWS, Component, Vector, parameter, unit_of
+from tisim.components.component import ROWS, Component, Vector, option, parameter
+from tisim.components.invalid import text_of, unit_of
 from tisim.errors import must
 
 
 class SampleSpring(Component):
     """A part with one parameter of each sort."""
 
-    stiffness: float = parameter("N/m", gt=0)
-    axis: Vector = parameter("", (0.0, 0.0, 1.0))
-    share: float = parameter("", 0.5, ge=0, le=1)
+    stiffness: float = parameter("N/m", "stiffness k of the spring", gt=0)
+    axis: Vector = parameter("", "axis", (0.0, 0.0, 1.0))
+    share: float = parameter("", "share", 0.5, ge=0, le=1)
     stiff: bool = False
-    order: int = parameter("", 2, ge=1)
+    order: int = option("order of the spring", 2, ge=1)
     requires: ClassVar = ()
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({}, "sample_spring.stiffness must be given; received nothing"),
+        ({}, "sample_spring.stiffness must be given (stiffness k of the spring, N/m); received nothing"),
         ({"stiffness": 0}, "sample_spring.stiffness must be greater than 0.0; received 0"),
         ({"stiffness": -1.5}, "sample_spring.stiffness must be greater than 0.0; received -1.5"),
         ({"stiffness": float("nan")}, "sample_spring.stiffness must be a finite number; received nan"),
@@ -34,7 +35,10 @@ class SampleSpring(Component):
         ({"stiffness": None}, "sample_spring.stiffness must be a number; received None"),
         ({"stiffness": 1, "share": 1.5}, "sample_spring.share must be at most 1.0; received 1.5"),
         ({"stiffness": 1, "share": -0.5}, "sample_spring.share must be at least 0.0; received -0.5"),
-        ({"stiffness": 1, "stifness": 2}, "sample_spring.stifness must be a known key; received 2"),
+        (
+            {"stiffness": 1, "stifness": 2},
+            "sample_spring.stifness must be a known key: stiffness, axis, share, stiff or order; received 2",
+        ),
         (
             {"stiffness": 1, "stiff": "perhaps"},
             "sample_spring.stiff must be true or false; received 'perhaps'",
@@ -75,6 +79,8 @@ def test_frozen_named_and_with_units():
         Component.named("sample_sprig", "part")
     assert unit_of(SampleSpring.model_fields["stiffness"]) == "N/m"
     assert unit_of(SampleSpring.model_fields["stiff"]) == ""
+    assert text_of(SampleSpring.model_fields["order"]) == "order of the spring"
+    assert text_of(SampleSpring.model_fields["stiff"]) == ""
 
 
 def test_parameters_vary_and_options_are_structure():
@@ -91,17 +97,25 @@ def test_parameters_vary_and_options_are_structure():
     assert part.structure() != SampleSpring(stiffness=2, order=3).structure()
 
 
+@pytest.mark.parametrize("text", ["", 0.5, None])
+def test_a_parameter_without_a_text_is_refused(text):
+    with pytest.raises(TypeError, match="parameter must be given a text after its unit; received"):
+        parameter("m", text)
+    with pytest.raises(TypeError, match="option must be given a text first; received"):
+        option(text)
+
+
 class SampleRow(Component):
     """A row of a list."""
 
-    radius: float = parameter("m", gt=0)
-    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+    radius: float = parameter("m", "radius", gt=0)
+    centre: Vector = parameter("m", "centre", (0.0, 0.0, 0.0))
 
 
 class SampleList(Component):
     """A part with a list of rows, of which each world may have its own number."""
 
-    scale: float = parameter("", 1.0)
+    scale: float = parameter("", "scale", 1.0)
     rows: tuple[SampleRow, ...]
 
 

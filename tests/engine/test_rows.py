@@ -15,14 +15,14 @@ from tisim.effects import Force, parameter
 class Spring(Component):
     """A spring to a point."""
 
-    stiffness: float = parameter("N/m", gt=0)
-    end: Vector = parameter("m")
+    stiffness: float = parameter("N/m", "stiffness", gt=0)
+    end: Vector = parameter("m", "end")
 
 
 class Springs(Force):
     """F = sum of k (end - r) over springs. Source: Hooke (1678)."""
 
-    share: float = parameter("", 1.0)
+    share: float = parameter("", "share", 1.0)
     springs: tuple[Spring, ...]
 
     @ti.func

@@ -27,8 +27,8 @@ class Held(Force):
     """A spring to the place where it is slack, for the first ``number`` particles; a pull for the others."""
 
     fields = Tether.fields
-    number: float = parameter("", 0.0, ge=0)
-    pull: Vector = parameter("N", (0.0, 0.0, 0.0))
+    number: float = parameter("", "number", 0.0, ge=0)
+    pull: Vector = parameter("N", "pull", (0.0, 0.0, 0.0))
 
     @ti.func
     def force(self, s, w, i, t):

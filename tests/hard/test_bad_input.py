@@ -74,7 +74,10 @@ BAD = {
         "impact.max_iterations must be less than 2147483648",
     ),
     "an exponent without end": (lambda: Mie(epsilon=1, n=1e300), "mie.n must be less than 2147483648"),
-    "unknown key": (lambda: Cloud(**CLOUD, colour="red"), "cloud.colour must be a known key; received 'red'"),
+    "unknown key": (
+        lambda: Cloud(**CLOUD, colour="red"),
+        "cloud.colour must be a known key: number, radius, ",
+    ),
     "unit in text": (
         lambda: Cloud(**{**CLOUD, "radius": "1 mm"}),
         "cloud.radius must be a number; received '1 mm'",
@@ -132,7 +135,7 @@ BAD = {
     ),
     "no duration": (
         lambda: Scene(particles=Cloud(**CLOUD)),
-        "scene.duration must be given; received nothing",
+        "scene.duration must be given (simulated time, s); received nothing",
     ),
     "duration zero": (
         lambda: Scene(particles=Cloud(**CLOUD), duration=0),
@@ -197,7 +200,7 @@ BAD_DATA = {
         "stepper.control.kind must be one of",
     ),
     "stepper not a table": (lambda: from_dict(stepper=1e-3), "stepper must be a table; received 0.001"),
-    "unknown key": (lambda: from_dict(durration=2), "scene.durration must be a known key; received 2"),
+    "unknown key": (lambda: from_dict(durration=2), "scene.durration must be a known key: name, particles, "),
     "name is a number": (lambda: from_dict(name=3), "scene.name must be text; received 3"),
 }
 

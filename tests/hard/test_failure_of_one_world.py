@@ -13,12 +13,12 @@ class Poison(Operator):
     """At a step, makes something of one particle not finite; each flag spoils one quantity."""
 
     fields = ("temperature",)
-    at_step: float = parameter("", 0.0)
-    victim: float = parameter("", 0.0)
-    velocity: float = parameter("", 0.0)
-    position: float = parameter("", 0.0)
-    temperature: float = parameter("", 0.0)
-    overflow: float = parameter("", 0.0)
+    at_step: float = parameter("", "at step", 0.0)
+    victim: float = parameter("", "victim", 0.0)
+    velocity: float = parameter("", "velocity", 0.0)
+    position: float = parameter("", "position", 0.0)
+    temperature: float = parameter("", "temperature", 0.0)
+    overflow: float = parameter("", "overflow", 0.0)
 
     @ti.func
     def particle(self, s, w, i, t, dt):

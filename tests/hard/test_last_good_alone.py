@@ -23,8 +23,8 @@ STEP = 1e-3
 class Ledge(Force):
     """A push across, and beyond a place along x a spring that is far too stiff."""
 
-    place: float = parameter("m")
-    push: float = parameter("N", 0.0)
+    place: float = parameter("m", "place")
+    push: float = parameter("N", "push", 0.0)
 
     @ti.func
     def force(self, s, w, i, t):

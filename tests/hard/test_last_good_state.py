@@ -16,9 +16,9 @@ WHEN = 0.783
 class Stiffening(Force):
     """A spring towards the middle, which after a time is stiffer, beyond all measure where asked for."""
 
-    when: float = parameter("s", WHEN)
-    stiffness: float = parameter("N/m", 1.0)
-    later: float = parameter("N/m", 1.0)
+    when: float = parameter("s", "when", WHEN)
+    stiffness: float = parameter("N/m", "stiffness", 1.0)
+    later: float = parameter("N/m", "later", 1.0)
 
     @ti.func
     def force(self, s, w, i, t):

@@ -184,7 +184,7 @@ def test_forces_over_lists_are_those_over_all_pairs(rng):
 class Vanish(Operator):
     """Removes every particle at a step."""
 
-    at_step: float = parameter("", 3.0)
+    at_step: float = parameter("", "at step", 3.0)
 
     @ti.func
     def particle(self, s, w, i, t, dt):

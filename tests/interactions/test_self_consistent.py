@@ -18,8 +18,8 @@ class Ramp(Source):
     """H(r) = strength + slope x, uniform apart from a gradient along x."""
 
     quantity = "magnetic_field_strength"
-    strength: Vector = parameter("A/m", (0.0, 0.0, 0.0))
-    slope: Vector = parameter("A/m^2", (0.0, 0.0, 0.0))
+    strength: Vector = parameter("A/m", "strength", (0.0, 0.0, 0.0))
+    slope: Vector = parameter("A/m^2", "slope", (0.0, 0.0, 0.0))
 
     @ti.func
     def value(self, w, r, t):
@@ -35,7 +35,7 @@ class Polarisation(SelfConsistentQuantity):
 
     fields = (DIPOLE, "radius")
     quantity = "dipole"
-    chi: float = parameter("", gt=0)
+    chi: float = parameter("", "chi", gt=0)
 
     def connect(self, peers):
         return {"applied": sources(peers, "magnetic_field_strength")}
@@ -201,7 +201,7 @@ class Potential(SelfConsistentQuantity):
 
     fields = (Field("potential", "V", 1, "keep"),)
     quantity = "potential"
-    strength: float = parameter("m", gt=0)
+    strength: float = parameter("m", "strength", gt=0)
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):

@@ -56,8 +56,8 @@ class Grip(PairForce):
     fields = ("spin",)
     short_ranged = True
     memory = 3
-    stiffness: float = parameter("N/m", gt=0)
-    grip: float = parameter("N/m", ge=0)
+    stiffness: float = parameter("N/m", "stiffness", gt=0)
+    grip: float = parameter("N/m", "grip", ge=0)
 
     @ti.func
     def slid(self, s, w, i, j, separation, distance, past, dt):

@@ -114,7 +114,12 @@ class TestReplace:
         ("key", "value", "message"),
         [
             ("effects.impact.hardness", -1, "impact.hardness must be greater than 0.0; received -1"),
-            ("effects.impact.hardnes", 1, "impact.hardnes must be a known key; received 1"),
+            (
+                "effects.impact.hardnes",
+                1,
+                "impact.hardnes must be a known key: name, hardness, deformation_length, initial_area, "
+                "final_area, tolerance or max_iterations; received 1",
+            ),
             (
                 "effects.impcat.hardness",
                 1,
@@ -123,7 +128,12 @@ class TestReplace:
             ("duration.long", 1, "duration.long must be a setting of this scene; received 'long'"),
             ("duration", 0, "scene.duration must be greater than 0.0; received 0"),
             ("stepper.control.shortest", "soon", "approach_time.shortest must be a number; received 'soon'"),
-            ("nonsense", 1, "scene.nonsense must be a known key; received 1"),
+            (
+                "nonsense",
+                1,
+                "scene.nonsense must be a known key: name, particles, effects, domain, stepper, "
+                "duration or seed; received 1",
+            ),
         ],
     )
     def test_says_what_is_wrong(self, key, value, message):

@@ -91,7 +91,7 @@ class Implicit(Stepper):
     counters = ("corrections",)
     world_quantities = ("unsolved", "largest_change")
     control: Controller
-    tolerance: float = parameter("m", 1e-14, gt=0)
+    tolerance: float = parameter("m", "tolerance", 1e-14, gt=0)
 
     def fields(self, turning, independent):
         return (

@@ -6,7 +6,6 @@ A ``Component`` is a frozen pydantic model. Its name in a file is its class name
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
@@ -18,8 +17,9 @@ from pydantic_core import PydanticCustomError
 
 from tisim.backend.taichi import DEVICE_FUNCTION
 from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.invalid import explain_invalid, unit_of
 from tisim.components.ranges import WHOLE, check_magnitude
-from tisim.errors import InputError, must, named, shown
+from tisim.errors import InputError, must
 from tisim.files import python_file
 
 Vector = tuple[float, float, float]
@@ -48,7 +48,7 @@ class Checked(BaseModel):
         try:
             super().__init__(**data)
         except ValidationError as invalid:
-            raise InputError(explain_invalid(invalid, self.called(data))) from None
+            raise InputError(explain_invalid(invalid, self.called(data), type(self).model_fields)) from None
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:
@@ -180,15 +180,31 @@ def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
         yield from _descendants(sub)
 
 
-def parameter(unit: str, default: Any = ..., **rules: Any) -> Any:
-    """Declare a physical parameter: its unit, and pydantic rules such as ``gt=0``.
+def parameter(unit: str, text: str, default: Any = ..., **rules: Any) -> Any:
+    """Declare a physical parameter: its unit ("" for a pure number), what it is in a phrase, and its default.
+
+    ``rules`` are pydantic's, such as ``gt=0``; ``examples=[3e5]`` gives a value for templates where there is
+    no default.
 
     A float or ``Vector`` parameter may differ in every world of a batch. A kernel reads it as
     ``self.name(w)``; a plain Python number there would be frozen into the kernel at first compile. A list of
     parts, ``tuple[Row, ...]`` with Row a Component of such parameters, is one bound Row there. Its parameters
     are functions of the world and the row: ``self.rows.name(w, k)``, k below ``self.rows.size(w)``.
     """
-    return Field(default, json_schema_extra={"unit": unit}, **rules)
+    if not (isinstance(text, str) and text):
+        raise TypeError(f"parameter must be given a text after its unit; received {text!r}")
+    return Field(default, description=text, json_schema_extra={"unit": unit}, **rules)
+
+
+def option(text: str, default: Any = ..., **rules: Any) -> Any:
+    """Declare what is no physical quantity, such as a method or a number of sweeps: what it is, its default.
+
+    It is the same in all worlds of a batch, and a kernel reads it as ``self.name``, compiled in. ``rules``
+    are those of ``parameter``.
+    """
+    if not (isinstance(text, str) and text):
+        raise TypeError(f"option must be given a text first; received {text!r}")
+    return Field(default, description=text, **rules)
 
 
 def _bounded(info: FieldInfo) -> bool:
@@ -199,74 +215,3 @@ def _bounded(info: FieldInfo) -> bool:
 def room(rows: int) -> int:
     """Rows that a world's table has room for, so that scenes with lists of like lengths run as one batch."""
     return max(ROWS, 1 << (rows - 1).bit_length())
-
-
-def unit_of(info: FieldInfo) -> str:
-    """The unit declared by ``parameter``, or an empty string."""
-    extra = info.json_schema_extra
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
-
-
-_RULES = {
-    "greater_than": "greater than {gt}",
-    "greater_than_equal": "at least {ge}",
-    "less_than": "less than {lt}",
-    "less_than_equal": "at most {le}",
-    "finite_number": "a finite number",
-    "float_parsing": "a number",
-    "float_type": "a number",
-    "int_parsing": "a whole number",
-    "int_parsing_size": "a whole number that is not so large",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "bool_parsing": "true or false",
-    "bool_type": "true or false",
-    "string_type": "text",
-    "string_pattern_mismatch": "text of the form {pattern}",
-    "missing": "given",
-    "extra_forbidden": "a known key",
-    "literal_error": "{expected}",
-    "tuple_type": "a list",
-    "too_short": "a list of {min_length}",
-    "too_long": "a list of {max_length}",
-}
-
-
-FAULTS = 10
-"""Faults that a message lists, a line for each."""
-_CHOICE = re.compile(r"int|float|tuple\[.*\]")
-"""What pydantic adds to the place of a fault, for each type that would have done."""
-
-
-def explain_invalid(invalid: ValidationError, where: str) -> str:
-    """One line per fault of a pydantic report: "X must be Y; received Z"."""
-    lines: dict[str, list[str]] = {}
-    received: dict[str, str] = {}
-    for fault in invalid.errors(include_url=False):
-        loc = tuple(itertools.takewhile(lambda part: not _is_choice(part), fault["loc"]))
-        name = named(".".join([where, *map(str, loc)]))
-        context: Mapping[str, Any] = fault.get("ctx", {})
-        if isinstance(context.get("error"), InputError):
-            for line in _named_within(name, loc, str(context["error"])):
-                lines.setdefault(line, [])
-            continue
-        known = _RULES.get(fault["type"])
-        rule = known.format(**context) if known else fault["msg"].removeprefix("Input should be ")
-        lines.setdefault(name, []).append(rule)
-        received.setdefault(name, "nothing" if fault["type"] == "missing" else shown(fault["input"]))
-    text = [
-        f"{name} must be {' or '.join(dict.fromkeys(rules))}; received {received[name]}" if rules else name
-        for name, rules in lines.items()
-    ]
-    rest = f" (and {len(text) - FAULTS} faults more)" if len(text) > FAULTS else ""
-    return "\n".join(text[:FAULTS]) + rest
-
-
-def _is_choice(part: int | str) -> bool:
-    return isinstance(part, str) and _CHOICE.fullmatch(part) is not None
-
-
-def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:
-    """What a part says of itself; a row of a list, which row it is."""
-    row = bool(loc) and isinstance(loc[-1], int)
-    return [f"{name}.{line.partition('.')[2]}" if row else line for line in text.splitlines()]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.component import Component, Vector, parameter
+from tisim.components.component import Component, Vector, option, parameter
 from tisim.errors import must
 
 
@@ -62,21 +62,23 @@ class Domain(Component):
 
 
 class Open(Domain):
-    """All of space."""
+    """The domain is all of space."""
 
 
 class Box(Domain):
-    """A box low..high (m); what leaves through one face comes back through the opposite one.
+    """The domain is a box; what leaves it through one face comes back through the opposite one.
 
-    images : whether particles also see each other across the faces (a periodic system). False is the
-        control volume of Z04 section 7: a grain that leaves comes back on the other side with the same
-        velocity, and meets there whatever is there. (The paper reverses the coordinate; the two differ
-        by twice the overshoot, and translation keeps the particle inside.)
+    With images, particles also see each other across the faces: a periodic system. Without, it is the control
+    volume of Z04 section 7: a grain that leaves comes back on the other side with the same velocity, and
+    meets there whatever is there. (The paper reverses the coordinate; the two differ by twice the overshoot,
+    and translation keeps the particle inside.)
+
+    Source: Z04 section 7.
     """
 
-    low: Vector = parameter("m")
-    high: Vector = parameter("m")
-    images: bool = True
+    low: Vector = parameter("m", "lower corner of the box", examples=[(-0.01, -0.01, -0.01)])
+    high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
+    images: bool = option("whether particles see each other across the faces", True)
 
     @model_validator(mode="after")
     def _ordered(self) -> Box:

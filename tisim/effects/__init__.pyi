@@ -5,6 +5,9 @@ from .base import (
     Effect as Effect,
 )
 from .base import (
+    Field as Field,
+)
+from .base import (
     Force as Force,
 )
 from .base import (
@@ -15,6 +18,9 @@ from .base import (
 )
 from .base import (
     SelfConsistentQuantity as SelfConsistentQuantity,
+)
+from .base import (
+    option as option,
 )
 from .base import (
     parameter as parameter,

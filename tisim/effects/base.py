@@ -37,36 +37,46 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field as Option
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
-from tisim.components.component import Component, parameter
+from tisim.components.component import Component, option, parameter
 from tisim.worlds.state import Field
 
 __all__ = [
     "DerivedQuantity",
     "Effect",
+    "Field",
     "Force",
     "PairEvent",
     "PairForce",
     "SelfConsistentQuantity",
+    "option",
     "parameter",
 ]
 
 
 class Effect(Component):
-    """Anything physical that a scene can call for.
+    """An effect is anything physical that a scene can call for: the contract of all of them.
 
-    name : what it is called in a scene, files and messages; its kind unless given. A scene has each name
-    once, so that it can hold two of a kind where ``repeatable`` says that they make sense: each then acts
-    with its own parameters, and what both count is added up.
+    Laws are made after one of its kinds: ``Force``, ``PairForce``, ``PairEvent``, ``DerivedQuantity``,
+    ``SelfConsistentQuantity``, ``Source`` or ``Operator``. A scene has each name once, so that it can hold
+    two of a kind where they make sense: each acts with its own parameters, and what both count is added up.
+
+    fields : the particle fields that it reads or writes, by name or as a ``Field``. counters : names of the
+    integer counters that it keeps of a world. world_quantities : names of the quantities that it keeps of a
+    world. requires_source : the quantities of which a scene must have at least one source. repeatable :
+    whether a scene can hold two of its kind.
     """
 
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = False
 
-    name: str | None = Option(None, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    name: str | None = option(
+        "name in the scene, files and messages; its kind unless given",
+        None,
+        pattern=r"^[A-Za-z][A-Za-z0-9_]*$",
+    )
 
     fields: ClassVar[tuple[str | Field, ...]] = ()
     counters: ClassVar[tuple[str, ...]] = ()
@@ -79,25 +89,26 @@ class Effect(Component):
         return str(data.get("name") or cls.kind())
 
     def required_fields(self) -> tuple[str | Field, ...]:
-        """The particle fields that this one needs, given its options; all of ``fields`` by default."""
+        """Return the particle fields that it needs, given its options; by default all of ``fields``."""
         return self.fields
 
     def at_start(self, masses: np.ndarray) -> Self:
-        """With parameters left at None taken from the masses of the start (kg); itself by default."""
+        """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""
         return self
 
     def capacity(self, masses: np.ndarray) -> int:
-        """Particles that may ever live at once, given those of the start (kg); their number by default."""
+        """Return how many particles may ever live at once, given the masses of those of the start (kg); by
+        default there are never more than at the start."""
         return len(masses)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        """Cheaper laws that ``tisim cost`` tries in its place, the coarsest first, for particles that are up
-        to ``extent`` (m) apart; none by default."""
+        """Return cheaper laws that ``tisim cost`` tries in its place, the coarsest first, for particles that
+        are up to ``extent`` (m) apart; by default none."""
         return ()
 
     @classmethod
     def offers(cls, hook: str) -> bool:
-        """Whether it defines a method that its contract leaves empty."""
+        """Return whether it defines a method that its contract leaves empty."""
         return getattr(cls, hook) is not getattr(cls._promise(hook), hook)
 
     @classmethod
@@ -106,36 +117,37 @@ class Effect(Component):
 
 
 class Force(Effect):
-    """A force on a particle by itself: of its state, its place and the time."""
+    """A force acts on each particle by itself, and depends on its state, its place and the time."""
 
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
 
     @ti.func
     def force(self, s, w, i, t):
-        """Force on particle i of world w at time t. N."""
+        """Return the force on particle i of world w at time t (s), in N."""
         return 0.0 * s.velocity[w, i]
 
     @ti.func
     def torque(self, s, w, i, t):
-        """Torque on particle i about its centre. N m."""
+        """Return the torque on particle i about its centre, in N m."""
         return 0.0 * s.velocity[w, i]
 
     @ti.func
     def velocity_jacobian(self, s, w, i, t):
-        """[a, b] the derivative of component a of ``force`` by component b of the velocity of i. N s/m.
+        """Return the derivatives of ``force``: [a, b] that of component a by component b of the velocity of
+        i, in N s/m.
 
-        Of the trial state, like ``force``. Implicit steppers solve with it what is linear in velocity
-        exactly; a force of which ``offers("velocity_jacobian")`` is false they take as given.
+        Like ``force`` it is of the trial state. Implicit steppers solve with it what is linear in velocity
+        exactly; a force that does not define it they take as given.
         """
         return ti.Matrix.zero(s.real, 3, 3)
 
 
 class Pairwise(Effect):
-    """What is summed over pairs.
+    """The contract of what is summed over pairs.
 
-    A ``short_ranged`` one is zero where the gap between surfaces is wider than ``reach``, and is summed
-    over the pair list; any other is summed over all pairs.
+    short_ranged : whether it is zero where the gap between surfaces is wider than ``reach``; it is then
+    summed over the pair list, otherwise over all pairs.
     """
 
     contract: ClassVar[bool] = True
@@ -143,12 +155,14 @@ class Pairwise(Effect):
 
     @ti.func
     def reach(self, s, w, i):
-        """Widest gap (m) at which it acts between i and a particle that is no larger, when short-ranged."""
+        """Return the widest gap (m) at which it acts between i and a particle that is no larger."""
         return 0.0
 
 
 class PairForce(Pairwise):
-    """A force between two particles, along any direction; ``pair_force(i, j) = -pair_force(j, i)``.
+    """A pair force acts between two particles, along any direction, and equals its reaction.
+
+        pair_force(i, j) = -pair_force(j, i)
 
     memory : values that a pair remembers while it touches, for short-ranged forces; a bound effect reads
         them with ``self.past.recall(s, w, i, j)``, a vector, and zero for a pair that has just met.
@@ -162,29 +176,31 @@ class PairForce(Pairwise):
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
-        """Force on i by j; ``separation`` is r_j - r_i (m), ``distance`` its length. N."""
+        """Return the force on i by j, in N; ``separation`` is r_j - r_i (m), ``distance`` its length."""
         return 0.0 * separation
 
     @ti.func
     def pair_torque(self, s, w, i, j, separation, distance, t):
-        """Torque on i, about its centre, by j. N m."""
+        """Return the torque on i by j, about the centre of i, in N m."""
         return 0.0 * separation
 
     @ti.func
     def touching(self, s, w, i, j, separation, distance):
-        """Whether the pair has something to remember; what it knows is forgotten when it has not."""
+        """Return whether the pair has something to remember; what it knows is forgotten when it has not."""
         return distance <= s.radius[w, i] + s.radius[w, j]
 
     @ti.func
     def remember(self, s, w, i, j, separation, distance, past, dt):
-        """What the pair knows after a further dt (s), given ``past``; i is the one who keeps it."""
+        """Return what the pair knows after a further dt (s), given ``past``; i is the one who keeps it."""
         return past
 
 
 class DerivedQuantity(Effect):
-    """A quantity of each particle, the field ``quantity``, that follows from the rest of the state.
+    """A derived quantity of each particle follows from the rest of the state, such as a magnetic moment.
 
-    Set before forces are summed, whenever they are; of several, in scene order.
+    It is set before forces are summed, whenever they are; several of them in scene order.
+
+    quantity : the name of the field that it sets.
     """
 
     contract: ClassVar[bool] = True
@@ -192,21 +208,23 @@ class DerivedQuantity(Effect):
 
     @ti.func
     def response(self, s, w, i, total, t):
-        """The value of i, given the sum of what the others do to it: zero unless it is self-consistent."""
+        """Return the value of i, given the sum of what others do to it: 0 unless it is self-consistent."""
         return total
 
 
 class SelfConsistentQuantity(DerivedQuantity, Pairwise):
-    """A quantity of each particle that depends on that of the others: q_i = response(sum_j influence(q_j)).
+    """A self-consistent quantity of each particle depends on that of all others, such as an induced dipole.
 
-    Settled by sweeps over all particles at once (the method of Jacobi), each starting from the last values,
-    also those of the last step, until no particle changes by more than ``tolerance`` times the largest
-    value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so; with ``sweeps`` of 0
-    there is one sweep per step and no such test.
+        q_i = response(sum_j influence(q_j))
 
-    relaxation : the part a of its way that a sweep goes, q = (1 - a) q + a response. Where the others act by
-    a linear law, with real eigenvalues L, sweeps converge if 1 - 2/a < L < 1 for all of them. There is no
-    solution to find where L exceeds 1; a < 1 helps where one is below -1, as in dense lattices.
+    It is found by sweeps over all particles at once (the method of Jacobi), each starting from the last
+    values, also those of the last step, until no particle changes by more than ``tolerance`` times the
+    largest value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so; with
+    ``sweeps`` of 0 there is one sweep per step and no such test.
+
+    Where the others act by a linear law, with real eigenvalues L, sweeps with a ``relaxation`` of a converge
+    if 1 - 2/a < L < 1 for all of them. There is no solution to find where L exceeds 1; a < 1 helps where one
+    is below -1, as in dense lattices.
 
     ``sweep_factor`` of a world is what sweeps multiply the change by, from the last three; without end it
     tends to the largest |1 - a + a L|.
@@ -216,9 +234,13 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     counters = ("mutual_sweeps",)
     world_quantities = ("sweep_factor",)
 
-    tolerance: float = parameter("", 1e-8, gt=0)
-    sweeps: int = Option(100, ge=0)
-    relaxation: float = parameter("", 1.0, gt=0, le=1)
+    tolerance: float = parameter(
+        "", "change in a sweep, over the largest value, at which the solution counts as converged", 1e-8, gt=0
+    )
+    sweeps: int = option("sweeps over all particles at most; 0 for one a step without a test", 100, ge=0)
+    relaxation: float = parameter(
+        "", "part a of its way that a sweep goes, q = (1 - a) q + a response", 1.0, gt=0, le=1
+    )
 
     accuracy_parameters = (AccuracyParameter(tolerance=1),)
 
@@ -227,15 +249,15 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """What j, with its present value, does at i."""
+        """Return what j, with its present value, does at i."""
         return 0.0 * separation
 
 
 class PairEvent(Effect):
-    """Something sudden between two particles, such as an impact.
+    """A pair event is something sudden between two particles, such as an impact.
 
-    hard : its particles are hard spheres, which may touch but not lie in each other: a world stops in which
-        that is true of more pairs than can touch.
+    hard : whether its particles are hard spheres, which may touch but not lie in each other: a world stops in
+        which that is true of more pairs than can touch.
     """
 
     contract: ClassVar[bool] = True
@@ -243,12 +265,12 @@ class PairEvent(Effect):
 
     @ti.func
     def contact(self, s, w, i, j, separation):
-        """How long ago (s) the event between i and j fell due; negative when it has not.
+        """Return how long ago (s) the event between i and j fell due; something negative when it has not.
 
-        ``separation`` is r_j - r_i (m). Called for every near pair in every step.
+        ``separation`` is r_j - r_i (m). It is called for every near pair in every step.
         """
         return -1.0
 
     @ti.func
     def resolve(self, s, w, i, j, separation):
-        """Change i and j; both are exclusively the caller's."""
+        """Change i and j, which no other event changes at the same time."""

@@ -18,7 +18,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Result:
-    """A world read back.
+    """A result is what a run has made of one scene.
 
     state : arrays of the live particles by field name, SI; shape (n,) or (n, 3). After a failure, that
         of the last good step; for particles that do not feel each other and take implicit or Brownian steps

@@ -11,13 +11,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, parameter
+from tisim.effects.base import Effect, option, parameter
 
-__all__ = ["Operator", "parameter"]
+__all__ = ["Operator", "option", "parameter"]
 
 
 class Operator(Effect):
-    """A change of state between steps."""
+    """An operator changes the state between steps."""
 
     contract: ClassVar[bool] = True
 

@@ -12,14 +12,16 @@ from tisim.worlds.state import Field
 
 
 class Capture(Operator):
-    """A particle whose surface meets that of a magnet is put on it, at rest, and fixed: no force moves it.
+    """A particle that touches a magnet of the scene stays where it touches, at rest.
 
-    It sets three fields of the particle. fixed : 1; a start may fix particles too, which are not counted.
-    captured_by : the magnet, counted from 0 through the lists of the scene in order; -1 for none.
-    captured_at : s, the end of the step in which it touched; -1 for a free one.
-    ``work["captures"]`` counts them. They still act on others. One that a step brings into a magnet goes to
-    the nearest point outside, so steps must be short beside the magnet. Impacts, which would move it again,
-    are refused. Source: B16 section 6.3.
+    A particle whose surface meets that of a magnet is put on it and fixed: no force moves it. It still acts
+    on others. Three fields of the particle say so: ``fixed`` is 1 (a start may fix particles too, which are
+    not counted); ``captured_by`` is the magnet, counted from 0 through the lists of the scene in order, -1
+    for none; ``captured_at`` is the end of the step in which it touched (s), -1 for a free one.
+    ``work["captures"]`` counts them. A particle that a step brings into a magnet goes to the nearest point
+    outside, so steps must be short beside the magnet. Impacts, which would move it again, are refused.
+
+    Source: B16 section 6.3.
     """
 
     fields: ClassVar = (

@@ -18,24 +18,26 @@ f''/(2 f') < 1.5/t for the equation below; a change below rounding would be wait
 
 
 class Cooling(Operator):
-    """Grains exchange heat with a gas and with what surrounds them. With a_s = 4 pi b^2,
+    """Grains exchange heat with a gas and, by radiation, with what surrounds them.
 
-        m C dT/dt = -h_c a_s (T - T_gas) - sigma eps a_s (T^4 - T_s^4)
+        m C dT/dt = -h_c a_s (T - T_gas) - sigma eps a_s (T^4 - T_s^4),    a_s = 4 pi b^2
 
-    emissivity : eps, 0..1. surroundings : T_s. convection : h_c. gas : T_gas.
-    Source: Z04 Eq. (6.20). The paper steps it explicitly (6.21), which turns negative for a small hot
-    grain, where a step of 1e-6 s is longer than the grain takes to cool. Here the step is implicit
-    (backward Euler, as accurate): the equation for the new temperature rises and is convex, so Newton's
-    iteration converges to its one root, which lies between the old temperature and equilibrium.
+    b is the radius, C the specific heat capacity and sigma the constant of Stefan and Boltzmann. The paper
+    steps this explicitly (6.21), which turns negative for a small hot grain, where a step of 1e-6 s is longer
+    than the grain takes to cool. Here the step is implicit (backward Euler, as accurate): the equation for
+    the new temperature rises and is convex, so Newton's iteration converges to its one root, which lies
+    between the old temperature and equilibrium.
+
+    Source: Z04 Eq. (6.20).
     """
 
     fields = ("temperature", "radius", Field("cooling_loss", "J", 1, "sum"))
     requires: ClassVar[tuple[type[Effect], ...]] = (Heating,)
 
-    emissivity: float = parameter("", 0.5, ge=0, le=1)
-    surroundings: float = parameter("K", 300.0, ge=0)
-    convection: float = parameter("W/(m^2 K)", 0.0, ge=0)
-    gas: float = parameter("K", 300.0, ge=0)
+    emissivity: float = parameter("", "emissivity eps of the grains", 0.5, ge=0, le=1)
+    surroundings: float = parameter("K", "temperature T_s of what surrounds the grains", 300.0, ge=0)
+    convection: float = parameter("W/(m^2 K)", "coefficient h_c of heat transfer by convection", 0.0, ge=0)
+    gas: float = parameter("K", "temperature T_gas of the gas", 300.0, ge=0)
 
     def connect(self, peers):
         return {"heating": next(peer for peer in peers if isinstance(peer, Heating))}

@@ -14,17 +14,18 @@ from tisim.worlds.state import Field, WorldStatus
 
 
 class Fragmentation(ImpactLaw, Operator):
-    """A grain whose absorbed kinetic energy dK would shrink its pieces below a threshold breaks.
+    """A grain that absorbs much kinetic energy in an impact breaks into equal pieces.
 
-    The radius of pieces whose surface costs dK is b = b_0 / (dK / (4 pi gamma b_0^2) + 1) (5.2). When
-    b / b_0 is below ``threshold`` it breaks into n = b_0^3 / b^3 equal pieces, rounded down and none lighter
-    than ``grain_mass``, which move on together as a touching cluster about the same centre of mass. Mass,
-    momentum and kinetic energy are conserved; the new surface takes dZ = gamma (n 4 pi b^2 - 4 pi b_0^2)
-    from the grain's heat (6.8). A grain that breaks does not bond in that impact.
+        b = b_0 / (dK / (4 pi gamma b_0^2) + 1)       radius of pieces whose surface costs dK     (5.2)
+        n = b_0^3 / b^3                               number of pieces
+        dZ = gamma (n 4 pi b^2 - 4 pi b_0^2)          energy of the new surface                   (6.8)
 
-    surface_energy : gamma. grain_mass : mass of an original grain, the smallest piece; by default the
-        lightest particle of the start, so that it follows the start's density and radius.
-    threshold : b / b_0 below which it breaks; 2^(-1/3), two pieces, by default. Z04 remark 5.1 uses 1/2.
+    dK is the kinetic energy absorbed and b_0 the radius. The grain breaks when b / b_0 is below the
+    threshold. n is rounded down, and no piece is lighter than an original grain. The pieces move on together
+    as a touching cluster about the same centre of mass. Mass, momentum and kinetic energy are conserved; dZ
+    is taken from the grain's heat. A grain that breaks does not bond in that impact. Z04 remark 5.1 uses a
+    threshold of 1/2.
+
     Source: Z04 Eqs (5.1)-(5.3).
     """
 
@@ -37,9 +38,16 @@ class Fragmentation(ImpactLaw, Operator):
     counters = ("fractures",)
     requires: ClassVar = (Impact,)
 
-    surface_energy: float = parameter("J/m^2", gt=0)
-    grain_mass: float | None = parameter("kg", None, gt=0)
-    threshold: float = parameter("", 2.0 ** (-1.0 / 3.0), gt=0, lt=1)
+    surface_energy: float = parameter("J/m^2", "surface energy gamma", examples=[10.0], gt=0)
+    grain_mass: float | None = parameter(
+        "kg",
+        "mass of an original grain, the smallest piece; unless given, the lightest of the start",
+        None,
+        gt=0,
+    )
+    threshold: float = parameter(
+        "", "ratio b / b_0 below which a grain breaks; two pieces by default", 2.0 ** (-1.0 / 3.0), gt=0, lt=1
+    )
 
     def at_start(self, masses: np.ndarray) -> Self:
         return self.model_copy(update={"grain_mass": self._grain(masses)})

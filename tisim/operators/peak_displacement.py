@@ -10,10 +10,13 @@ from tisim.worlds.state import Field
 
 
 class PeakDisplacement(Operator):
-    """max over steps of |sum_i m_i (r_i - r_i(0))| / sum_i m_i: ``measures["peak_displacement"]``, m.
+    """The largest displacement of the centre of gravity is observed; nothing is changed.
 
-    r(0) is the field ``origin`` (m), the position at the start. It changes nothing, but particles that do not
-    feel each other then take common steps. In a box with joined faces distances are those of open space.
+        max over steps of |sum_i m_i (r_i - r_i(0))| / sum_i m_i
+
+    It is ``measures["peak_displacement"]`` (m). r(0) is the field ``origin`` (m), the position at the start.
+    Particles that do not feel each other then take common steps. In a box with joined faces distances are
+    those of open space.
     """
 
     fields: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)

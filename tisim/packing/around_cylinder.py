@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import field_validator
 from scipy.spatial import cKDTree
 
-from tisim.components.component import Vector, parameter
+from tisim.components.component import Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import check_direction, check_resolved
 from tisim.errors import InputError, must
@@ -19,21 +19,22 @@ ROUNDS = 200
 
 
 class RandomAroundCylinder(Placement):
-    """Random sequential addition of spheres that lie wholly in a layer around a cylinder, or in part of it.
+    """Spheres lie at random and wholly inside a layer around a cylinder, or a part of it.
 
-    centre; axis : of any length but 0; radius, length : of the cylinder. thickness : of the layer, which is
-    what a cylinder larger by it on all sides has more. part : "side", beside the lateral surface; "top",
-    beyond both ends, from the axis to the outer side; or "all" of the layer, which is both.
-    Source: the regions SIDE and TOP of B16 section 6.3. The paper draws how they lie and says how wide they
-    are in a figure only; here they are as wide as the caller says, and together leave nothing out.
+    The layer is what a cylinder that is larger by its thickness on all sides has more. Its part "side" lies
+    beside the lateral surface, "top" beyond both ends, from the axis to the outer side; "all" is both. The
+    paper draws how its regions SIDE and TOP lie and says how wide they are in a figure only; here they are as
+    wide as the caller says, and together leave nothing out.
+
+    Source: B16 section 6.3.
     """
 
-    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
-    axis: Vector = parameter("", (0.0, 0.0, 1.0))
-    radius: float = parameter("m", gt=0)
-    length: float = parameter("m", gt=0)
-    thickness: float = parameter("m", gt=0)
-    part: Literal["all", "top", "side"] = "all"
+    centre: Vector = parameter("m", "centre of the cylinder", (0.0, 0.0, 0.0))
+    axis: Vector = parameter("", "direction of the axis, of any length but 0", (0.0, 0.0, 1.0))
+    radius: float = parameter("m", "radius of the cylinder", examples=[0.01], gt=0)
+    length: float = parameter("m", "length of the cylinder", examples=[0.04], gt=0)
+    thickness: float = parameter("m", "thickness of the layer", examples=[0.01], gt=0)
+    part: Literal["all", "top", "side"] = option("part of the layer that is filled", "all")
 
     @field_validator("axis", mode="after")
     @classmethod

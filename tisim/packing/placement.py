@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import model_validator
 
-from tisim.components.component import Component, Vector, parameter
+from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_resolved
 from tisim.errors import InputError, must
@@ -17,26 +17,28 @@ from tisim.packing.random_sequential import place
 
 
 class Placement(Component):
-    """Places for equal spheres; the contract of a placement."""
+    """The contract of a placement, which gives places to equal spheres."""
 
     contract: ClassVar[bool] = True
 
     def sites(self) -> int | None:
-        """How many spheres it has room for, where that is fixed; None where any number may be asked for."""
+        """Return how many spheres it has room for; None where any number may be asked for."""
         return None
 
     def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        """Centres, shape (number, 3) in m, of spheres of ``radius`` (m) that do not overlap.
+        """Return centres, shape (number, 3) in m, of spheres of ``radius`` (m) that do not overlap.
 
-        InputError when there is no room for them. Depends on the arguments alone.
+        InputError is raised when there is no room for them. The centres depend on the arguments alone.
         """
         raise NotImplementedError(f"{type(self).__name__} must define centres")
 
 
 class RandomInDomain(Placement):
-    """Random sequential addition with centres anywhere in the domain, as Z04 section 8.
+    """Spheres lie at random with their centres anywhere in the domain, by random sequential addition.
 
-    Spheres may reach over its faces, across which they keep apart where the domain is periodic.
+    They may reach over the faces of the domain, across which they keep apart where it is periodic.
+
+    Source: Z04 section 8.
     """
 
     def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
@@ -47,10 +49,10 @@ class RandomInDomain(Placement):
 
 
 class RandomInBox(Placement):
-    """Random sequential addition of spheres that lie wholly inside a box low..high (m)."""
+    """Spheres lie at random and wholly inside a box, by random sequential addition."""
 
-    low: Vector = parameter("m")
-    high: Vector = parameter("m")
+    low: Vector = parameter("m", "lower corner of the box", examples=[(0.0, 0.0, 0.0)])
+    high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
 
     def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
         return place(
@@ -59,29 +61,32 @@ class RandomInBox(Placement):
 
 
 class RandomInBall(Placement):
-    """Random sequential addition of spheres that lie wholly inside a ball (Z16 sections 6.1 and 9).
+    """Spheres lie at random and wholly inside a ball, by random sequential addition.
 
-    radius : of the ball, m. centre : m.
+    Source: Z16 sections 6.1, 9.
     """
 
-    radius: float = parameter("m", gt=0)
-    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+    radius: float = parameter("m", "radius of the ball", examples=[0.01], gt=0)
+    centre: Vector = parameter("m", "centre of the ball", (0.0, 0.0, 0.0))
 
     def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
         return place(number, radius, region.inside_ball(np.asarray(self.centre), self.radius, radius), seed)
 
 
 class Lattice(Placement):
-    """A simple cubic lattice about ``centre`` (m), as the 7 x 7 x 7 array of Z13 section 4.
+    """Spheres lie on a simple cubic lattice, or one that is stretched along the axes.
 
-    shape : sites along x, y and z. Give spacing (m), the distance of neighbours, or size (m): that of the
-    box from the first to the last site along each axis. An axis with one site has size 0.
+    Give the spacing or the size, not both. An axis with one site has size 0.
+
+    Source: Z13 section 4.
     """
 
-    shape: tuple[int, int, int]
-    spacing: float | None = parameter("m", None, gt=0)
-    size: Vector | None = parameter("m", None)
-    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
+    shape: tuple[int, int, int] = option("number of sites along x, y and z", examples=[(3, 3, 3)])
+    spacing: float | None = parameter(
+        "m", "distance of neighbours, the same along all axes", None, gt=0, examples=[1e-2]
+    )
+    size: Vector | None = parameter("m", "distance of the first site from the last one along each axis", None)
+    centre: Vector = parameter("m", "centre of the lattice", (0.0, 0.0, 0.0))
 
     @model_validator(mode="after")
     def _sound(self) -> Self:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, field_validator, model_validator
 
-from tisim.components.component import Component, Text, Vector, parameter
+from tisim.components.component import Component, Text, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
 from tisim.errors import InputError, must, shown
@@ -20,16 +20,16 @@ Arrays = dict[str, np.ndarray]
 
 
 class Start(Component):
-    """A starting configuration."""
+    """The contract of a starting configuration."""
 
     contract: ClassVar[bool] = True
 
     def masses(self) -> np.ndarray:
-        """Mass of each particle, kg, shape (n,); known without placing them."""
+        """Return the mass of each particle, kg, shape (n,), which is known without placing them."""
         raise NotImplementedError(f"{type(self).__name__} must define masses")
 
     def arrays(self, domain: Domain, seed: int) -> Arrays:
-        """position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
+        """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
 
 
@@ -41,20 +41,23 @@ def _listed(value: Any) -> Any:
 
 
 class Particles(Start):
-    """Particles given one by one.
+    """Particles are given one by one, as lists or arrays.
 
-    position, velocity : m and m/s, shape (n, 3).
-    radius : m, > 0; mass : kg, > 0; one number for all, or n of them. Give mass or density (kg/m^3).
-    quantities : any further field by name, such as temperature (K); one number, or n, or (n, 3).
+    Positions and velocities are of shape (n, 3). Of any other quantity one number stands for all particles,
+    or n of them are given. Give mass or density, not both.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    position: tuple[Vector, ...] = parameter("m", min_length=1)
-    velocity: tuple[Vector, ...] = parameter("m/s", min_length=1)
-    radius: tuple[float, ...] = parameter("m")
-    mass: tuple[float, ...] | None = parameter("kg", None)
-    density: float | None = parameter("kg/m^3", None, gt=0)
-    quantities: Mapping[Text, Any] = Field(default_factory=dict)
+    position: tuple[Vector, ...] = parameter("m", "positions", min_length=1, examples=[((0.0, 0.0, 0.0),)])
+    velocity: tuple[Vector, ...] = parameter("m/s", "velocities", min_length=1, examples=[((1.0, 0.0, 0.0),)])
+    radius: tuple[float, ...] = parameter("m", "radii, greater than 0", examples=[(1e-3,)])
+    mass: tuple[float, ...] | None = parameter("kg", "masses, greater than 0", None)
+    density: float | None = parameter(
+        "kg/m^3", "density of all particles, instead of masses", None, gt=0, examples=[2000.0]
+    )
+    quantities: Mapping[Text, Any] = option(
+        "further fields by name, in SI, such as temperature", default_factory=dict
+    )
 
     @field_validator("position", "velocity", "radius", "mass", mode="before")
     @classmethod
@@ -135,29 +138,38 @@ def _check_sizes(name: str, unit: str, column: np.ndarray) -> None:
 
 
 class Cloud(Start):
-    """Equal spheres: where they lie, how fast they are and what they carry.
+    """A cloud of equal spheres starts with random velocities.
 
-    number : of spheres; left out where the placement fixes it, as a lattice does.
-    placement : where the centres lie; at random in the domain unless given.
-    pulse : velocities added at the start, such as a blast's.
-    specific_charge : C/kg; each sphere carries its mass times this.
-    quantities : any further field by name, such as charge (C); one number, or three components, for all.
+        v = mean_velocity + deviation * lambda + pulse
 
-    Velocity: ``mean_velocity + deviation * lambda`` with lambda uniform in -1..1 for each particle and
-    component (Z04 section 7), and the pulse. The same seed gives the same lambdas whatever the other
-    parameters.
+    lambda is uniform in -1..1 for each particle and component. The same seed gives the same lambdas whatever
+    the other parameters.
+
+    Source: Z04 section 7.
     """
 
-    number: int | None = Field(None, gt=0, le=PARTICLES)
-    radius: float = parameter("m", gt=0)
-    density: float = parameter("kg/m^3", gt=0)
-    placement: Placement = RandomInDomain()
-    mean_velocity: Vector = parameter("m/s", (0.0, 0.0, 0.0))
-    deviation: Vector = parameter("m/s", (0.0, 0.0, 0.0))
-    pulse: Pulse | None = None
-    temperature: float = parameter("K", 300.0, gt=0)
-    specific_charge: float | None = parameter("C/kg", None)
-    quantities: Mapping[Text, float | Vector] = Field(default_factory=dict)
+    number: int | None = option(
+        "number of spheres; left out where the placement fixes it, as a lattice does",
+        None,
+        gt=0,
+        le=PARTICLES,
+        examples=[100],
+    )
+    radius: float = parameter("m", "radius of the spheres", examples=[1e-3], gt=0)
+    density: float = parameter("kg/m^3", "density of the spheres", examples=[2000.0], gt=0)
+    placement: Placement = option("where the centres lie", RandomInDomain())
+    mean_velocity: Vector = parameter("m/s", "mean velocity", (0.0, 0.0, 0.0))
+    deviation: Vector = parameter(
+        "m/s", "largest deviation from the mean velocity, along each axis", (0.0, 0.0, 0.0)
+    )
+    pulse: Pulse | None = option("velocities that are added at the start, such as a blast's", None)
+    temperature: float = parameter("K", "temperature", 300.0, gt=0)
+    specific_charge: float | None = parameter(
+        "C/kg", "charge over mass of each sphere; unless given, there is none", None
+    )
+    quantities: Mapping[Text, float | Vector] = option(
+        "further fields by name, in SI; one number or three components, for all", default_factory=dict
+    )
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -174,7 +186,7 @@ class Cloud(Start):
         return self
 
     def count(self) -> int:
-        """Number of spheres."""
+        """Return the number of spheres."""
         return self.placement.sites() or self.number or 0
 
     def _mass(self) -> float:

@@ -11,25 +11,30 @@ from tisim.errors import must
 
 
 class Pulse(Component):
-    """A change of all velocities at the start; the contract of a pulse."""
+    """The contract of a change of all velocities at the start."""
 
     contract: ClassVar[bool] = True
 
     def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
-        """What is added to velocities: m/s, shape (n, 3); for positions, m, (n, 3), and masses, kg, (n,)."""
+        """Return what is added to velocities, m/s, (n, 3), given positions, m, and masses, kg, (n,)."""
         raise NotImplementedError(f"{type(self).__name__} must define velocity")
 
 
 class Blast(Pulse):
-    """The same speed for all, away from the centre of mass: |dv| = sqrt(2 W/M), Z16 (3.1)-(3.4).
+    """A blast gives all particles the same speed away from their centre of mass.
 
-    energy : W, J; the kinetic energy of particles that were at rest.
+        |dv| = sqrt(2 W/M)
 
-    Total momentum is that of the unit vectors, which do not quite cancel in a random start. A particle in the
-    centre of mass, which has no direction to go, stays as it is, and M is the mass of the others.
+    M is the mass of the particles. Total momentum is that of the unit vectors, which do not quite cancel in a
+    random start. A particle in the centre of mass, which has no direction to go, stays as it is, and M is the
+    mass of the others.
+
+    Source: Z16 Eqs (3.1)-(3.4).
     """
 
-    energy: float = parameter("J", gt=0)
+    energy: float = parameter(
+        "J", "energy W: the kinetic energy of particles that were at rest", examples=[1.0], gt=0
+    )
 
     def velocity(self, position: np.ndarray, mass: np.ndarray) -> np.ndarray:
         arm = position - np.average(position, axis=0, weights=mass)

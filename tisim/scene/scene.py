@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from tisim.components import serialization
-from tisim.components.component import Component, Text
+from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.effects.base import Effect
 from tisim.errors import InputError, must, shown
@@ -29,24 +29,19 @@ __all__ = ["Box", "Open", "Scene"]
 
 
 class Scene(Component):
-    """Particles, the effects they are subject to, and for how long.
+    """A scene says what is simulated: particles, the effects that act on them, and for how long.
 
-    particles : the start, ``Particles`` or ``Cloud``.
-    effects : what acts, in this order; a scene pays only for what it calls for.
-    domain : ``Open()`` or ``Box(low, high)``, m.
-    stepper : how time advances; tolerances and limits are stated here.
-    duration : s, > 0. seed : of all that is random in the scene, 0..2^63-1.
-
-    Raises InputError ("X must be Y; received Z") when made from anything that cannot be run.
+    It pays only for what it calls for. It is made in Python or read from a TOML file; InputError ("X must be
+    Y; received Z") is raised when it is made from anything that cannot be run.
     """
 
-    name: Text = "scene"
-    particles: Start
-    effects: tuple[Effect, ...] = ()
-    domain: Domain = Open()
-    stepper: Stepper = Verlet()
-    duration: float = Field(gt=0)
-    seed: int = Field(0, ge=0, lt=2**63)
+    name: Text = option("name of the scene, for people", "scene")
+    particles: Start = option("what it starts with, Particles or Cloud")
+    effects: tuple[Effect, ...] = option("effects, sources and operators, which act in this order", ())
+    domain: Domain = option("space that it lives in, Open or Box", Open())
+    stepper: Stepper = option("how time advances; tolerances and limits are stated here", Verlet())
+    duration: float = parameter("s", "simulated time", gt=0)
+    seed: int = option("seed of all that is random in it", 0, ge=0, lt=2**63)
 
     @field_validator("effects", mode="before")
     @classmethod
@@ -90,23 +85,23 @@ class Scene(Component):
         return self
 
     def structure(self) -> tuple[Any, ...]:
-        """What is compiled in; scenes that agree in it can run as one batch."""
+        """Return what is compiled in; scenes that agree in it can run as one batch."""
         parts = (*self.effects, self.domain, self.stepper)
         return tuple(part.structure() for part in parts)
 
     def acting(self) -> tuple[Effect, ...]:
-        """The effects, with what they take from the start filled in."""
+        """Return the effects, with what they take from the start filled in."""
         masses = self.particles.masses()
         return tuple(effect.at_start(masses) for effect in self.effects)
 
     def capacity(self) -> int:
-        """Particles that may ever live at once."""
+        """Return how many particles may ever live at once."""
         masses = self.particles.masses()
         return max([len(masses), *(effect.capacity(masses) for effect in self.effects)])
 
     def digest(self) -> str:
-        """Hex hash of everything that decides the result: physics version, every parameter, the seed, and the
-        files that define parts of the scene that are not tisim's own."""
+        """Return a hash, in hex, of everything that decides the result: physics version, every parameter, the
+        seed, and the files that define parts of the scene that are not tisim's own."""
         order = [effect.label for effect in self.effects]
         files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
         described = [PHYSICS_VERSION, order, self.to_dict(), *([files] if files else [])]
@@ -114,7 +109,7 @@ class Scene(Component):
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, as in a TOML file; ``from_dict`` is its inverse."""
+        """Return plain data, as in a TOML file; ``from_dict`` is the inverse."""
         return {
             "name": self.name,
             "duration": self.duration,
@@ -127,7 +122,7 @@ class Scene(Component):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Scene:
-        """A scene from plain data; InputError names the key that is wrong."""
+        """Make a scene of plain data; InputError names the key that is wrong."""
         rest = serialization.table(data, "scene")
         must("particles" in rest, "scene.particles", "given", "nothing")
         made: dict[str, Any] = {
@@ -151,7 +146,7 @@ class Scene(Component):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Scene:
-        """A scene from a TOML file; InputError when it is not one."""
+        """Read a scene from a TOML file; InputError when it is not one."""
         file, what = Path(path), "scene file"
         text = None
         try:
@@ -171,12 +166,12 @@ class Scene(Component):
         return cls.from_dict(serialization.read_toml(text, what, str(path)))
 
     def to_toml(self) -> str:
-        """The scene as TOML text; ``from_toml`` gives it back."""
+        """Return the scene as TOML text; ``from_toml`` gives it back."""
         return serialization.toml(self.to_dict())
 
     def replace(self, settings: Mapping[str, Any]) -> Scene:
-        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a list by
-        number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
+        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a list
+        by number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
         data = self.to_dict()
         for key, value in settings.items():
             *path, last = key.split(".")
@@ -188,7 +183,7 @@ class Scene(Component):
         return type(self).from_dict(data)
 
     def without(self, *names: str) -> Scene:
-        """A copy that leaves effects out; InputError when one is not there, or those that stay need it."""
+        """Return a copy without some effects; InputError when one is not there, or is needed by others."""
         data = self.to_dict()
         for name in names:
             known = ", ".join(data["effects"]) or "none, as this scene has none"

@@ -6,18 +6,18 @@ from typing import Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.sources.base import Source, parameter
+from tisim.sources.base import Source, option, parameter
 
 
 class UniformFlow(Source):
-    """Fluid that moves everywhere at the same velocity; who feels it are the drag laws.
+    """A fluid moves everywhere at the same velocity, which drag laws feel.
 
-    velocity : of the fluid. Source: B16 section 7.2.
+    Source: B16 section 7.2.
     """
 
     quantity = "flow_velocity"
 
-    velocity: Vector = parameter("m/s")
+    velocity: Vector = parameter("m/s", "velocity of the fluid", examples=[(1e-3, 0.0, 0.0)])
 
     @ti.func
     def value(self, w, r, t):
@@ -37,26 +37,31 @@ _kozeny_carman = ti.func(kozeny_carman)
 
 
 class DarcyFlow(Source):
-    """U = -k/eta grad p: slow flow through a packing, in the mean over it; k of Kozeny and Carman.
+    """A fluid flows slowly through a packing, as a pressure gradient drives it; this is the mean over the
+    packing.
 
-    pressure_gradient : grad p; the fluid goes against it. viscosity : eta, dynamic, of the fluid.
-    porosity : 1 - phi. diameter : D of the fibres (long ones: nu = D/4) or spheres (D/6) it is packed of.
-    constant : C of Kozeny and Carman; about 5 in random packings.
-    mean : over the whole "packing", Darcy's velocity, or over the "pores" alone, where it is faster by one
-    over the porosity. B16 (7.3) gives the mass that flows, rho_0 A U.
+        U = -k/eta grad p,    k = (1 - phi)^3 nu^2 / (C phi^2)
+
+    k is the permeability of Kozeny and Carman. nu is volume over surface of what is packed, D/4 of long
+    fibres and D/6 of spheres of diameter D. The mean is over the whole packing (Darcy's velocity) or over the
+    pores alone, where it is faster by one over the porosity. B16 (7.3) gives the mass that flows, rho_0 A U.
 
     Source: B16 Eqs (7.3), (7.4).
     """
 
     quantity = "flow_velocity"
 
-    pressure_gradient: Vector = parameter("Pa/m")
-    viscosity: float = parameter("Pa s", gt=0)
-    porosity: float = parameter("", gt=0, lt=1)
-    diameter: float = parameter("m", gt=0)
-    constant: float = parameter("", 5.0, gt=0)
-    packed: Literal["fibres", "spheres"] = "fibres"
-    mean: Literal["packing", "pores"] = "packing"
+    pressure_gradient: Vector = parameter(
+        "Pa/m", "pressure gradient grad p; the fluid goes against it", examples=[(-100.0, 0.0, 0.0)]
+    )
+    viscosity: float = parameter("Pa s", "dynamic viscosity eta of the fluid", examples=[1e-3], gt=0)
+    porosity: float = parameter("", "porosity 1 - phi of the packing", examples=[0.9], gt=0, lt=1)
+    diameter: float = parameter(
+        "m", "diameter D of the fibres or spheres that are packed", examples=[6e-4], gt=0
+    )
+    constant: float = parameter("", "constant C of Kozeny and Carman; about 5 in random packings", 5.0, gt=0)
+    packed: Literal["fibres", "spheres"] = option("what is packed", "fibres")
+    mean: Literal["packing", "pores"] = option("what the velocity is the mean over", "packing")
 
     @ti.func
     def value(self, w, r, t):

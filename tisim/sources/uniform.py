@@ -12,7 +12,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Uniform(Source):
-    """constant + amplitude sin(omega t + phase), each component by itself; its gradient is zero."""
+    """The contract of a field constant + amplitude sin(omega t + phase), each component by itself."""
 
     contract: ClassVar[bool] = True
 
@@ -27,29 +27,33 @@ class Uniform(Source):
 
 
 class ElectricField(Uniform):
-    """Uniform electric field E = E_0 + E_1 sin(omega t + phase), per component.
+    """A uniform electric field is constant, oscillates, or both.
 
-    constant, amplitude : E_0, E_1, V/m (the same as N/C). omega : angular frequency. phase : at t = 0.
+        E = E_0 + E_1 sin(omega t + phase),    each component by itself
+
     Source: Z13 Eqs (3)-(5), (16).
     """
 
     quantity = "electric_field"
-    constant: Vector = parameter("V/m", STILL)
-    amplitude: Vector = parameter("V/m", STILL)
-    omega: Vector = parameter("rad/s", STILL)
-    phase: Vector = parameter("rad", STILL)
+    constant: Vector = parameter("V/m", "constant part E_0", STILL)
+    amplitude: Vector = parameter("V/m", "amplitude E_1 of the oscillating part", STILL)
+    omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
+    phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)
 
 
 class MagneticField(Uniform):
-    """Uniform magnetic flux density B = B_0 + B_1 sin(omega t + phase), per component.
+    """A uniform magnetic flux density is constant, oscillates, or both.
 
-    constant, amplitude : B_0, B_1, T. omega : angular frequency. phase : at t = 0. The electric field that
-    goes with a changing B (Faraday's law) is left out, as in the paper, where B is constant.
+        B = B_0 + B_1 sin(omega t + phase),    each component by itself
+
+    The electric field that goes with a changing B (Faraday's law) is left out, as in the paper, where B is
+    constant.
+
     Source: Z13 Eqs (3)-(5).
     """
 
     quantity = "magnetic_flux_density"
-    constant: Vector = parameter("T", STILL)
-    amplitude: Vector = parameter("T", STILL)
-    omega: Vector = parameter("rad/s", STILL)
-    phase: Vector = parameter("rad", STILL)
+    constant: Vector = parameter("T", "constant part B_0", STILL)
+    amplitude: Vector = parameter("T", "amplitude B_1 of the oscillating part", STILL)
+    omega: Vector = parameter("rad/s", "angular frequency omega of the oscillation", STILL)
+    phase: Vector = parameter("rad", "phase of the oscillation at t = 0", STILL)

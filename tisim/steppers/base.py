@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
-from tisim.components.component import Component
+from tisim.components.component import Component, option
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, Effect, Force, SelfConsistentQuantity
 from tisim.errors import must
@@ -60,52 +60,54 @@ def single(effect: Effect) -> bool:
 
 
 class Stepper(Component):
-    """How time advances. ``control`` chooses the length of the next step.
+    """A stepper says how time advances, and its control how long the next step is: the contract of both.
 
-    As with effects, ``counters`` names counters, ``world_quantities`` quantities of a world, and in a kernel
-    a parameter is a function of the world. Before the first step ``force`` and ``torque`` are those of
-    the start. ``random`` says that it draws random numbers, so that only statistics converge.
+    As with effects, in a kernel a parameter is a function of the world. Before the first step ``force`` and
+    ``torque`` are those of the start.
+
+    counters : names of the counters that it keeps of a world. world_quantities : names of the quantities that
+    it keeps of a world. random : whether it draws random numbers, so that only statistics converge.
     """
 
     contract: ClassVar[bool] = True
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
-    control: StepControl
+    control: StepControl = option("step control, which chooses the length of the next step")
 
     @property
     def order(self) -> int:
-        """Of its error in dt, for smooth forces."""
+        """The order of its error in dt, for smooth forces."""
         return 2
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        """InputError when it cannot step a scene of these; by default it can."""
+        """Raise InputError when it cannot step a scene of these effects; by default it can."""
 
     def countable(self, effects: Sequence[Effect]) -> float:
-        """The number of steps that it can count in a scene of these."""
+        """Return the number of steps that it can count in a scene of these effects."""
         return MOST_STEPS
 
     def fewest(self, effects: Sequence[Effect], duration: float) -> float:
-        """The number of steps that a run of this duration (s) takes at least; InputError where it is more
-        than can be counted."""
+        """Return the number of steps that a run of this duration (s) takes at least; InputError where it is
+        more than can be counted."""
         steps, most = min(self.control.fewest(duration), sys.float_info.max), self.countable(effects)
         rule = f"reached in at most {most:.3g} steps, but takes at least {steps:.3g} of {self.control.kind()}"
         must(steps <= most, "scene.duration", rule, duration)
         return max(1.0, steps)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
-        """Whether it may take each particle by itself: by default, when they feel nothing of each other and
-        only forces change them."""
+        """Return whether it may take each particle by itself: by default, when they feel nothing of each
+        other and only forces change them."""
         return all(single(effect) for effect in effects)
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
-        """Those of this kind that ``tisim cost`` tries in a scene of these effects, with steps of about dt
-        (s); none by default."""
+        """Return those of this kind that ``tisim cost`` tries in a scene of these effects, with steps of some
+        dt (s); by default none."""
         return ()
 
     def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
-        """What ``tisim cost`` tries beside this one: by default the alternatives of every kind."""
+        """Return what ``tisim cost`` tries beside this one: by default the alternatives of every kind."""
         # By name, whatever has been imported first.
         kinds = [kind for _, kind in sorted(Stepper.known().items())]
         return tuple(stepper for kind in kinds for stepper in kind.alternatives(effects, dt))
@@ -120,11 +122,12 @@ class Stepper(Component):
         return (*own, *self.control.structure())
 
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        """Fields that it reads or writes, in a scene that has torques, or whose particles are independent."""
+        """Return the fields that it reads or writes in a scene with torques (``turning``), or whose particles
+        do not feel each other (``independent``)."""
         return ()
 
     def step(self, parts: Parts) -> tuple[Item, ...]:
-        """The items of a step, up to pair events and what operators do to the world as a whole.
+        """Return the items of a step, up to pair events and what operators do to the world as a whole.
 
         They set ``dt`` and move ``time`` on, to ``end`` at most; count ``steps`` and ``particle_steps``; set
         ``events`` to 0; once the controller has been asked, set ``approach_time`` to infinity and ``fastest``

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Self
 
 from tisim.backend.taichi import ti
+from tisim.components.component import option
 from tisim.effects.base import Effect, Force
 from tisim.interactions.force_sum import FORCE
 from tisim.steppers.base import Parts, Stepper
@@ -15,18 +16,20 @@ from tisim.worlds.state import Field
 
 
 class Boris(Stepper):
-    """Half a drift, half a kick, a rotation, half a kick, half a drift; explicit, of second order.
+    """Boris' stepper, the standard of charged particles in magnetic fields, is explicit and of second order.
 
-    With F = F_0 + J v, J that of ``velocity_jacobian``: v- = v + dt/2m F_0, (1 - dt/2m J) v+ =
-    (1 + dt/2m J) v-, v' = v+ + dt/2m F_0, all at the middle of the step. For the Lorentz force the middle one
-    is Boris' rotation: it keeps the speed to rounding whatever the step. One sum of forces a step; torques
-    turn particles by one kick, at the middle.
+        r += dt/2 v,    v- = v + dt/2m F_0,    (1 - dt/2m J) v+ = (1 + dt/2m J) v-,    v = v+ + dt/2m F_0,
+        r += dt/2 v
+
+    Forces are those at the middle of the step, F = F_0 + J v, J that of ``velocity_jacobian``. For the
+    Lorentz force the middle equation is Boris' rotation: it keeps the speed to rounding whatever the step.
+    There is one sum of forces a step; torques turn particles by one kick, at the middle.
 
     Source: J. P. Boris, Proc. 4th Conf. Numerical Simulation of Plasmas (1970) 3-67; C. K. Birdsall, A. B.
     Langdon, Plasma Physics via Computer Simulation (1985), section 4-3.
     """
 
-    control: Controller
+    control: Controller = option("step control", examples=[FixedStep(dt=1e-6)])
 
     world_quantities: ClassVar = ("time_before",)
 

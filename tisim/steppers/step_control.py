@@ -26,10 +26,10 @@ def shortest_representable(s, w, shortest):
 
 
 class StepControl(Component):
-    """The contract of step control: ``pair`` sees every near pair, ``note`` every particle.
+    """Step control chooses the length of steps; ``pair`` sees every near pair, ``note`` every particle.
 
-    ``watches_pairs`` says whether it needs to see pairs at all; ``world_quantities`` names quantities of a
-    world.
+    watches_pairs : whether it needs to see pairs at all. world_quantities : names of the quantities that it
+    keeps of a world.
     """
 
     contract: ClassVar[bool] = True
@@ -38,33 +38,33 @@ class StepControl(Component):
 
     @ti.func
     def pair(self, s, w, i, j, separation):
-        """Time (s, f64) that this pair allows."""
+        """Return the time (s, f64) that this pair allows."""
         return ti.cast(ti.math.inf, ti.f64)
 
     @ti.func
     def note(self, s, w, i, soonest):
-        """Note for a particle the least time that its pairs allow. s, f64."""
+        """Note for a particle the least time (s, f64) that its pairs allow."""
 
     def fewest(self, duration: float) -> float:
-        """The number of steps that a run of this duration (s) takes at least."""
+        """Return the number of steps that a run of this duration (s) takes at least."""
         return 1.0
 
 
 class Controller(StepControl):
-    """Control of explicit steppers: ``next`` decides before the step is made."""
+    """Control of explicit steppers decides how long a step is before it is made."""
 
     contract: ClassVar[bool] = True
 
     @ti.func
     def next(self, s, w, horizon):
-        """Length of the next step. s, f64. ``horizon``: gap (m) within which every pair has been seen."""
+        """Return the length (s, f64) of the next step; pairs within a gap of ``horizon`` (m) were seen."""
         return ti.cast(0.0, ti.f64)
 
 
 class FixedStep(Controller):
-    """Steps of one length; the last one is cut to end on time."""
+    """All steps are of one length; the last one is cut to end on time."""
 
-    dt: float = parameter("s", ge=SHORTEST_STEP)
+    dt: float = parameter("s", "length dt of a step", examples=[1e-6], ge=SHORTEST_STEP)
 
     accuracy_parameters = (AccuracyParameter(dt=2),)
 
@@ -77,14 +77,16 @@ class FixedStep(Controller):
 
 
 class ApproachTime(Controller):
-    """The least time until two surfaces meet, gap over approach speed (Z04 Eq. 6.14), within limits.
+    """A step is as long as the least time until two surfaces meet, gap over approach speed, within limits.
 
     Z04 asks each particle's nearest neighbour only; here every approaching pair is asked, as the nearest
-    is not always the first to be met. Limits of Z04 section 8: 1e-6 s and 1e-3 s.
+    is not always the first to be met. The limits are those of Z04 section 8 unless given.
+
+    Source: Z04 Eq. (6.14).
     """
 
-    shortest: float = parameter("s", 1e-6, ge=SHORTEST_STEP)
-    longest: float = parameter("s", 1e-3, ge=SHORTEST_STEP)
+    shortest: float = parameter("s", "shortest step", 1e-6, ge=SHORTEST_STEP)
+    longest: float = parameter("s", "longest step", 1e-3, ge=SHORTEST_STEP)
     watches_pairs: ClassVar[bool] = True
 
     accuracy_parameters = (

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Self
 
 from tisim.backend.taichi import ti
+from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairEvent
 from tisim.steppers.base import Parts, Stepper
 from tisim.steppers.common import BeginStep, advance_clock, apply_displacement
@@ -16,9 +17,17 @@ from tisim.worlds.program import Item, PerParticle, Phase
 
 
 class Verlet(Stepper):
-    """Explicit stepper with step control. Second order in dt for forces that depend on position only."""
+    """Velocity Verlet advances time explicitly: half a kick by the forces, a drift, half a kick.
 
-    control: Controller = ApproachTime()
+        v += dt/2 F/m,    r += dt v,    v += dt/2 F'/m
+
+    It is of second order in dt for forces that depend on position only. A scene without forces drifts in
+    straight lines, and has no kick at all. Operators and pair events follow the drift.
+
+    Source: L. Verlet, Phys. Rev. 159 (1967) 98; W. C. Swope et al., J. Chem. Phys. 76 (1982) 637.
+    """
+
+    control: Controller = option("step control", ApproachTime())
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:

@@ -17,8 +17,8 @@ class Shear(Source):
     """v_f = v_0 + G r, for the drags."""
 
     quantity = "flow_velocity"
-    mean: Vector = parameter("m/s")
-    rate: Vector = parameter("1/s")
+    mean: Vector = parameter("m/s", "mean")
+    rate: Vector = parameter("1/s", "rate")
 
     @ti.func
     def value(self, w, r, t):
@@ -139,7 +139,9 @@ def test_velocity_jacobian_of_chow_in_each_of_its_pieces(rng):
 WRONG = {
     "chow_drag.density must be greater than 0.0; received 0": lambda: ChowDrag(density=0, viscosity=1),
     "stokes_drag.viscosity must be greater than 0.0; received -1": lambda: StokesDrag(viscosity=-1),
-    "constant_drag.coefficient must be given; received nothing": lambda: ConstantDrag(density=1),
+    "constant_drag.coefficient must be given (drag coefficient C_D); received nothing": lambda: ConstantDrag(
+        density=1
+    ),
 }
 
 

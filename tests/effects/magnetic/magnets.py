@@ -17,8 +17,8 @@ class Quadrupole(Source):
     """B = C + S (y, x, z^2), whose gradient is not symmetric once sheared by the scale of each component."""
 
     quantity = "magnetic_flux_density"
-    constant: Vector = parameter("T")
-    scale: Vector = parameter("T/m")
+    constant: Vector = parameter("T", "constant")
+    scale: Vector = parameter("T/m", "scale")
 
     @ti.func
     def value(self, w, r, t):

@@ -193,8 +193,8 @@ def test_restart_draws_anew_around_the_best_when_it_has_stalled():
 def test_options_are_those_of_the_method():
     assert Settings(method="cma-es", options={"sigma": 0.2}).options.sigma == 0.2
     for name, options, message in (
-        ("cma-es", {"parents": 3}, r"search\.options\.parents must be a known key; received 3"),
-        ("genetic", {"sigma": 0.2}, r"search\.options\.sigma must be a known key; received 0\.2"),
+        ("cma-es", {"parents": 3}, r"search\.options\.parents must be a known key: .*; received 3"),
+        ("genetic", {"sigma": 0.2}, r"search\.options\.sigma must be a known key: .*; received 0\.2"),
         ("cma-es", {"sigma": 0}, r"search\.options\.sigma must be greater than 0\.0; received 0"),
         ("restart", {"recentre_every": 4}, r"search\.options\.recentre_every must be at most 0; received 4"),
         ("nsga2", 5, r"search\.options must be settings of the method, by name; received 5"),

@@ -30,7 +30,7 @@ class Shear(Source):
     """u = (rate y, 0, 0)."""
 
     quantity = "flow_velocity"
-    rate: float = parameter("1/s")
+    rate: float = parameter("1/s", "rate")
 
     @ti.func
     def value(self, w, r, t):
@@ -42,7 +42,7 @@ class Stop(Operator):
 
     fields = (Field("fixed", "", 1, "keep", integer=True), Field("stopped_at", "s", 1, "keep"))
     counters = ("stops",)
-    place: float = parameter("m")
+    place: float = parameter("m", "place")
 
     @ti.func
     def particle(self, s, w, i, t, dt):

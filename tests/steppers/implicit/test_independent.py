@@ -17,7 +17,7 @@ DRIVEN = {"stiffness": 8.0, "amplitude": 1.5, "omega": 2.0}
 class Cliff(Force):
     """Nothing, and beyond a place along x a spring that is far too stiff."""
 
-    place: float = parameter("m")
+    place: float = parameter("m", "place")
 
     @ti.func
     def force(self, s, w, i, t):

@@ -130,7 +130,7 @@ def test_what_cannot_be_solved_together_says_so_too():
 class Late(Force):
     """None up to a time, then one that is not finite."""
 
-    when: float = parameter("s")
+    when: float = parameter("s", "when")
 
     @ti.func
     def force(self, s, w, i, t):

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from pydantic import Field as Option
-
 from tisim.backend.taichi import ti
-from tisim.effects.base import parameter
+from tisim.effects.base import option, parameter
 from tisim.effects.contact.normal import area, slip, strain
 from tisim.effects.contact.surface import SurfaceContact
 from tisim.numerics.powers import Exponent, power
 
 
 class ContactBond(SurfaceContact):
-    """While E >= E*: F_i = K_nb E^p A n_ij + K_rb A dt u, a pull and a grip.
+    """Grains that are pressed into each other hold on to each other: a bond pulls and grips.
 
-    stiffness : K_nb. exponent : p, compiled in. grip_stiffness : K_rb. threshold : E*, an overlap strain;
-    Z16 section 9 gives no value. The bond has no memory: it is there while the overlap is.
+        F_i = K_nb E^p A n_ij + K_rb A dt u        while E >= E*
 
-    E is the overlap strain, A the contact area, u the velocity of the surface of j past that of i at their
-    point of contact, spin included. The grip carries the time step dt, as stick does (friction.py):
-    it vanishes with dt, and is absent from the forces of the start.
+    E is the overlap strain, A the contact area, n_ij the unit vector from i to j, and u the velocity of the
+    surface of j past that of i at their point of contact, spin included. The bond has no memory: it is there
+    while the overlap is. The grip carries the time step dt, as the stick of ``contact_friction`` does: it
+    vanishes with dt, and is absent from the forces of the start.
+
     Source: Z16 Eqs (7.16), (7.17).
     """
 
-    stiffness: float = parameter("N/m^2", ge=0)
-    exponent: Exponent = Option(2, gt=0)
-    grip_stiffness: float = parameter("N/m^3", 0.0, ge=0)
-    threshold: float = parameter("", ge=0, lt=1)
+    stiffness: float = parameter(
+        "N/m^2", "stiffness K_nb of the bond along the line of centres", examples=[1e5], ge=0
+    )
+    exponent: Exponent = option("exponent p of the overlap strain", 2, gt=0)
+    grip_stiffness: float = parameter("N/m^3", "stiffness K_rb of the grip along the surfaces", 0.0, ge=0)
+    threshold: float = parameter(
+        "", "overlap strain E* from which on the bond holds; Z16 gives no value", examples=[0.01], ge=0, lt=1
+    )
 
     @ti.func
     def surface_force(self, s, w, i, j, separation, distance):

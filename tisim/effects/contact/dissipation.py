@@ -10,10 +10,13 @@ from tisim.effects.contact.normal import NormalContact, area
 
 
 class ContactDissipation(PairForce):
-    """F_i = c_cd (v_jn - v_in) A: a dashpot along n_ij, by the contact area.
+    """Touching grains lose energy along the line of centres, as by a dashpot.
 
-    damping : c_cd. As in the paper it also holds back grains that part: the sum of contact and dissipation
-    can pull just before they separate.
+        F_i = c_cd ((v_j - v_i) . n_ij) A n_ij
+
+    A is the contact area and n_ij the unit vector from i to j. As in the paper it also holds back grains that
+    part: the sum of contact and dissipation can pull just before they separate.
+
     Source: Z16 Eq. (7.10).
     """
 
@@ -21,7 +24,7 @@ class ContactDissipation(PairForce):
     fields = ("radius", "velocity")
     requires: ClassVar = (NormalContact,)
 
-    damping: float = parameter("N s/m^3", ge=0)
+    damping: float = parameter("N s/m^3", "damping coefficient c_cd per contact area", examples=[1e3], ge=0)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

@@ -14,12 +14,14 @@ from tisim.errors import must
 
 
 class ContactFriction(SurfaceContact):
-    """Stick, F_i = K_f A dt u, while that is below mu_s |F_n|; else slip, F_i = mu_d |F_n| u / |u|.
+    """Touching grains that slide past each other are held back by regularised friction, which turns them.
 
-    stiffness : K_f. static, dynamic : mu_s and mu_d <= mu_s.
+        F_i = K_f A dt u            stick, while that is below mu_s |F_n|
+        F_i = mu_d |F_n| u / |u|    slip
 
-    u is the velocity of the surface of j past that of i at their point of contact, spin included; |F_n| is
-    how hard contact presses, without dissipation (the paper has con,n here, con,c in 7.5, con,d in 7.10).
+    u is the velocity of the surface of j past that of i at their point of contact, spin included; A is the
+    contact area; |F_n| is how hard contact presses, without dissipation (the paper has con,n here, con,c in
+    7.5, con,d in 7.10).
 
     Stick carries the time step dt: it is a viscous regularisation, the spring K_f A of what has slid in one
     step, without memory of the steps before. As dt -> 0 it does not converge to sticking but vanishes, and
@@ -28,9 +30,11 @@ class ContactFriction(SurfaceContact):
     Source: Z16 Eqs (7.11)-(7.15).
     """
 
-    stiffness: float = parameter("N/m^3", ge=0)
-    static: float = parameter("", ge=0)
-    dynamic: float = parameter("", ge=0)
+    stiffness: float = parameter("N/m^3", "tangential stiffness K_f per contact area", examples=[1e8], ge=0)
+    static: float = parameter("", "coefficient mu_s of static friction", examples=[0.5], ge=0)
+    dynamic: float = parameter(
+        "", "coefficient mu_d of dynamic friction, at most the static one", examples=[0.4], ge=0
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

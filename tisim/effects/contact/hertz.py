@@ -8,16 +8,19 @@ from tisim.effects.contact.normal import NormalContact, overlap
 
 
 class Hertz(NormalContact):
-    """F_i = -4/3 sqrt(R*) E* delta^1.5 n_ij; 1/R* = 1/R_i + 1/R_j, 1/E* = 2 (1 - nu^2) / E.
+    """Elastic spheres that overlap push each other apart as Hertz found.
 
-    young : E, Young's modulus. poisson : nu, Poisson's ratio. All grains are of one material.
-    Frictionless, elastic, and for a circle of contact small beside the radii.
+        F_i = -4/3 sqrt(R*) E* delta^1.5 n_ij,    1/R* = 1/R_i + 1/R_j,    1/E* = 2 (1 - nu^2) / E
 
-    Source: Z16 Eq. (B.7), after Hertz (1882). The minus sign is missing as printed; its n_ij is from i to j.
+    delta is the overlap and n_ij the unit vector from i to j. All grains are of one material. The law is
+    without friction and loss, and for a circle of contact that is small beside the radii. As printed the
+    minus sign is missing; the paper's n_ij is from i to j.
+
+    Source: Z16 Eq. (B.7), after Hertz (1882).
     """
 
-    young: float = parameter("Pa", gt=0)
-    poisson: float = parameter("", gt=-1, le=0.5)
+    young: float = parameter("Pa", "Young's modulus E of the material", examples=[1e7], gt=0)
+    poisson: float = parameter("", "Poisson's ratio nu of the material", examples=[0.25], gt=-1, le=0.5)
 
     @ti.func
     def compression(self, s, w, i, j, distance):

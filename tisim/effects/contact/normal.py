@@ -60,7 +60,7 @@ def slip(s, w, i, j, separation, distance):
 
 
 class NormalContact(PairForce):
-    """Spheres that touch push each other apart along the line of centres: the contract of such a law."""
+    """The contract of a law by which spheres that touch push each other apart along the line of centres."""
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True

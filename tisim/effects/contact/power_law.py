@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from pydantic import Field as Option
-
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, parameter
+from tisim.effects.base import Effect, option, parameter
 from tisim.effects.contact.normal import NormalContact, area, strain
 from tisim.numerics.powers import Exponent, power
 
 
 class ContactLaw(Effect):
-    """What an effect may contribute to the stiffness of contact; nothing unless overridden."""
+    """The contract of an effect that changes the stiffness of contact."""
 
     contract: ClassVar[bool] = True
 
@@ -24,15 +22,18 @@ class ContactLaw(Effect):
 
 
 class Contact(NormalContact):
-    """F_i = -K E^p A n_ij, with E the overlap strain, A the contact area.
+    """Soft spheres that overlap push each other apart by a power of their overlap strain.
 
-    stiffness : K, of the material; K_ij is the mean of what the two grains have (7.20).
-    exponent : p, the same in all worlds of a batch: compiled in, so that a whole one costs products, no pow.
+        F_i = -K_ij E^p A n_ij
+
+    E is the overlap strain, A the contact area, n_ij the unit vector from i to j, and K_ij the mean of the
+    stiffnesses that the two grains have (7.20).
+
     Source: Z16 Eqs (7.3)-(7.7), (B.5).
     """
 
-    stiffness: float = parameter("N/m^2", gt=0)
-    exponent: Exponent = Option(2, gt=0)
+    stiffness: float = parameter("N/m^2", "stiffness K of the material", examples=[1e6], gt=0)
+    exponent: Exponent = option("exponent p of the overlap strain; whole ones are fastest", 2, gt=0)
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"laws": tuple(peer for peer in peers if isinstance(peer, ContactLaw))}

@@ -10,20 +10,24 @@ from tisim.effects.contact.power_law import Contact, ContactLaw
 
 
 class ContactSoftening(ContactLaw):
-    """K_i = max(K_0 exp(-a (T_i / T* - 1)), K_lim); K_0 is the stiffness of the contact.
+    """The stiffness of contact falls with the temperature of a grain.
 
-    sensitivity : a. reference_temperature : T*, at which K_i = K_0; below it a grain is stiffer.
-    floor : K_lim, the least stiffness.
+        K_i = max(K_0 exp(-a (T_i / T* - 1)), K_lim)
 
-    Source: Z16 Eqs (7.18)-(7.20). Section 9 prints the exponent as (a T/T* - 1), the same only for its a = 1.
+    K_0 is the stiffness that ``contact`` gives. Below T* a grain is stiffer. Section 9 of the
+    paper prints the exponent as (a T/T* - 1), the same only for its a = 1.
+
+    Source: Z16 Eqs (7.18)-(7.20).
     """
 
     fields = ("temperature",)
     requires: ClassVar = (Contact,)
 
-    sensitivity: float = parameter("", ge=0)
-    reference_temperature: float = parameter("K", gt=0)
-    floor: float = parameter("N/m^2", 0.0, ge=0)
+    sensitivity: float = parameter("", "thermal sensitivity a", examples=[1.0], ge=0)
+    reference_temperature: float = parameter(
+        "K", "reference temperature T*, at which the stiffness is K_0", examples=[300.0], gt=0
+    )
+    floor: float = parameter("N/m^2", "least stiffness K_lim", 0.0, ge=0)
 
     @ti.func
     def softened(self, s, w, i, stiffness):

@@ -8,7 +8,7 @@ from tisim.effects.contact.normal import NormalContact, arm
 
 
 class SurfaceContact(PairForce):
-    """A force between touching spheres that acts at their point of contact, and its torque: the contract."""
+    """The contract of a force at the point of contact of touching spheres, which turns both."""
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True

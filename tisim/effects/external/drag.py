@@ -3,16 +3,8 @@
 All are F = g u with u = v_f - v, the velocity of the fluid as the sphere sees it: v_f is the sum of all
 sources of a flow velocity, zero without any. The fluid does not feel the spheres.
 
-The law of Chow is in pieces of the Reynolds number Re = 2 R rho_a |u| / mu:
-
-    C_D = 24 / Re               0 < Re <= 1           which is Stokes's law
-          24 / Re^0.646         1 < Re <= 400
-          0.5                   400 < Re <= 3e5
-          0.000366 Re^0.4275    3e5 < Re <= 2e6
-          0.18                  2e6 < Re
-
-It jumps at 3e5 from 0.5 to 0.080, as Z16 says, and also a little at 400 (0.5003 to 0.5) and 2e6 (0.1808 to
-0.18). Z16 prints the unit of viscosity as Pa/s; it is Pa s.
+The law of Chow (``ChowDrag``) jumps at 3e5 from 0.5 to 0.080, as Z16 says, and also a little at 400 (0.5003
+to 0.5) and 2e6 (0.1808 to 0.18). Z16 prints the unit of viscosity as Pa/s; it is Pa s.
 """
 
 from __future__ import annotations
@@ -28,7 +20,7 @@ LEAST_SPEED = 1e-30
 
 
 class Drag(Force):
-    """F = g u, where g is a multiple of a power of |u|."""
+    """The contract of a drag law, F = g u, where g is a multiple of a power of |u| and u = v_f - v."""
 
     contract: ClassVar[bool] = True
     fields = ("radius",)
@@ -66,13 +58,17 @@ class Drag(Force):
 
 
 class ConstantDrag(Drag):
-    """F = 1/2 rho_a C_D |u| u pi R^2, u = v_f - v.
+    """A fluid drags spheres with a constant drag coefficient.
 
-    density : rho_a, of the fluid. coefficient : C_D. Source: Z16 Eq. (3.6).
+        F = 1/2 rho_a C_D |u| u pi R^2,    u = v_f - v
+
+    v_f is the sum of all sources of a flow velocity, zero without any.
+
+    Source: Z16 Eq. (3.6).
     """
 
-    density: float = parameter("kg/m^3", gt=0)
-    coefficient: float = parameter("", ge=0)
+    density: float = parameter("kg/m^3", "density rho_a of the fluid", examples=[1.2], gt=0)
+    coefficient: float = parameter("", "drag coefficient C_D", examples=[0.5], ge=0)
 
     @ti.func
     def resistance(self, s, w, i, speed):
@@ -81,14 +77,23 @@ class ConstantDrag(Drag):
 
 
 class ChowDrag(Drag):
-    """F = 1/2 rho_a C_D(Re) |u| u pi R^2, C_D of Chow in five pieces of Re.
+    """A fluid drags spheres with a drag coefficient that depends on the Reynolds number, in five pieces.
 
-    density : rho_a; viscosity : mu, dynamic; of the fluid. Re = 2 R rho_a |u| / mu.
+        F = 1/2 rho_a C_D(Re) |u| u pi R^2,    u = v_f - v,    Re = 2 R rho_a |u| / mu
+
+        C_D = 24 / Re               0 < Re <= 1           which is Stokes's law
+              24 / Re^0.646         1 < Re <= 400
+              0.5                   400 < Re <= 3e5
+              0.000366 Re^0.4275    3e5 < Re <= 2e6
+              0.18                  2e6 < Re
+
+    v_f is the sum of all sources of a flow velocity, zero without any.
+
     Source: Z16 section 4.2, after Chow (1979).
     """
 
-    density: float = parameter("kg/m^3", gt=0)
-    viscosity: float = parameter("Pa s", gt=0)
+    density: float = parameter("kg/m^3", "density rho_a of the fluid", examples=[1.2], gt=0)
+    viscosity: float = parameter("Pa s", "dynamic viscosity mu of the fluid", examples=[1.8e-5], gt=0)
 
     @ti.func
     def resistance(self, s, w, i, speed):
@@ -109,12 +114,16 @@ class ChowDrag(Drag):
 
 
 class StokesDrag(Drag):
-    """F = 6 pi mu R u, u = v_f - v; of a sphere at Re << 1.
+    """A fluid drags spheres by Stokes's law, which holds for Reynolds numbers far below 1.
 
-    viscosity : mu, dynamic, of the fluid. Source: Z16 Eq. (4.13).
+        F = 6 pi mu R u,    u = v_f - v
+
+    v_f is the sum of all sources of a flow velocity, zero without any.
+
+    Source: Z16 Eq. (4.13).
     """
 
-    viscosity: float = parameter("Pa s", gt=0)
+    viscosity: float = parameter("Pa s", "dynamic viscosity mu of the fluid", examples=[1e-3], gt=0)
 
     @ti.func
     def resistance(self, s, w, i, speed):

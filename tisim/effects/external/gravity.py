@@ -11,12 +11,12 @@ STANDARD = 9.80665
 
 
 class Gravity(Force):
-    """Weight F = m g.
+    """Uniform gravity gives particles their weight, F = m g.
 
-    acceleration : g, a vector; standard gravity along -z by default. Source: L21 section 2.3.
+    Source: L21 section 2.3.
     """
 
-    acceleration: Vector = parameter("m/s^2", (0.0, 0.0, -STANDARD))
+    acceleration: Vector = parameter("m/s^2", "acceleration g of free fall", (0.0, 0.0, -STANDARD))
 
     @ti.func
     def force(self, s, w, i, t):

@@ -10,10 +10,14 @@ from tisim.sources.base import sources
 
 
 class Lorentz(Force):
-    """F = q (E + v x B) in the external fields of all sources of E and of B.
+    """Electric and magnetic fields push charged particles by the Lorentz force.
 
-    Charges, a field of the particles (C), do not act on each other here: that is a near field. Fields that
-    moving particles make are left out (Z16 section 7.7: far below the speed of light).
+        F = q (E + v x B)
+
+    E and B are the sums of all sources of each. The charges, a field of the particles (C), do not act on each
+    other here: that is ``near_field``. Fields that moving particles make are left out (Z16 section 7.7: far
+    below the speed of light).
+
     Source: Z13 Eqs (1)-(5).
     """
 

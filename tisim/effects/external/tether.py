@@ -9,20 +9,25 @@ from tisim.worlds.state import Field
 
 
 class Tether(Force):
-    """F = -k (r - r(0)), each component by itself.
+    """A binder holds each particle at the place where it began, by a spring along each axis.
 
-    stiffness : k. A stiffness of 0 leaves that direction free, as in Z13 (11).
+        F = -k (r - r(0)),    each component by itself
 
     r(0) is the field ``anchor`` (m): the position at the start, or what the start gives for it. In a box with
     joined faces the distance is still that of open space: a particle that leaves through a face is pulled
-    back across the box, so tethered particles must stay clear of the faces.
+    back across the box, so tethered particles must stay clear of the faces. The
+    minus sign is missing in (34) as printed; (11) has it.
 
-    Source: Z13 Eqs (11), (34). The minus sign is missing in (34) as printed; (11) has it.
+    Source: Z13 Eqs (11), (34).
     """
 
     fields = (Field("anchor", "m", 3, "mean", default="position"),)
 
-    stiffness: Vector = parameter("N/m")
+    stiffness: Vector = parameter(
+        "N/m",
+        "stiffness k of the binder along each axis; 0 leaves that direction free",
+        examples=[(0.5, 0.5, 0.5)],
+    )
 
     @ti.func
     def force(self, s, w, i, t):

@@ -9,10 +9,15 @@ from tisim.effects.impact.impact import Impact, ImpactLaw
 
 
 class Agglomeration(ImpactLaw):
-    """Bonded grains merge into a sphere of their mass, momentum, volume and heat, at their centre of mass.
+    """Two grains that bond in an impact merge into one sphere, which conserves mass, momentum, volume and
+    heat.
 
-    Each quantity follows its own rule (state.Field.merge): sums add, means are weighted by mass, the
-    radius follows from the volume, b = (b_i^3 + b_j^3)^(1/3). Source: Z04 remark 2.1.
+        b = (b_i^3 + b_j^3)^(1/3),    at the centre of mass of the two
+
+    Each quantity of a particle follows its own rule (state.Field.merge): sums add, means are weighted by
+    mass, the radius b follows from the volume.
+
+    Source: Z04 remark 2.1.
     """
 
     counters = ("merges",)

@@ -10,15 +10,19 @@ from tisim.effects.impact.impact import Impact, ImpactLaw
 
 
 class Friction(ImpactLaw):
-    """Slip is slowed by a tangential impulse mu |I_n| dtau, or stopped where that is more than it takes.
+    """Coulomb friction slows the slip of two grains in an impact, or stops it.
 
-    coefficient : mu. Grains do not rotate (Z04 section 2). Z04 prints no bound at sticking, without which
-    friction could reverse the slip.
+        tangential impulse = min(mu |I_n| dtau, what stops the slip)
+
+    |I_n| dtau is the normal impulse. Grains do not rotate (Z04 section 2). Z04 prints no bound at sticking,
+    without which friction could reverse the slip.
+
+    Source: Z04 Eq. (4.17).
     """
 
     requires: ClassVar = (Impact,)
 
-    coefficient: float = parameter("", ge=0)
+    coefficient: float = parameter("", "coefficient of friction mu", examples=[0.1], ge=0)
 
     @ti.func
     def limit(self, w, impulse):

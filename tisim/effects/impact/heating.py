@@ -11,15 +11,19 @@ from tisim.worlds.state import Field
 
 
 class Heating(ImpactLaw):
-    """Grains have a uniform temperature, and energy they receive warms them: dT = dE / (m C).
+    """Each grain has a uniform temperature, and the energy that it receives in impacts warms it.
 
-    heat_capacity : C, per mass. Source: Z04 Eqs (6.5)-(6.8).
+        dT = dE / (m C)
+
+    Source: Z04 Eqs (6.5)-(6.8).
     """
 
     fields = ("temperature",)
     requires: ClassVar = (Impact,)
 
-    heat_capacity: float = parameter("J/(kg K)", gt=0)
+    heat_capacity: float = parameter(
+        "J/(kg K)", "specific heat capacity C of the grains", examples=[1e3], gt=0
+    )
 
     @ti.func
     def temperature(self, s, w, i, energy):
@@ -27,12 +31,16 @@ class Heating(ImpactLaw):
 
 
 class DeformationWork(ImpactLaw):
-    """Each grain receives the work of deformation of Z04 (6.10), dW = m_ij v_n^2 (1 - e^2) / 3.
+    """Each grain receives the work of deformation in an impact as heat.
+
+        dW = m_ij v_n^2 (1 - e^2) / 3
 
     With the linear force and velocity histories of (4.4)-(4.6), the integral (4.7)-(4.9) of |I_n| over the
     relative approach is I* v_n (dtau_1 - e dtau_2) / 6, I* = 2 |I_n|. It is two thirds of the kinetic energy
     lost, which (6.10) also counts, and both grains receive it: an energy source of the paper's model, kept
     in the books as ``deformation_work``. A scene without this effect conserves energy without it.
+
+    Source: Z04 Eqs (4.7)-(4.9), (6.10).
     """
 
     fields = ("temperature", Field("deformation_work", "J", 1, "sum"))

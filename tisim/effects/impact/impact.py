@@ -35,16 +35,16 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, Force, PairEvent, PairForce, parameter
+from tisim.effects.base import Effect, Force, PairEvent, PairForce, option, parameter
 from tisim.effects.impact.resting import press, rests, rounding
 from tisim.errors import must
 
 
 class ImpactLaw(Effect):
-    """What an effect may contribute to an impact; each does nothing unless overridden."""
+    """The contract of an effect that contributes to an impact; each hook does nothing by default."""
 
     contract: ClassVar[bool] = True
 
@@ -86,14 +86,16 @@ HOOKS = ("hardness_factor", "limit", "supply", "temperature", "fracture", "bond"
 
 
 class Impact(PairEvent):
-    """Impact of spheres with pressure-dependent restitution; bonds when pressure reaches twice hardness.
+    """Spheres collide with a restitution that depends on pressure; they bond when it reaches twice their
+    hardness.
 
-    hardness : H_0, Vickers hardness at high temperature, Pa.
-    deformation_length : beta, deformation over the smaller radius (Z04 4.10).
-    initial_area, final_area : a_0 and a_f, contact area over pi min(b)^2 at e = 1 and e = 0 (Z04 4.12).
-    tolerance : change of e at which the coupling to temperature has settled.
+        e = max(1 - |I_n| / (2 a min(H_i, H_j)), 0)                   restitution            (3.1)
+        |I_n| = m_ij v_n^2 / (2 beta min(b_i, b_j))                   mean normal force      (4.10)
+        a = (a_0 + (a_f - a_0)(1 - e)) pi min(b_i, b_j)^2             contact area           (4.12)
 
-    ``impacts`` counts collisions, ``contacts`` the steps in which forces have pressed a pair in contact.
+    v_n is the speed of approach, m_ij = m_i m_j / (m_i + m_j) the reduced mass, b the radius and H the
+    hardness. ``impacts`` counts collisions, ``contacts`` the steps in which forces have pressed a pair in
+    contact, ``bonds`` the pairs that have bonded.
 
     Source: Z04 Eqs (2.1)-(2.5), (3.1), (4.10), (4.12), (4.17), staggering scheme of section 6b.
     """
@@ -103,12 +105,20 @@ class Impact(PairEvent):
     counters = ("impacts", "contacts", "bonds", "iterations", "unsettled")
     forced: ClassVar[bool] = False
 
-    hardness: float = parameter("Pa", gt=0)
-    deformation_length: float = parameter("", 1.0, gt=0)
-    initial_area: float = parameter("", 0.0, ge=0)
-    final_area: float = parameter("", 1.0, gt=0)
-    tolerance: float = parameter("", 1e-9, gt=0)
-    max_iterations: int = Field(200, ge=1)
+    hardness: float = parameter(
+        "Pa", "Vickers hardness H_0 of the grains; with softening, at high temperature", examples=[3e5], gt=0
+    )
+    deformation_length: float = parameter(
+        "", "deformation beta in an impact, over the smaller radius", 1.0, gt=0
+    )
+    initial_area: float = parameter(
+        "", "contact area a_0 of a rebound without loss (e = 1), over pi min(b)^2", 0.0, ge=0
+    )
+    final_area: float = parameter("", "contact area a_f of a bond (e = 0), over pi min(b)^2", 1.0, gt=0)
+    tolerance: float = parameter(
+        "", "change of e at which the coupling to temperature counts as converged", 1e-9, gt=0
+    )
+    max_iterations: int = option("iterations of the coupling to temperature at most", 200, ge=1)
 
     @model_validator(mode="after")
     def _areas(self) -> Self:

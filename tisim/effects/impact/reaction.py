@@ -12,15 +12,19 @@ from tisim.worlds.state import Field
 
 
 class Reaction(ImpactLaw):
-    """Adsorbed gas gives each grain the energy dH = alpha a, a the contact area.
+    """Gas that is adsorbed on the grains reacts in an impact, and heats each of the two grains.
 
-    energy_density : alpha, energy released per contact area. Source: Z04 Eq. (6.9).
+        dH = alpha a,    a the contact area
+
+    Source: Z04 Eq. (6.9).
     """
 
     fields = ("temperature", Field("reaction_heat", "J", 1, "sum"))
     requires: ClassVar = (Heating,)
 
-    energy_density: float = parameter("J/m^2", ge=0)
+    energy_density: float = parameter(
+        "J/m^2", "energy alpha that the reaction releases per contact area", examples=[10.0], ge=0
+    )
 
     @ti.func
     def supply(self, w, area, work):

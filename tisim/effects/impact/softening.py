@@ -16,16 +16,20 @@ LARGEST_EXPONENT = 50.0
 
 
 class Softening(ImpactLaw):
-    """Hardness H = H_0 exp(Q / (R T)).
+    """The hardness of a grain falls with its temperature.
 
-    activation_energy : Q. Source: Z04 section 6, text after Eq. (6.2). H_0 is the limit at high
-    temperature (the paper calls it the hardness at absolute zero, where its formula is infinite).
+        H = H_0 exp(Q / (R T)),    R the gas constant
+
+    H_0 is the hardness of ``impact``, the limit at high temperature (the paper calls it the hardness at
+    absolute zero, where its formula is infinite).
+
+    Source: Z04 section 6, text after Eq. (6.2).
     """
 
     fields = ("temperature",)
     requires: ClassVar = (Heating,)
 
-    activation_energy: float = parameter("J/mol", ge=0)
+    activation_energy: float = parameter("J/mol", "activation energy Q of softening", examples=[5e3], ge=0)
 
     @ti.func
     def hardness_factor(self, w, temperature):

@@ -10,16 +10,19 @@ from tisim.sources.base import sources
 
 
 class MagneticBodyForce(Force):
-    """F = grad(gamma B.B) = 2 gamma (grad B)^T B, B the sum of all sources.
+    """An uneven magnetic field pulls particles to where it is stronger, or weaker for a negative gamma.
 
-    gamma : of each particle, whatever its size; positive is drawn to the stronger field. For a sphere of
-    volume V and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert none.
+        F = grad(gamma B.B) = 2 gamma (grad B)^T B
+
+    B is the sum of all sources. gamma is that of each particle, whatever its size; for a sphere of volume V
+    and small susceptibility chi it is chi V / (2 mu_0). Uniform fields exert no force.
+
     Source: Z16 Eq. (7.24).
     """
 
     requires_source = ("magnetic_flux_density",)
 
-    gamma: float = parameter("J/T^2")
+    gamma: float = parameter("J/T^2", "magnetic parameter gamma of each particle", examples=[1e-6])
 
     def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}

@@ -13,14 +13,18 @@ CUTS = (10.0, 20.0, 30.0, 60.0)
 
 
 class DipoleDipole(PairForce):
-    """F_i = -grad_i U, U = -mu_0 / (4 pi) (3 (m_i.n)(m_j.n) - m_i.m_j) / d^3, over all pairs.
+    """Magnetic moments attract and repel each other as dipoles, over all pairs.
 
-    That is -3 mu_0 / (4 pi d^4) [(m_i.n) m_j + (m_j.n) m_i + (m_i.m_j) n - 5 (m_i.n)(m_j.n) n] with
-    n from i to j and the ``moment`` of each that another effect has set, held fixed. The force is not along
-    n: it turns the pair as a whole, against the torques m x B of the fields on the moments. These are not
-    given to the particles, as moments turn inside them; where they lie along the field of all sources and
-    moments (mutual_moment.py) there are none, and where they lie along that of the sources alone, the sources
-    take the balance up. In a periodic box only the nearest image of a particle acts.
+        F_i = -grad_i U,    U = -mu_0 / (4 pi) (3 (m_i.n)(m_j.n) - m_i.m_j) / d^3
+            = -3 mu_0 / (4 pi d^4) [(m_i.n) m_j + (m_j.n) m_i + (m_i.m_j) n - 5 (m_i.n)(m_j.n) n]
+
+    n is the unit vector from i to j, d the distance, m the ``moment`` of each that another effect has set,
+    held fixed. The force is not along n: it turns the pair as a whole, against the torques m x B of the
+    fields on the moments. These are not given to the particles, as moments turn inside them; where they lie
+    along the field of all sources and moments (``mutual_induced_moment``) there are none, and where they lie
+    along that of the sources alone, the sources take the balance up. In a periodic box only the nearest image
+    of a particle acts.
+
     Source: B16 Eqs (6.21), (6.23).
     """
 
@@ -45,16 +49,20 @@ class DipoleDipole(PairForce):
 
 
 class TruncatedDipoleDipole(DipoleDipole):
-    """The same between pairs within a distance, found with the pair list; no force beyond.
+    """Magnetic moments within a cut-off attract and repel each other as dipoles; beyond it there is no force.
 
-    cutoff : between centres, in mean radii of the two. The force is not shifted: at 30 radii it jumps by
-    2e-5 of that at contact. B16 takes 30 (section 6.3), as the energy of the strongest moments it has is less
-    than k T from about 20 radii on (by its numbers, from 25).
+    The law is that of ``dipole_dipole``; pairs are found with the pair list. The force is not shifted: at 30
+    radii it jumps by 2e-5 of that at contact. B16 takes 30 (section 6.3), as the energy of the strongest
+    moments it has is less than k T from about 20 radii on (by its numbers, from 25).
+
+    Source: B16 Eqs (6.21), (6.23), section 6.3.
     """
 
     short_ranged = True
 
-    cutoff: float = parameter("", 30.0, gt=2)
+    cutoff: float = parameter(
+        "", "cut-off distance of the centres, over the mean radius of the two", 30.0, gt=2
+    )
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return ()

@@ -11,11 +11,16 @@ from tisim.sources.base import sources
 
 
 class Magnetophoresis(Force):
-    """F = (m.grad) B, B the sum of all sources, m the ``moment`` that another effect has set.
+    """An uneven magnetic field pulls particles by their magnetic moments.
 
-    Where B is free of curl, as it is where no current flows, this is grad(m.B) with m held fixed; of a
-    moment that goes with B it is half of grad(m.B) with m varying, MagneticBodyForce. What moments do to
-    each other is DipoleDipole. Source: B16 Eqs (6.20), (7.1).
+        F = (m.grad) B
+
+    B is the sum of all sources, m the ``moment`` that another effect has set. Where B is free of curl, as it
+    is where no current flows, this is grad(m.B) with m held fixed; of a moment that goes with B it is half of
+    grad(m.B) with m varying, which is ``magnetic_body_force``. What moments do to each other is
+    ``dipole_dipole``.
+
+    Source: B16 Eqs (6.20), (7.1).
     """
 
     fields = (MOMENT,)

@@ -23,7 +23,7 @@ DOMAIN = Field("domain_moment", "A m^2", 1, "mean", default="saturation_moment",
 
 
 class Moment(DerivedQuantity):
-    """m = law(B)."""
+    """The contract of a law that gives each particle a magnetic moment, m = law(B)."""
 
     contract: ClassVar[bool] = True
     quantity = "moment"
@@ -47,10 +47,14 @@ class Moment(DerivedQuantity):
 
 
 class FixedMoment(Moment):
-    """m = m_s B/|B|: a moment of fixed magnitude along the field; 0 where there is no field.
+    """Each particle has a magnetic moment of fixed magnitude along the field where it is.
 
-    m_s : of each particle, ``saturation_moment`` of the start. Without a field no direction is preferred, and
-    the mean over all of them is 0. Source: B16 section 6.2.4, table 6.1.
+        m = m_s B/|B|,    0 where there is no field
+
+    B is the sum of all sources, m_s the ``saturation_moment`` (A m^2) of each particle, which the start
+    gives. Without a field no direction is preferred, and the mean over all of them is 0.
+
+    Source: B16 section 6.2.4, table 6.1.
     """
 
     fields = (MOMENT, SATURATION)
@@ -62,16 +66,20 @@ class FixedMoment(Moment):
 
 
 class LangevinMoment(Moment):
-    """m = m_s L(x) B/|B|, L(x) = coth x - 1/x, x = mu_d |B| / (k T): superparamagnetic, without hysteresis.
+    """Each particle is superparamagnetic: its moment follows Langevin's law, without hysteresis.
 
-    temperature : T. m_s : ``saturation_moment`` of each particle, M_sat times its volume. mu_d : its
-    ``domain_moment``, that of a single domain in it; unless the start says, the particle is one domain.
-    For x << 1 it is the linear m_s mu_d B / (3 k T) (B16 7.7). Source: B16 Eqs (6.22), (7.5).
+        m = m_s L(x) B/|B|,    L(x) = coth x - 1/x,    x = mu_d |B| / (k T)
+
+    B is the sum of all sources. m_s is the ``saturation_moment`` (A m^2) of each particle, its saturation
+    magnetisation times its volume; mu_d its ``domain_moment`` (A m^2), that of a single domain in it: unless
+    the start says, the particle is one domain. For x << 1 it is the linear m_s mu_d B / (3 k T) (B16 7.7).
+
+    Source: B16 Eqs (6.22), (7.5).
     """
 
     fields = (MOMENT, SATURATION, DOMAIN)
 
-    temperature: float = parameter("K", gt=0)
+    temperature: float = parameter("K", "temperature T of the particles", examples=[300.0], gt=0)
 
     @ti.func
     def law(self, s, w, i, b):
@@ -80,15 +88,24 @@ class LangevinMoment(Moment):
 
 
 class InducedMoment(Moment):
-    """m = V 3 chi / (3 + chi) B / mu_0: of a sphere of volume V and linear susceptibility chi.
+    """Each particle is a sphere of linear material, which the field where it is magnetises.
 
-    susceptibility : chi = mu_r - 1, of the material; the field that the sphere makes in itself,
-    -M/3, is taken into account. -1 excludes all field. Source: L21 Eq. (2.4).
+        m = V 3 chi / (3 + chi) B / mu_0
+
+    V is its volume, B the sum of all sources. The field that the sphere makes in itself, -M/3, is taken into
+    account.
+
+    Source: L21 Eq. (2.4).
     """
 
     fields = (MOMENT, "radius")
 
-    susceptibility: float = parameter("", ge=-1)
+    susceptibility: float = parameter(
+        "",
+        "magnetic susceptibility chi = mu_r - 1 of the material; -1 excludes all field",
+        examples=[1.0],
+        ge=-1,
+    )
 
     @ti.func
     def law(self, s, w, i, b):

@@ -12,7 +12,9 @@ from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment, Moment
 
 
 class MutualMoment(SelfConsistentQuantity, Moment):
-    """m_i = law(B(r_i) + sum_j B_j(r_i)), B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j), a dipole's field.
+    """The contract of a moment that follows the field of the sources and of all other moments.
+
+        m_i = law(B(r_i) + sum_j B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
     A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,
     matter as well. In a periodic box only the nearest image of a particle acts.
@@ -37,19 +39,31 @@ class MutualMoment(SelfConsistentQuantity, Moment):
 
 
 class MutualInducedMoment(MutualMoment, InducedMoment):
-    """m_i = V_i 3 chi / (3 + chi) (B + sum_j B_j) / mu_0: linear spheres that magnetise each other.
+    """Spheres of linear material are magnetised by the sources and by each other.
 
-    Two at a distance d, with a = chi / (3 + chi) R^3 / d^3: 1 / (1 - 2 a) times the moment of one alone along
-    the line between them, 1 / (1 + a) across it. Source: L21 Eqs (2.6), (4.12).
+        m_i = V_i 3 chi / (3 + chi) (B(r_i) + sum_j B_j(r_i)) / mu_0
+        B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)                        the field of a dipole
+
+    Two at a distance d, with a = chi / (3 + chi) R^3 / d^3, have 1 / (1 - 2 a) times the moment of one alone
+    along the line between them, 1 / (1 + a) across it. Near contact the higher multipoles, which are left
+    out, matter as well. In a periodic box only the nearest image of a particle acts.
+
+    Source: L21 Eqs (2.6), (4.12).
     """
 
     alone = InducedMoment
 
 
 class MutualLangevinMoment(MutualMoment, LangevinMoment):
-    """m_i = m_s L(x) B/|B|, x = mu_d |B| / (k T), in B of the sources and of all the other moments.
+    """Superparamagnetic particles are magnetised by the sources and by each other.
 
-    Left out by B16, as it matters for weak fields only (section 6.2.4). Source: B16 Eq. (6.22), L21 (2.6).
+        m_i = m_s L(x) B/|B|,    L(x) = coth x - 1/x,    x = mu_d |B| / (k T)
+
+    B is that of the sources and of all other moments, each a dipole; the rest is as in ``langevin_moment``.
+    B16 leaves this out, as it matters for weak fields only (section 6.2.4). In a periodic box only the
+    nearest image of a particle acts.
+
+    Source: B16 Eq. (6.22), L21 (2.6).
     """
 
     alone = LangevinMoment

@@ -5,25 +5,23 @@ from __future__ import annotations
 from typing import Self
 
 import numpy as np
-from pydantic import Field as Option
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import PairForce, parameter
+from tisim.effects.base import PairForce, option, parameter
 from tisim.errors import must
 from tisim.numerics.powers import Exponent, power
 
 
 class Mie(PairForce):
-    """F_i = -grad_i U, U = C eps [(sigma/d)^n - (sigma/d)^m] + const within a cut-off, 0 beyond.
+    """Spheres repel and attract each other by Mie's potential within a cut-off; beyond it there is no force.
 
-    C = n/(n - m) (n/m)^(m/(n - m)) makes eps the depth of the well, at d = sigma (n/m)^(1/(n - m)), and sigma
-    is R_i + R_j. U is shifted to vanish at the cut-off, which changes no force.
+        F_i = -grad_i U,    U = C eps [(sigma/d)^n - (sigma/d)^m] + const,    sigma = R_i + R_j
 
-    epsilon : eps. n, m : n > m; compiled in, so that whole ones cost products, no pow. 30 and 15 stand for
-    hard spheres in B16 (section 6.3), with eps = 100 k T and repulsion alone; 12 and 6 are Lennard-Jones's.
-    cutoff : in sigma; left out, at the bottom of the well: repulsion alone, which ends smoothly there.
-    Elsewhere the force jumps at the cut-off.
+    C = n/(n - m) (n/m)^(m/(n - m)) makes eps the depth of the well, at d = sigma (n/m)^(1/(n - m)). U is
+    shifted to vanish at the cut-off, which changes no force. Exponents of 30 and 15 stand for hard spheres in
+    B16 (section 6.3), with eps = 100 k T and repulsion alone; 12 and 6 are Lennard-Jones's. With the cut-off
+    at the bottom of the well, where it is unless given, the force ends smoothly; elsewhere it jumps there.
 
     Source: B16 Eqs (6.18), (6.19), after Mie (1903).
     """
@@ -31,10 +29,12 @@ class Mie(PairForce):
     fields = ("radius",)
     short_ranged = True
 
-    epsilon: float = parameter("J", gt=0)
-    n: Exponent = Option(30, gt=0)
-    m: Exponent = Option(15, gt=0)
-    cutoff: float | None = parameter("", None, gt=0)
+    epsilon: float = parameter("J", "depth eps of the potential well", examples=[4e-19], gt=0)
+    n: Exponent = option("exponent n of the repulsion, above m; whole ones are fastest", 30, gt=0)
+    m: Exponent = option("exponent m of the attraction", 15, gt=0)
+    cutoff: float | None = parameter(
+        "", "cut-off distance over sigma; unless given, the bottom of the well", None, gt=0
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -14,11 +14,9 @@ lacks the minus sign that its n_ij, from i to j, asks for: like charges repel.)
 
 from typing import Literal
 
-from pydantic import Field as Option
-
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import three_digits
-from tisim.effects.base import Effect, PairForce, parameter
+from tisim.effects.base import Effect, PairForce, option, parameter
 from tisim.numerics.powers import Exponent, power
 from tisim.worlds.state import Field
 
@@ -27,24 +25,32 @@ CUTS = (0.1, 0.2, 0.5, 1.0)
 
 
 class NearField(PairForce):
-    """F_i = sum_j (alpha_1 d^-beta_1 - alpha_2 d^-beta_2) n_ij over all pairs: attraction and repulsion.
+    """Particles attract and repel each other by powers of their distance, over all pairs.
 
-    alpha1, alpha2 : the coefficients, or abar of ``strength``: N m^beta, per product of the two strengths.
-    beta1, beta2 : the same in all worlds of a batch: compiled in, so that whole ones cost products, no pow.
-    strength : "plain" (s = 1), "mass" (kg), "area" (4 pi R^2), "volume" (4/3 pi R^3) or "charge" (C, signed).
-    signed : whether particles carry c, the field ``polarity``, +1 or -1. Without it all are alike.
+        F_i = sum_j (alpha_1 d^-beta_1 - alpha_2 d^-beta_2) n_ij,    alpha = abar s_i s_j c_i c_j
 
-    In a periodic box only the nearest image of a particle acts. Source: Z16 Eq. (7.23), Z13 Eq. (24).
+    n_ij is the unit vector from i to j, so alpha_1 attracts and alpha_2 repels. The strength s of a particle
+    is 1 ("plain"), its mass (kg), its surface area 4 pi R^2 ("area"), its volume or its charge (C, signed); c
+    is its field ``polarity``, +1 or -1, where the law is signed, and 1 otherwise. In a periodic box only the
+    nearest image of a particle acts.
+
+    Source: Z16 Eq. (7.23), Z13 Eq. (24).
     """
 
     fields = ("charge", Field("polarity", "", 1, "keep", integer=True, default=None))
 
-    alpha1: float = parameter("N m^beta1", 0.0, ge=0)
-    beta1: Exponent = Option(1, ge=0)
-    alpha2: float = parameter("N m^beta2", 0.0, ge=0)
-    beta2: Exponent = Option(2, ge=0)
-    strength: Literal["plain", "mass", "area", "volume", "charge"] = "plain"
-    signed: bool = False
+    alpha1: float = parameter(
+        "N m^beta1", "coefficient abar_1 of attraction, per product of the two strengths", 0.0, ge=0
+    )
+    beta1: Exponent = option("exponent beta_1 of attraction; whole ones are fastest", 1, ge=0)
+    alpha2: float = parameter(
+        "N m^beta2", "coefficient abar_2 of repulsion, per product of the two strengths", 0.0, ge=0
+    )
+    beta2: Exponent = option("exponent beta_2 of repulsion; whole ones are fastest", 2, ge=0)
+    strength: Literal["plain", "mass", "area", "volume", "charge"] = option(
+        "what the strength s of a particle is", "plain"
+    )
+    signed: bool = option("whether particles carry a polarity c, +1 or -1", False)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         own = {name: getattr(self, name) for name in NearField.model_fields}
@@ -84,14 +90,18 @@ class NearField(PairForce):
 
 
 class TruncatedNearField(NearField):
-    """The near field of pairs within a distance, found with the pair list; no force beyond.
+    """Particles within a cut-off attract and repel each other by powers of distance; beyond it there is no
+    force.
 
-    cutoff : between centres. The force is not shifted: it jumps there. Z13 and Z16 cut nothing off.
+    The law is that of ``near_field``; pairs are found with the pair list. The force is not shifted: it jumps
+    at the cut-off. Z13 and Z16 cut nothing off.
+
+    Source: Z16 Eq. (7.23), Z13 Eq. (24).
     """
 
     short_ranged = True
 
-    cutoff: float = parameter("m", gt=0)
+    cutoff: float = parameter("m", "cut-off distance of the centres", examples=[0.1], gt=0)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return ()

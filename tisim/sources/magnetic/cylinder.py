@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from typing import Any, Self
 
 import numpy as np
-from pydantic import Field as Option
 from pydantic import field_validator, model_validator
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.components.ranges import check_direction
-from tisim.effects.base import Effect, parameter
+from tisim.effects.base import Effect, option, parameter
 from tisim.errors import InputError, must
 from tisim.sources.magnetic import cylinder_field
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
@@ -23,14 +22,11 @@ from tisim.sources.magnetic.magnets import Body, Magnets
 
 
 class Cylinder(Body):
-    """A cylinder, magnetised uniformly and in any direction, or not at all.
+    """A cylinder, magnetised uniformly and in any direction, or not at all."""
 
-    centre; axis : of any length but 0; radius; length : from end to end; magnetisation : M.
-    """
-
-    axis: Vector = parameter("", (0.0, 0.0, 1.0))
-    radius: float = parameter("m", gt=0)
-    length: float = parameter("m", gt=0)
+    axis: Vector = parameter("", "direction of the axis, of any length but 0", (0.0, 0.0, 1.0))
+    radius: float = parameter("m", "radius R", examples=[3e-4], gt=0)
+    length: float = parameter("m", "length from end to end", examples=[1e-2], gt=0)
 
     @field_validator("axis", mode="after")
     @classmethod
@@ -111,24 +107,31 @@ class Cylinder(Body):
 
 
 class MagneticCylinders(Magnets):
-    """B of uniformly magnetised cylinders: the sum over all of them. They do not magnetise each other.
+    """Uniformly magnetised cylinders make a magnetic field, the sum over all of them; they do not magnetise
+    each other.
 
-    cylinders : any number of them, which may differ per world.
-    table_digits : with these many digits field and gradient are read from a table, made when a scene is
-        compiled, where its error is measured; cylinders must then be at least as long as their radius.
-    Without it they are closed forms in complete elliptic integrals, with series about the axis and far away.
-    In f64, for lengths of 1/10 to 2000 radii in any direction, their errors are below 1e-12, and 1e-15 R/d
-    more at a distance d from the rim, as places are known to rounding only: that of B relative to |B|, that
-    of its gradient to |grad B| + |B|/l, l the distance to the rim with R added across, as it passes through 0
-    in the middle. That is of the numbers as they are given: what their own rounding puts across the axis of
-    a long cylinder that is magnetised along it is of the order of 1e-16 (length/R)^2 of the field beside it.
-    Where the field has no value - on the surface, where it jumps, and at the rims, where it grows as a
-    logarithm - it is finite.
+        B = mu_0 (H + M) inside,    mu_0 H outside
+
+    Field and gradient are closed forms in complete elliptic integrals, with series about the axis and far
+    away. In f64, for lengths of 1/10 to 2000 radii in any direction, their errors are below 1e-12, and 1e-15
+    R/d more at a distance d from the rim, as places are known to rounding only: that of B relative to |B|,
+    that of its gradient to |grad B| + |B|/l, l the distance to the rim with R added across, as it passes
+    through 0 in the middle. That is of the numbers as they are given: what their own rounding puts across the
+    axis of a long cylinder that is magnetised along it is of the order of 1e-16 (length/R)^2 of the field
+    beside it. Where the field has no value - on the surface, where it jumps, and at the rims, where it grows
+    as a logarithm - it is finite. With ``table_digits`` they are read from a table, made when a scene is
+    compiled, where its error is measured; cylinders must then be at least as long as their radius.
+
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
-    cylinders: tuple[Cylinder, ...]
-    table_digits: int | None = Option(None, ge=2, le=6)
+    cylinders: tuple[Cylinder, ...] = option("the cylinders; their number may differ per world")
+    table_digits: int | None = option(
+        "digits to which field and gradient are read from a table; unless given, closed forms",
+        None,
+        ge=2,
+        le=6,
+    )
 
     @model_validator(mode="after")
     def _fit_for_a_table(self) -> Self:

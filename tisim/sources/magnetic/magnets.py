@@ -10,38 +10,40 @@ from tisim.sources.base import Source, parameter
 
 
 class Body(Component):
-    """A solid body that may be magnetised. Bound, its functions are of the world and the row of the list."""
+    """The contract of a solid body that may be magnetised; k is its row in the list of the source."""
 
     contract: ClassVar[bool] = True
 
-    centre: Vector = parameter("m", (0.0, 0.0, 0.0))
-    magnetisation: Vector = parameter("A/m", (0.0, 0.0, 0.0))
+    centre: Vector = parameter("m", "centre", (0.0, 0.0, 0.0))
+    magnetisation: Vector = parameter("A/m", "magnetisation M", (0.0, 0.0, 0.0))
 
     @ti.func
     def nearest(self, w, k, r):
-        """Distance of r (m) from the surface of body k, negative inside, and the unit vector along which it
-        grows."""
+        """Return the distance of r (m) from the surface of body k, negative inside, and the unit vector along
+        which it grows."""
         return 0.0 * r[0], 0.0 * r
 
     @ti.func
     def flux_density(self, w, k, r):
-        """B (T) of body k at r."""
+        """Return the flux density B (T) of body k at r."""
         return 0.0 * r
 
     @ti.func
     def flux(self, w, k, r):
-        """B, and dB_i/dr_j (T/m) where r is not on the surface."""
+        """Return B (T) and its gradient dB_i/dr_j (T/m), which is right where r is not on the surface."""
         return 0.0 * r, 0.0 * r.outer_product(r)
 
 
 class Magnets(Source):
-    """The sum of the fields of a list of bodies, each magnetised as it says, not by the others."""
+    """The contract of the sum of the fields of a list of bodies, each magnetised as it says, not by the
+    others.
+    """
 
     contract: ClassVar[bool] = True
     quantity: ClassVar[str] = "magnetic_flux_density"
 
     def bodies(self) -> Any:
-        """The list; bound, the one row that stands for it."""
+        """Return the list of bodies; in kernels the one row that stands for it."""
         ((name, _),) = self.lists()
         return getattr(self, name)
 

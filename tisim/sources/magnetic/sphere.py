@@ -5,14 +5,14 @@ from __future__ import annotations
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import parameter
+from tisim.effects.base import option, parameter
 from tisim.sources.magnetic.magnets import Body, Magnets
 
 
 class Sphere(Body):
-    """A sphere, magnetised uniformly or not at all. centre; radius; magnetisation : M."""
+    """A sphere, magnetised uniformly or not at all."""
 
-    radius: float = parameter("m", gt=0)
+    radius: float = parameter("m", "radius R", examples=[1e-3], gt=0)
 
     @ti.func
     def nearest(self, w, k, r):
@@ -43,11 +43,12 @@ class Sphere(Body):
 
 
 class MagneticSpheres(Magnets):
-    """B of uniformly magnetised spheres: 2/3 mu_0 M inside, outside that of a dipole, m = M V. They do not
-    magnetise each other.
+    """Uniformly magnetised spheres make a magnetic field, the sum over all of them; they do not magnetise
+    each other.
 
-    spheres : any number of them, which may differ per world.
+        B = 2/3 mu_0 M inside;    outside that of a dipole of moment M V, V the volume
+
     Source: J. D. Jackson, Classical Electrodynamics (1999), Eqs (5.56), (5.105).
     """
 
-    spheres: tuple[Sphere, ...]
+    spheres: tuple[Sphere, ...] = option("the spheres; their number may differ per world")

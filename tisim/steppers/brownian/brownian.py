@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
-from tisim.components.component import parameter
+from tisim.components.component import option, parameter
 from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
@@ -27,17 +27,19 @@ from tisim.worlds.state import Field
 
 
 class Brownian(Stepper):
-    """dr_i = u(r_i) dt + dt/(kT) sum_j D_ij F_j + R_i, R normal with mean 0 and <R_i R_j> = 2 D_ij dt.
+    """Brownian dynamics moves particles without inertia: by the flow, by forces and by thermal noise.
 
-    u is the sum of all sources of a flow velocity, F the sum of forces, D that at the start of the step. For
-    spheres so small that they have no inertia; ``velocity`` is that of drift in the last step,
-    u + sum_j D_ij F_j / kT. Its mean is exact to first order in dt, and so is every statistic (weak order 1).
+        dr_i = u(r_i) dt + dt/(kT) sum_j D_ij F_j + R_i,    <R_i> = 0,    <R_i R_j> = 2 D_ij dt
 
-    temperature : T; viscosity : eta, of the fluid, which has no inertia either; infinite, and at rest but for
-    u. hydrodynamics : what D_ij is for i != j, zero or a tensor (mobility.py). noise : by Cholesky's
-    decomposition, or by the truncated expansion, in N^2 operations (fast_noise.py). A world in which the
-    matrix is not positive definite fails, with time and particle: that happens with Oseen's tensor at
-    distances below some 3/2 R. "fast" sees only pairs for which it is not.
+    u is the sum of all sources of a flow velocity, F the sum of forces, D the diffusion tensor at the start
+    of the step and R normal noise. ``velocity`` is that of drift in the last step, u + sum_j D_ij F_j / kT.
+    Its mean is exact to first order in dt, and so is every statistic (weak order 1). The fluid has no inertia
+    either; it is infinite, and at rest but for u.
+
+    Noise is made by Cholesky's decomposition ("exact"), or by the truncated expansion, in N^2 operations
+    ("fast"). A world in which the diffusion tensor is not positive definite fails, with time and particle:
+    that happens with Oseen's tensor at distances below some 3/2 R. "fast" sees only pairs for which it is
+    not.
 
     Particles whose field ``fixed`` is not 0 stay where they are, and take no part in D. Spheres do not
     rotate: refused are torques, and also what asks for velocities, which particles here do not have: drag,
@@ -50,11 +52,13 @@ class Brownian(Stepper):
     Source: B16 Eqs (6.1)-(6.16).
     """
 
-    temperature: float = parameter("K", ge=0)
-    viscosity: float = parameter("Pa s", gt=0)
-    control: DriftLimit
-    hydrodynamics: Literal["none", "oseen", "rotne-prager"] = "none"
-    noise: Literal["exact", "fast"] = "exact"
+    temperature: float = parameter("K", "temperature T of the fluid", examples=[300.0], ge=0)
+    viscosity: float = parameter("Pa s", "dynamic viscosity eta of the fluid", examples=[1e-3], gt=0)
+    control: DriftLimit = option("step control")
+    hydrodynamics: Literal["none", "oseen", "rotne-prager"] = option(
+        "hydrodynamic interaction: what D_ij is for i != j, zero or a tensor", "none"
+    )
+    noise: Literal["exact", "fast"] = option("how noise is made", "exact")
 
     random: ClassVar = True
     world_quantities: ClassVar = (*KEEPS, "beta")

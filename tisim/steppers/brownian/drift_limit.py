@@ -24,7 +24,7 @@ def fault(rate):
 
 
 class DriftLimit(Controller):
-    """Steps in which no force pushes a particle farther than ``drift`` radii, and of ``longest`` at most.
+    """A step is so short that no force pushes a particle farther than a part of its radius.
 
     The velocity that is limited is that which forces give, sum_j D_ij F_j / kT, at the start of the step; so
     the step depends on nothing that is random in it, and its noise has the law of a step given beforehand.
@@ -33,14 +33,18 @@ class DriftLimit(Controller):
     it feels that, and is pushed out again in steps of at most ``drift`` radii. So overlaps stay bounded
     whatever the step, but for right statistics of contacts, ``longest`` has to keep sqrt(2 D dt) below the
     range over which the potential changes by kT.
-
-    drift : in radii. longest : also what particles by themselves meet at multiples of. shortest : a force
-    that asks for less stops its world, with time and particle.
     """
 
-    longest: float = parameter("s", ge=SHORTEST_STEP)
-    shortest: float = parameter("s", 1e-12, ge=SHORTEST_STEP)
-    drift: float = parameter("", 0.05, gt=0)
+    longest: float = parameter(
+        "s",
+        "longest step; particles by themselves meet at multiples of it",
+        examples=[1e-4],
+        ge=SHORTEST_STEP,
+    )
+    shortest: float = parameter(
+        "s", "shortest step; a force that asks for less stops its world", 1e-12, ge=SHORTEST_STEP
+    )
+    drift: float = parameter("", "largest displacement by forces in a step, over the radius", 0.05, gt=0)
 
     world_quantities: ClassVar = ("steepest",)
     accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = (

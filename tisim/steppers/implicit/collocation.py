@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Self
 
-from pydantic import Field as Option
-
 from tisim.components.accuracy_parameter import three_digits
+from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.force_sum import FORCE
 from tisim.steppers.base import Parts, Stepper
@@ -31,25 +30,27 @@ from tisim.worlds.state import Field
 
 
 class Collocation(Stepper):
-    """Order 2s - 2 with s stages: v_i = v + dt sum_j a_ij v'_j, r_i = r + dt sum_j a_ij v_j, v'_j = F_j/m.
+    """Lobatto's collocation advances time implicitly, with order 2s - 2 for s stages.
 
-    Symmetric and implicit as the trapezoidal rule, which is s = 2. The equations are solved by sweeps over
-    the stages, each with what is newest of the others. The first sweep starts from the polynomial of the
-    last step; what it turns out to be off at one stage tells what it is off at the later ones, so that one
-    or two sweeps are enough: some s - 1 to 2 (s - 1) sums of forces for a step. The part of the force that is
+        v_i = v + dt sum_j a_ij v'_j,    r_i = r + dt sum_j a_ij v_j,    v'_j = F_j/m
+
+    It is symmetric, as the trapezoidal rule is, which it is for s = 2. The equations are solved by sweeps
+    over the stages, each with what is newest of the others. The first sweep starts from the polynomial of the
+    last step; what it turns out to be off at one stage tells what it is off at the later ones, so that one or
+    two sweeps are enough: some s - 1 to 2 (s - 1) sums of forces for a step. The part of the force that is
     linear in velocity is solved exactly with each stage. Spin is stepped as velocity is. What the first sweep
     starts from is made anew when there have been impacts.
 
     It pays where forces are smooth and more than three digits are wanted; for forces with kinks, such as
     contacts, its order is lost.
 
-    Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.5; sweeps from
-    the last step's polynomial: E. Everhart, Celest. Mech. 10 (1974) 35-55, and H. Rein, D. S. Spiegel, MNRAS
-    446 (2015) 1424-1437, both for Radau's stages.
+    Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section IV.5. Sweeps that
+    start from the polynomial of the last step: E. Everhart, Celest. Mech. 10 (1974) 35-55, and H. Rein, D. S.
+    Spiegel, MNRAS 446 (2015) 1424-1437, both for Radau's stages.
     """
 
-    stages: int = Option(5, ge=3, le=8)
-    control: StageControl = StageControl()
+    stages: int = option("number s of stages; the order is 2s - 2", 5, ge=3, le=8)
+    control: StageControl = option("step control", StageControl())
 
     counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     world_quantities: ClassVar = (

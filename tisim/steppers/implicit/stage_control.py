@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
-
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
-from tisim.components.component import parameter
+from tisim.components.component import option, parameter
 from tisim.steppers.implicit.span import Per, compared
 from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
@@ -16,32 +14,41 @@ CONTRACTION = 0.25
 
 
 class StageControl(ImplicitControl):
-    """Steps whose error, and that of the sweeps that solve them, is that asked for.
+    """A step of collocation has the error that is asked for, and sweeps that converge.
 
-    error : of position, summed over the particles. per : "step", a bound of the error of a step over the
-    displacement in it, mostly far above the error itself; or "run", the error at the end over the size of the
-    motion (span.py), by the leading term of the method's own error. sweeps : as many as a step may take.
-    part : what may be left of the error when sweeps end. safety : how much of the error the next step aims
-    at. resolution : part of its radius that is added to a particle's displacement or size of motion: for one
-    that starts from rest the ratio of error and displacement has no limit.
+    The error is of position, summed over the particles, per "step": a bound of the error of a step over the
+    displacement in it, mostly far above the error itself; or per "run": the error at the end over the size of
+    the motion, by the leading term of the method's own error. The resolution is there as for a particle that
+    starts from rest the ratio of error and displacement has no limit.
 
     With ``per="run"`` the error at the end was 0.03 to 30 times that asked for in 13 scenes, less under drag
     (docs/steppers.md); a chaotic motion multiplies it without bound.
 
     Sweeps end once the change in the last one, times the factor by which a sweep makes the error smaller, is
     below ``part`` of the error. The factor is that of the last two sweeps; in the first, that of the last
-    steps for the present length. Source: as for implicit Runge-Kutta methods, E. Hairer, G. Wanner, Solving
-    Ordinary Differential Equations II, Eq. (IV.8.10) and (IV.8.11).
+    steps for the present length.
+
+    Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Eqs (IV.8.10), (IV.8.11).
     """
 
-    error: float = parameter("", 1e-6, gt=0)
-    part: float = parameter("", 0.3, gt=0)
-    sweeps: int = Field(10, ge=2)
-    safety: float = parameter("", 0.85, ge=LEAST_SAFETY, lt=1)
-    resolution: float = parameter("", 1e-3, ge=0)
-    per: Per = "step"
-    first: float = parameter("s", 1e-6, ge=SHORTEST_STEP)
-    longest: float = parameter("s", 1.0, ge=SHORTEST_STEP)
+    error: float = parameter("", "error of position that is asked for, relative", 1e-6, gt=0)
+    part: float = parameter("", "part of that error that may be left when sweeps end", 0.3, gt=0)
+    sweeps: int = option("sweeps that a step may take at most", 10, ge=2)
+    safety: float = parameter(
+        "",
+        "part of that error at which the next step aims",
+        0.85,
+        ge=LEAST_SAFETY,
+        lt=1,
+    )
+    resolution: float = parameter(
+        "", "part of its radius that is added to a particle's displacement or size of motion", 1e-3, ge=0
+    )
+    per: Per = option(
+        "what the error is relative to: the displacement in a step, or the motion of the run", "step"
+    )
+    first: float = parameter("s", "step that is tried first", 1e-6, ge=SHORTEST_STEP)
+    longest: float = parameter("s", "longest step", 1.0, ge=SHORTEST_STEP)
 
     accuracy_parameters = (AccuracyParameter(error=1),)
 

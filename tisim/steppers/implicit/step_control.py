@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
-from tisim.components.component import parameter
+from tisim.components.component import option, parameter
 from tisim.errors import must
 from tisim.steppers.implicit.span import Per, compared
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
@@ -20,18 +20,19 @@ error, no step is short enough, and all would be the shortest."""
 
 
 class ImplicitControl(StepControl):
-    """What control of implicit steppers has in common: the limits of a step.
-
-    first : step that is tried first. longest, shortest : one that fails at the shortest stops its world, with
-    time, particle and force. most, least : factors by which the step changes in one go at most.
-    """
+    """The contract of step control of implicit steppers: the limits of a step."""
 
     contract: ClassVar[bool] = True
-    first: float = parameter("s", 1e-5, ge=SHORTEST_STEP)
-    longest: float = parameter("s", 2.5e-4, ge=SHORTEST_STEP)
-    shortest: float = parameter("s", 1e-12, ge=SHORTEST_STEP)
-    most: float = parameter("", 4.0, ge=1)
-    least: float = parameter("", 0.1, gt=0, lt=1)
+    first: float = parameter("s", "step that is tried first, dt_0", 1e-5, ge=SHORTEST_STEP)
+    longest: float = parameter("s", "longest step, dt_lim", 2.5e-4, ge=SHORTEST_STEP)
+    shortest: float = parameter(
+        "s",
+        "shortest step; one that fails there stops its world, with time, particle and force",
+        1e-12,
+        ge=SHORTEST_STEP,
+    )
+    most: float = parameter("", "largest factor by which the step grows in one go", 4.0, ge=1)
+    least: float = parameter("", "smallest factor by which the step shrinks in one go", 0.1, gt=0, lt=1)
 
     @property
     def at_end(self) -> bool:
@@ -78,24 +79,28 @@ class ImplicitControl(StepControl):
 
 
 class IterationControl(ImplicitControl):
-    """Steps such that the fixed-point iteration meets its tolerance in the desired number of iterations.
+    """A step is so long that the fixed-point iteration meets its tolerance in the desired number of
+    iterations.
 
-    With w_K the change of the last iteration over the displacement in the step, Lambda_K =
-    (TOL / w_0)^(1/(p K_d)) / (w_K / w_0)^(1/(p K)) and w_0 = 1, as the first iterate is compared with
-    the place where the step began (Z13 A9, Z16 C.5). The step is accepted when w_K <= TOL within K_d
-    iterations; the next one is Lambda_K times as long, or a rejected one is tried again so.
+        Lambda_K = (TOL / w_0)^(1/(p K_d)) / (w_K / w_0)^(1/(p K))
+
+    w_K is the change of the last iteration over the displacement in the step, and w_0 = 1, as the first
+    iterate is compared with the place where the step began (Z13 A9, Z16 C.5). The step is accepted when w_K
+    <= TOL within K_d iterations; the next one is Lambda_K times as long, or a rejected one is tried again so.
 
     This bounds the error of the iteration only. That of the trapezoidal rule itself is not seen, and is left
     to ``longest``. What the papers leave open: the step never changes by more than ``most`` or less than
     ``least`` times in one go, and a step that fails at ``shortest`` stops the world, with time, particle and
     force.
 
-    tolerance : TOL. iterations : K_d. order : p. first : dt_0. longest : dt_lim. Source: Z16 section 8.1.
+    Source: Z16 section 8.1.
     """
 
-    tolerance: float = parameter("", 5e-4, gt=0)
-    iterations: int = Field(10, ge=2)
-    order: float = parameter("", 2.0, gt=0)
+    tolerance: float = parameter(
+        "", "tolerance TOL of the iteration, relative to the displacement in the step", 5e-4, gt=0
+    )
+    iterations: int = option("desired number K_d of iterations; a step with more is rejected", 10, ge=2)
+    order: float = parameter("", "order p of convergence of the iteration in dt", 2.0, gt=0)
 
     accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = (
         AccuracyParameter(longest=2, tolerance=1),
@@ -140,24 +145,32 @@ class IterationControl(ImplicitControl):
 
 
 class ErrorControl(IterationControl):
-    """The same, and steps whose truncation error is that asked for.
+    """A step meets the tolerance of its iteration, and its truncation error is that asked for.
 
-    error : of position, as the stepper estimates it. A step with more is rejected. per : "step", the error of
-    a step over the displacement in it, which says little about the end of a run; or "run", the error at the
-    end over the size of the motion (span.py). Either falls as dt^2. safety : how much of it the next step
-    aims at. resolution : part of its radius that is added to a particle's displacement or size of motion
-    here: for one that starts from rest, and for no force, the ratio of error and displacement has no limit.
+    The iteration is held to its tolerance as by ``iteration_control``.
+
+    A step with more error is rejected. The error falls as dt^2. It is of position, as the stepper estimates
+    it, per "step": the error of a step over the displacement in it, which says little about the end of a run;
+    or per "run": the error at the end over the size of the motion. The resolution is there as for a particle
+    that starts from rest, and for no force, the ratio of error and displacement has no limit.
 
     With ``per="run"`` the error at the end was 0.2 to 15 times that asked for in 13 scenes, less under drag
     (docs/steppers.md); a chaotic motion multiplies it without bound. ``tolerance`` stays one of a step: ask
-    for a hundredth of ``error``. Source: as for any embedded estimate, E. Hairer, S. P. Norsett, G. Wanner,
-    Solving Ordinary Differential Equations I, Eq. (II.4.13).
+    for a hundredth of ``error``.
+
+    Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, Eq. (II.4.13).
     """
 
-    error: float = parameter("", 1e-4, gt=0)
-    safety: float = parameter("", 0.8, ge=LEAST_SAFETY, lt=1)
-    resolution: float = parameter("", 1e-3, ge=0)
-    per: Per = "step"
+    error: float = parameter("", "error of position that is asked for, relative", 1e-4, gt=0)
+    safety: float = parameter(
+        "", "part of that error at which the next step aims", 0.8, ge=LEAST_SAFETY, lt=1
+    )
+    resolution: float = parameter(
+        "", "part of its radius that is added to a particle's displacement or size of motion", 1e-3, ge=0
+    )
+    per: Per = option(
+        "what the error is relative to: the displacement in a step, or the motion of the run", "step"
+    )
 
     accuracy_parameters = (AccuracyParameter(error=1, tolerance=1),)
 

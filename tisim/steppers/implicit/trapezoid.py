@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal, Self
 
 from tisim.components.accuracy_parameter import three_digits
-from tisim.components.component import parameter
+from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.force_sum import FORCE
 from tisim.steppers.base import Parts, Stepper
@@ -32,25 +32,31 @@ OWN = (Field("own_dt", "s", 1, "keep", scratch=True), *PLACE)
 
 
 class Trapezoid(Stepper):
-    """v' = v + dt/m (phi F' + (1 - phi) F), r' = r + dt (phi v' + (1 - phi) v), and spin as v.
+    """The implicit trapezoidal rule advances time; its equations are solved by fixed-point iteration.
 
-    phi = 1/2 is the trapezoidal rule, of second order; 1 is implicit Euler and 0 explicit Euler, of first.
-    F' is the force at the end of the step, by fixed-point iteration: each iterate is made with the force
-    that positions, velocities and spins of the last one give, at the end of the step. The first one takes F
-    itself. Each world has its own step, iterations and end.
+        v' = v + dt/m (phi F' + (1 - phi) F),    r' = r + dt (phi v' + (1 - phi) v),    spin as v
+
+    F' is the force at the end of the step: each iterate is made with the force that positions, velocities and
+    spins of the last one give, at the end of the step. The first one takes F itself. Each world has its own
+    step, iterations and end.
 
     The part of the force that is linear in velocity, of effects that give ``velocity_jacobian``, is solved
-    exactly with each iterate. ``acceleration`` makes iterates from the last two (see anderson.py), which
-    converges in fewer of them, and where plain iteration does not. Particles that do not feel each other
-    take their own steps and meet at every multiple of ``longest``; a step of the world is then from one to
-    the next.
+    exactly with each iterate. Anderson's acceleration makes iterates from the last two, which converges in
+    fewer of them, and where plain iteration does not. Particles that do not feel each other take their own
+    steps and meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
 
     Source: Z13 (A1)-(A10); Z16 (8.4), (C.1)-(C.5).
     """
 
-    phi: float = parameter("", 0.5, ge=0, le=1)
-    control: IterationControl = IterationControl()
-    acceleration: Literal["none", "anderson"] = "none"
+    phi: float = parameter(
+        "",
+        "weight phi of the end of a step: 1/2 of second order, 1 implicit Euler, 0 explicit",
+        0.5,
+        ge=0,
+        le=1,
+    )
+    control: IterationControl = option("step control", IterationControl())
+    acceleration: Literal["none", "anderson"] = option("how the iteration is accelerated", "none")
 
     counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     world_quantities: ClassVar = (
