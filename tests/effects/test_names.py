@@ -144,7 +144,7 @@ def test_explain_lists_them_by_name():
     shells = SoftShell(stiffness=1.0, width=1e-3), SoftShell(name="outer", stiffness=0.1, width=2e-3)
     found = explain(one(*shells))
     assert [part.name for part in found.effects] == ["soft_shell", "outer"]
-    assert [dict((n, v) for n, v, _ in part.parameters)["width"] for part in found.effects] == [
+    assert [dict((n, v) for n, v, *_ in part.parameters)["width"] for part in found.effects] == [
         "0.001",
         "0.002",
     ]

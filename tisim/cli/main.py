@@ -14,7 +14,7 @@ from rich.text import Text
 
 from tisim.backend import runtime
 from tisim.backend.taichi import check_backend
-from tisim.cli import cost, inspect, new, scene_arguments, search, targets
+from tisim.cli import cost, effects, inspect, new, scene_arguments, search, targets
 from tisim.cli.options import (
     CaseName,
     Changes,
@@ -259,6 +259,7 @@ def doctor() -> None:
     out().print(table)
 
 
+app.command()(effects.effects)
 app.command()(new.new)
 app.command()(cost.cost)
 app.command()(search.optimize)

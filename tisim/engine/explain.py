@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tisim import effects, operators, sources
-from tisim.components import serialization
-from tisim.components.component import Component, unit_of
+from tisim.components.component import Component
+from tisim.components.invalid import text_of, unit_of
 from tisim.effects.base import Effect
+from tisim.engine import reference
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.scene.scene import Scene
@@ -28,13 +26,14 @@ SHOWN = 3
 class Part:
     """An effect, the domain or the step control of a scene.
 
-    name : in files. summary : one line. source : where the law is from. parameters : (name, value, unit).
+    name : in files. summary : one line. source : where the law is from. parameters : name, value, unit and
+    text of each.
     """
 
     name: str
     summary: str
     source: str
-    parameters: tuple[tuple[str, str, str], ...]
+    parameters: tuple[tuple[str, str, str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -99,18 +98,16 @@ def explain(scene: Scene) -> Explanation:
         others=(_part(scene.domain), _part(scene.stepper), _part(scene.stepper.control)),
         memory=memory,
         phases=phases,
-        absent_effects=tuple(Part(kind.kind(), _summary(kind), _source(kind), ()) for kind in absent),
+        absent_effects=tuple(_what(kind) for kind in absent),
         absent_fields=tuple(_absent_fields(absent, present)),
     )
 
 
 def known_effects() -> list[type[Effect]]:
     """Every effect of the package, by name."""
-    packages = (effects, operators, sources)
-    for package in packages:
-        serialization.load(package)
-    homes = tuple(package.__name__ for package in packages)
-    return [kind for _, kind in sorted(Effect.known().items()) if kind.__module__.startswith(homes)]
+    known = (reference.FAMILIES[family].kinds().values() for family in ("effects", "operators", "sources"))
+    mine = [kind for kinds in known for kind in kinds if kind.__module__.startswith("tisim.")]
+    return sorted(mine, key=lambda kind: kind.kind())  # type: ignore[arg-type]
 
 
 def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
@@ -144,11 +141,15 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
 
 
 def _part(spec: Component) -> Part:
-    return Part(spec.label, _summary(type(spec)), _source(type(spec)), tuple(_values(spec)))
+    return replace(_what(type(spec), tuple(_values(spec))), name=spec.label)
 
 
-def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str]]:
-    """(name, value, unit) of each parameter; of a long list, of its first rows."""
+def _what(kind: type[Component], values: tuple[tuple[str, str, str, str], ...] = ()) -> Part:
+    return Part(kind.kind(), reference.summary(kind), reference.source(kind), values)
+
+
+def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, str]]:
+    """(name, value, unit, text) of each parameter; of a long list, of its first rows."""
     lists = dict(spec.lists())
     for name, info in type(spec).model_fields.items():
         value = getattr(spec, name)
@@ -158,37 +159,9 @@ def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str]]
             for k, row in enumerate(value[:SHOWN]):
                 yield from _values(row, f"{within}{name}.{k}.")
             if not 0 < len(value) <= SHOWN:
-                yield f"{within}{name}", f"{len(value)} in all", ""
+                yield f"{within}{name}", f"{len(value)} in all", "", text_of(info)
         elif not isinstance(value, Component):
-            yield f"{within}{name}", _text(value), unit_of(info)
-
-
-def _text(value: object) -> str:
-    if isinstance(value, tuple):
-        return "(" + ", ".join(_text(item) for item in value) + ")"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _summary(kind: type) -> str:
-    """The first sentence of the docstring, without its source."""
-    return re.split(r"\s*\((?=[A-Z]\d\d)|\.\s|\.$", _paragraphs(kind)[0])[0]
-
-
-def _source(kind: type) -> str:
-    """What the docstring names as source; else the first work that it or its module cites in brackets."""
-    paragraphs = _paragraphs(kind)
-    # A full stop ends it unless it follows an initial or stands before a bracket, as in "Eq. (6.9)".
-    if found := re.search(r"Source: (.*?)(?<![A-Z])\.(?: [A-Z]|$)", " ".join(paragraphs)):
-        return found.group(1)
-    module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
-    for text in (paragraphs[0], module):
-        if found := re.search(r"\(([A-Z]\d\d[^()]*(?:\([^)]*\)[^()]*)*)\)", text):
-            return found.group(1)
-    return ""
-
-
-def _paragraphs(kind: type) -> list[str]:
-    return [" ".join(part.split()) for part in (inspect.getdoc(kind) or "").split("\n\n")]
+            yield f"{within}{name}", reference.shown(value), unit_of(info), text_of(info)
 
 
 def render(found: Explanation) -> RenderableType:
@@ -199,10 +172,11 @@ def render(found: Explanation) -> RenderableType:
         f"schedule '{found.schedule}'; {_bytes(found.bytes)} per world; "
         f"at least {found.steps:.3g} steps",
     )
-    what = _table("It has", "effect", "parameters", "what it is", "source")
+    what = _table("It has", "effect", "what it is", "source")
     for part in (*found.effects, *found.others):
-        values = "\n".join(f"{name} = {value} {unit}".rstrip() for name, value, unit in part.parameters)
-        what.add_row(part.name, values, part.summary, part.source)
+        what.add_row(part.name, part.summary, part.source)
+        for name, value, unit, text in part.parameters:
+            what.add_row("", f"{name} = {value} {unit}".rstrip(), text)
     memory = _table("It allocates", "", "bytes", "for")
     memory.columns[1].justify = "right"
     for item in found.memory:

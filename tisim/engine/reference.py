@@ -1,0 +1,241 @@
+"""What there is to make a scene of, read from the code: ``tisim effects`` and the reference print it.
+
+A part's docstring says what it is in its first sentence, then its equations, indented, and what must be known
+of them; its last paragraph names the source. Parameters and options have their texts with them.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from tisim import packing
+from tisim.components import serialization
+from tisim.components.component import Checked, Component
+from tisim.components.domain import Domain
+from tisim.components.invalid import text_of, unit_of
+from tisim.effects.base import Effect
+from tisim.engine import template
+from tisim.errors import must
+from tisim.operators.base import Operator
+from tisim.packing.placement import Placement
+from tisim.scene import plugins
+from tisim.scene.initial_state import Start
+from tisim.scene.initial_velocity import Pulse
+from tisim.sources.base import Source
+from tisim.sources.magnetic.magnets import Body
+from tisim.steppers.base import Stepper
+from tisim.steppers.step_control import StepControl
+from tisim.worlds.state import resolve_fields
+
+PUBLICATIONS = {
+    "Z04": "T. I. Zohdi, A computational framework for agglomeration in thermochemically reacting granular "
+    "flows, Proc. R. Soc. Lond. A 460 (2004) 3421-3445, doi 10.1098/rspa.2004.1277",
+    "Z13": "T. I. Zohdi, Electromagnetically-induced vibration in particulate-functionalized materials, "
+    "J. Vib. Acoust. (2013), doi 10.1115/1.4023251",
+    "Z16": "T. I. Zohdi, Comput. Methods Appl. Mech. Engrg. 308 (2016) 47-72",
+    "B16": "R. J. Baars, Random porous media and magnetic separation of magnetic colloids, thesis, Utrecht "
+    "University (2016)",
+    "L21": "T. Leps, Simulation of magnetic granular media using open source soft sphere DEM, thesis, "
+    "University of Maryland (2021)",
+}
+"""The works that docstrings cite in short."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """Parts of one sort.
+
+    title : for people. base : what they are made after. place : the table of a scene file that holds one,
+    with ``NAME`` for its name where that is the key; elsewhere the name is the table's ``kind``.
+    """
+
+    title: str
+    base: type[Component]
+    place: str
+
+    def kinds(self) -> dict[str, type[Component]]:
+        """Those known, by name."""
+        plugins.load_parts()
+        serialization.load(packing)
+        narrower = tuple(one.base for one in FAMILIES.values() if one.base in self.base.__subclasses__())
+        known = sorted(self.base.known().items())
+        return {name: kind for name, kind in known if not issubclass(kind, narrower)}
+
+
+FAMILIES = {
+    "effects": Family("Effects", Effect, "effects.NAME"),
+    "sources": Family("Sources", Source, "effects.NAME"),
+    "bodies": Family("Bodies of magnetic sources", Body, ""),
+    "operators": Family("Operators", Operator, "effects.NAME"),
+    "steppers": Family("Steppers", Stepper, "stepper"),
+    "step_controls": Family("Step controls", StepControl, "stepper.control"),
+    "starts": Family("Starts", Start, "particles"),
+    "placements": Family("Placements", Placement, "particles.placement"),
+    "pulses": Family("Pulses", Pulse, "particles.pulse"),
+    "domains": Family("Domains", Domain, "domain"),
+}
+"""By name."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A parameter or option. rule : what it must be. default : as people read it; "" where there is none."""
+
+    name: str
+    unit: str
+    text: str
+    rule: str
+    default: str
+
+
+@dataclass(frozen=True)
+class Entry:
+    """All that the code says of a part.
+
+    summary : one sentence; body : the rest of its docstring, without the source. fields : (name, unit) of the
+    particle fields that it may need; needs : what else a scene must have. gives : what it counts and
+    measures. toml : a table of a scene file with all of its settings.
+    """
+
+    name: str
+    kind: type[Component]
+    family: str
+    summary: str
+    body: str
+    source: str
+    settings: tuple[Setting, ...]
+    fields: tuple[tuple[str, str], ...]
+    needs: tuple[str, ...]
+    gives: tuple[str, ...]
+    toml: str
+
+    def publications(self) -> list[str]:
+        """The works that its source cites in short, in full."""
+        return [f"{short}: {work}" for short, work in PUBLICATIONS.items() if short in self.source]
+
+
+def entries() -> list[Entry]:
+    """Of all that is known, family by family."""
+    return [describe(kind, name) for name, family in FAMILIES.items() for kind in family.kinds().values()]
+
+
+def find(name: str) -> Entry:
+    """The entry of a part by name; InputError listing the known ones where there is none."""
+    known = {kind: (cls, family) for family, of in FAMILIES.items() for kind, cls in of.kinds().items()}
+    must(name in known, "effect", f"one of {', '.join(sorted(known))}", name)
+    return describe(*known[name])
+
+
+def describe(kind: type[Component], family: str) -> Entry:
+    """The entry of a part."""
+    effect = kind if issubclass(kind, Effect) else Effect
+    wanted = {need if isinstance(need, str) else need.name for need in effect.fields}
+    declared = resolve_fields(effect.fields)
+    place = FAMILIES[family].place.replace("NAME", kind.kind())
+    return Entry(
+        name=kind.kind(),
+        kind=kind,
+        family=family,
+        summary=summary(kind),
+        body=_body(kind),
+        source=source(kind),
+        settings=settings(kind),
+        fields=tuple((field.name, field.unit) for field in declared if field.name in wanted),
+        needs=tuple(_needs(kind)),
+        gives=(*effect.counters, *effect.world_quantities),
+        toml=template.toml(kind, place, named="NAME" not in FAMILIES[family].place) if place else "",
+    )
+
+
+def _needs(kind: type[Component]) -> Iterator[str]:
+    for other in kind.requires:
+        names = sorted(other.known()) if other.__dict__.get("contract") else [other.kind()]
+        yield " or ".join(names)
+    if quantities := getattr(kind, "requires_source", ()):
+        yield f"a source of {' or '.join(quantities)}"
+    for other in kind.excludes:
+        yield f"no {' or '.join(sorted(other.known()))}"
+    if kind.incompatible_controls:
+        yield f"another step control than {' or '.join(kind.incompatible_controls)}"
+    for source_ in FAMILIES["sources"].kinds().values():
+        yield from (f"{source_.kind()}, a row of its {name}" for name, row in source_.lists() if row is kind)
+    if issubclass(kind, Stepper):
+        control = kind.model_fields["control"].annotation
+        yield f"a step control: {' or '.join(_suiting(control))}"
+
+
+def _suiting(control: Any) -> list[str]:
+    known = FAMILIES["step_controls"].kinds()
+    return [name for name, kind in known.items() if issubclass(kind, control)]
+
+
+def settings(kind: type[Checked]) -> tuple[Setting, ...]:
+    """Its parameters and options, in order, but for the name of an effect, which is that of its table."""
+    shown = template.fields(kind) if issubclass(kind, Component) else kind.model_fields
+    return tuple(_setting(name, info) for name, info in shown.items())
+
+
+def _setting(name: str, info: FieldInfo) -> Setting:
+    value = info.get_default(call_default_factory=True)
+    default = "" if info.is_required() else f'"{value}"' if isinstance(value, str) else shown(value)
+    return Setting(name, unit_of(info), text_of(info), _rule(info), default)
+
+
+def _rule(info: FieldInfo) -> str:
+    """What a value must be, beside what its unit says."""
+    choices = [one for t in (info.annotation, *get_args(info.annotation)) for one in _choices(t)]
+    if choices:
+        return " or ".join(choices)
+    signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+    bounds = [(sign, getattr(rule, name, None)) for rule in info.metadata for name, sign in signs.items()]
+    return ", ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)
+
+
+def _choices(annotation: Any) -> list[str]:
+    if annotation is bool:
+        return ["true", "false"]
+    return [f'"{one}"' for one in get_args(annotation)] if get_origin(annotation) is Literal else []
+
+
+def shown(value: object) -> str:
+    """A value as people read it."""
+    if isinstance(value, Component):
+        return value.kind()
+    if isinstance(value, tuple):
+        return "(" + ", ".join(shown(item) for item in value) + ")"
+    if isinstance(value, bool | None):
+        return {True: "true", False: "false", None: "none"}[value]
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def summary(kind: type) -> str:
+    """The first sentence of the docstring, without its source."""
+    return re.split(r"\s*\((?=[A-Z]\d\d)|\.\s|\.$", " ".join(_docstring(kind)[0].split("\n\n")[0].split()))[0]
+
+
+def _body(kind: type) -> str:
+    """The docstring but for its first sentence and its source."""
+    first, *rest = _docstring(kind)[0].split("\n\n")
+    opening = " ".join(first.split())[len(summary(kind)) :].lstrip(". ")
+    return "\n\n".join(part for part in (opening, *rest) if part)
+
+
+def source(kind: type) -> str:
+    """What the docstring names as source; else the first work that its module cites in brackets."""
+    if found := _docstring(kind)[1]:
+        return found
+    module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
+    cited = re.search(r"\(([A-Z]\d\d[^()]*(?:\([^)]*\)[^()]*)*)\)", module)
+    return cited.group(1) if cited else ""
+
+
+def _docstring(kind: type) -> tuple[str, str]:
+    """The docstring of a class itself: what stands before its source, and the source."""
+    text, _, named = inspect.cleandoc(kind.__doc__ or "").partition("Source: ")
+    return text.strip(), " ".join(named.split()).removesuffix(".")

@@ -1,0 +1,56 @@
+"""Tables of a scene file with all settings of a part, each with its text, ready to be pasted and edited."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from tisim.components import serialization
+from tisim.components.component import Component
+from tisim.components.invalid import text_of, unit_of
+from tisim.effects.base import Effect
+
+
+def toml(kind: type[Component], place: str, named: bool) -> str:
+    """The table ``[place]`` of a part, and those within it. named : whether it says its kind."""
+    return "\n".join(_lines(kind, place, named))
+
+
+def fields(kind: type[Component]) -> dict[str, FieldInfo]:
+    """What a table says of a part; the name of an effect is that of its table."""
+    shown = dict(kind.model_fields)
+    if issubclass(kind, Effect):
+        del shown["name"]
+    return shown
+
+
+def _lines(kind: type[Component], place: str, named: bool, row: bool = False) -> Iterator[str]:
+    """The lines of a table of a scene file with all settings of a part, and of the tables within it."""
+    yield f"[[{place}]]" if row else f"[{place}]"
+    if named:
+        yield f'kind = "{kind.kind()}"'
+    listed, inner = dict(kind.lists()), []
+    for name, info in fields(kind).items():
+        value = example(info)
+        if name in listed:
+            inner += ["", *_lines(listed[name], f"{place}.{name}", named=False, row=True)]
+        elif isinstance(value, Component):
+            inner += ["", f"# {text_of(info)}", *_lines(type(value), f"{place}.{name}", named=True)]
+        else:
+            given = "; ".join(filter(None, (unit_of(info), "an example" * info.is_required())))
+            yield f"# {text_of(info)}{f' ({given})' if given else ''}"
+            yield f"# {name} =" if value is None or value == {} else f"{name} = {serialization.inline(value)}"
+    yield from inner
+
+
+def example(info: FieldInfo) -> Any:
+    """The default of a setting, or a value that will do where it has none."""
+    default = None if info.is_required() else info.get_default(call_default_factory=True)
+    if default is not None:
+        return default
+    annotation = info.annotation
+    if isinstance(annotation, type) and issubclass(annotation, Component) and not info.examples:
+        return annotation(**{name: example(one) for name, one in annotation.model_fields.items()})
+    return info.examples[0] if info.examples else None
