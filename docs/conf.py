@@ -1,0 +1,34 @@
+"""Settings of the reference: ``sphinx-build -W --keep-going -n docs docs/_build``."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+import reference_pages
+
+from tisim.version import __version__
+
+project, author, copyright, release = "tisim", "the tisim authors", "the tisim authors", __version__
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = f"tisim {release}"
+myst_heading_anchors = 3
+autodoc_member_order = "bysource"
+HIDDEN = ("model_config", "contract", "structure", "requires", "accuracy_parameters", "incompatible_controls")
+autodoc_default_options = {"exclude-members": ", ".join(HIDDEN)}
+smartquotes = False
+python_use_unqualified_type_names = True
+# What other projects document, and what stands behind public names.
+OTHERS = ("numpy", "pathlib", "collections", "typing", "matplotlib", "rich", "RenderableType", "DataFrame")
+INNER = (
+    r"(tisim\.(io\.trajectory|backend\.runtime|steppers\.base|worlds\.program)|optimize\.methods\.\w+)\.\w+"
+)
+nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in OTHERS)]
+
+
+def setup(app):
+    """Write the pages that come from the code, and read its docstrings as the plain text that they are."""
+    app.connect("builder-inited", lambda app: reference_pages.write(Path(app.srcdir) / "reference"))
+    app.connect("autodoc-process-docstring", reference_pages.as_rst)
+    app.connect("autodoc-process-signature", reference_pages.signature)

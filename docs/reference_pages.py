@@ -1,0 +1,198 @@
+"""Makes the pages of docs/reference from the code: one for each family of parts, and one of the public names.
+
+Docstrings are plain text: paragraphs, indented blocks such as equations, and names in double backticks.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from collections.abc import Iterable, Iterator
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+from tisim.components.component import Checked, Component
+from tisim.engine import reference
+from tisim.engine.reference import Entry, Setting
+
+PACKAGES = ("tisim", "tisim.effects", "tisim.sources", "tisim.operators", "tisim.steppers", "tisim.packing",
+            "tisim.accuracy", "tisim.analysis", "optimize")  # fmt: skip
+"""Those with public names."""
+NAMES = {entry.name for entry in reference.entries()}
+"""Of all parts, as scene files have them."""
+
+
+def write(folder: Path) -> None:
+    """All pages."""
+    folder.mkdir(exist_ok=True)
+    entries = reference.entries()
+    for name, family in reference.FAMILIES.items():
+        _put(
+            folder / f"{name}.rst",
+            _family(family.title, family.base, [one for one in entries if one.family == name]),
+        )
+    _put(folder / "api.rst", _api({one.kind: one for one in entries}))
+
+
+def _put(path: Path, lines: Iterable[str]) -> None:
+    """Write a page, but not one that is there: Sphinx reads anew what is newer."""
+    text = "\n".join(lines) + "\n"
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def rst(text: str) -> list[str]:
+    """Plain text as lines of reStructuredText: indented paragraphs as they are, all else without markup."""
+    lines: list[str] = []
+    for paragraph in text.strip("\n").split("\n\n"):
+        if paragraph.startswith("    "):
+            lines += [".. code-block:: text", "", *paragraph.splitlines(), ""]
+        else:
+            lines += [*_items(paragraph), ""]
+    return lines
+
+
+def _items(paragraph: str) -> Iterator[str]:
+    """Lines of a paragraph; where it explains names, ``name : what it is``, an item of a list for each."""
+    if not re.search(r"^[\w, ]+ : ", paragraph, re.M):
+        yield from map(plain, paragraph.splitlines())
+        return
+    # A line goes on with the one before, but for names and new sentences; names may also follow a stop.
+    lines = re.sub(r"\n\s*(?![A-Z]|[\w, ]+ : )", " ", paragraph)
+    lines = re.sub(r"(?<=\.) (?=[a-z_]\w*(?:, [a-z_]\w*)* : )", "\n", lines)
+    for line in lines.splitlines():
+        named = re.match(r"[\w, ]+ : ", line.strip())
+        yield from ("", f"{'- ' if named else ''}{plain(line.strip())}")
+
+
+def plain(line: str) -> str:
+    """A line of plain text, without markup: what looks like it is escaped. Names of parts in double backticks
+    are links."""
+    parts = re.split(r"``(.*?)``", line)
+    names = (f":ref:`{name}`" if name in NAMES else f"``{name}``" for name in parts[1::2])
+    texts = (re.sub(r"([\\*|`_])", r"\\\1", text) for text in parts[::2])
+    return "".join(part for pair in zip_longest(texts, names, fillvalue="") for part in pair)
+
+
+def as_rst(_app: Any, _what: str, _name: str, value: Any, _options: Any, lines: list[str]) -> None:
+    """For autodoc: a docstring as plain text, in place; of a part of a scene, its settings too."""
+    lines[:] = rst("\n".join(lines))
+    if isinstance(value, type) and issubclass(value, Component):
+        lines += _settings(reference.settings(value))
+
+
+def signature(_app: Any, _what: str, _name: str, value: Any, *_: Any) -> tuple[str, None] | None:
+    """For autodoc: how plain data that is checked is made."""
+    checked = isinstance(value, type) and issubclass(value, Checked)
+    return (_call(reference.settings(value)), None) if checked else None
+
+
+def _call(settings: tuple[Setting, ...]) -> str:
+    """The arguments that make a part: what must be given, then what has a default."""
+    needed = [one.name for one in settings if not one.default]
+    return f"({', '.join([*needed, *(f'{one.name}={one.default}' for one in settings if one.default)])})"
+
+
+def _heading(text: str, line: str) -> list[str]:
+    return [text, line * len(text), ""]
+
+
+def _family(title: str, base: type, entries: list[Entry]) -> Iterator[str]:
+    yield from _heading(title, "=")
+    rows = [(f":ref:`{one.name}`", plain(one.summary), plain(one.source)) for one in entries]
+    yield from _grid(("name", "what it is", "source"), rows)
+    for entry in entries:
+        yield from _law(entry)
+    if _home(base) is None:
+        yield from _heading("The contract", "-")
+        yield from (f".. autoclass:: {base.__module__}.{base.__name__}", "   :members:", "")
+
+
+def _home(kind: type) -> str | None:
+    """The package that users import a class from; None where none has it."""
+    for package in reversed(PACKAGES):
+        if getattr(importlib.import_module(package), kind.__name__, None) is kind:
+            return package
+    return None
+
+
+def _grid(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+    yield from (".. list-table::", "   :header-rows: 1", "")
+    for row in (head, *rows):
+        yield from (f"   {'*' if k == 0 else ' '} - {cell}" for k, cell in enumerate(row))
+    yield ""
+
+
+def _law(entry: Entry) -> Iterator[str]:
+    """The section of a part."""
+    name, module, public = entry.kind.__name__, entry.kind.__module__, _home(entry.kind)
+    yield from (f".. _{entry.name}:", "")
+    yield from _heading(entry.name, "-")
+    yield from (
+        f".. py:class:: {public}.{name}{_call(entry.settings)}",
+        f"   :canonical: {module}.{name}",
+        "",
+    )
+    text = (*rst(f"{entry.summary}."), *rst(entry.body), *_facts(entry), *_settings(entry.settings))
+    yield from (f"   {line}".rstrip() for line in (*text, *_toml(entry)))
+
+
+def _facts(entry: Entry) -> Iterator[str]:
+    fields = ", ".join(f"{name} ({unit})" if unit else name for name, unit in entry.fields)
+    facts = {
+        "Source": entry.source, "Needs": "; ".join(entry.needs), "Particle fields": fields,
+        "Counts and measures": ", ".join(entry.gives),
+    }  # fmt: skip
+    for what, text in facts.items():
+        if text:
+            yield from (f"{what}: {plain(text)}.", "")
+    for work in entry.publications():
+        yield from (plain(work), "")
+
+
+def _settings(settings: tuple[Setting, ...]) -> Iterator[str]:
+    if settings:
+        rows = [
+            (f"``{one.name}``", *map(plain, (one.unit, one.default or "(required)", one.rule, one.text)))
+            for one in settings
+        ]
+        yield from _grid(("parameter", "unit", "default", "must be", "what it is"), rows)
+
+
+def _toml(entry: Entry) -> Iterator[str]:
+    if entry.toml:
+        yield from (
+            ".. code-block:: toml",
+            "",
+            *(f"   {line}".rstrip() for line in entry.toml.splitlines()),
+            "",
+        )
+
+
+def _api(parts: dict[type, Entry]) -> Iterator[str]:
+    """Every public name: a part links to its section, anything else stands here."""
+    yield from _heading("Public names", "=")
+    seen: set[int] = set()
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        yield from _heading(package, "-")
+        yield from (*rst(inspect.getdoc(module) or ""), f".. py:module:: {package}", "")
+        links = []
+        for name in sorted(getattr(module, "__all__", ())):
+            value = getattr(module, name)
+            if value in parts if isinstance(value, type) else False:
+                links.append(f":ref:`{name} <{parts[value].name}>`")
+            elif not inspect.ismodule(value) and id(value) not in seen:
+                seen.add(id(value))
+                yield from _autodoc(package, name, value)
+        if links:
+            yield from (f"Parts: {', '.join(links)}.", "")
+
+
+def _autodoc(package: str, name: str, value: Any) -> Iterator[str]:
+    if inspect.isclass(value):
+        yield from (f".. autoclass:: {package}.{name}", "   :members:", "")
+    elif callable(value):
+        yield from (f".. autofunction:: {package}.{name}", "")

@@ -1,0 +1,67 @@
+"""Pages of the reference from the code; Sphinx itself is run by .ci/run."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from tisim.engine import reference
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+@pytest.fixture(scope="module")
+def maker():
+    """docs/reference_pages.py, which is no part of a package."""
+    spec = importlib.util.spec_from_file_location("reference_pages", DOCS / "reference_pages.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def pages(maker, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages") / "reference"
+    maker.write(folder)
+    return {page.stem: page.read_text(encoding="utf-8") for page in folder.iterdir()}
+
+
+def test_there_is_a_page_for_each_family_and_one_of_names(pages):
+    assert set(pages) == {*reference.FAMILIES, "api"}
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^reference/(\w+)$", index, re.M)) == set(pages)
+
+
+def test_every_guide_and_case_is_in_the_index():
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^(?!reference/)([\w/]+)$", index, re.M))
+    pages = {str(page.relative_to(DOCS).with_suffix("")) for page in DOCS.rglob("*.md")}
+    assert pages - {"index"} == listed
+
+
+def test_every_part_has_a_section(pages):
+    for entry in reference.entries():
+        (section,) = re.findall(
+            rf"^\.\. _{entry.name}:\n\n.*?(?=^\.\. _|\Z)", pages[entry.family], re.M | re.S
+        )
+        assert f".{entry.kind.__name__}" in section
+        for one in entry.settings:
+            assert f"``{one.name}``" in section
+
+
+def test_public_names_are_all_there(pages):
+    assert ".. autofunction:: tisim.init" in pages["api"]
+    assert ".. autoclass:: tisim.effects.PairForce" in pages["api"]
+    assert ":ref:`Impact <impact>`" in pages["api"]
+    assert "autoclass:: tisim.effects.Impact\n" not in pages["api"]
+
+
+def test_docstrings_are_plain_text(maker):
+    law = "A force |F| on i_ by ``impact``, ``j`` and *.\n\n    F = |a_b|\n\n"
+    text = f"{law}name : one,\n    and more. third : 3,\n3.\nlow, high : two.\nMore."
+    assert maker.rst(text) == [
+        *(r"A force \|F\| on i\_ by :ref:`impact`, ``j`` and \*.", ""),
+        *(".. code-block:: text", "", "    F = |a_b|", ""),
+        *("", "- name : one, and more.", "", "- third : 3, 3.", "", "- low, high : two.", "", "More.", ""),
+    ]
