@@ -10,17 +10,30 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
+PAGES = [
+    "README.md",
+    "CONTRIBUTING.md",
+    *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").rglob("*.md"))),
+]
+SCRIPTS = {
+    page: re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.M | re.S)
+    for page in PAGES
+    if "guides" not in page
+}
+"""The Python code of each page; files and guides are for test_contributing.py and test_guides.py."""
+PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": ["control="]}
+"""What they print, among other things."""
+
+
 @pytest.mark.long
-def test_the_readme_script_runs(capsys):
-    """The scene in the README, as it stands there."""
-    (script,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
-    exec(compile(script, "README.md", "exec"), {})
+@pytest.mark.parametrize("page", [page for page, scripts in SCRIPTS.items() if scripts])
+def test_the_scripts_of_a_page_run_as_they_stand_there(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for script in SCRIPTS[page]:
+        exec(compile(script, page, "exec"), names)
     printed = capsys.readouterr().out
-    assert "ok=True" in printed
-    assert "grains, mean radius" in printed
-
-
-PAGES = ["README.md", *sorted(str(page.relative_to(ROOT)) for page in (ROOT / "docs").rglob("*.md"))]
+    assert all(text in printed for text in PRINTED.get(page, ()))
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -1,0 +1,32 @@
+"""The examples of CONTRIBUTING.md run, and so do their tests, as they are printed."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.test_guides import SNIPPET
+from tisim.engine import reference
+from tisim.scene import plugins
+
+TEXT = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+FILES = {title: code for language, title, code in SNIPPET.findall(TEXT) if language == "python"}
+EXAMPLES = [name.removeprefix("test_") for name in FILES if name.startswith("test_")]
+
+
+def test_every_example_is_a_file_with_a_test():
+    assert TEXT.count("\n```") / 2 == len(FILES) == 2 * len(EXAMPLES) > 0
+    assert {name.removeprefix("test_") for name in FILES} == set(EXAMPLES)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_passes_its_test(name, own_file):
+    for file in (name, f"test_{name}"):
+        own_file(file, FILES[file])
+    plugins.load(name)
+    tests = [test for word, test in vars(plugins.load(f"test_{name}")).items() if word.startswith("test_")]
+    assert tests
+    for test in tests:
+        test()
+    made = [entry for entry in reference.entries() if entry.kind.__module__ == name.removesuffix(".py")]
+    assert [entry.name for entry in made] == [name.removesuffix(".py")] * (name != "bend.py")
