@@ -59,7 +59,10 @@ class Interrupt:
 
 @contextlib.contextmanager
 def handled(handle: Callable[[int], None]) -> Iterator[None]:
-    """Within it, ``handle`` is called with the number of each signal that asks to stop."""
+    """Within it, ``handle`` is called with the number of each signal that asks to stop.
+
+    In the main thread, that is: Python handles signals in no other, and leaves those of others alone.
+    """
 
     def take(number: int, frame: FrameType | None) -> None:
         global _last
@@ -67,8 +70,9 @@ def handled(handle: Callable[[int], None]) -> Iterator[None]:
         _leave_dead_terminals()
         handle(number)
 
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-    mine = [number for number in SIGNALS if before[number] not in (signal.SIG_IGN, None)]
+    here = threading.current_thread() is threading.main_thread()
+    before = {number: signal.getsignal(number) for number in SIGNALS if here}
+    mine = [number for number in before if before[number] not in (signal.SIG_IGN, None)]
     for number in mine:
         signal.signal(number, take)
     try:
@@ -81,12 +85,11 @@ def handled(handle: Callable[[int], None]) -> Iterator[None]:
 @contextlib.contextmanager
 def held() -> Iterator[None]:
     """Within it signals that ask to stop wait, and are raised again at its end: for a library that calls back
-    into Python and does not bear an exception from there. Python handles signals in the main thread only.
+    into Python and does not bear an exception from there.
     """
     came: list[int] = []
-    here = threading.current_thread() is threading.main_thread()
     try:
-        with handled(came.append) if here else contextlib.nullcontext():
+        with handled(came.append):
             yield
     finally:
         for number in came:

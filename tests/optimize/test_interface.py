@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -70,6 +71,14 @@ def test_a_folder_is_gone_on_with(drift, tmp_path, capsys):
 
 
 @pytest.mark.long
+def test_a_search_may_run_in_a_thread_of_its_own(drift):
+    """Where Python cannot be told to handle Ctrl-C."""
+    with ThreadPoolExecutor(1) as pool:
+        again = pool.submit(optimize.run, problem("default", ""), seed=4, **SMALL).result()
+    assert again.designs == drift.designs
+
+
+@pytest.mark.long
 def test_several_objectives_give_a_front(tmp_path):
     two = (
         optimize.Objective("R", distance, "m"),
@@ -96,7 +105,7 @@ def test_wrong_settings_are_refused_before_anything_runs():
 
 def test_another_objective_has_another_identity():
     """Of functions of one file nothing but the file tells them apart; of this package its version does."""
-    from cases.vibration_design import problem as built_in
+    from cases.vibration.problem import problem as built_in
 
     assert problem("default", "").identity
     assert not built_in().identity
