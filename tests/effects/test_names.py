@@ -9,11 +9,12 @@ from tests.effects.pair.test_mie import crowd, twin
 from tests.scenes import scene, simulate
 from tests.throwaway import RandomKicks, SoftShell, Trap
 from tisim import InputError, Scene
-from tisim.effects import Gravity, Impact, Lorentz, Mie, NearField
+from tisim.effects import Gravity, Impact, Lorentz, Mie, NearField, Tether
 from tisim.engine.assembly import needed_fields
 from tisim.operators import Cooling
 from tisim.sources import ElectricField
 from tisim.steppers import IterationControl, Trapezoid, Verlet
+from tisim.worlds.state import Field, resolve_fields
 
 CORE, SHELL = Mie(name="core", epsilon=1.0), Mie(name="shell", epsilon=0.3, n=9, m=4, cutoff=2.0)
 ONE = ([[0, 0, 0]], [[0, 0, 0]])
@@ -97,6 +98,23 @@ def test_what_touching_pairs_remember_is_kept_for_each_by_name():
         one.name: who for one, who in users.items() if not isinstance(one, str) and "_partners" in one.name
     }
     assert kept == {"remembering_partners": "remembering", "other_partners": "other"}
+
+
+class Anchored(Gravity):
+    """One that declares a field of its own, in another unit than Tether does."""
+
+    fields = (Field("anchor", "mm", 3, "mean", default="position"),)
+
+
+def test_fields_that_two_declare_must_agree():
+    """Two tethers share the place where a particle began; what is declared differently is refused."""
+    tethers = (Tether(stiffness=(1.0,) * 3), Tether(name="other", stiffness=(2.0,) * 3))
+    shared = resolve_fields(needed_fields(tethers, Verlet()))
+    assert [field.name for field in shared].count("anchor") == 1
+    with pytest.raises(
+        InputError, match=r"^field anchor must be declared as everywhere, Field\(name='anchor', unit='m'"
+    ):
+        resolve_fields(needed_fields((*tethers, Anchored()), Verlet()))
 
 
 REFUSED = {

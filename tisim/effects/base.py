@@ -6,8 +6,9 @@ Rules
    may a list of parts, in number too: ``self.list.name(w, k)``, k below ``self.list.size(w)``.
    Every other option (bool, int, text) is compiled in, and the same for all worlds of a batch.
 3. ``fields`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
-   A field that no other effect has ever needed is declared by putting a ``Field`` there. Where the
-   effect's options decide, ``required_fields`` returns those of this one.
+   A field that no other effect has ever needed is declared by putting a ``Field`` there; effects that
+   share one declare it alike. Where the effect's options decide, ``required_fields`` returns those of
+   this one.
 4. ``counters`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
    back.

@@ -15,7 +15,7 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
-from tisim.errors import RunError
+from tisim.errors import RunError, must
 
 
 @dataclass(frozen=True)
@@ -126,11 +126,15 @@ TALLIES = ("steps", "particle_steps")
 
 
 def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
-    """The core and everything needed, each once, in a fixed order."""
+    """The core and everything needed, each once, in a fixed order.
+
+    InputError for a field that two parts declare differently.
+    """
     wanted = {field.name: field for field in CORE}
     for need in needs:
         field = SHARED[need] if isinstance(need, str) else need
-        wanted.setdefault(field.name, field)
+        known = wanted.setdefault(field.name, field)
+        must(known == field, f"field {field.name}", f"declared as everywhere, {known}", field)
     return tuple(wanted.values())
 
 
