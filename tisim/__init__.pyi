@@ -20,12 +20,14 @@ from . import (
     steppers as steppers,
 )
 from .backend.runtime import init as init
+from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
 from .engine.result import Status as Status
 from .engine.run import run as run
 from .engine.simulation import Simulation as Simulation
 from .errors import InputError as InputError
 from .errors import RunError as RunError
+from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.trajectory import Recording as Recording
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
 from .packing.placement import (

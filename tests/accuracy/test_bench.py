@@ -7,7 +7,7 @@ from tests.accuracy.scenes import oscillator
 from tisim import Result, Status, steppers
 from tisim.accuracy import timing
 from tisim.accuracy.sweep import in_steps_of_at_most
-from tisim.accuracy.timing import LOOKS, ROOM, Bench, watched
+from tisim.accuracy.timing import LOOKS, ROOM, Bench, Looks
 from tisim.backend import memory
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
@@ -23,28 +23,23 @@ class Waiting:
     """A world that is where it waits to be looked at, or at its end."""
 
     def __init__(self, duration):
-        self.s, self.pause_time, self.time = self, np.zeros(1), 0.0
+        self.time = 0.0
         self.scenes = [oscillator().model_copy(update={"duration": duration})]
 
     def results(self, worlds):
         return [Result(self.scenes[0], {}, {}, self.time, {}, Status(True, ""), 0.0)]
-
-    def read(self, name):
-        return self.hold.copy()
-
-    def write(self, name, value):
-        self.pause_time = value
 
 
 def test_a_world_is_looked_at_each_time_once_and_waits_for_what_is_to_come():
     """In one case of 20, n times a part of the duration is rounded to less than n such parts."""
     for duration in np.random.default_rng(0).uniform(0.0, 10.0, 200):
         seen, world = [], Waiting(duration)
-        watched(world, lambda result, seen=seen: seen.append(result.time))
+        looks = Looks(duration, lambda result, seen=seen: seen.append(result.time))
+        looks.observe(world)
         while world.time < duration:
-            assert world.hold[0] > world.time
-            world.time = min(world.hold[0], duration)
-            world.look()
+            assert looks.pause(world)[0] > world.time
+            world.time = min(looks.pause(world)[0], duration)
+            looks.observe(world)
         assert len(seen) == LOOKS + 1
         np.testing.assert_allclose(np.diff(seen), duration / LOOKS, rtol=1e-12)
 

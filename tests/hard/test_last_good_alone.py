@@ -1,6 +1,8 @@
 """Particles that do not feel each other, with a longest step as long as the run: what is given back when one
 fails on the way, and what there is to go on from when a launch ends there."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
@@ -119,7 +121,7 @@ def test_launches_that_end_within_a_step(made, monkeypatch, tmp_path):
     simulation = in_launches(fails, monkeypatch, 64)
     simulation.load([fails, ends])
     done = []
-    for _ in simulation.chunks():
+    for _ in islice(simulation.chunks(), 1, None):
         done.append(simulation.fraction())
         ended = simulation.s.read("underway")[1] == 0
         assert simulation.results()[1].time == (1.0 if ended else 0.0)
@@ -144,7 +146,7 @@ def test_a_launch_is_of_so_many_steps(made):
     long = made(step=1e-7, place=5.0)
     simulation = compiled(long, worlds=2, capacity=len(SPEED))
     simulation.load([long])
-    next(simulation.chunks())
+    list(islice(simulation.chunks(), 2))
     steps = simulation.s.read("particle_steps")[0]
     assert 0.1 * independent.LAUNCH < steps <= independent.LAUNCH
     assert simulation.fraction() == pytest.approx(steps / (1e7 * len(SPEED)), rel=1e-3)

@@ -35,9 +35,8 @@ def recorded(path, schedule="world", **rate):
     """Results of the flows, and their trajectory at the path."""
     made = simulation(schedule)
     made.load(FLOWS)
-    with Trajectory(Recording(path, **rate), FLOWS) as trajectory:
-        trajectory.record(made, (0, 1))
-        made.run()
+    with Recording(path, **rate).observer(made) as recorder:
+        made.run(observers=[recorder])
     return made.results()
 
 
@@ -217,23 +216,20 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
     made = simulation()
     asked = Recording(tmp_path / "t.h5", frames=15)
     made.load(FLOWS[:1])
-    with Trajectory(asked, FLOWS[:1]) as trajectory:
-        trajectory.record(made, [0])
-        while made.s.read("time")[0] < 3e-4:
-            made.run(steps=7)
+    with asked.observer(made) as recorder:
+        made.run(until=3e-4, observers=[recorder])
         save(made, tmp_path / "c.h5")
-        made.run(steps=100)
+        made.run(steps=100, observers=[recorder])
     cut = every_frame(tmp_path / "t.h5")
     made.load(FLOWS[:1])
     restore(made, tmp_path / "c.h5")
     now = float(made.s.read("time")[0])
     assert now < cut[-1].time < FLOWS[0].duration
-    with Trajectory.going_on(asked, FLOWS[0], now) as trajectory:
+    with asked.observer(made, resume=True) as recorder:
         kept = [frame.time for frame in cut if frame.time <= now]
-        assert trajectory.groups[0]["position/time"][:].tolist() == kept
+        assert recorder.trajectory.groups[0]["position/time"][:].tolist() == kept
         assert len(kept) > 1
-        trajectory.record(made, [0])
-        made.run()
+        made.run(observers=[recorder])
     recorded(tmp_path / "whole.h5", frames=15)
     whole, found = every_frame(tmp_path / "whole.h5"), every_frame(tmp_path / "t.h5")
     assert [f.step for f in found] == [f.step for f in whole]

@@ -8,7 +8,6 @@ from tisim import Particles, Recording, Scene
 from tisim.backend import runtime
 from tisim.effects import NearField
 from tisim.io.reader import frames
-from tisim.io.trajectory import Trajectory
 from tisim.sources import UniformFlow
 from tisim.steppers import (
     ApproachTime,
@@ -147,9 +146,8 @@ def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
     for every in LONGEST[0] * np.array([1e-3, 1 - 1e-7, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-7, 2.5]):
         path = tmp_path / f"{every}.h5"
         simulation.load(scenes)
-        with Trajectory(Recording(path, every=every), scenes, runtime.current().precision) as trajectory:
-            trajectory.record(simulation, range(len(scenes)))
-            simulation.run()
+        with Recording(path, every=every).observer(simulation) as recorder:
+            simulation.run(observers=[recorder])
         for w, (result, other) in enumerate(zip(simulation.results(), alone, strict=True)):
             np.testing.assert_array_equal(result.state["position"], other.state["position"])
             with frames(path, w) as seen:

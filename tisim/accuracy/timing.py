@@ -13,6 +13,7 @@ import numpy as np
 
 from tisim.backend import memory
 from tisim.engine.batches import Progress
+from tisim.engine.observer import Observer, Observing
 from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import RunError
@@ -48,24 +49,22 @@ class Timed:
         return steps / starts, sums / starts, rejections / starts
 
 
-def watched(simulation: Simulation, look: Look) -> None:
-    """Let the first world wait ``LOOKS`` times on its way, and look at its state there."""
-    times = np.append(simulation.scenes[0].duration / LOOKS * np.arange(LOOKS + 1), np.inf)
-    due = 0.0
+class Looks(Observer):
+    """Lets the first world wait ``LOOKS`` times on its way, and looks at its state there."""
 
-    def arrived() -> None:
-        nonlocal due
+    def __init__(self, duration: float, look: Look) -> None:
+        """duration : of the run, s."""
+        self.times = np.append(duration / LOOKS * np.arange(LOOKS + 1), np.inf)
+        self.look, self.due = look, 0.0
+
+    def pause(self, simulation: Simulation) -> np.ndarray:
+        return np.array([self.due, *[np.inf] * (len(simulation.scenes) - 1)])
+
+    def observe(self, simulation: Simulation) -> None:
         (result,) = simulation.results([0])
-        if result.time >= due:
-            look(result)
-            # Later than now by all means: a world that waits for what has been would wait for ever.
-            due = float(times[np.searchsorted(times, result.time, side="right")])
-            hold = simulation.s.read("pause_time")
-            hold[0] = due
-            simulation.s.write("pause_time", hold)
-
-    simulation.look = arrived
-    arrived()
+        if result.time >= self.due:
+            self.look(result)
+            self.due = float(self.times[np.searchsorted(self.times, result.time, side="right")])
 
 
 class Bench:
@@ -105,11 +104,10 @@ class Bench:
             simulation.results()
             simulation.load(scenes)
             self.warm.add(simulation)
+        observers: list[Observing] = [Looks(scenes[0].duration, look)] if look else []
         if progress:
-            progress(0.0)
-        if look:
-            watched(simulation, look)
-        simulation.run(progress)
+            observers.append(lambda simulation: progress(simulation.fraction()))
+        simulation.run(observers=observers)
         results = simulation.results()
         for result in results:
             if not result.status.ok:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -32,6 +32,7 @@ from tisim.cli.options import (
     Threads,
 )
 from tisim.console import err, out, plain_table, progress_bar, stopping
+from tisim.engine.observer import Observer
 from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError
@@ -103,7 +104,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
-    from tisim.io.trajectory import asked, recorded
+    from tisim.io.trajectory import asked
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads)
@@ -117,9 +118,13 @@ def run(
     with place.taken(overwrite, resume):
         if resume:
             checkpoint.restore(simulation, place.checkpoint)
+        if recording is None:
+            place.trajectory.unlink(missing_ok=True)
+        observed = recording.observer(simulation, resume) if recording else nullcontext()
+        saving = checkpoint.PeriodicCheckpoint(place.checkpoint, scene_arguments.checkpoint_seconds())
         try:
-            with recorded(recording, place.trajectory, simulation, resume):
-                done = _advance(simulation, name, place.checkpoint)
+            with observed as recorder:
+                done = _advance(simulation, name, [recorder, saving] if recorder else [saving])
             paths = run_folder.write(simulation.results()[0], place) if done else []
         except RunError as error:
             raise RunError(f"{error}. {_rescued(simulation, place.checkpoint)}") from error
@@ -137,28 +142,18 @@ def run(
         raise RunError(f"run failed {result.status.reason}")
 
 
-def _advance(simulation: Simulation, name: str, path: Path) -> bool:
-    """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps.
-
-    A long run saves a checkpoint now and then, so that one that is killed can go on from the last.
-    """
-    from tisim.io import checkpoint
-
-    saved, between = time.monotonic(), scene_arguments.checkpoint_seconds()
+def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -> bool:
+    """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps."""
     with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
-        def progress(fraction: float) -> None:
-            nonlocal saved
+        def show(simulation: Simulation) -> None:
             ahead = f"{name}, {simulation.ahead():.3g} steps ahead"
-            bar.update(task, completed=fraction, description=ahead)
+            bar.update(task, completed=simulation.fraction(), description=ahead)
             ctrl_c.check()
-            if time.monotonic() - saved > between:
-                checkpoint.save(simulation, path)
-                saved = time.monotonic()
 
         try:
-            simulation.run(progress)
+            simulation.run(observers=[*observers, show])
         except KeyboardInterrupt:
             if ctrl_c.forced:
                 raise

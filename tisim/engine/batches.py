@@ -78,15 +78,12 @@ class Batches:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
                     simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
-                    if trajectory:
-                        trajectory.record(simulation, batch)
-                    chunks = simulation.chunks()
+                    observers = [trajectory.recorder(simulation, batch)] if trajectory else []
                     given: set[int] = set()
-                    while len(given) < len(batch):
+                    for _ in simulation.chunks(observers=observers):
                         new = [w for w in simulation.ended() if w not in given]
                         yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
                         given.update(new)
-                        next(chunks, None)
                         if progress:
                             progress((done + len(batch) * simulation.fraction()) / len(scenes))
                     done += len(batch)

@@ -67,7 +67,9 @@ class Replay:
         worlds : indices. sound : whether all is well, for each world of an image. A world in which something
         is wrong from the start is left there.
         """
-        last = self.simulation.s.read("steps")
+        last, pauses = self.simulation.s.read("steps"), self.simulation.s.read("pause_time")
+        # Nobody waits for them on the way.
+        self.simulation.s.write("pause_time", np.inf)
         good = self._rewound()
         going = worlds[sound(good)[worlds]]
         # How many steps are good, from the highest binary digit of that number to the lowest.
@@ -81,6 +83,7 @@ class Replay:
                 values[fine] = now[name][fine]
         self._cut(good, going, sound)
         self._after(good, going, 1)
+        self.simulation.s.write("pause_time", pauses)
         return good
 
     def _cut(self, good: Image, going: np.ndarray, sound: Callable[[Image], np.ndarray]) -> None:

@@ -25,8 +25,8 @@ class Result:
         of their own, of the last good step of the particle that failed. start : the same at the start.
     time : s, of ``state``. work : counts until then (steps, particle_steps, and what the effects count).
         measures : quantities of the world that its effects keep, at the end. wall_s : wall seconds of
-        the batch that this world was part of, per world; set-up and compilation are not in it, but what it
-        took to find the last good steps is.
+        the batch that this world was part of, per world; set-up, compilation and observers are not
+        in it, but what it took to find the last good steps is.
     """
 
     scene: Scene

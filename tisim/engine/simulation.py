@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.engine.assembly import Assembly, declared, needed_fields
 from tisim.engine.loading import check_start, laid_out, volume
 from tisim.engine.monitor import Monitor
+from tisim.engine.observer import Observers, Observing
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
@@ -90,13 +92,15 @@ class Simulation:
         many = self.worlds >= self.runtime.threads
         return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
 
-    def load(self, scenes: Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
-        """Put one scene in each of the first worlds; the others stay empty. No compilation.
+    def load(self, scenes: Scene | Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
+        """Put one scene in each of the first worlds, or one in the first; the others stay empty. No
+        compilation.
 
         starts : ``particles.arrays`` of each scene, where the caller has made them already.
         Raises InputError when a scene is of another structure, or larger than the capacity.
         """
         self.s.check()
+        scenes = [scenes] if isinstance(scenes, Scene) else scenes
         must(0 < len(scenes) <= self.worlds, "number of scenes", f"1 to {self.worlds}", len(scenes))
         for scene in scenes:
             must(scene.structure() == self.structure, "scene", "of the structure compiled", scene.name)
@@ -112,7 +116,6 @@ class Simulation:
             check_start(self.s.fields, scene, start)
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
-        self.look: Callable[[], None] | None = None
         self.s.fill({"pause_time": np.inf, "goal": NEVER})
         self.begin()
         self.monitor = Monitor(self)
@@ -161,43 +164,61 @@ class Simulation:
             }
         )
 
-    def run(self, progress: Callable[[float], None] | None = None, steps: int | None = None) -> None:
-        """Run every world to its end, or for at most ``steps`` more steps each.
+    def run(
+        self,
+        until: float | None = None,
+        steps: int | None = None,
+        observers: Sequence[Observing] = (),
+    ) -> None:
+        """Run every world to its end, or for a part of the way; the next call goes on from there.
 
-        progress : called about four times a second with the fraction done, 0..1.
+        until : s of simulated time; a world stops at the end of the first step at or after it. steps : at
+        most so many more steps of each world. observers : what looks at the run on its way (see Observer),
+        such as a function of this simulation. The steps, and so all bits, are those of a run in one go.
         """
-        for _ in self.chunks(steps):
-            if progress:
-                progress(self.fraction())
+        for _ in self.chunks(until, steps, observers):
+            pass
 
-    def chunks(self, steps: int | None = None) -> Iterator[None]:
-        """The same in stretches of some steps, about four a second: between them, whoever runs this may look
-        at the state, save a checkpoint, or stop for good or for a while.
-
-        What a recorder has put in ``look`` is called there too; worlds wait at ``s.pause_time`` for it.
-        """
+    def chunks(
+        self,
+        until: float | None = None,
+        steps: int | None = None,
+        observers: Sequence[Observing] = (),
+    ) -> Iterator[None]:
+        """The same a part at a time: yields wherever observers have looked, first before the first step."""
         self.s.check()
+        rule = "a number of s of simulated time, at least 0"
+        must(until is None or until >= 0, "until", rule, until)
+        must(steps is None or steps >= 0, "steps", "at least 0", steps)
+        watching, stop = Observers(observers), np.inf if until is None else until
         self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
+        watching.observe(self)
+        yield
         # Short enough to be heard from soon, long enough that looking costs little.
         chunk = max(8, FIRST // (self.worlds * self.s.capacity))
-        while self.going_on():
+        written = np.empty(0)
+        while self.going_on(stop):
+            pauses = watching.pauses(self, stop)
+            if not np.array_equal(pauses, written):
+                self.s.write("pause_time", pauses)
+                written = pauses
             began = time.perf_counter()
             self.program.advance(chunk)
             self.monitor.look()
-            if self.look:
-                self.look()
             taken = time.perf_counter() - began
             self.wall_s += taken
             if taken < CHUNK_SECONDS / 2:
                 chunk = min(2 * chunk, 100_000)
             elif taken > 2 * CHUNK_SECONDS:
                 chunk = max(chunk // 2, 1)
+            watching.observe(self)
             yield
 
-    def going_on(self) -> bool:
-        """Whether any world runs that has not taken all of the steps asked for."""
-        now = self.s.snapshot(("status", "steps", "goal"))
-        return bool(((now["status"] == WorldStatus.RUNNING) & (now["steps"] < now["goal"])).any())
+    def going_on(self, until: float = np.inf) -> bool:
+        """Whether any world runs that has not taken all of the steps asked for, nor come to ``until`` (s)."""
+        now = self.s.snapshot(("status", "steps", "goal", "time"))
+        going = (now["status"] == WorldStatus.RUNNING) & (now["steps"] < now["goal"])
+        return bool((going & (now["time"] < until)).any())
 
     def fraction(self) -> float:
         """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
@@ -244,6 +265,25 @@ class Simulation:
                 )
             )
         return found
+
+    def checkpoint(self, path: str | Path) -> None:
+        """Write where all worlds are to a file, in place of any before; RunError when the disk is full.
+
+        A simulation of the same scenes goes on from there to the same bits (``restore``).
+        """
+        from tisim.io import checkpoint
+
+        checkpoint.save(self, path)
+
+    def restore(self, path: str | Path) -> None:
+        """Go back, or on, to where a checkpoint of the same scenes, which are loaded, was written.
+
+        InputError when the file is none, is cut short or damaged, or is of other scenes, another precision or
+        another capacity; everything is then as it was.
+        """
+        from tisim.io import checkpoint
+
+        checkpoint.restore(self, path)
 
     def close(self) -> None:
         """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""

@@ -9,6 +9,7 @@ holds besides where worlds were before.
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from tisim.backend import runtime
 from tisim.engine.monitor import Monitor
+from tisim.engine.observer import Observer
 from tisim.engine.simulation import Simulation
 from tisim.errors import must
 from tisim.files import checksum
@@ -70,6 +72,22 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     simulation.wall_s = wall_s
     simulation.monitor = Monitor(simulation, before)
     simulation.monitor.look()
+
+
+class PeriodicCheckpoint(Observer):
+    """An observer that saves a checkpoint now and then, so that a run that is killed can go on from the last.
+
+    seconds : wall time between two of them.
+    """
+
+    def __init__(self, path: str | Path, seconds: float = 60.0) -> None:
+        must(seconds >= 0, "seconds between checkpoints", "at least 0", seconds)
+        self.path, self.seconds, self.saved = Path(path), seconds, time.monotonic()
+
+    def observe(self, simulation: Simulation) -> None:
+        if time.monotonic() - self.saved > self.seconds:
+            save(simulation, self.path)
+            self.saved = time.monotonic()
 
 
 def _agree(name: str, value: Any, received: Any) -> None:

@@ -8,39 +8,44 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from tisim.engine.simulation import Simulation
+from tisim.engine.observer import Observer
 from tisim.io.reader import Frame
 from tisim.worlds.state import WorldStatus
 
 if TYPE_CHECKING:
+    from tisim.engine.simulation import Simulation
     from tisim.io.trajectory import Trajectory
 
 EARLY = 1e-9
 """Part of an interval by which a frame may come early, so that rounding of times costs no further step."""
 
 
-class Recorder:
-    """Looks at a simulation between stretches of steps, and has its worlds wait where a frame is due."""
+class Recorder(Observer):
+    """Writes the frames that are due, and has worlds wait for those that come."""
 
     def __init__(self, trajectory: Trajectory, simulation: Simulation, indices: Sequence[int]) -> None:
-        self.trajectory, self.simulation, self.indices = trajectory, simulation, list(indices)
+        """indices : of the trajectory's scenes, which the worlds of the loaded simulation are."""
+        self.trajectory, self.indices = trajectory, list(indices)
         self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
         self.last = [_last(trajectory.groups[index]) for index in self.indices]
-        self.due = np.full(simulation.worlds, np.inf)
-        for w, interval in enumerate(self.interval):
-            # A run that goes on may owe the frame of the time where it goes on: the disk was full.
-            self.due[w] = 0.0 if self.last[w] < 0 else self._after(self.last[w], interval)
-        simulation.look = self.look
-        self.look()
+        # A run that goes on may owe the frame of the time where it goes on: the disk was full.
+        self.due = np.array(
+            [
+                0.0 if last < 0 else self._after(last, interval)
+                for last, interval in zip(self.last, self.interval, strict=True)
+            ]
+        )
 
     @staticmethod
     def _after(time: float, interval: float) -> float:
         """The first time after this one at which a frame is due, s."""
         return float((np.floor(time / interval + EARLY) + 1 - EARLY) * interval)
 
-    def look(self) -> None:
-        """Write what is due, and say when each world is due next."""
-        s, good = self.simulation.s, self.simulation.monitor.good
+    def pause(self, simulation: Simulation) -> np.ndarray:
+        return self.due
+
+    def observe(self, simulation: Simulation) -> None:
+        s, good = simulation.s, simulation.monitor.good
         running = s.read("status") == WorldStatus.RUNNING
         steps = s.read("steps")
         for w, interval in enumerate(self.interval):
@@ -53,7 +58,6 @@ class Recorder:
                 arrays = {f.name: good[f.name][w, :n] for f in self.trajectory.fields[self.indices[w]]}
                 self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
                 self.last[w] = time
-        s.write("pause_time", self.due)
 
 
 def _last(group: h5py.Group) -> float:

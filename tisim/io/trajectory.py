@@ -69,6 +69,22 @@ class Recording:
         """The file, made anew, for these scenes."""
         return Trajectory(self, scenes, real)
 
+    @contextmanager
+    def observer(self, simulation: Simulation, resume: bool = False) -> Iterator[Recorder]:
+        """The file, made anew, for all worlds of a loaded simulation while this lasts: what writes to it is
+        an observer, to give to each ``run``.
+
+        resume : of a simulation with one world, go on with the file that a stopped run has left.
+        """
+        scenes, real = simulation.scenes, simulation.runtime.precision
+        if resume:
+            time = float(simulation.monitor.good["time"][0])
+            made = Trajectory.going_on(self, scenes[0], time, real)
+        else:
+            made = self.begun(scenes, real)
+        with made as trajectory:
+            yield trajectory.recorder(simulation, range(len(scenes)))
+
 
 class Trajectory:
     """A file that frames are written to, for scenes that run one after another or side by side.
@@ -188,8 +204,9 @@ class Trajectory:
         if value is None:
             self._check()
 
-    def record(self, simulation: Simulation, indices: Sequence[int]) -> Recorder:
-        """Write frames of a loaded simulation, whose worlds are the scenes of these indices, as it runs."""
+    def recorder(self, simulation: Simulation, indices: Sequence[int]) -> Recorder:
+        """What writes frames of a loaded simulation, whose worlds are the scenes of these indices: an
+        observer, to give to its ``run``."""
         return Recorder(self, simulation, indices)
 
 
@@ -200,30 +217,6 @@ def asked(path: Path, frames: int | None, every: float | None, resume: bool) -> 
         must(not begun, "--frames or --every", "given as before, to go on with trajectory.h5", "neither")
         return None
     return Recording(path, frames, every)
-
-
-@contextmanager
-def recorded(
-    recording: Recording | None, path: Path, simulation: Simulation, resume: bool = False
-) -> Iterator[None]:
-    """While this lasts, record all worlds of a loaded simulation; where nothing is asked for, leave no file.
-
-    resume : go on with the file that a stopped run has left at the path.
-    """
-    if recording is None:
-        path.unlink(missing_ok=True)
-        yield
-        return
-    real, scenes = simulation.runtime.precision, simulation.scenes
-    if resume:
-        time = float(simulation.monitor.good["time"][0])
-        trajectory = Trajectory.going_on(recording, scenes[0], time, real)
-    else:
-        trajectory = Trajectory(recording, scenes, real)
-    with trajectory:
-        trajectory.record(simulation, range(len(scenes)))
-        yield
-        simulation.look = None
 
 
 def _put(path: Path, image: bytes) -> None:

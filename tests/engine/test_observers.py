@@ -1,0 +1,152 @@
+"""Runs of a part of the way, and what looks at them meanwhile."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, flow
+from tisim import InputError, Observer, PeriodicCheckpoint
+
+FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
+CAPACITY = max(made.capacity() for made in FLOWS)
+
+
+@pytest.fixture
+def simulation():
+    made = compiled(FLOWS[0], 2, CAPACITY)
+    made.load(FLOWS)
+    return made
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Results in one go, and the times of all ends of steps of each world, s."""
+    made = compiled(FLOWS[0], 2, CAPACITY)
+    made.load(FLOWS)
+    times = [made.s.read("time")]
+    while len(made.ended()) < 2:
+        made.run(steps=1)
+        times.append(made.s.read("time"))
+    made.load(FLOWS)
+    made.run()
+    return made.results(), np.array(times).T
+
+
+def same(found, wanted):
+    for result, other in zip(found, wanted, strict=True):
+        assert (result.time, result.work, result.status) == (other.time, other.work, other.status)
+        for name, values in result.state.items():
+            np.testing.assert_array_equal(values, other.state[name], err_msg=name)
+
+
+def first_end(times, wanted):
+    """The first of these times at or after one; the last where none is."""
+    return times[min(np.searchsorted(times, wanted), len(times) - 1)]
+
+
+class Waits(Observer):
+    """Has each world wait at times of its own, and keeps when it has seen it."""
+
+    def __init__(self, *wanted):
+        self.wanted, self.seen = [list(times) for times in wanted], []
+
+    def pause(self, simulation):
+        return np.array([min(times, default=np.inf) for times in self.wanted])
+
+    def observe(self, simulation):
+        now = simulation.s.read("time")
+        self.seen.append(now)
+        self.wanted = [[t for t in times if t > now[w]] for w, times in enumerate(self.wanted)]
+
+
+def test_until_is_the_first_end_of_a_step_there_and_a_later_run_goes_on(simulation, whole):
+    results, times = whole
+    simulation.run(until=2e-4)
+    assert [r.time for r in simulation.results()] == [first_end(times[w], 2e-4) for w in range(2)]
+    assert [r.status.reason for r in simulation.results()] == ["running", "running"]
+    simulation.run(until=2e-4)  # where they are already
+    simulation.run(until=3e-4, steps=2)
+    assert simulation.results()[0].time < 3e-4
+    simulation.run(until=5e-4)
+    assert [r.time for r in simulation.results()] == [first_end(times[0], 5e-4), FLOWS[1].duration]
+    simulation.run()
+    same(simulation.results(), results)
+
+
+def test_worlds_wait_for_the_earliest_of_all_observers(simulation, whole):
+    results, times = whole
+    one, other = Waits([1.1e-4, 3e-4], [2.2e-4]), Waits([2e-4], [])
+    simulation.run(until=2.5e-4, observers=[one, other])
+    simulation.run(observers=[one, other])
+    same(simulation.results(), results)
+    for observer in (one, other):
+        seen = np.array(observer.seen)
+        for w, wanted in ((0, (0.0, 1.1e-4, 2e-4, 2.5e-4, 3e-4, 1.0)), (1, (0.0, 2.2e-4, 2.5e-4, 1.0))):
+            assert {first_end(times[w], t) for t in wanted} <= set(seen[:, w])
+
+
+def test_a_pause_that_has_passed_is_none(simulation, whole):
+    class Stubborn(Observer):
+        seen = 0
+
+        def pause(self, simulation):
+            return 1e-4
+
+        def observe(self, simulation):
+            self.seen += 1
+
+    stubborn = Stubborn()
+    simulation.run(observers=[stubborn])
+    same(simulation.results(), whole[0])
+    assert stubborn.seen >= 3
+
+
+def test_a_function_is_called_from_the_start_to_the_end(simulation):
+    fractions = []
+    simulation.run(observers=[lambda made: fractions.append(made.fraction())])
+    assert (fractions[0], fractions[-1]) == (0.0, 1.0)
+    assert (np.diff(fractions) > 0).all()
+
+
+def test_an_observer_that_raises_stops_between_two_steps(simulation, whole):
+    class Enough(Exception):
+        pass
+
+    def stop(made):
+        if made.fraction() > 0:
+            raise Enough
+
+    with pytest.raises(Enough):
+        simulation.run(observers=[stop])
+    assert simulation.fraction() > 0
+    simulation.run()
+    same(simulation.results(), whole[0])
+
+
+def test_a_checkpoint_now_and_then(simulation, whole, tmp_path):
+    path = tmp_path / "c.h5"
+    with pytest.raises(InputError, match="seconds between checkpoints must be at least 0; received -1"):
+        PeriodicCheckpoint(path, seconds=-1)
+    simulation.run(until=1e-4, observers=[PeriodicCheckpoint(path, seconds=3600.0)])
+    assert not path.exists()
+    simulation.run(until=2e-4, observers=[PeriodicCheckpoint(path, seconds=0.0)])
+    simulation.load(FLOWS)
+    simulation.restore(path)
+    assert [r.time for r in simulation.results()] == [first_end(whole[1][w], 2e-4) for w in range(2)]
+    simulation.run()
+    same(simulation.results(), whole[0])
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"until": -1.0}, "until must be a number of s of simulated time, at least 0; received -1.0"),
+        ({"until": float("nan")}, "until must be a number of s of simulated time, at least 0; received nan"),
+        ({"steps": -1}, "steps must be at least 0; received -1"),
+        ({"observers": [3]}, "an observer must be an Observer or a function of the simulation; received 3"),
+        ({"observers": [Observer]}, "an observer must be an Observer or a function"),
+    ],
+)
+def test_what_cannot_be_asked_for(simulation, asked, message):
+    with pytest.raises(InputError, match=message):
+        simulation.run(**asked)
+    assert simulation.fraction() == 0

@@ -1,0 +1,81 @@
+"""What looks at a run from outside, between its steps: the recorder of a trajectory, a checkpoint now and
+then, a progress bar, a script's own function. Observers are given to ``Simulation.run``; they do not change a
+result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tisim.errors import must
+
+if TYPE_CHECKING:
+    from tisim.engine.simulation import Simulation
+
+
+class Observer:
+    """The contract of an observer.
+
+    1. ``observe`` is called before the first step of a run, then about four times a second, whenever a world
+       has come to its pause, and after the last step; never within a step.
+    2. ``pause`` is asked after that. A world waits at the end of the first step at or after its pause, the
+       earliest of all observers', until all have looked. A time that the world has reached is no pause.
+    3. An observer may read whatever a simulation has, save a checkpoint, or raise to stop the run between two
+       steps; it runs, loads and restores nothing.
+    4. The wall time that it takes is no part of a result's ``wall_s``.
+    """
+
+    def pause(self, simulation: Simulation) -> float | np.ndarray:
+        """When worlds are to wait for this observer next, s: one number for all, or one for each that is
+        loaded; never by default."""
+        return np.inf
+
+    def observe(self, simulation: Simulation) -> None:
+        """Look at a loaded simulation, which is between two steps."""
+        raise NotImplementedError(f"{type(self).__name__} must define observe")
+
+
+Observing = Observer | Callable[["Simulation"], object]
+"""An observer, or a plain function of the simulation, which no world waits for."""
+
+
+class Callback(Observer):
+    """A plain function as an observer."""
+
+    def __init__(self, function: Callable[[Simulation], object]) -> None:
+        self.function = function
+
+    def observe(self, simulation: Simulation) -> None:
+        self.function(simulation)
+
+
+class Observers:
+    """All observers of a run, as one."""
+
+    def __init__(self, given: Sequence[Observing]) -> None:
+        """InputError when one is neither an Observer nor a function."""
+        for one in given:
+            sound = isinstance(one, Observer) or (callable(one) and not isinstance(one, type))
+            must(sound, "an observer", "an Observer or a function of the simulation", one)
+        self.members = [one if isinstance(one, Observer) else Callback(one) for one in given]
+
+    def observe(self, simulation: Simulation) -> None:
+        """Have all look, in the order given."""
+        for member in self.members:
+            member.observe(simulation)
+
+    def pauses(self, simulation: Simulation, until: float) -> np.ndarray:
+        """When each world waits next, s, shape (worlds,): at ``until``, or before it for an observer."""
+        pauses = np.full(simulation.worlds, until)
+        n = len(simulation.scenes)
+        if not self.members or n == 0:
+            return pauses
+        time = simulation.s.read("time")[:n]
+        for member in self.members:
+            asked = np.broadcast_to(np.asarray(member.pause(simulation), float), n)
+            ahead = np.where(asked > time, asked, np.inf)
+            pauses[:n] = np.minimum(pauses[:n], ahead)
+        return pauses
