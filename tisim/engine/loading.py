@@ -35,7 +35,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         must(rest, "particles.velocity", "0 where particles are fixed", "one that moves")
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
-            _check(f, start[f.name], n)
+            check_field(f, start[f.name], n)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
     must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))
@@ -47,7 +47,8 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     must(not coarse.any(), "particles.position", rule, worst)
 
 
-def _check(f: Field, values: np.ndarray, n: int) -> None:
+def check_field(f: Field, values: np.ndarray, n: int) -> None:
+    """InputError unless values of n particles have the shape and the range of a field."""
     must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
     held: np.ndarray
     with np.errstate(over="ignore"):

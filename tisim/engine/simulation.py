@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from tisim.engine.assembly import Assembly, declared, needed_fields
 from tisim.engine.loading import check_start, laid_out, volume
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
+from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
@@ -52,6 +53,7 @@ class Simulation:
         must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
         self.trees = self._make(scene, worlds, capacity, schedule)
         self.scenes: list[Scene] = []
+        self.edits: list[list[str]] = []
         self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
 
     @in_taichi_thread
@@ -116,11 +118,23 @@ class Simulation:
             check_start(self.s.fields, scene, start)
         self.table.write([self._parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
+        self.edits = [[] for _ in scenes]
         self.s.fill({"pause_time": np.inf, "goal": NEVER})
         self.begin()
         self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.monitor.look()
+
+    @property
+    def state(self) -> ParticleState:
+        """The particles of the one world that is loaded, to be read and written by name between runs, SI."""
+        must(len(self.scenes) == 1, "simulation", "of one world (or ask states[w])", len(self.scenes))
+        return self.states[0]
+
+    @property
+    def states(self) -> list[ParticleState]:
+        """The same of each loaded world, in order."""
+        return [ParticleState(self, w) for w in range(len(self.scenes))]
 
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
@@ -131,7 +145,7 @@ class Simulation:
         if self.first.items:
             self.first.advance(1)
 
-    def put(self, image: dict[str, np.ndarray]) -> None:
+    def put(self, image: Mapping[str, np.ndarray]) -> None:
         """Put all worlds where they were when ``s.image()`` was made of them."""
         self.s.fill(image)
         self.forget_lists()
@@ -260,11 +274,15 @@ class Simulation:
                     work={name: int(tally[w]) for name, tally in tallies.items()},
                     status=self.monitor.status(w, int(status[w])),
                     wall_s=self.wall_s / len(self.scenes),
-                    settings=self.runtime.settings,
+                    settings={**self.runtime.settings, **self._edited(w)},
                     measures={name: float(values[w]) for name, values in kept.items()},
                 )
             )
         return found
+
+    def _edited(self, w: int) -> dict[str, str]:
+        """What has been written to a world besides its scene."""
+        return {"edited": "; ".join(self.edits[w])} if self.edits[w] else {}
 
     def checkpoint(self, path: str | Path) -> None:
         """Write where all worlds are to a file, in place of any before; RunError when the disk is full.

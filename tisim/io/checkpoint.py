@@ -46,6 +46,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
     simulation.s.check()
     with checksum.created(Path(path)) as file:
         file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
+        file.attrs["edits"] = json.dumps(simulation.edits)
         now = simulation.s.image()
         for name, values in now.items():
             file[name] = values
@@ -64,12 +65,13 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     with checksum.opened(Path(path), "checkpoint", FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])
-        wall_s = float(file.attrs["wall_s"])
+        wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs.get("edits", "[]"))
         columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
         group = file.get(BEFORE, file)
         before = {name: np.asarray(group[name]) for name in columns}
     simulation.put(columns)
     simulation.wall_s = wall_s
+    simulation.edits = edits or [[] for _ in simulation.scenes]
     simulation.monitor = Monitor(simulation, before)
     simulation.monitor.look()
 

@@ -106,13 +106,13 @@ class Particles(Start):
         must((self.mass is None) != (self.density is None), "particles", "given mass or density", given)
         farthest = float(np.abs(arrays["position"]).max())
         must(farthest <= MOST, "particles.position", f"at most {MOST:g} m from the origin", farthest)
-        _check_sizes("radius", "m", arrays["radius"])
+        check_sizes("radius", "m", arrays["radius"])
         if self.density is not None:
             with np.errstate(over="ignore"):
                 arrays["mass"] = 4 / 3 * np.pi * arrays["radius"] ** 3 * self.density
         else:
             arrays["mass"] = self._column("mass", self.mass, n)
-        _check_sizes("mass", "kg", arrays["mass"])
+        check_sizes("mass", "kg", arrays["mass"])
         for name, value in self.quantities.items():
             must(
                 name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value
@@ -128,7 +128,7 @@ def _worst(column: np.ndarray) -> float:
     return float(column[~np.isfinite(column)].flat[0]) if not np.isfinite(column).all() else 0.0
 
 
-def _check_sizes(name: str, unit: str, column: np.ndarray) -> None:
+def check_sizes(name: str, unit: str, column: np.ndarray) -> None:
     """InputError unless all are above 0 and within the limits of their unit."""
     least, most = limits(unit)
     must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min()))

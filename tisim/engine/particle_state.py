@@ -1,0 +1,116 @@
+"""The particles of a world between runs, by name and in SI: ``simulation.state["velocity"]``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tisim.effects.base import DerivedQuantity
+from tisim.engine.loading import check_field, check_start
+from tisim.engine.monitor import Monitor
+from tisim.errors import must
+from tisim.interactions.force_sum import FORCE, TORQUE
+from tisim.scene.initial_state import check_sizes
+from tisim.worlds.state import NEVER, WorldStatus
+
+if TYPE_CHECKING:
+    from tisim.engine.simulation import Simulation
+
+
+class ParticleState(Mapping[str, np.ndarray]):
+    """The live particles of a loaded world: arrays of shape (n,) or (n, 3), SI, by the names of its fields.
+
+    The arrays are those of a Result at this moment, and are not writeable: ``state["velocity"] = 2.0 *
+    state["velocity"]`` writes. What is written must be finite and what a start may be, for the particles that
+    there are; ``id``, forces and derived quantities follow from the rest. Then pair lists are made anew, and
+    derived quantities and forces are summed as at a start. Time, counters and other worlds stay as they are.
+
+    A world that has been written to is not what its scene describes: its Result says what was written and
+    when under ``settings["edited"]``; ``Result.start`` stays what was loaded.
+    """
+
+    def __init__(self, simulation: Simulation, world: int) -> None:
+        self._simulation, self._world = simulation, world
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return float(self._simulation.monitor.good["time"][self._world])
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        must(name in self, "quantity of particles", f"one of {', '.join(self)}", name)
+        good = self._simulation.monitor.good
+        values: np.ndarray = good[name][self._world, : good["count"][self._world]].copy()
+        values.flags.writeable = False
+        return values
+
+    def __setitem__(self, name: str, values: Any) -> None:
+        fields = {f.name: f for f in self._simulation.s.reported}
+        derived = {e.quantity for e in self._simulation.scenes[0].effects if isinstance(e, DerivedQuantity)}
+        derived |= {"id", FORCE.name, TORQUE.name} | {f.name for f in fields.values() if f.slots}
+        given = [known for known in fields if known not in derived]
+        must(name in given, "quantity to write", f"one of {', '.join(given)}", name)
+        new, whole = _numbers(name, values, fields[name].integer), dict(self)
+        check_field(fields[name], new, len(whole["mass"]))
+        must(bool(np.isfinite(new).all()), f"particles.{name}", "finite", new[~np.isfinite(new)][:1])
+        if name in ("mass", "radius"):
+            check_sizes(name, fields[name].unit, new)
+        scene = self._simulation.scenes[self._world]
+        check_start(self._simulation.s.fields, scene, {**whole, name: new})
+        _edit(self._simulation, self._world, name, new)
+
+    def __contains__(self, name: object) -> bool:
+        return name in tuple(self)
+
+    def __iter__(self) -> Iterator[str]:
+        return (f.name for f in self._simulation.s.reported)
+
+    def __len__(self) -> int:
+        return len(self._simulation.s.reported)
+
+    def __repr__(self) -> str:
+        return f"<state of world {self._world} at {self.time:g} s: {', '.join(self)}>"
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+
+def _numbers(name: str, values: Any, whole: bool) -> np.ndarray:
+    """An array of floats; InputError unless these are numbers."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        array = np.asarray(str(values))
+    must(array.dtype.kind in "biuf", f"particles.{name}", "numbers", values)
+    floats: np.ndarray = array.astype(float)
+    must(not whole or bool((floats == np.rint(floats)).all()), f"particles.{name}", "whole numbers", values)
+    return floats
+
+
+def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None:
+    """Write a quantity of a world that is between two steps, and what follows from it."""
+    s = simulation.s
+    now, before = s.image(), simulation.monitor.replay.whole()
+    status, goal, pauses = now["status"].copy(), now["goal"].copy(), s.read("pause_time")
+    reason = simulation.monitor.status(w, int(status[w])).reason
+    must(status[w] == WorldStatus.RUNNING, "world to write to", "one that runs", reason)
+    must(now["underway"][w] == 0, "world to write to", "between two steps", "one whose step is under way")
+    now[name][w, : len(values)] = values
+    # As at a start, of this world alone.
+    for quantity, start in (("approach_time", np.inf), ("fastest", 0.0), ("events", 0)):
+        now[quantity][w] = start
+    now["status"][:], now["status"][w], now["goal"][:] = WorldStatus.ENDED, WorldStatus.RUNNING, NEVER
+    simulation.put(now)
+    s.write("pause_time", np.inf)
+    if simulation.first.items:
+        simulation.first.advance(1)
+    after = s.image()
+    status[w] = after["status"][w]
+    simulation.put({**after, "status": status, "goal": goal, "pause_time": pauses})
+    for column, old in before.items():
+        old[w] = status[w] if column == "status" else after[column][w]
+    simulation.edits[w].append(f"{name} at t = {float(after['time'][w]):.6g} s")
+    simulation.monitor = Monitor(simulation, before)
+    simulation.monitor.look()
