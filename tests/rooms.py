@@ -29,6 +29,7 @@ ROOMS = (
 """From the ground up."""
 LATE = {
     ("tisim.io.run_folder", "tisim.plotting.cloud"),
+    ("tisim.io.read", "tisim.accuracy.storage"),
     ("tisim.engine.simulation", "tisim.io.checkpoint"),
 }
 """A module, and what one of its functions imports from above."""

@@ -28,6 +28,7 @@ from .engine.simulation import Simulation as Simulation
 from .errors import InputError as InputError
 from .errors import RunError as RunError
 from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
+from .io.read import read as read
 from .io.trajectory import Recording as Recording
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
 from .packing.placement import (

@@ -117,6 +117,12 @@ def resume(study: Study, folder: Path) -> None:
         study.complete = file.attrs["complete"] == json.dumps(study.asked())
 
 
+def rows(path: Path) -> list[Row]:
+    """What a study has measured, of a cost.h5. InputError when the file is none, cut short or damaged."""
+    with checksum.opened(path, "cost", FORMAT) as file:
+        return _rows(file["rows"])
+
+
 def _rows(group: Any) -> list[Row]:
     columns: dict[str, list[Any]] = {name: list(group[name].asstr()) for name in _TEXTS}
     columns |= {name: [kind(value) for value in group[name]] for name, kind in _NUMBERS.items()}

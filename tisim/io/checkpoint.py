@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,9 @@ from tisim.engine.observer import Observer
 from tisim.engine.simulation import Simulation
 from tisim.errors import must
 from tisim.files import checksum
+from tisim.scene.initial_state import Arrays
 
-FORMAT = "tisim checkpoint 2"
+FORMAT = "tisim checkpoint 3"
 BEFORE = "before"
 
 
@@ -50,9 +52,35 @@ def save(simulation: Simulation, path: str | Path) -> None:
         now = simulation.s.image()
         for name, values in now.items():
             file[name] = values
+        for field in simulation.s.reported:
+            file[field.name].attrs["unit"] = field.unit
         if now["underway"].any():
             for name, values in simulation.monitor.replay.whole().items():
                 file[f"{BEFORE}/{name}"] = values
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The particles of each world at a moment, as a checkpoint has them.
+
+    times : s, shape (worlds,). steps : taken until then, shape (worlds,). states : for each world the arrays
+    of its live particles by field name, SI; shape (n,) or (n, 3).
+    """
+
+    times: np.ndarray
+    steps: np.ndarray
+    states: tuple[Arrays, ...]
+
+
+def snapshot(path: str | Path) -> Snapshot:
+    """What a checkpoint holds of the particles; of a world in which a step is under way, from before that
+    step. InputError when the file is none, or is cut short or damaged."""
+    with checksum.opened(Path(path), "checkpoint", FORMAT) as file:
+        group, worlds = file.get(BEFORE, file), len(json.loads(file.attrs["scenes"]))
+        arrays = {name: np.asarray(group[name]) for name in file if "unit" in file[name].attrs}
+        counts, times, steps = (np.asarray(group[name])[:worlds] for name in ("count", "time", "steps"))
+        states = tuple({k: v[w, :n].copy() for k, v in arrays.items()} for w, n in enumerate(counts))
+        return Snapshot(times, steps, states)
 
 
 def restore(simulation: Simulation, path: str | Path) -> None:
@@ -65,13 +93,13 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     with checksum.opened(Path(path), "checkpoint", FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])
-        wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs.get("edits", "[]"))
+        wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs["edits"])
         columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
         group = file.get(BEFORE, file)
         before = {name: np.asarray(group[name]) for name in columns}
     simulation.put(columns)
     simulation.wall_s = wall_s
-    simulation.edits = edits or [[] for _ in simulation.scenes]
+    simulation.edits = edits
     simulation.monitor = Monitor(simulation, before)
     simulation.monitor.look()
 

@@ -21,15 +21,17 @@ import numpy as np
 
 from tisim import version
 from tisim.backend import runtime
-from tisim.engine.result import Result
+from tisim.components import serialization
+from tisim.engine.assembly import needed_fields
+from tisim.engine.result import Result, Status
 from tisim.errors import must
 from tisim.files import checksum, lock, ownership, regular_file
 from tisim.files.atomic import replace_file
-from tisim.io.reader import RESULT
+from tisim.io.reader import RESULT, undamaged
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.state import resolve_fields
+from tisim.worlds.state import SHARED, resolve_fields
 
 NAMES = (
     "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,
@@ -130,8 +132,28 @@ def write_result(result: Result, path: Path) -> None:
         file.create_group("measures").attrs.update(result.measures)
 
 
+def read_result(path: Path) -> Result:
+    """The Result that ``write_result`` has written, to the bit. InputError when it is damaged or none."""
+    with checksum.opened(path, "result", RESULT) as file, undamaged():
+        arrays = {
+            group: {name: np.asarray(values) for name, values in file[group].items()}
+            for group in ("start", "end")
+        }
+        return Result(
+            scene=Scene.from_dict(serialization.parse(file.attrs["scene"])),
+            state=arrays["end"],
+            start=arrays["start"],
+            time=float(file.attrs["time"]),
+            work={name: int(count) for name, count in file["work"].attrs.items()},
+            status=Status(bool(file.attrs["ok"]), str(file.attrs["reason"])),
+            wall_s=float(file.attrs["wall_s"]),
+            settings=json.loads(file.attrs["settings"]),
+            measures={name: float(value) for name, value in file["measures"].attrs.items()},
+        )
+
+
 def _units(scene: Scene) -> dict[str, str]:
-    fields = resolve_fields(need for effect in scene.effects for need in effect.required_fields())
+    fields = resolve_fields((*SHARED, *needed_fields(scene.effects, scene.stepper)))
     return {field.name: field.unit for field in fields}
 
 

@@ -1,0 +1,194 @@
+"""Whatever a run has written is read back by one function, which knows it by what is in it."""
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+import tisim
+from optimize.storage import hdf5_store
+from tests.accuracy.scenes import oscillator
+from tests.scenes import compiled, flow, scene
+from tisim import InputError, Recording, Result, Scene, Status
+from tisim.accuracy import Study, storage
+from tisim.accuracy.row import Row
+from tisim.effects import Contact, ContactFriction
+from tisim.io import read as reading
+from tisim.io import run_folder
+from tisim.io.run_folder import Folder
+
+FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
+CONTACT = Contact(stiffness=1.0), ContactFriction(stiffness=1.0, static=0.5, dynamic=0.4)
+CAPACITY = max(made.capacity() for made in FLOWS)
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """Two flows: a trajectory of both, one of the first, a checkpoint on the way, and results."""
+    folder = tmp_path_factory.mktemp("ran")
+    made = compiled(FLOWS[0], 2, CAPACITY)
+    made.load(FLOWS)
+    both, half = Recording(folder / "both.h5", frames=7), folder / "half.h5"
+    with both.observer(made) as recorder:
+        made.run(until=3e-4, observers=[recorder])
+        made.checkpoint(half)
+        middle = made.results()
+        made.run(observers=[recorder])
+    results = made.results()
+    made.load(FLOWS[0])
+    with Recording(folder / "one.h5", frames=5).observer(made) as recorder:
+        made.run(observers=[recorder])
+    return SimpleNamespace(folder=folder, half=half, middle=middle, results=results)
+
+
+def identical(found, wanted):
+    """All of a Result, arrays bit by bit and with their types."""
+    for field in dataclasses.fields(Result):
+        one, other = getattr(found, field.name), getattr(wanted, field.name)
+        if field.name not in ("state", "start"):
+            assert one == other, field.name
+            continue
+        assert one.keys() == other.keys()
+        for name, values in one.items():
+            assert (values.dtype, values.shape) == (other[name].dtype, other[name].shape), name
+            assert values.tobytes() == other[name].tobytes(), name
+
+
+@pytest.mark.parametrize("world", [0, 1])
+def test_a_result_is_the_same_to_the_bit(ran, tmp_path, world):
+    folder, result = Folder(tmp_path), ran.results[world]
+    run_folder.write(result, folder)
+    identical(tisim.read(tmp_path), result)
+    identical(tisim.read(str(folder.result)), result)
+    assert tisim.read(tmp_path / "scene.toml") == result.scene
+    assert tisim.read(tmp_path / "versions.json") == run_folder.versions()
+
+
+def test_so_are_one_that_failed_and_one_of_odd_numbers(ran, tmp_path):
+    odd = np.array([[np.nan, -0.0, 5e-324]])
+    result = dataclasses.replace(
+        ran.results[0], state={"position": odd}, start={}, time=0.1 + 0.2, work={"steps": 2**53 + 1},
+        status=Status(False, "found at t = 1 s: µ"), settings={"edited": "velocity at t = 1 s"},
+        measures={"peak": math.inf, "least": 1e-300}, wall_s=1 / 3,
+    )  # fmt: skip
+    run_folder.write_result(result, tmp_path / "r.h5")
+    identical(tisim.read(tmp_path / "r.h5"), result)
+
+
+def test_all_quantities_have_units(tmp_path):
+    """Also forces and torques, and what a start has that no effect needs."""
+    pair = scene([(0, 0, 0), (1, 0, 0)], [(0, 0, 0)] * 2, CONTACT)
+    units = {"force": "N", "torque": "N m", "spin": "rad/s", "velocity": "m/s", "temperature": "K"}
+    arrays = {name: np.zeros((2, 3)) for name in units}
+    run_folder.write_result(Result(pair, arrays, arrays, 0.0, {}, Status(True, ""), 0.0), tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert {name: values.attrs["unit"] for name, values in file["end"].items()} == units
+
+
+def test_frames_of_a_trajectory(ran):
+    trajectory = tisim.read(ran.folder / "one.h5")
+    assert len(trajectory) == 6
+    assert trajectory.scene == FLOWS[0]
+    assert (trajectory.times[0], trajectory.times[-1]) == (0.0, FLOWS[0].duration)
+    first, last = trajectory[0], trajectory[-1]
+    np.testing.assert_array_equal(first.arrays["position"], ran.results[0].start["position"])
+    order = np.argsort(ran.results[0].state["id"])
+    np.testing.assert_array_equal(last.arrays["velocity"], ran.results[0].state["velocity"][order])
+    times = trajectory.times.tolist()
+    assert [frame.time for frame in trajectory] == times
+    assert [frame.time for frame in trajectory[1:3]] == times[1:3]
+    with trajectory:
+        assert [frame.time for frame in trajectory] == times
+        assert trajectory[2].time == times[2]
+    assert trajectory[2].time == times[2]  # after the with, too
+    with pytest.raises(IndexError):
+        _ = trajectory[6]
+
+
+def test_worlds_of_a_trajectory(ran):
+    with tisim.read(ran.folder / "both.h5") as trajectory:
+        assert [world.scene for world in trajectory.worlds] == FLOWS
+        for world, result in zip(trajectory.worlds, ran.results, strict=True):
+            assert world[-1].time == result.time
+            assert len(world) == len(world.times) == 8
+    with pytest.raises(InputError, match=r"trajectory must be of one world \(or ask worlds\[w\]\)"):
+        len(trajectory)
+
+
+def test_a_frame_is_read_when_it_is_asked_for(ran, monkeypatch):
+    """Of a thousand frames one costs as much as of one."""
+    seen = []
+    row = reading.recorded_trajectory.Frames._row
+    monkeypatch.setattr(
+        reading.recorded_trajectory.Frames, "_row", lambda self, file, k: seen.append(k) or row(self, file, k)
+    )
+    trajectory = tisim.read(ran.folder / "one.h5")
+    assert len(trajectory.times) == 6
+    assert seen == []
+    _ = trajectory[3]
+    assert seen == [3]
+
+
+def test_a_checkpoint_is_the_state_of_each_world(ran):
+    snapshot = tisim.read(ran.half)
+    assert snapshot.times.tolist() == [result.time for result in ran.middle]
+    assert snapshot.steps.tolist() == [result.work["steps"] for result in ran.middle]
+    for state, result in zip(snapshot.states, ran.middle, strict=True):
+        assert state.keys() == result.state.keys()
+        for name, values in state.items():
+            np.testing.assert_array_equal(values, result.state[name], err_msg=name)
+
+
+def test_rows_of_a_study(tmp_path):
+    study = Study(oscillator())
+    errors = ((0.1, 0.01),) * len(study.quantities)
+    study.rows = [
+        Row("verlet", "dt = 1", "Verlet()", "", "f64", 1, (0.1, 0.3), 5.0, 6.0, 0.0, errors),
+        Row("verlet", "dt = 2", "Verlet()", "", "f64", 1, failed="a force so strong"),
+    ]  # fmt: skip
+    storage.write(study, tmp_path)
+    good, failed = tisim.read(tmp_path / "cost.h5")
+    assert good == study.rows[0]
+    assert (failed.key, failed.failed) == (study.rows[1].key, "a force so strong")
+    assert tisim.read(tmp_path)[0] == good
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.h5", None, "file to read must be there; received "),
+        (
+            "a.png",
+            b"\x89PNG\r\n\x1a\n\xff\xfe",
+            "file to read must be the folder of a run",
+        ),
+        ("a.csv", b"method,setting\nverlet,1\n", "file to read must be the folder of a run"),
+        ("a.json", b'{"name": 1}', "file to read must be the folder of a run"),
+        ("a.toml", b"name = ", "scene file must be TOML; received "),
+        ("b.toml", b'name = "x"', "scene.particles must be given"),
+        ("a.h5", b"\x89HDF\r\n\x1a\n" + bytes(200), "file to read must be .* whole and with its checksum"),
+        (
+            "search.h5",
+            hdf5_store.image(None, [], {}),
+            "read by `tisim cache` and by `tisim plot` of its folder",
+        ),
+        (".", None, r"folder must be one with a whole run or study \(what an interrupted run has left"),
+    ],
+)
+def test_what_cannot_be_read(tmp_path, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        tisim.read(tmp_path / name)
+
+
+def test_the_format_of_a_search_is_the_one_known():
+    assert reading.SEARCH == hdf5_store.FORMAT
+
+
+def test_a_scene_of_any_name(tmp_path):
+    (tmp_path / "scene").write_text(FLOWS[0].to_toml())
+    assert tisim.read(tmp_path / "scene") == Scene.from_toml(tmp_path / "scene") == FLOWS[0]

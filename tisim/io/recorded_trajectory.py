@@ -1,0 +1,97 @@
+"""A trajectory that a run has written, or still writes: a sequence of frames for each of its worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Self, overload
+
+import numpy as np
+
+from tisim.errors import must
+from tisim.io.reader import Frame, Frames, frames, worlds
+from tisim.scene.scene import Scene
+
+
+class RecordedWorld(Sequence[Frame]):
+    """The frames of a world, in the order of their times: ``len``, index, slice, iteration.
+
+    A frame is read when it is asked for; what a run that goes on adds is seen when ``len`` is asked anew.
+    """
+
+    def __init__(self, path: Path, world: int) -> None:
+        self._path, self._world = path, world
+        self._held: Frames | None = None
+
+    def _frames(self) -> AbstractContextManager[Frames]:
+        return nullcontext(self._held) if self._held is not None else frames(self._path, self._world)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """What was run."""
+        with self._frames() as found:
+            return found.scene
+
+    @property
+    def times(self) -> np.ndarray:
+        """Of each frame, s, shape (frames,)."""
+        with self._frames() as found:
+            return found.times
+
+    def __len__(self) -> int:
+        with self._frames() as found:
+            return len(found)
+
+    @overload
+    def __getitem__(self, k: int) -> Frame: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[Frame]: ...
+    def __getitem__(self, k: int | slice) -> Frame | list[Frame]:
+        with self._frames() as found:
+            return [found[n] for n in range(len(found))[k]] if isinstance(k, slice) else found[k]
+
+    def __iter__(self) -> Iterator[Frame]:
+        with self._frames() as found:
+            yield from found
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} frames of world {self._world} in {self._path}>"
+
+
+class RecordedTrajectory(RecordedWorld):
+    """The file of a trajectory. Of a single world it is the sequence of its frames; of several, each of
+    ``worlds`` is one.
+
+    Without ``with``, the file is opened for each thing asked for, or once for a loop. While a ``with`` lasts
+    it stays open, and has the frames that it had then.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """InputError when there is no such file."""
+        super().__init__(Path(path).absolute(), 0)
+        number = worlds(self._path)
+        self.worlds: list[RecordedWorld] = [RecordedWorld(self._path, w) for w in range(number)]
+        self._opened = ExitStack()
+
+    def _frames(self) -> AbstractContextManager[Frames]:
+        rule = "of one world (or ask worlds[w])"
+        must(len(self.worlds) == 1, "trajectory", rule, f"one of {len(self.worlds)}")
+        return self.worlds[0]._frames()
+
+    def __enter__(self) -> Self:
+        for world in self.worlds:
+            world._held = self._opened.enter_context(world._frames())
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for world in self.worlds:
+            world._held = None
+        self._opened.close()
+
+    def __repr__(self) -> str:
+        return f"<trajectory of {len(self.worlds)} worlds in {self._path}>"
