@@ -234,6 +234,6 @@ def test_a_scene_is_a_value():
     place = np.zeros((2, 3))
     particles = Particles(position=place, velocity=place, radius=1.0, mass=1.0)
     place += 1
-    assert particles.position == ((0, 0, 0), (0, 0, 0))
+    assert particles.position.tolist() == [[0, 0, 0], [0, 0, 0]]
     with pytest.raises(Exception, match="frozen"):
         cloud().duration = 2.0

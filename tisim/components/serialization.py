@@ -56,9 +56,13 @@ def _part(annotation: Any) -> type[Component] | None:
     return kinds[0] if kinds else None
 
 
-def to_dict(part: Component, named: bool = True) -> dict[str, Any]:
-    """Kind and parameters of a part and of those that it is made of, without what is left at None."""
-    values = {key: value for key, value in part.model_dump(mode="json").items() if value is not None}
+def to_dict(part: Component, named: bool = True, arrays: bool = False) -> dict[str, Any]:
+    """Kind and parameters of a part and of those that it is made of, without what is left at None.
+
+    arrays : whether arrays stay what they are; otherwise they become lists.
+    """
+    dumped = part.model_dump(mode="python" if arrays else "json")
+    values = {key: value for key, value in dumped.items() if value is not None}
     for key in values:
         if isinstance(inner := getattr(part, key), Component):
             values[key] = to_dict(inner)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from pydantic import ConfigDict, field_validator, model_validator
+from pydantic import ConfigDict, field_serializer, field_validator, model_validator
 
+from tisim.components.arrays import Numbers, Rows, equal, frozen
 from tisim.components.component import Component, Text, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
@@ -33,25 +34,19 @@ class Start(Component):
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
 
 
-def _listed(value: Any) -> Any:
-    """An array, or one number, as rows of plain numbers; anything else as it is."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    return (value,) if isinstance(value, float | int) else value
-
-
 class Particles(Start):
     """Particles are given one by one, as lists or arrays.
 
     Positions and velocities are of shape (n, 3). Of any other quantity one number stands for all particles,
-    or n of them are given. Give mass or density, not both.
+    or n of them are given. Give mass or density, not both. Arrays are copied, and kept as arrays that are not
+    writeable.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    position: tuple[Vector, ...] = parameter("m", "positions", min_length=1, examples=[((0.0, 0.0, 0.0),)])
-    velocity: tuple[Vector, ...] = parameter("m/s", "velocities", min_length=1, examples=[((1.0, 0.0, 0.0),)])
-    radius: tuple[float, ...] = parameter("m", "radii, greater than 0", examples=[(1e-3,)])
-    mass: tuple[float, ...] | None = parameter("kg", "masses, greater than 0", None)
+    position: Rows = parameter("m", "positions", examples=[((0.0, 0.0, 0.0),)])
+    velocity: Rows = parameter("m/s", "velocities", examples=[((1.0, 0.0, 0.0),)])
+    radius: Numbers = parameter("m", "radii, greater than 0", examples=[(1e-3,)])
+    mass: Numbers | None = parameter("kg", "masses, greater than 0", None)
     density: float | None = parameter(
         "kg/m^3", "density of all particles, instead of masses", None, gt=0, examples=[2000.0]
     )
@@ -59,10 +54,20 @@ class Particles(Start):
         "further fields by name, in SI, such as temperature", default_factory=dict
     )
 
-    @field_validator("position", "velocity", "radius", "mass", mode="before")
-    @classmethod
-    def _from_array(cls, value: Any) -> Any:
-        return _listed(value)
+    # Not that of pydantic, which takes the comparison of two arrays for a truth.
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(equal(getattr(self, name), getattr(other, name)) for name in type(self).model_fields)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        """Arrays that come from another process are not writeable either."""
+        super().__setstate__(state)
+        for value in (*self.__dict__.values(), *self.quantities.values()):
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
 
     def _column(self, name: str, value: Any, n: int) -> np.ndarray:
         try:
@@ -78,13 +83,14 @@ class Particles(Start):
         must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", _worst(column))
         return column
 
-    @field_validator("quantities", mode="before")
+    @field_validator("quantities")
     @classmethod
-    def _plain(cls, value: Any) -> Any:
-        listed = isinstance(value, Mapping)
-        return (
-            {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in value.items()} if listed else value
-        )
+    def _frozen(cls, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        return {k: frozen(v) if isinstance(v, np.ndarray) else v for k, v in values.items()}
+
+    @field_serializer("quantities", when_used="json")
+    def _plain(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
 
     @model_validator(mode="after")
     def _sound(self) -> Self:

@@ -13,6 +13,7 @@ from pydantic import field_validator, model_validator
 from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
+from tisim.components.json_text import json_pieces
 from tisim.effects.base import Effect
 from tisim.errors import InputError, must, shown
 from tisim.files import python_file
@@ -104,17 +105,22 @@ class Scene(Component):
         seed, and the files that define parts of the scene that are not tisim's own."""
         order = [effect.label for effect in self.effects]
         files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
-        described = [PHYSICS_VERSION, order, self.to_dict(), *([files] if files else [])]
-        text = json.dumps(described, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        made = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
+        for piece in json_pieces(self._data(serialization.to_dict(self.particles, arrays=True))):
+            made.update(piece.encode())
+        made.update((f", {json.dumps(files, sort_keys=True)}]" if files else "]").encode())
+        return made.hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, as in a TOML file; ``from_dict`` is the inverse."""
+        return self._data(serialization.to_dict(self.particles))
+
+    def _data(self, particles: dict[str, Any]) -> dict[str, Any]:
         return {
             "name": self.name,
             "duration": self.duration,
             "seed": self.seed,
-            "particles": serialization.to_dict(self.particles),
+            "particles": particles,
             "domain": serialization.to_dict(self.domain),
             "stepper": serialization.to_dict(self.stepper),
             "effects": {effect.label: _table(effect) for effect in self.effects},

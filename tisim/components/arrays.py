@@ -1,0 +1,57 @@
+"""Arrays in validated plain data: checked as lists of numbers are, and then not writeable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, GetPydanticSchema
+from pydantic_core import CoreSchema, core_schema
+
+from tisim.components.component import Vector
+
+
+def frozen(values: Any, kind: type | None = None) -> np.ndarray:
+    """A copy that is not writeable."""
+    array = np.array(values, dtype=kind)
+    array.flags.writeable = False
+    return array
+
+
+def equal(a: Any, b: Any) -> bool:
+    """Whether two values are the same: numbers, tables or lists of them, or arrays, also beside lists."""
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(equal(value, b[key]) for key, value in a.items())
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.array_equal(a, b)
+    return bool(a == b)
+
+
+def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
+    """An array of as many rows as are given, from such an array or from what makes the list."""
+
+    def validated(value: Any, as_list: Callable[[Any], Any]) -> np.ndarray:
+        if isinstance(value, np.ndarray):
+            if value.dtype.kind in "iuf" and value.shape[1:] == columns and value.ndim and len(value):
+                array = frozen(value, float)
+                if np.isfinite(array).all():
+                    return array
+            # What is wrong with it, or how it can be read, is found out as of a list.
+            value = value.tolist()
+        return frozen(as_list((value,) if isinstance(value, float | int) else value), float)
+
+    def plain(array: np.ndarray, info: Any) -> Any:
+        return array.tolist() if info.mode_is_json() else array
+
+    def schema(source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
+        to_list = core_schema.plain_serializer_function_ser_schema(plain, info_arg=True)
+        return core_schema.no_info_wrap_validator_function(validated, handler(listed), serialization=to_list)
+
+    return GetPydanticSchema(schema)
+
+
+Rows = Annotated[np.ndarray, _schema(Annotated[tuple[Vector, ...], Field(min_length=1)], (3,))]
+"""Shape (n, 3), at least one row."""
+Numbers = Annotated[np.ndarray, _schema(tuple[float, ...], ())]
+"""Shape (n,); a single number is one of one."""
