@@ -12,6 +12,16 @@ import pytest
 from tisim.cli.main import main
 
 GUIDES = sorted((Path(__file__).parents[1] / "docs/guides").glob("*.md"))
+PRINTED = {
+    "simulation": r"(hardness \d{6} Pa: [\d.]+ grains are left\n){3}"
+    r"at 0.0004\d* s, 4\d% is done\n"
+    r"0%, 200 grains\n(\d+%, \d+ grains\n)*100%, \d+ grains\n"
+    r"\d+% of the energy of motion is left\n"
+    r"velocity at t = 0.0005\d* s\n"
+    r"21 frames, the last at 0.001 s\n"
+    r"0.0005\d* s: \d+ grains\n",
+}
+"""What a guide prints."""
 SNIPPET = re.compile(r'^```(\w+)(?: title="([\w.]+)")?\n(.*?)^```$', re.M | re.S)
 
 
@@ -31,7 +41,7 @@ def console(text):
 
 @pytest.mark.long
 @pytest.mark.parametrize("guide", GUIDES, ids=lambda path: path.stem)
-def test_snippets_run_as_printed(guide, own_file, tmp_path, monkeypatch):
+def test_snippets_run_as_printed(guide, own_file, tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(tmp_path))
     snippets = SNIPPET.findall(guide.read_text(encoding="utf-8"))
     assert len(snippets) == guide.read_text(encoding="utf-8").count("\n```") / 2
@@ -46,3 +56,5 @@ def test_snippets_run_as_printed(guide, own_file, tmp_path, monkeypatch):
             exec(compile(text, guide.name, "exec"), names)
         if language == "toml":
             assert tomllib.loads(text)
+    if guide.stem in PRINTED:
+        assert re.fullmatch(PRINTED[guide.stem], capsys.readouterr().out)
