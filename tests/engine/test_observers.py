@@ -150,3 +150,10 @@ def test_what_cannot_be_asked_for(simulation, asked, message):
     with pytest.raises(InputError, match=message):
         simulation.run(**asked)
     assert simulation.fraction() == 0
+
+
+def test_what_is_not_loaded_is_not_run(monkeypatch):
+    made = compiled(FLOWS[0], 2, CAPACITY)
+    monkeypatch.setattr(made, "scenes", [])
+    with pytest.raises(InputError, match="simulation must be loaded before it is run; received 'no scene'"):
+        made.run()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from tisim.backend import runtime
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.state import SHARED, Field
+from tisim.worlds.state import NO_ONE, SHARED, Field, WorldStatus
 
 
 def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
@@ -82,6 +83,27 @@ def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> 
         default = start[copied] if copied else column[w, :n]
         column[w, :n] = np.arange(n) if f.name == "id" else start.get(f.name, default)
     return column
+
+
+def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int) -> dict[str, Any]:
+    """What is not 0 of the worlds' own quantities at a start, by name; worlds without a scene have ended."""
+    empty = worlds - len(scenes)
+    counts = np.array([len(start["mass"]) for start in starts] + [0] * empty)
+    frames = [np.average(start["velocity"], axis=0, weights=start["mass"]) for start in starts]
+    volumes = [volume(scene, start) for scene, start in zip(scenes, starts, strict=True)]
+    return {
+        "frame": np.array(frames + [np.zeros(3)] * empty),
+        "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
+        "count": counts,
+        "next_id": counts,
+        "most": np.array([scene.capacity() for scene in scenes] + [0] * empty),
+        "status": np.array([WorldStatus.RUNNING] * len(scenes) + [WorldStatus.ENDED] * empty),
+        "end": np.array([scene.duration for scene in scenes] + [0.0] * empty),
+        "volume": np.array(volumes + [1.0] * empty),
+        "approach_time": np.inf,
+        "failing_particle": NO_ONE,
+        "failing_effect": NO_ONE,
+    }
 
 
 def volume(scene: Scene, start: Arrays) -> float:

@@ -13,7 +13,7 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine.assembly import Assembly, declared, needed_fields
-from tisim.engine.loading import check_start, laid_out, volume
+from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
@@ -23,7 +23,7 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.parameter_table import ParameterTable, connect
 from tisim.worlds.program import Nest, Program
-from tisim.worlds.state import NEVER, NO_ONE, State, WorldStatus, resolve_fields
+from tisim.worlds.state import NEVER, State, WorldStatus, resolve_fields
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
 """Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; steps of all
@@ -139,8 +139,9 @@ class Simulation:
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
         self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
-        counts = [len(start["mass"]) for start in self.starts]
-        self._reset(self.scenes, self.starts, np.array(counts + [0] * (self.worlds - len(counts))))
+        # What worlds wait for is asked of them by others, and stays.
+        cleared = dict.fromkeys((name for name in self.s.columns if name not in ("pause_time", "goal")), 0)
+        self.s.fill({**cleared, **world_columns(self.scenes, self.starts, self.worlds)})
         self.forget_lists()
         if self.first.items:
             self.first.advance(1)
@@ -154,29 +155,6 @@ class Simulation:
         """Pair lists are made anew before they are used again."""
         if self.made.near is not None:
             self.made.near.forget()
-
-    def _reset(self, scenes: Sequence[Scene], starts: list[Arrays], counts: np.ndarray) -> None:
-        empty = self.worlds - len(scenes)
-        frame = [np.average(a["velocity"], axis=0, weights=a["mass"]) for a in starts]
-        self.s.fill(
-            {
-                # What worlds wait for is asked of them by others, and stays.
-                **dict.fromkeys((name for name in self.s.columns if name not in ("pause_time", "goal")), 0),
-                "frame": np.array(frame + [np.zeros(3)] * empty),
-                "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
-                "count": counts,
-                "next_id": counts,
-                "most": np.array([scene.capacity() for scene in scenes] + [0] * empty),
-                "status": np.array([WorldStatus.RUNNING] * len(scenes) + [WorldStatus.ENDED] * empty),
-                "end": np.array([scene.duration for scene in scenes] + [0.0] * empty),
-                "volume": np.array(
-                    [volume(*pair) for pair in zip(scenes, starts, strict=True)] + [1.0] * empty
-                ),
-                "approach_time": np.inf,
-                "failing_particle": NO_ONE,
-                "failing_effect": NO_ONE,
-            }
-        )
 
     def run(
         self,
@@ -201,6 +179,7 @@ class Simulation:
     ) -> Iterator[None]:
         """The same a part at a time: yields wherever observers have looked, first before the first step."""
         self.s.check()
+        must(len(self.scenes) > 0, "simulation", "loaded before it is run", "no scene")
         rule = "a number of s of simulated time, at least 0"
         must(until is None or until >= 0, "until", rule, until)
         must(steps is None or steps >= 0, "steps", "at least 0", steps)
