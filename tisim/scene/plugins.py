@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
-from tisim import effects, operators, sources, steppers
+from tisim import effects, operators, packing, sources, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.errors import InputError, must, named
@@ -39,7 +39,7 @@ def load(path: str | Path) -> ModuleType:
 
 
 def load_parts() -> None:
-    """Import all effects, sources, operators and steppers that are installed, so that they can be found."""
+    """Import all parts of scenes that are installed, so that they can be found."""
     _load_own()
     _load_installed()
 
@@ -57,7 +57,7 @@ def installed() -> dict[str, str]:
 
 @cache
 def _load_own() -> None:
-    for package in (effects, operators, sources, steppers):
+    for package in (effects, operators, packing, sources, steppers):
         serialization.load(package)
 
 

@@ -131,6 +131,7 @@ class Scene(Component):
         """Make a scene of plain data; InputError names the key that is wrong."""
         rest = serialization.table(data, "scene")
         must("particles" in rest, "scene.particles", "given", "nothing")
+        plugins.load_parts()
         made: dict[str, Any] = {
             "particles": serialization.from_dict(Start, rest.pop("particles"), "particles")
         }
@@ -139,7 +140,6 @@ class Scene(Component):
         if "stepper" in rest:
             made["stepper"] = cls._stepper(rest.pop("stepper"))
         listed = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
-        plugins.load_parts()
         made["effects"] = tuple(_effect(name, values) for name, values in listed.items())
         return cls(**made, **rest)
 

@@ -1,5 +1,8 @@
 """The case capture: its scene, its statistics and its figures."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -43,6 +46,14 @@ def test_transverse_captures_more_and_pictures_show_it(tmp_path):
     curve = drawn.axes[1].lines[0].get_ydata()
     assert curve[-1] == pytest.approx((last["captured_at"] >= 0).mean())
     assert len(drawn.axes[0].collections[0].get_segments()) == 40 * (len(found.times) - 1)
+
+
+def test_a_scene_of_its_own_placement_is_read_where_nothing_else_is_imported(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(capture.scene().to_toml(), encoding="utf-8")
+    code = f"import tisim; print(tisim.Scene.from_toml({str(file)!r}).digest())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == capture.scene().digest()
 
 
 def test_force_towards_a_cylinder():
