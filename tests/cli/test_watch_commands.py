@@ -31,14 +31,14 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
         0, 0.334, 0.667, 1,
     ]  # fmt: skip
     assert tisim("plot", folder, "--out", "p")[0] == 0
-    assert {path.name for path in (tmp_path / "p").iterdir()} == {".tisim", "cloud.png", "courses.png"}
+    assert {path.name for path in (tmp_path / "p").iterdir()} == {".tisim", "cloud.png", "time_series.png"}
     assert tisim("movie", folder, "--to", "m/flow.gif", "--rate", 5)[0] == 0
     assert (tmp_path / "m/flow.gif").read_bytes()[:4] == b"GIF8"
     code, out, _ = tisim("export", folder, "--format", "vtk", "--out", "v")
     assert (code, out.strip()) == (0, "v/trajectory.pvd")
     assert len(list((tmp_path / "v").glob("*.vtu"))) == 4
     for command, name in (
-        (("plot", folder, "--out", "u"), "courses.png"),
+        (("plot", folder, "--out", "u"), "time_series.png"),
         (("movie", folder, "--to", "u/flow.gif"), "flow.gif"),
         (("export", folder, "--format", "vtk", "--out", "u"), "trajectory_00003.vtu"),
         (("export", folder, "--format", "xyz", "--out", "u"), "trajectory.xyz.new"),
@@ -216,7 +216,7 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     assert tisim("run", toml, "--frames", 3)[0] == 0
     assert tisim("plot", "out/flow", "--out", "p")[0] == 0
     drawn = {path.name for path in (tmp_path / "p").iterdir()}
-    assert drawn == {".tisim", "cloud.png", "courses.png", "own.png"}
+    assert drawn == {".tisim", "cloud.png", "time_series.png", "own.png"}
     assert seen == [4]
     code, out, _ = tisim("figures", "toy", "--size", "small")
     assert (code, out.split()) == (0, ["out/toy-figures/many.png", "out/toy-figures/many.csv"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ from PIL import Image
 
 import tisim
 from tests.scenes import scene
-from tisim import Box, InputError, Recording
+from tisim import Box, InputError, Open, Recording
 from tisim.io.reader import Frames, frames
 from tisim.io.trajectory import Trajectory
+from tisim.plotting.cloud import start_and_end
 from tisim.plotting.movie import movie
-from tisim.plotting.time_series import clouds, courses, history, mark_missing
+from tisim.plotting.time_series import clouds, history, mark_missing, quantities
 
 MOVING = dict(
     position=[(0, 0, 0), (0.01, 0, 0)],
@@ -43,23 +45,41 @@ def test_history_is_that_of_two_grains_in_straight_flight(file):
     assert seen.number.tolist() == [2] * 5
 
 
-def test_courses_draw_the_history(file):
+def test_quantities_draw_the_history(file):
     with frames(file) as found:
-        figure, seen = courses(found), history(found)
-    energy, centre, number = figure.axes
+        figure, seen = quantities(found), history(found)
+    energy, centre = figure.axes
     np.testing.assert_array_equal(energy.lines[0].get_ydata(), seen.kinetic_energy)
     for k, line in enumerate(centre.lines):
         np.testing.assert_array_equal(line.get_ydata(), seen.shift[:, k])
-    np.testing.assert_array_equal(number.lines[0].get_ydata(), seen.number)
     assert energy.get_ylim()[0] == 0
-    assert "shift" in centre.get_ylabel()
+    assert [axis.get_title("left") for axis in figure.axes] == ["(a)", "(b)"]
+    labels = energy.get_ylabel(), centre.get_ylabel(), centre.get_xlabel()
+    assert labels == ("kinetic energy (J)", "shift of the\ncentre of gravity (mm)", "time (ms)")
+    assert centre.xaxis.get_major_formatter()(0.002) == "2"
+    assert figure.get_suptitle() == "2 particles throughout"
+
+
+def test_a_number_of_particles_that_changes_has_a_panel():
+    class Seen(list):
+        times = np.array([0.0, 1.0])
+        scene = SimpleNamespace(domain=Open())
+
+    def frame(number):
+        arrays = {name: np.ones((number, 3)) for name in ("position", "velocity")}
+        return SimpleNamespace(arrays={**arrays, "mass": np.ones(number)})
+
+    figure = quantities(Seen([frame(3), frame(2)]))
+    *_, number = figure.axes
+    assert number.lines[0].get_ydata().tolist() == [3, 2]
+    assert (number.get_title("left"), figure.get_suptitle()) == ("(c)", "")
 
 
 def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
     box = Box(low=(-0.02,) * 3, high=(0.02,) * 3)
     tisim.run(scene(**MOVING, domain=box), record=Recording(tmp_path / "t.h5", frames=4))
     with frames(tmp_path / "t.h5") as found:
-        centre = courses(found).axes[1]
+        centre = quantities(found).axes[1]
     assert "velocity" in centre.get_ylabel()
     np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.5)
 
@@ -68,21 +88,38 @@ def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
     """The same frames of a run that was to last twice as long."""
     longer = scene(**{**MOVING, "steps": 8})
     with frames(file) as found, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
-        assert mark_missing(courses(found), found).get_supxlabel() == ""
+        assert mark_missing(quantities(found), found).get_supxlabel() == ""
         for frame in found:
             begun.write(0, frame)
     with frames(tmp_path / "t.h5") as found:
-        figures = [mark_missing(draw(found), found) for draw in (clouds, courses)]
+        figures = [mark_missing(draw(found), found) for draw in (clouds, quantities)]
     for figure in figures:
         told = "the run has come to t = 0.004 s of 0.008 s; what follows is missing"
         assert figure.get_supxlabel() == told
-    assert [axis.get_title().split(",")[0] for axis in figures[0].axes] == ["start", "last frame"]
+    assert [axis.get_title("left").split(",")[0] for axis in figures[0].axes] == [
+        "(a) start",
+        "(b) last frame",
+    ]
 
 
 def test_clouds_are_of_the_first_and_last_frame(file):
     with frames(file) as found:
-        titles = [axis.get_title().split(":")[0] for axis in clouds(found).axes]
-    assert titles == ["start, t = 0 s", "end, t = 4 ms"]
+        start, end = clouds(found).axes
+    titles = [axis.get_title("left").split(":")[0] for axis in (start, end)]
+    assert titles == ["(a) start, t = 0 s", "(b) end, t = 4 ms"]
+
+
+def test_start_and_end_are_on_one_scale_with_the_axes_of_space_and_gravity():
+    """A cloud that spreads tenfold in open space."""
+    states = [{"position": k * np.eye(3), "radius": np.full(3, 0.1)} for k in (1.0, 10.0)]
+    for effects, seen in (((), "xyz"), ((tisim.effects.Gravity(acceleration=(0, 0, -2.0)),), "xyzg")):
+        figure = start_and_end(states, (0.0, 1.0), SimpleNamespace(domain=Open(), effects=effects))
+        left, right = figure.axes
+        assert left.get_xlim() == right.get_xlim()
+        assert left.get_ylim() == right.get_ylim()
+        named = {text.get_text(): text.get_position()[1] for text in right.texts if text.get_text() in "xyzg"}
+        assert "".join(sorted(filter(None, named), key="xyzg".index)) == seen
+        assert "g" not in named or named["g"] < named["x"] < named["z"]
 
 
 def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):

@@ -108,7 +108,7 @@ class Bench:
                 whole = path.name != "trajectory.h5" or code == 0
                 if found != (expected if whole else expected[: len(found)]):
                     raise Wrong("wrong", f"{path.name} holds {len(found)} of {len(expected)} parts")
-            elif path.name in ("cloud.png", "courses.png") or path.suffix == ".gif":
+            elif path.name in ("cloud.png", "time_series.png") or path.suffix == ".gif":
                 with Image.open(path) as picture:
                     picture.load()
             elif path.suffix in (".vtu", ".pvd", ".xyz") and path.read_bytes() != (
@@ -187,7 +187,7 @@ EXPORTS: dict[str, Callable[[Path, Path], tuple]] = {
     "export h5md": lambda file, to: ("export", file, "--format", "h5md", "--out", to),
 }
 MADE = {
-    "plot": ("courses.png",), "movie": (".gif",), "export vtk": (".vtu", ".pvd"), "export xyz": (".xyz",),
+    "plot": ("time_series.png",), "movie": (".gif",), "export vtk": (".vtu", ".pvd"), "export xyz": (".xyz",),
     "export h5md": ("trajectory_copy.h5",),
 }  # fmt: skip
 TRIALS = {"run": run, "checkpoint": checkpoint, "cost": cost, **{name: show(name) for name in EXPORTS}}

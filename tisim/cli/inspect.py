@@ -49,7 +49,7 @@ def plot(
     file = _file(file)
     place = folder or file.parent
     with frames(file, world) as found:
-        pictures = {"cloud.png": time_series.clouds(found), "courses.png": time_series.courses(found)}
+        pictures = {"cloud.png": time_series.clouds(found), "time_series.png": time_series.quantities(found)}
         case = every().get(found.scene.name)
         if case and case.pictures:
             pictures |= case.pictures(found)

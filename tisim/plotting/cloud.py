@@ -1,4 +1,4 @@
-"""A picture of a cloud: its start and its end, grains as spheres of their true size."""
+"""A picture of a cloud: its start and its end on one scale, grains as spheres of their true size."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from tisim.components.domain import Domain
+from tisim.effects.external.gravity import Gravity
 from tisim.engine.result import Result
-from tisim.plotting.style import empty
+from tisim.plotting.style import empty, letters, si
 from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
 
 PIXELS = 1400
 """Width of a panel as it is drawn; half of it as it is shown, so that edges are smooth."""
@@ -24,6 +25,8 @@ SMALLEST = 4.0
 """Least radius of a grain in those pixels: a smaller one would not be seen."""
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
 PLAIN = (0.36, 0.55, 0.73)
+FALL = "#b3413e"
+"""Colour of gravity."""
 # Without its black end, against which neither shade nor edge of a cold grain would show.
 HEAT = ListedColormap(colormaps["inferno"](np.linspace(0.17, 0.97, 256)))
 
@@ -39,28 +42,28 @@ _LIGHT = np.array([-0.45, 0.6, 0.66])
 
 def cloud(result: Result) -> Figure:
     """Start and end of a run side by side, as ``start_and_end``."""
-    return start_and_end((result.start, result.state), (0.0, result.time), result.scene.domain)
+    return start_and_end((result.start, result.state), (0.0, result.time), result.scene)
 
 
 def start_and_end(
-    states: tuple[Arrays, Arrays], times: tuple[float, float], domain: Domain, last: str = "end"
+    states: tuple[Arrays, Arrays], times: tuple[float, float], scene: Scene, last: str = "end"
 ) -> Figure:
-    """Two states (at times in s) side by side, seen from one side without perspective.
+    """Two states (at times in s) side by side on one scale, seen from one side without perspective.
 
     last : what the second is called.
 
     Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
-    In open space each panel has its own scale, which its bar gives.
     """
     figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
     norm = temperatures(states)
-    seen = corners(*domain.bounds())
-    both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
-    views = [view(both if len(seen) else state, seen) for state in states]
-    for axis, state, square, heading, time in zip(axes, states, views, ("start", last), times, strict=True):
+    seen = corners(*scene.domain.bounds())
+    square = common(states, seen)
+    for axis, state, heading, time in zip(axes, states, ("start", last), times, strict=True):
         panel(axis, state, square, seen, norm)
-        axis.set_title(f"{heading}, {caption(state, time)}", fontsize=10)
+        directions(axis, square, gravity(scene))
+        axis.set_title(f"{heading}, {caption(state, time)}")
+    letters(axes)
     if norm is not None:
         scale(figure, axes, norm)
     return figure
@@ -106,6 +109,12 @@ def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
     return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
+def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
+    """A ``view`` that all states are seen in."""
+    both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
+    return view(both, box)
+
+
 def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
     """Left, bottom and side of a square that holds all grains and the box. m."""
     seen, radius = _project(state["position"]), state["radius"][:, None]
@@ -132,6 +141,27 @@ def panel(
     axis.set_xlim(left, left + side)
     axis.set_ylim(bottom, bottom + side)
     axis.set_axis_off()
+
+
+def gravity(scene: Scene) -> np.ndarray:
+    """Acceleration of all gravity in a scene, m/s^2; 0 where there is none."""
+    found = [effect.acceleration for effect in scene.effects if isinstance(effect, Gravity)]
+    return np.sum([(0.0, 0.0, 0.0), *found], axis=0)
+
+
+def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray) -> None:
+    """The axes of space in the lower right of a panel, and the direction of gravity where there is some."""
+    left, bottom, side = square
+    origin, length = np.array([left + 0.88 * side, bottom + 0.09 * side]), 0.07 * side
+    ends = [(name, end, "0.35") for name, end in zip("xyz", np.eye(3), strict=True)]
+    if fall.any():
+        ends.append(("g", fall / np.linalg.norm(fall), FALL))
+    for name, end, colour in ends:
+        tip = origin + length * (end @ SEEN)[:2]
+        arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
+        axis.annotate("", tip, origin, arrowprops=arrow, zorder=4)
+        beyond = origin + 1.3 * (tip - origin)
+        axis.text(*beyond, name, color=colour, fontsize=9, ha="center", va="center", zorder=4)
 
 
 def _draw(seen: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:
@@ -176,12 +206,3 @@ def _scale_bar(axis: Axes, left: float, bottom: float, side: float) -> None:
     x, y = left + 0.02 * side, bottom + 0.015 * side
     axis.plot([x, x + length], [y, y], color="0.2", lw=2, solid_capstyle="butt", zorder=4)
     axis.text(x + length / 2, y + 0.012 * side, si(length, "m"), ha="center", fontsize=9, zorder=4)
-
-
-def si(value: float, unit: str) -> str:
-    """A value with a prefix: 0.01 s is 10 ms."""
-    if value == 0:
-        return f"0 {unit}"
-    power = int(np.clip(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3), -4, 3))
-    prefix = ("p", "n", "µ", "m", "", "k", "M", "G")[power + 4]
-    return f"{value / 10.0 ** (3 * power):.3g} {prefix}{unit}"

@@ -48,6 +48,7 @@ def movie(
             for k, frame in enumerate(found):
                 axis.clear()
                 cloud.panel(axis, frame.arrays, square, seen, coloured)
+                cloud.directions(axis, square, cloud.gravity(found.scene))
                 figure.suptitle(cloud.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
                 writer.grab_frame()
                 progress((k + 1) / len(found))

@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from string import ascii_lowercase
+
+import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import FuncFormatter
+
+TIME = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
+"""Colours of time: even to the eye, and without the end that is lost on white."""
+PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+"""Of units, by power of ten."""
+WIDE = 30.0
+"""Largest over smallest value from which on an axis is logarithmic."""
 
 
 def empty(width: float, height: float, pad: float | None = None) -> Figure:
@@ -20,3 +35,50 @@ def plain(axis: Axes) -> None:
     axis.spines[["top", "right"]].set_visible(False)
     axis.grid(color="0.92", lw=0.8)
     axis.set_axisbelow(True)
+
+
+def letters(panels: Iterable[Axes], size: float = 10) -> None:
+    """(a), (b), ... before the titles of a figure's panels, at their left edges; size: of type, points."""
+    for letter, axis in zip(ascii_lowercase, panels, strict=False):
+        title = f"({letter}) {axis.get_title()}".rstrip()
+        axis.set_title("")
+        axis.set_title(title, loc="left", fontsize=size)
+
+
+def legend_beside(axis: Axes) -> None:
+    """A legend off the data, at the right of the panel."""
+    axis.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def legend_above(axis: Axes, columns: int = 3) -> None:
+    """A legend off the data, above the panel at its right."""
+    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1}
+    axis.legend(frameon=False, fontsize=8, ncols=columns, **place)
+
+
+def si(value: float, unit: str) -> str:
+    """A value with a prefix: 0.01 s is 10 ms."""
+    power = _power(value)
+    return f"{value / 10.0**power:.3g} {PREFIXES[power]}{unit}"
+
+
+def quantity(axis: Axis, name: str, unit: str) -> None:
+    """Label an axis with a quantity and its unit, with the prefix that suits its limits: "time (ms)"."""
+    power = _power(float(np.abs(axis.get_view_interval()).max()))
+    axis.set_major_formatter(
+        FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}".replace("-", "\N{MINUS SIGN}"))
+    )
+    axis.set_label_text(f"{name} ({PREFIXES[power]}{unit})")
+
+
+def scale_of(values: np.ndarray) -> str:
+    """Of an axis for these values: "log" where they span decades and are positive, else "linear"."""
+    wide = values.size and values.min() > 0 and values.max() > WIDE * values.min()
+    return "log" if wide else "linear"
+
+
+def _power(value: float) -> int:
+    """Power of ten of the prefix of a value."""
+    if value == 0:
+        return 0
+    return 3 * int(np.clip(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3), -4, 3))

@@ -1,0 +1,49 @@
+"""What all figures have in common."""
+
+import numpy as np
+import pytest
+from matplotlib import colormaps
+
+from tisim.plotting.style import TIME, empty, letters, quantity, scale_of, si
+
+
+def test_panels_have_letters_before_their_titles():
+    axes = empty(4, 3).subplots(1, 3)
+    axes[1].set_title("paths")
+    letters(axes)
+    assert [axis.get_title("left") for axis in axes] == ["(a)", "(b) paths", "(c)"]
+    assert [axis.get_title() for axis in axes] == [""] * 3
+
+
+@pytest.mark.parametrize(
+    ("limits", "label", "tick"),
+    [((0, 2e-3), "time (ms)", "1"), ((-3e-6, 1e-6), "time (µs)", "1000"), ((0, 50), "time (s)", "0.001")],
+)
+def test_an_axis_says_its_quantity_and_a_unit_that_suits_it(limits, label, tick):
+    axis = empty(4, 3).subplots()
+    axis.set_xlim(*limits)
+    quantity(axis.xaxis, "time", "s")
+    assert axis.get_xlabel() == label
+    assert axis.xaxis.get_major_formatter()(1e-3) == tick
+
+
+def test_values_have_prefixes():
+    assert [si(v, "m") for v in (0.0, 1e-3, 4.76e-4, 1234.0)] == ["0 m", "1 mm", "476 µm", "1.23 km"]
+
+
+def test_axes_are_logarithmic_where_values_span_decades():
+    assert scale_of(np.array([1.0, 100.0])) == "log"
+    for values in ([1.0, 20.0], [0.0, 100.0], [-1.0, 100.0], []):
+        assert scale_of(np.array(values)) == "linear"
+
+
+def test_colours_of_time_rise_evenly_in_lightness():
+    """Rec. 709 luminance of the map; a rainbow goes up and down."""
+
+    def rises(colours):
+        light = colours[:, :3] ** 2.2 @ [0.2126, 0.7152, 0.0722]
+        return bool((np.diff(light) > 0).all())
+
+    at = np.linspace(0, 1, 50)
+    assert rises(TIME(at))
+    assert not rises(colormaps["turbo"](at))
