@@ -20,13 +20,15 @@ from cases.case import size_named
 from tisim import Recording, RunError, run
 from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frame, Frames, frames
-from tisim.plotting.cloud import SEEN, corners, panel, view
-from tisim.plotting.style import empty, plain
+from tisim.plotting.cloud import SEEN, common, corners, directions, panel
+from tisim.plotting.style import empty, legend_above, letters, plain
 from tisim.plotting.time_series import COLOURS
 from tisim.scene.initial_state import Arrays
 
 SHOWN = 6
 """Frames of a sequence."""
+NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
+"""The blast is in open space and weightless."""
 PATHS = 40
 """Particles whose paths are drawn."""
 RUNS = {
@@ -87,39 +89,41 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
 def sequence(chosen: Sequence[Frame]) -> Figure:
     """The cloud from its start on, all on one scale, as in Z16 figures 5 to 9."""
     figure = empty(10.4, 7.2)
-    square = common([frame.arrays for frame in chosen])
-    for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
+    square = common([frame.arrays for frame in chosen], NO_BOX)
+    axes = figure.subplots(2, 3)
+    for axis, frame in zip(axes.flat, chosen, strict=True):
         snapshot(axis, frame.arrays, square)
-        axis.set_title(f"t = {1e3 * frame.time:.0f} ms", fontsize=10)
+        axis.set_title(f"t = {1e3 * frame.time:.0f} ms")
+    letters(axes.flat)
     return figure
 
 
 def velocities(chosen: Sequence[Frame]) -> Figure:
     """Velocity vectors at the places of the particles, all on one scale (Z16 Fig. 6, left)."""
     figure = empty(10.4, 7.2)
-    left, bottom, side = common([frame.arrays for frame in chosen])
+    left, bottom, side = common([frame.arrays for frame in chosen], NO_BOX)
     fastest = max(np.linalg.norm(frame.arrays["velocity"], axis=1).max() for frame in chosen)
     # The longest arrow is an eighth of the picture, and finds room at its edge.
     left, bottom, side = left - side / 8, bottom - side / 8, 1.25 * side
     scale = 8.0 * fastest / side
-    for axis, frame in zip(figure.subplots(2, 3).flat, chosen, strict=True):
+    axes = figure.subplots(2, 3)
+    for axis, frame in zip(axes.flat, chosen, strict=True):
         (x, y), (u, v) = ((frame.arrays[name] @ SEEN)[:, :2].T for name in ("position", "velocity"))
         axis.quiver(
             x, y, u, v, angles="xy", scale_units="xy", scale=scale, color=COLOURS[0], width=0.0025, alpha=0.6
         )
         axis.set(xlim=(left, left + side), ylim=(bottom, bottom + side), aspect="equal", xticks=[], yticks=[])
-        axis.set_title(f"t = {1e3 * frame.time:.0f} ms", fontsize=10)
+        directions(axis, (left, bottom, side), NO_GRAVITY)
+        axis.set_title(f"t = {1e3 * frame.time:.0f} ms")
+    figure.suptitle(f"longest arrow: {fastest:.3g} m/s", fontsize=10)
+    letters(axes.flat)
     return figure
 
 
-def common(states: Sequence[Arrays]) -> tuple[float, float, float]:
-    """A square that all of them are seen in."""
-    both = {name: np.concatenate([s[name] for s in states]) for name in ("position", "radius")}
-    return view(both, corners(None, None))
-
-
 def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
-    panel(axis, state, square, corners(None, None), None)
+    """A state as seen in a square, with the axes of space."""
+    panel(axis, state, square, NO_BOX, None)
+    directions(axis, square, NO_GRAVITY)
 
 
 def envelope(history: BlastHistory) -> Figure:
@@ -129,14 +133,15 @@ def envelope(history: BlastHistory) -> Figure:
     for k, colour in enumerate(COLOURS):
         left.plot(history.time, history.axes[:, k], "--" if k == 2 else "-", color=colour, label="xyz"[k])
     left.set(xlabel="time (s)", ylabel="half axes of the cloud (m)", ylim=(0, None))
-    left.legend(frameon=False, ncols=3)
+    left.set_title("half axes")
+    legend_above(left)
     fastest = int(np.linalg.norm(history.velocities[0, :, 1:], axis=1).argmax())
     line = "-" if history.dense(fastest) else "."
     for k in (1, 2):
         speed = history.velocities[:, fastest, k]
         right.plot(history.time, speed, line, ms=3, color=COLOURS[k], lw=1.0, label="xyz"[k])
-    right.set(xlabel="time (s)", ylabel="velocity of one particle (m/s)")
-    right.legend(frameon=False, ncols=2, loc="upper right")
+    right.set(xlabel="time (s)", ylabel="velocity (m/s)", title="one particle")
+    legend_above(right)
     along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=COLOURS[0], lw=0.7)
     along.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"paths of {PATHS} particles")
     # The one that starts fastest across the field, from near: its circle is far smaller than the cloud.
@@ -147,6 +152,7 @@ def envelope(history: BlastHistory) -> Figure:
     across.set_aspect("equal", "datalim")
     for axis in (left, right, along, across):
         plain(axis)
+    letters((left, right, along, across))
     return figure
 
 
@@ -172,13 +178,13 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> Figure:
     """The clouds at the end on one scale, and their half axes and contacts in time."""
-    figure = empty(10.4, 5.8)
+    figure = empty(10.4, 6.4)
     grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
-    square = common([frame.arrays for frame in ends.values()])
+    square = common([frame.arrays for frame in ends.values()], NO_BOX)
     for k, (name, frame) in enumerate(ends.items()):
         axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
         snapshot(axis, frame.arrays, square)
-        axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"), fontsize=8)
+        axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"))
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
     for (name, history), colour in zip(histories.items(), colours, strict=False):
@@ -199,9 +205,12 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
     along.set_ylabel("half axis along x, the field (m)")
     across.set_ylabel("half axis across (m)")
     touching.set(xlabel="time (s)", ylabel=f"pairs that touch, of {number} particles", yscale="symlog")
-    across.legend(frameon=False, fontsize=7, loc="upper left")
+    figure.legend(
+        *across.get_legend_handles_labels(), frameon=False, fontsize=8, loc="outside lower center", ncols=3
+    )
     for axis in (along, across, touching):
         plain(axis)
+    letters(figure.axes, 8)
     return figure
 
 

@@ -26,7 +26,7 @@ from cases.capture.statistics import (
 from cases.statistics import Mean
 from tisim import Result
 from tisim.engine.batches import Progress, share
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, legend_beside, letters, plain
 
 REPEATS = 10
 """Of a setting; the checks take more."""
@@ -61,11 +61,11 @@ def figures(progress: Progress) -> Mapping[str, Figure | str]:
 def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]) -> Figure:
     """Fraction in time by angle, TOP and SIDE (B16 Fig. 6.4), by size, and by aspect ratio; at the end by
     angle and size (6.6a), and by aspect ratio and size (6.6b)."""
-    figure = empty(10.4, 11.4)
+    figure = empty(12.0, 13.0)
     grid = figure.subplots(4, 2)
     for k, axis in enumerate(grid[:2].flat):
         in_time_by_angle(axis, angles[k * len(ANGLES) : (k + 1) * len(ANGLES)])
-    grid[0, 0].legend(frameon=False, fontsize=8, ncols=2, title="axis to field", title_fontsize=8)
+    handles, names = grid[0, 0].get_legend_handles_labels()
     in_time_by_size(grid[2, 0], [row for row in sizes if row[0]["angle"] == 90.0])
     in_time_by_aspect(grid[2, 1], [row for row in aspects if row[0]["nanometres"] == 125])
     by_size(grid[3, 0], sizes)
@@ -74,6 +74,11 @@ def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]
         axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02))
     for axis in grid.flat:
         plain(axis)
+    letters(grid.flat)
+    figure.legend(
+        handles, names, loc="outside upper center", frameon=False, ncols=len(names),
+        title="(a) to (d): angle of the axis to the field",
+    )  # fmt: skip
     return figure
 
 
@@ -86,30 +91,31 @@ def in_time_by_angle(axis: Axes, rows: Sequence[Row]) -> None:
     for (settings, found), colour in zip(rows, _colours("viridis", len(rows)), strict=True):
         axis.plot(TIMES, curve(found), color=colour, lw=1.4, label=f"{settings['angle']:.0f}°")
     settings = rows[0][0]
-    axis.set_title(f"{settings['nanometres']} nm, {str(settings['part']).upper()}, L/D = 20", fontsize=10)
+    axis.set_title(f"{settings['nanometres']} nm, {str(settings['part']).upper()}, L/D = 20")
 
 
 def in_time_by_size(axis: Axes, rows: Sequence[Row]) -> None:
     for (settings, found), colour in zip(rows, _colours("plasma", len(rows)), strict=True):
         axis.plot(TIMES, curve(found), color=colour, lw=1.4, label=f"{settings['nanometres']} nm")
-    axis.set_title("transverse, L/D = 20", fontsize=10)
-    axis.legend(frameon=False, fontsize=8, ncols=2)
+    axis.set_title("transverse, L/D = 20, by radius")
+    legend_beside(axis)
 
 
 def in_time_by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
     for aspect, colour in zip(ASPECTS, _colours("cividis", len(ASPECTS)), strict=True):
         curves = [curve(found) for settings, found in rows if settings["aspect"] == aspect]
         axis.plot(TIMES, even(np.array(curves)), color=colour, lw=1.4, label=f"L/D = {aspect:.3g}")
-    axis.set_title("125 nm, even mean over angles", fontsize=10)
-    axis.legend(frameon=False, fontsize=8)
+    axis.set_title("125 nm, even mean over angles, by aspect ratio")
+    legend_beside(axis)
 
 
 def by_size(axis: Axes, rows: Sequence[Row]) -> None:
     for n, colour in zip(capture.MOMENT, _colours("plasma", len(capture.MOMENT)), strict=True):
         means = [mean(found) for settings, found in rows if settings["nanometres"] == n]
         bars(axis, ANGLES, means, colour, f"{n} nm")
-    axis.set(xlabel="angle of the axis to the field (°)", ylabel="captured in 50 s, L/D = 20", ylim=(0, 1.02))
-    axis.legend(frameon=False, fontsize=8, ncols=2)
+    axis.set(xlabel="angle of the axis to the field (°)", ylabel="captured fraction after 50 s")
+    axis.set(ylim=(0, 1.02), title="L/D = 20, by radius; 95 % intervals")
+    legend_beside(axis)
 
 
 def by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
@@ -119,19 +125,22 @@ def by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
             for aspect in ASPECTS
         ]
         bars(axis, ASPECTS, [Mean.of(even(group)) for group in groups], colour, f"{n} nm")
-        axis.plot(ASPECTS, [isotropic(group).mean() for group in groups], ":", color=colour, lw=1.2)
-    axis.set(xlabel="L/D", ylabel="captured in 50 s", ylim=(0.4, 1.0), xscale="log")
+        alike = [Mean.of(isotropic(group)) for group in groups]
+        bars(axis, ASPECTS, alike, colour, f"{n} nm, all directions\nequally likely", ":")
+    axis.set(xlabel="aspect ratio L/D", ylabel="captured fraction after 50 s", ylim=(0.4, 1.0), xscale="log")
     axis.set_xticks([2, 5, 10, 20], ["2", "5", "10", "20"])
     axis.minorticks_off()
-    axis.set_title("even mean over angles; dotted: all directions equally likely", fontsize=9)
-    axis.legend(frameon=False, fontsize=8)
+    axis.set_title("even mean over angles; 95 % intervals")
+    legend_beside(axis)
 
 
-def bars(axis: Axes, x: Sequence[float], means: Sequence[Mean], colour: object, label: str) -> None:
+def bars(
+    axis: Axes, x: Sequence[float], means: Sequence[Mean], colour: object, label: str, line: str = "-"
+) -> None:
     """Means with their confidence intervals."""
     axis.errorbar(
-        x, [m.value for m in means], [m.half for m in means], color=colour, lw=1.3, marker="o", ms=3,
-        capsize=2, label=label,
+        x, [m.value for m in means], [m.half for m in means], color=colour, lw=1.3, ls=line, marker="o",
+        ms=3, capsize=2, label=label,
     )  # fmt: skip
 
 

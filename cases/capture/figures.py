@@ -16,13 +16,15 @@ from cases.capture.statistics import MICRO
 from tisim import Scene
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import TIME, empty, letters, plain
 from tisim.sources import Cylinder, MagneticCylinders, sample
 
 LEAST_FORCE = 0.5e-15
 """N, of what counts as capture volume (B16 section 6.4.1)."""
 PLANE, SPACE = 181, 96
 """Points along a side of a map, and of the box in which capture volume is counted."""
+EVERY = (-2000, 0, 2000)
+"""µm, that maps of forces have marks at."""
 BEYOND = 2.5e-3
 """m, farther than the capture volume of 50 nm reaches."""
 
@@ -33,7 +35,7 @@ def cylinder(scene: Scene) -> Cylinder:
 
 
 def outline(axis: Axes, body: Cylinder) -> None:
-    """A cylinder whose axis lies in the xz plane, as seen along y. In um."""
+    """A cylinder whose axis lies in the xz plane, as seen along y. In µm."""
     along = np.array(body.direction)[[0, 2]]
     across = np.array([-along[1], along[0]])
     a, b = 0.5 * body.length * along / MICRO, body.radius * across / MICRO
@@ -55,12 +57,12 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
     norm = Normalize(0.0, found.times[-1])
     pieces = np.stack([places[:-1], places[1:]], axis=2)[..., [0, 2]].reshape(-1, 2, 2)
     when = np.repeat(found.times[1:], places.shape[1])
-    lines = LineCollection(list(pieces), cmap="turbo", norm=norm, lw=0.8)
+    lines = LineCollection(list(pieces), cmap=TIME, norm=norm, lw=0.8)
     lines.set_array(when)
     left.add_collection(lines)
     outline(left, cylinder(found.scene))
     left.autoscale()
-    left.set(xlabel="x, along the field (um)", ylabel="z (um)", aspect="equal")
+    left.set(xlabel="x, along the field (µm)", ylabel="z (µm)", aspect="equal")
     figure.colorbar(lines, ax=left, label="time (s)", shrink=0.8)
     state = frames[-1].arrays
     at = np.sort(state["captured_at"][state["captured_at"] >= 0])
@@ -70,8 +72,10 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
         np.array([*range(len(at) + 1), len(at)]) / number,
         where="post", color="#4477aa", lw=1.6,
     )  # fmt: skip
-    right.set(xlabel="time (s)", ylabel=f"captured, of {number} particles", ylim=(0, 1.02))
+    right.set(xlabel="time (s)", ylabel=f"captured fraction of {number} particles", ylim=(0, 1.02))
     plain(right)
+    left.set_title("paths, as seen along y")
+    letters((left, right))
     return {"trajectories.png": figure}
 
 
@@ -91,7 +95,7 @@ def plane(reach: float) -> np.ndarray:
 
 def field() -> Figure:
     """Field lines and |B| around a short cylinder at three angles to the field."""
-    figure = empty(10.4, 3.9)
+    figure = empty(10.4, 3.7)
     axes = figure.subplots(1, 3, sharey=True)
     for axis, angle in zip(axes, (0.0, 45.0, 90.0), strict=True):
         scene = capture.scene(angle=angle)
@@ -107,17 +111,18 @@ def field() -> Figure:
         outline(axis, body)
         axis.patches[-1].set_facecolor("none")
         axis.patches[-1].set_edgecolor("white")
-        axis.set(xlabel="x, along the field (um)", aspect="equal", title=f"axis at {angle:.0f}° to the field")
+        axis.set(xlabel="x, along the field (µm)", aspect="equal", title=f"axis at {angle:.0f}° to the field")
         axis.set(xlim=(line[0], line[-1]), ylim=(line[0], line[-1]))
-    axes[0].set_ylabel("z (um)")
-    figure.colorbar(drawn, ax=axes, label="|B| (T)", shrink=0.8)
+    axes[0].set_ylabel("z (µm)")
+    letters(axes)
+    figure.colorbar(drawn, ax=axes, label="magnetic flux density |B| (T)", shrink=0.8)
     return figure
 
 
 def volume() -> Figure:
     """Magnetic force on a particle of 50 nm towards the cylinder, where above LEAST_FORCE (B16 Fig. 6.3;
     there magnetised along the field, here as Stoner and Wohlfarth say)."""
-    figure = empty(10.4, 6.6)
+    figure = empty(10.4, 6.8)
     grid = figure.subplots(2, 3)
     for row, aspect in zip(grid, (5 / 3, 20 / 3), strict=True):
         for axis, angle in zip(row, (0.0, 45.0, 90.0), strict=True):
@@ -132,12 +137,14 @@ def volume() -> Figure:
             )  # fmt: skip
             outline(axis, body)
             axis.set(aspect="equal", xlim=(line[0], line[-1]), ylim=(line[0], line[-1]))
+            axis.set(xticks=EVERY, yticks=EVERY)
             own = capture_volume(scene)
-            axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°: {own:.1f} times its volume", fontsize=10)
+            axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°:\n{own:.1f} times its own volume")
     for axis in grid[-1]:
-        axis.set_xlabel("x, along the field (um)")
+        axis.set_xlabel("x, along the field (µm)")
     for axis in grid[:, 0]:
-        axis.set_ylabel("z (um)")
+        axis.set_ylabel("z (µm)")
+    letters(grid.flat)
     figure.colorbar(shown, ax=grid, label="force towards the cylinder (N)", shrink=0.7)
     return figure
 

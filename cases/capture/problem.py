@@ -22,7 +22,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from cases.capture.scene import DENSITY, DIAMETER, MOMENT, SATURATION, TEMPERATURE, VISCOSITY
-from cases.capture.statistics import MICRO
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
@@ -31,7 +30,7 @@ from tisim.components.component import Vector
 from tisim.effects import LangevinMoment, Magnetophoresis
 from tisim.errors import must
 from tisim.operators import Capture
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, letters, plain
 from tisim.sources import Cylinder, MagneticCylinders, MagneticField, UniformFlow
 from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.steppers import Brownian, DriftLimit
@@ -55,6 +54,7 @@ LARGEST = 212
 """nm. Particles of other sizes have its moment (B16 table 6.1) by volume."""
 DIGITS = 3
 """Of the field of the fibres; what decides is random."""
+MILLI = 1e-3
 
 FIBRES = (
     Gene("flux", "T", 0.05, 1.0),
@@ -67,6 +67,12 @@ HARD = Gene("magnetisation_angle", "degrees", 0.0, 90.0)
 STREAM = (Gene("speed", "m/s", 1e-4, 1e-2, "log"), Gene("radius", "nm", 25.0, 212.0))
 GENES = {"fraction": FIBRES, "hard": (*FIBRES, HARD), "throughput": (*FIBRES, *STREAM)}
 """By variant."""
+WANTED = {
+    "fraction": "the soft fibres and the field that catch the most particles from a stream",
+    "hard": "the hard magnets and the field that catch the most particles from a stream",
+    "throughput": "the front of fraction caught and throughput, with speed and radius of particles free",
+}
+"""What is looked for, by variant."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +193,7 @@ def problem(variant: str) -> Problem:
     return Problem(
         name=f"filter-{variant}",
         title="A filter of magnetised fibres (B16)",
-        description="the fibres and the field that catch the most particles from a stream",
+        description=WANTED[variant],
         genome=Genome(GENES[variant]),
         scene=lambda design, seed: Filter(**design).scene(seed),
         objective=(fraction, flow) if variant == "throughput" else (fraction,),
@@ -218,19 +224,20 @@ def caught(result: Result) -> Figure:
     magnets = next(e for e in result.scene.effects if isinstance(e, MagneticCylinders))
     for axis, k in ((side, 1), (front, 0)):
         for body in magnets.cylinders:
-            low = np.array([body.centre[2] - body.length / 2, body.centre[k] - body.radius]) / MICRO
-            box = Rectangle((low[0], low[1]), body.length / MICRO, 2 * body.radius / MICRO)
+            low = np.array([body.centre[2] - body.length / 2, body.centre[k] - body.radius]) / MILLI
+            box = Rectangle((low[0], low[1]), body.length / MILLI, 2 * body.radius / MILLI)
             box.set(facecolor="0.85", edgecolor="0.4", lw=0.7)
             axis.add_patch(box)
         shown = ((start, ~held, "0.6", "passed by"), (start, held, "#dd8899", "caught"),
                  (state, held, "#882255", "where it was caught"))  # fmt: skip
         for arrays, which, colour, name in shown:
             z, y = arrays["position"][which][:, 2], arrays["position"][which][:, k]
-            axis.plot(z / MICRO, y / MICRO, "o", ms=3, color=colour, label=name)
-        axis.set(ylabel=f"{'xy'[k]} (um)", aspect="equal")
+            axis.plot(z / MILLI, y / MILLI, "o", ms=3, color=colour, label=name)
+        axis.set(ylabel=f"{'xy'[k]} (mm)", aspect="equal")
         plain(axis)
-    side.set_title(f"from the side, the flow upwards: {held.mean():.0%} caught", fontsize=10)
+    side.set_title(f"from the side, the flow upwards: {held.mean():.0%} caught")
     side.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.02))
-    front.set(xlabel="z, along the fibres (um)")
-    front.set_title("as the flow sees it", fontsize=10)
+    front.set(xlabel="z, along the fibres (mm)")
+    front.set_title("as the flow sees it")
+    letters((side, front))
     return figure

@@ -17,7 +17,7 @@ from cases.cascade.scene import STAGE, Cascade, Orientation
 from cases.cascade.statistics import OFF, ORIENTATIONS, PUBLISHED, RANDOM
 from cases.statistics import Mean
 from tisim.engine.batches import Progress
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, legend_beside, letters, plain
 
 SHOWN = 0.97
 """Share of the particles up to which curves go."""
@@ -26,6 +26,8 @@ FEW = 20
 STAGES = (0.1, 0.5, 2.0, 10.0)
 """s, of 125 nm (B16 Fig. 6.11b)."""
 COLOURS = {25: "#cc6677", 125: "#4477aa"}
+LIKELY = {"directions": "all directions alike", "angles": "all angles alike"}
+"""What random means."""
 LINES: dict[Orientation, str] = {"optimal": "-", "directions": ":", "angles": "--"}
 
 Found = Mapping[Cascade, np.ndarray]
@@ -45,12 +47,13 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     wanted = list(dict.fromkeys([*runs, *stages]))
     times = captured_at(wanted, FEW, SHOWN, progress=progress)
     found = dict(zip(wanted, times, strict=True))
-    figure = empty(10.4, 7.6)
+    figure = empty(12.6, 7.6)
     (a, b), (c, d) = figure.subplots(2, 2)
     of_size(a, found, 125)
     of_size(b, found, 25)
     of_stage(c, found)
     of_ratio(d, found)
+    letters((a, b, c, d))
     return {"cascade.png": figure, "cascade.csv": table(found)}
 
 
@@ -68,12 +71,12 @@ def of_size(axis: Axes, found: Found, nanometres: int) -> None:
         one = Cascade(nanometres, STAGE[nanometres], how, gap=OFF)
         label = {"optimal": "optimal", "directions": "random direction", "angles": "random angle"}[how]
         curve(axis, found[one], label, color=COLOURS[nanometres], linestyle=line)
-    axis.axhline(SHARE, color="0.6", lw=0.8)
+    axis.axhline(SHARE, color="0.6", lw=0.8, label=f"{SHARE:.0%}")
     for time, name in zip(PUBLISHED[nanometres], ("B16, random", "B16, optimal"), strict=True):
         axis.plot(time, SHARE, "o" if name.endswith("optimal") else "s", color="0.3", ms=5, label=name, ls="")
     axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02), xlim=(0, None))
-    axis.set_title(f"{nanometres} nm, stages of {STAGE[nanometres]:g} s", fontsize=10)
-    axis.legend(frameon=False, fontsize=8)
+    axis.set_title(f"{nanometres} nm, stages of {STAGE[nanometres]:g} s")
+    legend_beside(axis)
     plain(axis)
 
 
@@ -81,12 +84,12 @@ def of_stage(axis: Axes, found: Found) -> None:
     """125 nm with stages of different lengths (B16 Fig. 6.11b)."""
     for stage, colour in zip(STAGES, ("#aa3377", "#4477aa", "#228833", "#ccbb44"), strict=True):
         for how in ORIENTATIONS[:2]:
-            label = f"{stage:g} s" if how == "optimal" else ""
+            label = f"{stage:g} s, {'optimal' if how == 'optimal' else 'random direction'}"
             curve(axis, found[Cascade(125, stage, how, gap=OFF)], label, color=colour, linestyle=LINES[how])
-    axis.axhline(SHARE, color="0.6", lw=0.8)
+    axis.axhline(SHARE, color="0.6", lw=0.8, label=f"{SHARE:.0%}")
     axis.set(xlabel="time (s)", ylabel="captured fraction", ylim=(0, 1.02), xlim=(0, 40))
-    axis.set_title("125 nm by length of a stage; dotted: random direction", fontsize=10)
-    axis.legend(frameon=False, fontsize=8)
+    axis.set_title("125 nm, by length of a stage")
+    legend_beside(axis)
     plain(axis)
 
 
@@ -99,14 +102,16 @@ def of_ratio(axis: Axes, found: Found) -> None:
         for how, mark, shift in zip(RANDOM, "oD", (-0.08, 0.08), strict=True):
             m = ratio(found, replace(base, orientation=how))
             x = places[base.aspect, base.gap] + shift + (0.2 if base.nanometres == 25 else -0.2)
-            axis.errorbar(x, m.value, m.half, color=COLOURS[base.nanometres], marker=mark, ms=4, capsize=2)
+            colour = COLOURS[base.nanometres]
+            label = f"{base.nanometres} nm, {LIKELY[how]}" if x < 0.5 else None
+            axis.errorbar(x, m.value, m.half, color=colour, marker=mark, ms=4, capsize=2, ls="", label=label)
     for nanometres, (random, best) in PUBLISHED.items():
         label = f"B16, {nanometres} nm"
         axis.axhline(random / best, color=COLOURS[nanometres], lw=0.9, ls="--", label=label)
     axis.set_xticks(list(places.values()), list(names.values()))
-    axis.set(ylabel="time to 90 %, random over optimal", ylim=(0.8, 3.6))
-    axis.set_title("circles: all directions alike; diamonds: all angles alike", fontsize=10)
-    axis.legend(frameon=False, fontsize=8)
+    axis.set(ylabel=f"time to {SHARE:.0%}, random over optimal", ylim=(0.8, 3.6))
+    axis.set_title("random cascades against optimal ones; 95 % intervals")
+    legend_beside(axis)
     plain(axis)
 
 

@@ -22,7 +22,7 @@ from tisim import Recording, run
 from tisim.analysis import head_to_tail, labels
 from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frames, frames
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
 MICRO = 1e-6
@@ -47,9 +47,11 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
     snapshot(left, last)
     times = 1e3 * found.times
     moment = last["moment"]
-    right.plot(times, [chain(frame.arrays, moment) for frame in every], color="#4477aa", label="mean chain")
-    right.set(xlabel="time (ms)", ylabel="particles of a chain", ylim=(0, None))
+    right.plot(times, [chain(frame.arrays, moment) for frame in every], color="#4477aa")
+    right.set(xlabel="time (ms)", ylabel="mean number of particles of a chain", ylim=(0, None))
     plain(right)
+    left.set_title(f"after {times[-1]:.3g} ms, coloured by chain; white: single")
+    letters((left, right))
     return {"chains.png": figure}
 
 
@@ -69,7 +71,7 @@ def snapshot(axis: Axes, state: Arrays) -> None:
     axis.autoscale_view()
     reach = np.abs(places).max() + 2 * radius / MICRO
     axis.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    axis.set(xlabel="x, along the field (um)", ylabel="z (um)")
+    axis.set(xlabel="x, along the field (µm)", ylabel="z (µm)")
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
@@ -78,10 +80,12 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     scenes = [concentration.scene(nanometres=n, concentration=c, **SHOWN) for n, c in keys]
     figure = empty(8.8, 8.4)
     found = run(scenes, share(progress, 0, 2))
-    for axis, (n, c), result in zip(figure.subplots(2, 2).flat, keys, found, strict=True):
+    grid = figure.subplots(2, 2)
+    for axis, (n, c), result in zip(grid.flat, keys, found, strict=True):
         snapshot(axis, result.state)
         length = chain(result.state, result.state["moment"])
-        axis.set_title(f"{n} nm, {c:g} g/mL, Γ = {coupling(n):.3g}: chains of {length:.1f}", fontsize=10)
+        axis.set_title(f"{n} nm, {c:g} g/mL, coupling Γ = {coupling(n):.3g}: mean chain {length:.1f}")
+    letters(grid.flat)
     curves = captured(share(progress, 1, 2))
     return {"snapshots.png": figure, "captured.png": drawn(curves), "captured.csv": table(curves)}
 
@@ -114,16 +118,20 @@ def captured(progress: Progress) -> Curves:
 
 def drawn(curves: Curves) -> Figure:
     """Longitudinal and transverse side by side."""
-    figure = empty(10.4, 4.2)
-    for axis, angle in zip(figure.subplots(1, 2, sharey=True), (0.0, 90.0), strict=True):
+    figure = empty(10.4, 4.4)
+    axes = figure.subplots(1, 2, sharey=True)
+    for axis, angle in zip(axes, (0.0, 90.0), strict=True):
         for c, colour in zip(CONCENTRATIONS, ("#cc6677", "#4477aa", "#228833"), strict=True):
             times, touched, hanging = curves[angle, c]
-            axis.plot(times, hanging, color=colour, lw=1.5, label=f"{1e3 * c:g} mg/mL")
-            axis.plot(times, touched, color=colour, lw=1.0, ls=":")
+            name = f"{1e3 * c:g} mg/mL"
+            axis.plot(times, hanging, color=colour, lw=1.5, label=f"{name}, captured or in a chain that is")
+            axis.plot(times, touched, color=colour, lw=1.0, ls=":", label=f"{name}, captured")
         axis.set(xlabel="time (s)", ylim=(0, 1.02), title=f"axis at {angle:.0f}° to the field")
-        axis.legend(frameon=False, fontsize=8)
         plain(axis)
-        axis.set_ylabel("captured, or in a chain that is" if angle == 0 else "")
+    axes[0].set_ylabel(f"fraction of the particles,\nmean of {FEW} starts")
+    letters(axes)
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", frameon=False, fontsize=8, ncols=3)
     return figure
 
 

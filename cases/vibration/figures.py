@@ -9,7 +9,6 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
 
 from cases.case import size_named
 from cases.vibration import scene as vibration
@@ -27,10 +26,12 @@ from cases.vibration.response import (
 )
 from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frames
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, legend_above, letters, plain, quantity
 
 LEAST = 9
 """Frames that make a spectrum."""
+FLOOR = 1e-4
+"""Of the highest line, what is drawn of a spectrum: below are side lobes of its window."""
 FOUND, EXACT, MARK, OTHER = "#4477aa", "0.25", "#cc6677", "#228833"
 
 
@@ -50,12 +51,13 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
             closed = part(response(history.time, **known))
             label = "closed form" if name == "x" else None
             above.plot(history.time, closed, ":", color=EXACT, lw=1.4, label=label)
-    above.set_ylabel("centre of gravity")
-    above.legend(frameon=False, ncols=3, loc="upper left", fontsize=9)
-    above.margins(y=0.18)
-    engineering(above, "s", "m")
-    above.set_xlabel("time")
+    quantity(above.xaxis, "time", "s")
+    quantity(above.yaxis, "displacement of the\ncentre of gravity", "m")
+    legend_above(above)
+    plain(above)
     spectrum(below, history, known)
+    below.set_title("spectrum of the displacement")
+    letters((above, below))
     return {"response.png": figure}
 
 
@@ -72,11 +74,11 @@ def spectrum(axis: Axes, history: CentreOfGravityHistory, known: Mapping[str, fl
         )  # fmt: skip
         for at, label, colour in marks:
             axis.axvline(at, color=colour, ls="--" if colour == MARK else ":", lw=1.2, label=label, zorder=0)
-        axis.legend(frameon=False, fontsize=9, loc="upper right")
+        legend_above(axis)
         reach = min(reach, 3.0 * max(fast, known["omega"]))
     axis.set_xlim(-reach, reach)
     shown = lines[np.abs(omega) <= reach]
-    axis.set_ylim(max(shown.min(), 1e-5 * shown.max()) / 2, 6 * shown.max())
+    axis.set_ylim(FLOOR * shown.max(), 3 * shown.max())
     axis.set_xlabel("angular frequency (1/s), anticlockwise > 0")
     axis.set_ylabel("amplitude (m)")
     plain(axis)
@@ -117,7 +119,7 @@ def table(*sweeps: tuple[str, Sweep]) -> str:
 
 def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, history: CentreOfGravityHistory) -> Figure:
     """Resonance curves over both resonances, beats beside their closed form, and their spectrum."""
-    figure = empty(10.4, 7.4)
+    figure = empty(10.4, 8.4)
     (left, right), (below, lines) = figure.subplots(2, 2)
     known = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
              "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
@@ -125,32 +127,26 @@ def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, history: CentreOfG
         axis.semilogy(sweep.omega, sweep.exact, color=EXACT, lw=1.0, label="closed form")
         axis.semilogy(sweep.omega, sweep.found, ".", color=FOUND, ms=5, label="one particle, as run")
         axis.axvline(at, color=OTHER, ls=":", lw=1.2, label=f"{name} resonance, {at:.4g} 1/s", zorder=0)
-        axis.set_title(f"largest displacement within {sweep.duration:g} s", fontsize=10)
+        axis.set_title(f"largest displacement within {sweep.duration:g} s")
         axis.set_xlabel(r"drive frequency $\Omega$ (1/s)")
-        axis.set_ylabel("centre of gravity (m)")
+        axis.set_ylabel("displacement of the centre of gravity (m)")
         plain(axis)
     label = f"27 particles, near field {near}:\nthe ratios of Z13 Fig. 3"
     right.semilogy(arrays.omega, arrays.found, "o", mfc="none", color=MARK, ms=8, label=label)
     for axis in (left, right):
-        axis.legend(framealpha=1, edgecolor="none", fontsize=8)
+        axis.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
     below.plot(1e3 * history.time, np.abs(history.velocity), color=FOUND, lw=0.9)
     expected, period = 2 * np.pi / (FAST * (1 - DRIVE)), history.beat_period()
     for k in range(int(history.time[-1] / expected + 0.5) + 1):
         below.axvline(1e3 * k * expected, color=OTHER, ls=":", lw=1.2, zorder=0)
     below.set_title(
         rf"beats at $\Omega$ = {DRIVE:g} of the fast resonance: {1e3 * period:.2f} ms as run;"
-        f"\ndotted, $2\\pi/|\\Omega - \\omega|$ = {1e3 * expected:.2f} ms", fontsize=10,
+        f"\ndotted, $2\\pi/|\\Omega - \\omega|$ = {1e3 * expected:.2f} ms"
     )  # fmt: skip
     below.set_ylabel("speed (m/s)")
     below.set_xlabel("time (ms)")
     plain(below)
     spectrum(lines, history, {**known, "omega": DRIVE * FAST})
-    lines.set_title("its spectrum", fontsize=10)
+    lines.set_title("spectrum of the displacement")
+    letters((left, right, below, lines))
     return figure
-
-
-def engineering(axis: Axes, x: str, y: str) -> None:
-    """Units with prefixes."""
-    axis.xaxis.set_major_formatter(EngFormatter(x))
-    axis.yaxis.set_major_formatter(EngFormatter(y))
-    plain(axis)

@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from scipy.signal.windows import blackmanharris
 
 from cases.vibration import scene as vibration
 from cases.vibration.closed_forms import resonances, response
@@ -125,10 +126,10 @@ class CentreOfGravityHistory:
     def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
         """Angular frequencies (1/s, both signs: the sense of rotation) and amplitudes (m) of the place.
 
-        Of |FFT| with Hann's window, so that a line of amplitude A stands at A; filled up with zeros, so that
-        the curve is smooth.
+        Of |FFT| with the window of Blackman and Harris, whose side lobes are below 3e-5 of a line; a line of
+        amplitude A stands at A. Filled up with zeros, so that the curve is smooth.
         """
-        window = np.hanning(len(self.time))
+        window = blackmanharris(len(self.time), sym=False)
         n = 8 * len(window)
         lines = np.abs(np.fft.fft(self.place * window, n)) / window.sum()
         omega = 2 * np.pi * np.fft.fftfreq(n, self.time[1] - self.time[0])

@@ -65,8 +65,8 @@ def test_pictures_of_the_magnet(monkeypatch):
     )
     assert short[0] > 2 * long[0]
     assert short[1] > 1.1 * long[1]
-    titles = [axis.get_title() for axis in figures.volume().axes]
-    assert titles[2] == f"L/D = 1.67, 90°: {short[1]:.1f} times its volume"
+    titles = [axis.get_title("left") for axis in figures.volume().axes]
+    assert titles[2] == f"(c) L/D = 1.67, 90°:\n{short[1]:.1f} times its own volume"
     field = figures.field().axes[2].collections[0]
     # |B| at the edge of the picture is hardly that of the magnet, 1 T along x.
     assert field.get_array().reshape(41, 41)[0, 0] == pytest.approx(capture.FLUX, rel=0.1)

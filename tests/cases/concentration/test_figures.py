@@ -15,7 +15,7 @@ def test_curves_of_concentrated_samples():
     }  # fmt: skip
     right = figures.drawn(curves).axes[1]
     held, touched = right.lines[2:4]
-    assert held.get_label() == "500 mg/mL"
+    assert held.get_label() == "500 mg/mL, captured or in a chain that is"
     np.testing.assert_allclose(held.get_ydata(), 0.5 * np.arange(4.0) + 90.0)
     np.testing.assert_allclose(touched.get_ydata(), 0.5 * np.arange(4.0))
     assert figures.table(curves).splitlines()[2] == f"0.0,0.005,{when[1]},0.005,0.005"
@@ -38,7 +38,7 @@ def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
     np.testing.assert_allclose(right.lines[0].get_xdata(), [0.0, 1.0])
     np.testing.assert_allclose(right.lines[0].get_ydata(), [1.0, 5 / 3])
     discs = left.collections[0]
-    # Drawn from the farthest, the single one, on; places in um, seen along y.
+    # Drawn from the farthest, the single one, on; places in µm, seen along y.
     assert discs.get_array().mask.tolist() == [True, False, False, False, False]
     middle = pairs.mean(axis=0)
     np.testing.assert_allclose(discs.get_offsets()[0], 1e6 * (pairs[4] - middle)[[0, 2]])
