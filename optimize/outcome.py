@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from deap import tools
 
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.hall_of_fame import compromise
 from optimize.methods.individual import Individual
 from optimize.problem.problem import Problem
@@ -59,8 +60,8 @@ class Outcome:
     """What a search found.
 
     hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
-    succeeded); of several objectives the front. Failed designs never enter. seen : values of the objectives
-    of each design that succeeded, in the order they were first estimated.
+    succeeded); of several objectives the front. Failed designs never enter. seen : the estimates
+    of each design that succeeded, by its string, in the order they were first estimated.
     logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations asked for),
     failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
@@ -73,7 +74,7 @@ class Outcome:
     settings: Settings
     identity: Mapping[str, Any]
     hall: list[Individual] = field(default_factory=list)
-    seen: list[tuple[float, ...]] = field(default_factory=list)
+    seen: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0
     hits: int = 0

@@ -131,7 +131,7 @@ class _Search:
             if estimates is not None:
                 string.know(estimates)
                 if not string.failed:
-                    self.outcome.seen.append(self.problem.costs(string.fitness.values))
+                    self.outcome.seen[tuple(string)] = estimates
         return sum(string.fitness.valid for string in fresh)
 
     def _race(self, population: list[Individual], generation: int) -> None:
@@ -142,6 +142,7 @@ class _Search:
         designs = [self.problem.genome.decode(string) for string in racing]
         found = self.ensemble.race(designs, lambda fraction: self._report(generation, 1.0))
         known = {tuple(string): estimates for string, estimates in zip(racing, found, strict=True)}
+        self.outcome.seen |= known
         for string in (*racing, *population):
             if tuple(string) in known:
                 string.know(known[tuple(string)])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optimize.generation_log import best_of
 from optimize.outcome import Outcome
 from optimize.tables import logbook_columns
-from tisim.plotting.style import empty
+from tisim.plotting.style import empty, legend_above, letters, superscripts
 
 _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
@@ -31,7 +31,7 @@ def convergence_figure(outcome: Outcome) -> Figure:
     log = logbook_columns(problem, outcome.logbook)
     derived = next(iter(problem.derived), None)
     panels = 2 if derived else 1
-    figure = empty(5.6, 2.7 * panels)
+    figure = empty(6.4, 2.9 * panels)
     axes = figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0]
     if log:
         generation = np.array(log["gen"])
@@ -45,14 +45,19 @@ def convergence_figure(outcome: Outcome) -> Figure:
             (mean_again,) = problem.costs([sure.mean])
             axes[0].errorbar(
                 generation[-1] + 0.4, mean_again, sure.half_width, color=_SURE, marker="s", ms=3.5, lw=1.2,
-                capsize=2, ls="none", label="best, from fresh starts, 95 % CI",
+                capsize=2, ls="none", label="best, fresh starts, 95 % interval",
             )  # fmt: skip
             if derived:
-                value = problem.derived[derived](mean_again)
-                axes[1].plot(generation[-1] + 0.4, value, color=_SURE, marker="s", ms=3.5)
+                of = problem.derived[derived]
+                ends = [of(mean_again + side * np.nan_to_num(sure.half_width)) for side in (-1, 1)]
+                value = of(mean_again)
+                axes[1].errorbar(
+                    generation[-1] + 0.4, value, [[value - min(ends)], [max(ends) - value]], color=_SURE,
+                    marker="s", ms=3.5, lw=1.2, capsize=2,
+                )  # fmt: skip
         _mark_moves(axes, log)
-        axes[0].legend(framealpha=1, edgecolor="none", fontsize=8)
-    axes[0].set_ylabel(problem.objectives[0].label)
+        legend_above(axes[0], 2)
+    axes[0].set_ylabel(superscripts(problem.objectives[0].label))
     if derived:
         axes[1].set_ylabel(f"{derived} of the best")
     _finish(axes)
@@ -65,7 +70,7 @@ def _of_several(outcome: Outcome) -> Figure:
     figure = empty(5.6, 2.2 * len(labels) + 0.5)
     axes = figure.subplots(len(labels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, label in zip(axes, labels, strict=True):
-        axis.set_ylabel(f"best {label}")
+        axis.set_ylabel(f"best {superscripts(label)}")
         if log:
             axis.plot(log["gen"], _plottable(log[best_of(label)]), color=_BEST, marker="o", ms=3.5, lw=1.6)
     _finish(axes)
@@ -82,6 +87,8 @@ def _mark_moves(axes: NDArray[Any], log: Mapping[str, Any]) -> None:
 def _finish(axes: NDArray[Any]) -> None:
     axes[-1].set_xlabel("generation")
     axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    if len(axes) > 1:
+        letters(axes)
     for axis in axes:
         axis.spines[["top", "right"]].set_visible(False)
         axis.tick_params(direction="in")

@@ -1,28 +1,50 @@
-"""The front of several objectives, drawn: what is given up of one for more of another."""
+"""The front of several objectives, drawn: what is given up of one for more of another.
+
+Of many designs that were estimated from few starts, the luckiest lie beyond the front, which is known from
+more. So only those that have had as many starts as the front are drawn as what is known, with their
+intervals; the others are marked as few starts.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from optimize.evaluation.estimate import FitnessEstimate
 from optimize.outcome import Outcome
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
-_FRONT, _SEEN, _CHOSEN = "#0b5394", "#bdbdbd", "#b45f06"
+_FRONT, _KNOWN, _FEW, _CHOSEN = "#0b5394", "#8f8f8f", "#d3d3d3", "#b45f06"
+Estimates = tuple[FitnessEstimate, ...]
 
 
 def front_figure(outcome: Outcome) -> Figure:
-    """A panel for each pair of objectives: the front with 95 % confidence intervals, all designs that were
-    estimated behind it, and the compromise (Outcome.best). Values from fresh starts where there are any.
+    """A panel for each pair of objectives: the front with 95 % confidence intervals, from fresh starts where
+    there are any; behind it other designs; and the compromise (Outcome.best).
     """
     pairs = list(combinations(range(len(outcome.problem.objectives)), 2))
-    figure = empty(5.2 * len(pairs), 4.2)
-    for axis, (x, y) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
+    figure = empty(5.6 * len(pairs), 5.0)
+    axes = figure.subplots(1, len(pairs), squeeze=False)[0]
+    for axis, (x, y) in zip(axes, pairs, strict=True):
         _panel(axis, outcome, x, y)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize=8, ncols=1
+    )
+    if len(pairs) > 1:
+        letters(axes)
     return figure
+
+
+def others(outcome: Outcome) -> tuple[list[Estimates], list[Estimates]]:
+    """Designs outside the front: from as many starts as the median design of the front, and from fewer."""
+    front = {tuple(string) for string in outcome.hall}
+    enough = np.median([string.estimates[0].starts for string in outcome.hall] or [1])
+    good = [e for genes, e in outcome.seen.items() if e[0].ok and genes not in front]
+    return [e for e in good if e[0].starts >= enough], [e for e in good if e[0].starts < enough]
 
 
 def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
@@ -30,30 +52,61 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
     plain(axis)
     axis.set_xlabel(_heading(objectives[x].label, objectives[x].maximise))
     axis.set_ylabel(_heading(objectives[y].label, objectives[y].maximise))
-    if outcome.seen:
-        seen = np.array(outcome.seen)
-        axis.plot(seen[:, x], seen[:, y], ".", color=_SEEN, ms=3, label="designs estimated")
+    known, few = others(outcome)
+    means, _ = _values(outcome, few)
+    if few:
+        axis.plot(
+            means[:, x], means[:, y], "o", mfc="none", color=_FEW, ms=2.5, mew=0.6, zorder=1,
+            label=f"other designs, only {_starts(few)}: the luckiest lie beyond the front",
+        )  # fmt: skip
+    if known:
+        _bars(axis, outcome, known, (x, y), _KNOWN, f"other designs, {_starts(known)}")
     if not outcome.hall:
         return
-    estimates = [string.confirmed or string.estimates for string in outcome.hall]
-    means = np.array([outcome.problem.costs([e.mean for e in of_all]) for of_all in estimates])
-    widths = np.nan_to_num([[estimate.half_width for estimate in of_all] for of_all in estimates])
-    axis.errorbar(
-        means[:, x], means[:, y], xerr=widths[:, x], yerr=widths[:, y], fmt="o", color=_FRONT, ms=4, lw=0.8,
-        label="front, 95 % CI",
-    )  # fmt: skip
+    front = [string.confirmed or string.estimates for string in outcome.hall]
+    fresh = "run again: " if outcome.hall[0].confirmed else ""
+    _bars(axis, outcome, front, (x, y), _FRONT, f"front, {fresh}{_starts(front)}")
+    means, _ = _values(outcome, front)
     chosen = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
     axis.plot(
-        *means[chosen, [x, y]],
-        "o",
-        ms=10,
-        mfc="none",
-        mec=_CHOSEN,
-        mew=1.5,
+        *means[chosen, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN, mew=1.5, zorder=5, ls="",
         label="nearest to the best of each",
-    )
-    axis.legend(framealpha=1, edgecolor="none", fontsize=8)
+    )  # fmt: skip
+    everything, _ = _values(outcome, [*known, *few, *front])
+    positive = (everything > 0).all(axis=0)
+    axis.set_xscale(scale_of(means[:, x]) if positive[x] else "linear")
+    axis.set_yscale(scale_of(means[:, y]) if positive[y] else "linear")
+
+
+def _bars(
+    axis: Axes, outcome: Outcome, estimates: Sequence[Estimates], of: tuple[int, int], colour: str, label: str
+) -> None:
+    """Points with their intervals where they have had several starts."""
+    means, widths = _values(outcome, estimates)
+    unsure = bool(widths.any())
+    axis.errorbar(
+        means[:, of[0]], means[:, of[1]], xerr=widths[:, of[0]], yerr=widths[:, of[1]], fmt="o",
+        color=colour, ms=4 if colour == _FRONT else 2.5, lw=0.8 if colour == _FRONT else 0.4,
+        zorder=4 if colour == _FRONT else 2,
+        label=label + ", 95 % intervals" * unsure,
+    )  # fmt: skip
+
+
+def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the objectives and half-widths of their intervals, 0 where unknown; (designs, objectives)."""
+    many = len(outcome.problem.objectives)
+    means = [outcome.problem.costs([e.mean for e in of_all]) for of_all in estimates]
+    widths = [[e.half_width for e in of_all] for of_all in estimates]
+    return np.reshape(means, (-1, many)), np.nan_to_num(np.reshape(np.array(widths, float), (-1, many)))
+
+
+def _starts(estimates: Iterable[Estimates]) -> str:
+    """How many starts they had: "1 start" or "4 to 30 starts"."""
+    numbers = [of_all[0].starts for of_all in estimates]
+    low, high = min(numbers), max(numbers)
+    many = f"{low}" if low == high else f"{low} to {high}"
+    return f"{many} start{'s' * (high != 1)}"
 
 
 def _heading(label: str, maximise: bool) -> str:
-    return f"{label}, {'more' if maximise else 'less'} is better"
+    return f"{superscripts(label)}, {'more' if maximise else 'less'} is better"

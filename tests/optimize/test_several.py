@@ -13,8 +13,10 @@ from optimize.evaluation.ensemble import EnsembleSettings
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.hall_of_fame import Hall, compromise
 from optimize.methods.individual import Individual
+from optimize.outcome import Outcome
 from optimize.problem.objective import Objective
 from optimize.report import report
+from optimize.report.front import others
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage import hdf5_store
@@ -70,7 +72,8 @@ def test_nsga2_finds_the_front_and_spreads_along_it(outcome):
 
 
 def test_front_is_what_nothing_dominates(outcome):
-    front, seen = values(outcome), np.array(outcome.seen)
+    costs = [[estimate.mean for estimate in estimates] for estimates in outcome.seen.values()]
+    front, seen = values(outcome), np.array([outcome.problem.costs(each) for each in costs])
     better = (seen[:, None, 0] >= front[None, :, 0]) & (seen[:, None, 1] <= front[None, :, 1])
     strictly = (seen[:, None, 0] > front[None, :, 0]) | (seen[:, None, 1] < front[None, :, 1])
     assert not np.any(better & strictly)
@@ -121,10 +124,37 @@ def test_log_and_report(outcome, tmp_path):
     assert [float(row["gain (1/s)"]) for row in rows] == list(values(outcome)[:, 0])
     assert [float(row["price"]) for row in rows] == list(values(outcome)[:, 1])
     (axis,) = report.front_figure(outcome).axes
-    shown = [line for line in axis.get_lines() if len(line.get_xdata()) == len(outcome.hall)]
-    np.testing.assert_array_equal(shown[0].get_xydata(), values(outcome))
+    shown = {bars.get_label(): bars.lines[0].get_xydata() for bars in axis.containers}
+    np.testing.assert_array_equal(shown["front, 1 start"], values(outcome))
+    assert len(shown["other designs, 1 start"]) == len(outcome.seen) - len(outcome.hall)
     assert axis.get_xlabel() == "gain (1/s), more is better"
     assert imread(paths["front.png"]).std() > 0.01
+
+
+def test_designs_of_few_starts_are_told_from_those_that_are_known(outcome):
+    """The front from 9 starts, others from 3 and 9."""
+
+    def design(gain, starts):
+        string = Individual([gain, starts / 10], 2)
+        of_all = tuple(FitnessEstimate(cost, 0.1, 0.05, starts, True) for cost in (-gain, 1.0 - gain))
+        string.estimates = of_all
+        return string
+
+    front, known, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
+    front.fitness.values = (-0.5, 0.5)
+    made = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
+    made.seen = {tuple(string): string.estimates for string in (front, known, lucky)}
+    assert others(made) == ([known.estimates], [lucky.estimates])
+    (axis,) = report.front_figure(made).axes
+    lines = {bars.get_label(): bars for bars in axis.containers}
+    assert list(lines) == [
+        "other designs, 9 starts, 95 % intervals",
+        "front, 9 starts, 95 % intervals",
+    ]
+    across = lines["front, 9 starts, 95 % intervals"].lines[2][0].get_segments()[0]
+    np.testing.assert_allclose(across, [[0.45, 0.5], [0.55, 0.5]])
+    few = next(line for line in axis.get_lines() if "only 3 starts" in str(line.get_label()))
+    assert few.get_xydata().tolist() == [[0.9, 0.09999999999999998]]
 
 
 def test_resumed_after_interrupt_it_is_the_same(path, tmp_path):

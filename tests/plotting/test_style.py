@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 
-from tisim.plotting.style import TIME, empty, letters, quantity, scale_of, si
+from tisim.plotting.style import TIME, empty, letters, quantity, scale_of, si, superscripts
 
 
 def test_panels_have_letters_before_their_titles():
@@ -29,6 +29,10 @@ def test_an_axis_says_its_quantity_and_a_unit_that_suits_it(limits, label, tick)
 
 def test_values_have_prefixes():
     assert [si(v, "m") for v in (0.0, 1e-3, 4.76e-4, 1234.0)] == ["0 m", "1 mm", "476 µm", "1.23 km"]
+
+
+def test_powers_of_units_are_raised():
+    assert superscripts("throughput (m^3/s), kg m^-2") == "throughput (m³/s), kg m⁻²"
 
 
 def test_axes_are_logarithmic_where_values_span_decades():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from string import ascii_lowercase
 
@@ -19,6 +20,7 @@ TIME = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
 """Colours of time: even to the eye, and without the end that is lost on white."""
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 """Of units, by power of ten."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = 30.0
 """Largest over smallest value from which on an axis is logarithmic."""
 
@@ -69,6 +71,11 @@ def quantity(axis: Axis, name: str, unit: str) -> None:
         FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}".replace("-", "\N{MINUS SIGN}"))
     )
     axis.set_label_text(f"{name} ({PREFIXES[power]}{unit})")
+
+
+def superscripts(text: str) -> str:
+    """Units as they are printed: "m^3/s" is "m³/s"."""
+    return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), text)
 
 
 def scale_of(values: np.ndarray) -> str:
