@@ -87,6 +87,7 @@ def session(
         paths = [folder / FILE]
         if outcome.best is not None:
             say.print(report.best_table(outcome))
+            say.print(report.notes(outcome))
             paths += report.write(outcome, folder).values()
             if not outcome.interrupted:
                 paths += _show_best(outcome.best, outcome, evaluator, folder, say)

@@ -35,6 +35,12 @@ SURFACE_ENERGY = {
 }
 """Variants of the inverse problem, by what the surface energy may be."""
 
+MEANINGS = {
+    "Pi": "1 - b_f/b*, b* the radius of one sphere of all the mass; 0 where all grains are one",
+    "b_f / b_0": "mean radius at the end over that at the start",
+    "n_f": "(b_f/b_0)^3, grains of the start in one of the mean radius at the end",
+}
+
 
 def cost(result: Result) -> float:
     """Pi = 1 - b_f / b*, b_f the mean final radius and b* that of all the mass in one sphere (Z04 7.1)."""
@@ -60,4 +66,5 @@ def problem(size: str = "default", variant: str = "paper") -> Problem:
             "b_f / b_0": lambda pi: edge * (1.0 - pi),
             "n_f": lambda pi: (edge * (1.0 - pi)) ** 3,
         },
+        meanings=MEANINGS,
     )

@@ -66,6 +66,7 @@ def problem(size: str = "default", wanted: np.ndarray | None = None) -> Problem:
         scene=lambda design, seed: scene(design, seed, number),
         objective=lambda result: misfit(moments(result.state), target),
         symbol="misfit",
+        meanings={"misfit": "|S - S*|/|S*| of second moments S of the cloud, S* those that are wanted"},
         picture=lambda scene, result: cloud(result),
         details=lambda design, result: details(design, result, target),
     )

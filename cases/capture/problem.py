@@ -73,6 +73,12 @@ WANTED = {
     "throughput": "the front of fraction caught and throughput, with speed and radius of particles free",
 }
 """What is looked for, by variant."""
+MEANINGS = {
+    "captured": "fraction of the particles that is caught",
+    "throughput": "water that flows through the channel",
+    "aspect": "length of a fibre over its diameter D",
+    "spacing": "distance of the axes of fibres side by side",
+}
 
 
 @dataclass(frozen=True)
@@ -197,6 +203,7 @@ def problem(variant: str) -> Problem:
         genome=Genome(GENES[variant]),
         scene=lambda design, seed: Filter(**design).scene(seed),
         objective=(fraction, flow) if variant == "throughput" else (fraction,),
+        meanings=MEANINGS,
         picture=lambda scene, result: caught(result),
         details=details,
     )

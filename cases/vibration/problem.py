@@ -33,6 +33,8 @@ GENES = (
 )
 """About the paper's 1 T, and from twice its 0.5 N/m on: sqrt(k/m) is 31 to 977 1/s."""
 
+MEANING = "largest displacement of the centre of gravity; with a minus sign where the largest is wanted"
+
 
 def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> Scene:
     """One particle with the field and the binder of a design. Nothing in it is random."""
@@ -66,6 +68,7 @@ def problem(size: str = "default", variant: str = "resonate") -> Problem:
     """
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     aim, sign = ("largest", -1e3) if variant == "resonate" else ("smallest", 1e3)
+    symbol = "-peak (mm)" if sign < 0 else "peak (mm)"
     return Problem(
         name=f"vibration-{variant}",
         title=f"{vibration.TITLE}: the {aim} response to {DRIVE:.1f} 1/s within {DURATION} s",
@@ -73,7 +76,8 @@ def problem(size: str = "default", variant: str = "resonate") -> Problem:
         genome=Genome(GENES),
         scene=lambda design, seed: scene(design),
         objective=lambda result: sign * displacement(result),
-        symbol="-peak (mm)" if sign < 0 else "peak (mm)",
+        symbol=symbol,
+        meanings={symbol: MEANING},
         details=details,
     )
 

@@ -30,6 +30,7 @@ class Problem:
         design beats in one without losing in another.
     version : raise it when objective changes its meaning: fitnesses of the old one are then not reused.
     symbol : heading of the fitness in tables and plots, where objective is a function.
+    meanings : what headings of the report stand for, heading -> words; printed under its tables.
     derived : extra report columns computed from the fitness, heading -> function; for one objective only.
     picture : (Scene, Result) -> figure of a run, for the report.
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
@@ -47,6 +48,7 @@ class Problem:
     version: int = 1
     symbol: str = "fitness"
     derived: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    meanings: Mapping[str, str] = field(default_factory=dict)
     picture: Callable[[Scene, Result], Figure] | None = None
     details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
     code: str = ""

@@ -27,6 +27,10 @@ FILE, CSV = "compare.h5", "compare.csv"
 NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV)
 FRESH = 10**6
 """Seed of the starts from which what was found is run again: that of no search."""
+NOTE = (
+    "median, lowest, highest: of the best designs of the searches, from fresh starts; claimed: what the "
+    "searches held them for, the median; 95 % +-: half of the interval from fresh starts, the median"
+)
 
 
 @dataclass(frozen=True)
@@ -104,16 +108,10 @@ def table(problem: Problem, found: Sequence[Found]) -> Table:
     searches themselves held it for.
     """
     (objective,) = problem.objectives
-    made = plain_table(
-        "method",
-        "searches",
-        "runs each",
-        f"{objective.label}: median",
-        "lowest",
-        "highest",
-        "claimed",
-        "95 % +-",
-    )
+    meaning = problem.meanings.get(objective.name, "")
+    made = plain_table("method", "searches", "runs each", "median", "lowest", "highest", "claimed", "95 % +-")
+    made.title, made.title_justify = objective.label + (f": {meaning}" if meaning else ""), "left"
+    made.caption, made.caption_justify = NOTE, "left"
     by_method = {f.method: [g for g in found if g.method == f.method] for f in found}
     for method, mine in sorted(
         by_method.items(), key=lambda item: np.median([f.fresh.mean for f in item[1]])

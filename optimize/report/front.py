@@ -73,9 +73,8 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
         label="nearest to the best of each",
     )  # fmt: skip
     everything, _ = _values(outcome, [*known, *few, *front])
-    positive = (everything > 0).all(axis=0)
-    axis.set_xscale(scale_of(means[:, x]) if positive[x] else "linear")
-    axis.set_yscale(scale_of(means[:, y]) if positive[y] else "linear")
+    axis.set_xscale(scale_of(means[:, x]) if everything[:, x].min() > 0 else "linear")
+    axis.set_yscale(scale_of(means[:, y]) if everything[:, y].min() > 0 else "linear")
 
 
 def _bars(

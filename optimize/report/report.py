@@ -50,6 +50,21 @@ def best_table(outcome: Outcome) -> RenderableType:
     return Group(*blocks)
 
 
+def notes(outcome: Outcome) -> RenderableType:
+    """What the headings of ``best_table`` stand for, a line each; nothing where there is no design."""
+    problem, ensemble = outcome.problem, outcome.settings.ensemble
+    if not outcome.hall:
+        return Group()
+    common = {
+        "95 % +-": "half of the 95 % confidence interval of the mean",
+        "starts": "random starts that the mean is over",
+        "settled": f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it",
+    }
+    fresh = {"fresh starts": f"the mean over {ensemble.confirm} starts that the search has not seen"}
+    told = {**problem.meanings, **common, **(fresh if outcome.hall[0].confirmed else {})}
+    return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in told.items()))
+
+
 def _spread(number: int, places: int) -> list[int]:
     """At most so many places in a row of that number, the first and the last among them."""
     return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})

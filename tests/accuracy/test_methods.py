@@ -1,9 +1,11 @@
 """How a study finds what to turn: from what the parts of a scene say of themselves."""
 
+import io
 from dataclasses import replace
 from typing import ClassVar
 
 import pytest
+from rich.console import Console
 
 from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
 from tests.steppers.charged import accurate, charged
@@ -290,3 +292,19 @@ def test_nothing_found_is_told_in_words():
     made.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
     with pytest.raises(RunError, match=r"there is none: a quantity is not finite"):
         made.cheapest(1.0)
+
+
+def test_the_table_fits_80_columns_and_cuts_no_number():
+    """Two quantities with long names, and a method with long settings."""
+    many = {"seconds": (0.05,), "steps": 123456.0, "sums": 1234567.0, "rejections": 12345.0}
+    long = Row("Long", "error=1e-04, tolerance=1e-05", "", "", "f64", 1, errors=((1.2e-4, 0.0),) * 2, **many)
+    failed = Row("Long", "error=1e-05", "", "", "f64", 1, failed="a quantity is not finite")
+    made = Study(oscillator(), [replace(KNOWN, name=name) for name in ("positions", "centre of gravity")])
+    made.rows = [long, failed]
+    console = Console(width=80, file=io.StringIO())
+    console.print(made.table())
+    lines = console.file.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    (whole,) = [line for line in lines if "1.2e-04" in line]
+    assert whole.split()[-8:-1] == ["0.05", "0", "123456", "1234567", "12345", "1.2e-04", "1.2e-04"]
+    assert "  error=1e-05: a quantity is not finite" in lines

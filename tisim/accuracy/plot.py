@@ -14,7 +14,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row, decades
 from tisim.files.atomic import replace_file
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, letters, plain
 
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
 """P. Tol's bright set, and one of his light one."""
@@ -44,6 +44,8 @@ def picture(study: Study) -> Figure:
     axes = figure.subplots(1, wide, squeeze=False)[0]
     for k, axis in enumerate(axes):
         _panel(axis, study, lines, k)
+    if wide > 1:
+        letters(axes)
     axes[0].set_ylabel("relative error")
     if any(row.errors and not row.trusted(k) for row in study.rows for k in range(wide)):
         axes[0].plot([], [], "o", mfc="white", mec="0.3", ms=5, label="hollow: no more than this")
@@ -86,7 +88,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     # Room for a ring on the topmost; what is far off where others are not is left out.
     axis.set_ylim(low, min(1.2 * high, max(30.0, 30.0 * low)))
     quantity = study.quantities[k]
-    axis.set_title(f"{quantity.name}, relative to {quantity.relative_to}", fontsize=10.5)
+    axis.set_title(f"{quantity.name}, relative to {quantity.relative_to}")
     left, right = axis.get_xlim()
     narrow = right < 300 * left
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))

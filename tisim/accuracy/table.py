@@ -9,37 +9,46 @@ from rich.text import Text
 from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row
 
+WIDTH = 80
+"""Characters of a line; every terminal has as many."""
+NARROW = 16
+"""The least of them for the settings of a method."""
+
 
 def table(study: Study) -> RenderableType:
     """Every setting by method, with its median time, work and errors; for what error it is the cheapest, in
-    brackets where timings do not tell it from the one that is chosen."""
-    names = [quantity.name for quantity in study.quantities]
-    heads = ["", "seconds", "spread", "steps", "forces", "rejected", *names, "best for"]
+    brackets where timings do not tell it from the one that is chosen; below, what has failed and why."""
+    names = [quantity.name.replace(" ", "\n") for quantity in study.quantities]
+    heads = ["", "time\n(s)", "spread\n(s)", "steps", "forces", "rejected", *names, "best\nfor"]
     best: dict[tuple[str, str], str] = {}
     for error, (chosen, *others) in study.decades().items():
         best |= {row.key: f"({error:.0e})" for row in others} | {chosen.key: f"{error:.0e}"}
-    cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows}
-    columns = zip(heads, *(line for line in cells.values() if len(line) == len(heads)), strict=True)
-    widths = [max(map(len, column)) for column in columns]
+    cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows if not row.failed}
+    columns = zip(heads, *cells.values(), strict=True)
+    first, *widths = (max(len(line) for cell in column for line in cell.split("\n")) for column in columns)
+    widths = [max(NARROW, min(first, WIDTH - sum(widths) - len(widths))), *widths]
     relative = ", ".join(f"{q.name}: relative to {q.relative_to}" for q in study.quantities)
     blocks: list[RenderableType] = [Text(f"errors of {relative}"), _grid([heads], widths, "bold")]
     for method in dict.fromkeys(row.method for row in study.rows):
-        blocks += [Text(method, "bold"), _grid([cells[row.key] for row in study.line(method)], widths)]
+        rows = study.line(method)
+        blocks += [Text(method, "bold"), _grid([cells[row.key] for row in rows if not row.failed], widths)]
+        blocks += [Text(f"  {row.setting}: {row.failed}") for row in rows if row.failed]
     return Group(*blocks)
 
 
 def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
+    """Columns of these widths; what does not fit into the first goes on below."""
     grid = Table.grid(padding=(0, 1, 0, 0))
     for k, width in enumerate(widths):
-        grid.add_column(justify="right" if k else "left", min_width=width, no_wrap=k > 0, style=style)
+        grid.add_column(
+            justify="right" if k else "left", vertical="bottom", width=width, no_wrap=k > 0, style=style
+        )
     for line in lines:
         grid.add_row(*line)
     return grid
 
 
 def _cells(row: Row, best: str) -> list[str]:
-    if row.failed:
-        return [f"  {row.setting}: {row.failed}"]
     errors = [
         f"{row.errors[k][0]:.1e}" if row.trusted(k) else f"< {row.at_most(k):.0e}"
         for k in range(len(row.errors))

@@ -157,11 +157,11 @@ def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray)
     if fall.any():
         ends.append(("g", fall / np.linalg.norm(fall), FALL))
     for name, end, colour in ends:
-        tip = origin + length * (end @ SEEN)[:2]
+        x, y = origin + length * (end @ SEEN)[:2]
         arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
-        axis.annotate("", tip, origin, arrowprops=arrow, zorder=4)
-        beyond = origin + 1.3 * (tip - origin)
-        axis.text(*beyond, name, color=colour, fontsize=9, ha="center", va="center", zorder=4)
+        axis.annotate("", (x, y), (origin[0], origin[1]), arrowprops=arrow, zorder=4)
+        x, y = origin + 1.3 * length * (end @ SEEN)[:2]
+        axis.text(x, y, name, color=colour, fontsize=9, ha="center", va="center", zorder=4)
 
 
 def _draw(seen: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:

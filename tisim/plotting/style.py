@@ -54,8 +54,10 @@ def legend_beside(axis: Axes) -> None:
 
 def legend_above(axis: Axes, columns: int = 3) -> None:
     """A legend off the data, above the panel at its right."""
-    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1}
-    axis.legend(frameon=False, fontsize=8, ncols=columns, **place)
+    axis.legend(
+        frameon=False, fontsize=8, ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
+    )  # fmt: skip
 
 
 def si(value: float, unit: str) -> str:

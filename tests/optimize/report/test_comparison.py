@@ -65,7 +65,9 @@ def rows(problem, made):
 
 def test_table_ranks_by_the_median_from_fresh_starts():
     made = found(["random", "genetic"], repeats=5)
-    heading, *lines = rows(fake_problem(6), made)
+    printed = rows(fake_problem(6), made)
+    heading = next(line for line in printed if line[0] == "method")
+    lines = [line for line in printed if line[0] in ("random", "genetic")]
     medians = {}
     for name, searches, _, *numbers in lines:
         mine = [f for f in made if f.method == name]
@@ -78,9 +80,10 @@ def test_table_ranks_by_the_median_from_fresh_starts():
     assert medians["genetic"] < medians["random"]
     assert [line[0] for line in lines] == ["genetic", "random"]
     assert "median" in heading
+    assert printed[0] == ["fitness"], "the objective, above"
     large = fake_problem(6, objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
     turned = found(["random", "genetic"], repeats=5, problem=large)
-    assert [line[0] for line in rows(large, turned)[1:]] == ["genetic", "random"]
+    assert [line[0] for line in rows(large, turned) if line[0] in medians] == ["genetic", "random"]
     numbers = list(csv.reader(comparison.as_csv(large, turned).decode().splitlines()))
     assert [float(row[3]) for row in numbers[1:]] == [-f.fresh.mean for f in made]
 
@@ -118,7 +121,8 @@ def test_command(tmp_path, monkeypatch, capsys):
         main([*command, "--set", "search.ensemble.max_starts=4", "--fresh-starts", "4"])
     assert exit_.value.code == 0
     out, err = capsys.readouterr()
-    assert {line.split()[0] for line in out.splitlines()[-3:-1]} == {"random", "cma-es"}
+    first = {line.split()[0] for line in out.splitlines() if line}
+    assert {"random", "cma-es"} <= first
     assert "cma-es, search 2 of 2: 60 runs" in err
     with (tmp_path / "out" / "compare-drift" / "compare.csv").open() as file:
         assert len(list(csv.reader(file))) == 5

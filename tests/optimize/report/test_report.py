@@ -124,6 +124,27 @@ def test_no_row_wraps_on_80_columns(number):
         assert len(row.removeprefix(heading).split()) == shown, "the name and all values on one line"
 
 
+def test_symbols_of_the_table_are_explained_under_it(outcome):
+    def told(made):
+        console = Console(width=80, record=True, file=io.StringIO())
+        console.print(report.notes(made))
+        return [line.split(": ")[0] for line in console.export_text().splitlines() if ": " in line]
+
+    assert told(outcome) == ["95 % +-", "starts", "settled"]
+    assert told(agglomerations(2)) == [
+        "Pi",
+        "b_f / b_0",
+        "n_f",
+        "95 % +-",
+        "starts",
+        "settled",
+        "fresh starts",
+    ]
+    assert told(agglomerations(0)) == []
+    headings = best_columns(agglomerations(2).problem, agglomerations(2).hall)
+    assert set(agglomeration("paper").meanings) <= set(headings)
+
+
 def test_convergence_figure_shows_the_logbook(outcome, tmp_path):
     figure = report.convergence_figure(outcome)
     top, bottom = figure.axes
