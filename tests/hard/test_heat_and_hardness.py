@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.constants import R
 
 from tests.engine.test_schedules import BATCH
 from tests.scenes import DENSITY, HEAT_CAPACITY, energy, flow, head_on, hit, simulate
 from tisim.effects import DeformationWork, Friction, Heating, Impact, Reaction, Softening
-from tisim.effects.impact.softening import GAS_CONSTANT
 
 
 def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):
@@ -93,7 +93,7 @@ def test_extreme_temperatures(temperature):
 def test_cold_grains_are_hard_and_hot_ones_as_hard_as_h0():
     """At 1 mK nothing bonds that would at room temperature; at 1e9 K the hardness is H_0."""
     q = 1000.0
-    speed = 0.5 * np.sqrt(3 * 1e5 * np.exp(q / GAS_CONSTANT / 300) / (2 * DENSITY))
+    speed = 0.5 * np.sqrt(3 * 1e5 * np.exp(q / R / 300) / (2 * DENSITY))
     effects = (Impact(hardness=1e5), Heating(heat_capacity=1e12), Softening(activation_energy=q))
     # So large a heat capacity that the impact itself does not matter.
     e = []

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.constants import g
 
 from tests.scenes import fixed, scene, simulate
 from tisim import Box
 from tisim.effects import Gravity, NearField
-from tisim.effects.external.gravity import STANDARD
 from tisim.interactions.pair_sum import LANES
 
 NUMBERS = (1, LANES - 1, LANES, LANES + 1, 2 * LANES + 6)
@@ -30,7 +30,7 @@ def forces(state):
     d -= np.round(d)
     distance = np.linalg.norm(d, axis=2) + np.eye(len(d))
     size = state["mass"][:, None] * state["mass"] * (0.5 / distance - 0.1 / distance**2) / distance
-    return (size[..., None] * d).sum(axis=1) - state["mass"][:, None] * [0, 0, STANDARD]
+    return (size[..., None] * d).sum(axis=1) - state["mass"][:, None] * [0, 0, g]
 
 
 @pytest.fixture(scope="module")

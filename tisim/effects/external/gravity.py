@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from scipy.constants import g
+
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects.base import Force, parameter
-
-STANDARD = 9.80665
-"""Standard acceleration of free fall, m/s^2, exact by definition."""
 
 
 class Gravity(Force):
@@ -16,7 +15,7 @@ class Gravity(Force):
     Source: L21 section 2.3.
     """
 
-    acceleration: Vector = parameter("m/s^2", "acceleration g of free fall", (0.0, 0.0, -STANDARD))
+    acceleration: Vector = parameter("m/s^2", "acceleration g of free fall", (0.0, 0.0, -g))
 
     @ti.func
     def force(self, s, w, i, t):

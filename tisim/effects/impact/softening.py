@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from scipy.constants import R
+
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import ImpactLaw
 
-GAS_CONSTANT = 8.31446261815324
-"""J/(mol K), exact in SI."""
 LARGEST_EXPONENT = 50.0
 """Hardness is then 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a solid."""
 
@@ -33,5 +33,5 @@ class Softening(ImpactLaw):
 
     @ti.func
     def hardness_factor(self, w, temperature):
-        coldest = self.activation_energy(w) / (GAS_CONSTANT * LARGEST_EXPONENT) + 1e-30
-        return ti.exp(self.activation_energy(w) / (GAS_CONSTANT * ti.max(temperature, coldest)))
+        coldest = self.activation_energy(w) / (R * LARGEST_EXPONENT) + 1e-30
+        return ti.exp(self.activation_energy(w) / (R * ti.max(temperature, coldest)))
