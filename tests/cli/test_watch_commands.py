@@ -90,6 +90,13 @@ def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
     (tmp_path / "out").mkdir()
     rule = "folder must be one with a trajectory.h5 or result.h5; received 'out', with"
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s" / "search.h5").touch()
+    told = "folder must be that of a run; received that of a search, whose pictures are:"
+    assert tisim("plot", "s") == (2, "", f"{told} none yet\n")
+    for name in ("front.png", "convergence.png"):
+        (tmp_path / "s" / name).touch()
+    assert tisim("plot", "s") == (2, "", f"{told} s/convergence.png, s/front.png\n")
     (tmp_path / "out" / "checkpoint.h5").touch()
     assert tisim("plot", "out") == (2, "", f"{rule} only the checkpoint of an unfinished run\n")
 

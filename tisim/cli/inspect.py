@@ -154,6 +154,11 @@ def _file(path: Path) -> Path:
             return file
     begun = regular_file.exists(path / "checkpoint.h5")
     why = ", with only the checkpoint of an unfinished run" if begun else ", with neither"
+    if regular_file.exists(path / "search.h5"):
+        drawn = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
+        raise InputError(
+            f"folder must be that of a run; received that of a search, whose pictures are: {drawn}"
+        )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 
 
