@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tisim import Scene
+from tisim.backend import runtime
 
 
 def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
@@ -12,6 +13,7 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
     assert code == 0
     assert "ok" in out
     assert ["particle", "steps", "80000"] in [line.split() for line in out.splitlines()]
+    assert f"cpu, f64, {runtime.current().threads} threads" in out
     folder = tmp_path / "out" / "flow"
     assert {path.name for path in folder.iterdir()} == {
         "result.h5",

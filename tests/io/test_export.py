@@ -86,6 +86,10 @@ def test_ase_reads_the_extended_xyz(file, tmp_path):
         assert atoms.pbc.all()
         np.testing.assert_array_equal(atoms.info["Origin"], [-0.01] * 3)
         assert (atoms.info["Time"], atoms.info["Step"]) == (frame.time, frame.step)
+        assert set(atoms.symbols) == {"X"}
+        units = dict(each.split(":") for each in atoms.info["Units"].split())
+        assert units.keys() == {"pos", "velo", *frame.arrays} - {"position", "velocity"}
+        assert (units["pos"], units["velo"], units["mass"], units["id"]) == ("m", "m/s", "kg", "1")
 
 
 def test_open_space_has_no_lattice(tmp_path):
@@ -93,6 +97,7 @@ def test_open_space_has_no_lattice(tmp_path):
     tisim.run(scene([(1.0, 2.0, 3.0)], [(0, 0, 0)]), record=Recording(path, frames=1))
     (first, _) = ase.io.read(export(path, "xyz", tmp_path), index=":", format="extxyz")
     assert not first.pbc.any()
+    assert first.info["Units"].startswith("pos:m velo:m/s")
     np.testing.assert_array_equal(first.positions, [[1.0, 2.0, 3.0]])
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from tests.scenes import scene, simulate
 from tisim import InputError, RunError, Scene
+from tisim.backend import runtime
 from tisim.files.ownership import writable
 from tisim.io.run_folder import Folder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
@@ -38,7 +39,9 @@ def test_whole_run_is_in_the_folder(result, tmp_path):
         assert Scene.from_dict(tomllib.loads(file.attrs["scene"])) == result.scene
     assert Scene.from_toml(tmp_path / "scene.toml").digest() == result.scene.digest()
     versions = json.loads((tmp_path / "versions.json").read_text())
-    assert {"tisim", "backend", "numpy", "h5py", "python", "platform"} == set(versions)
+    assert {"tisim", "backend", "numpy", "h5py", "python", "platform", *result.settings} == set(versions)
+    ran = runtime.current()
+    assert result.settings == {"precision": "f64", "device": "cpu", "threads": str(ran.threads)}
 
 
 def test_folder_that_holds_a_run_is_refused(tmp_path):
@@ -129,4 +132,5 @@ def test_nearer_sphere_hides_the_farther():
 def test_one_grain_can_be_drawn():
     alone = simulate([scene(ONE, ONE)])[0]
     figure = cloud(alone)
-    assert [axis.get_title().split(":")[0] for axis in figure.axes] == ["start, t = 0 s", "end, t = 1 ns"]
+    titles = [axis.get_title("left").split(":")[0] for axis in figure.axes]
+    assert titles == ["(a) start, t = 0 s", "(b) end, t = 1 ns"]

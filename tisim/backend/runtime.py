@@ -54,6 +54,11 @@ class Runtime:
         """What decides the last bits of a result beside the scene: precision and kind of device."""
         return {"precision": self.precision, "device": self.device}
 
+    @property
+    def described(self) -> dict[str, str]:
+        """What a run ran on: the settings, and CPU threads, which change no bit."""
+        return {**self.settings, **({"threads": str(self.threads)} if self.device == "cpu" else {})}
+
 
 turn = threading.RLock()
 """Held while scenes are run by ``tisim.run``, and while settings change: calls of several threads take turns,

@@ -184,6 +184,9 @@ def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
         table.add_row(name.replace("_", " "), str(n))
     for name, value in result.measures.items():
         table.add_row(name.replace("_", " "), f"{value:.6g}")
+    ran = result.settings
+    threads = f", {ran['threads']} threads" if "threads" in ran else ""
+    table.add_row("device", f"{ran['device']}, {ran['precision']}{threads}")
     table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
     table.add_row("written", "\n".join(map(str, paths)))
     return table

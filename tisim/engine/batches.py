@@ -69,7 +69,7 @@ class Batches:
                 if strict:
                     raise
                 failed = Status(False, str(error))
-                yield index, Result(scene, {}, {}, 0.0, {}, failed, 0.0, runtime.current().settings)
+                yield index, Result(scene, {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
                 continue
             groups.setdefault(scene.structure(), []).append(index)
         done = len(scenes) - len(starts)

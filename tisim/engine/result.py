@@ -27,8 +27,8 @@ class Result:
         measures : quantities of the world that its effects keep, at the end. wall_s : wall seconds of
         the batch that this world was part of, per world; set-up, compilation and observers are not
         in it, but what it took to find the last good steps is.
-    settings : of the run; ``edited`` among them says what was written to ``Simulation.state`` on the way, and
-        then neither the scene nor ``start`` alone describe the run.
+    settings : precision, device and threads that it ran with; ``edited`` among them says what was written to
+        ``Simulation.state`` on the way, and then neither the scene nor ``start`` alone describe the run.
     """
 
     scene: Scene

@@ -253,7 +253,7 @@ class Simulation:
                     work={name: int(tally[w]) for name, tally in tallies.items()},
                     status=self.monitor.status(w, int(status[w])),
                     wall_s=self.wall_s / len(self.scenes),
-                    settings={**self.runtime.settings, **self._edited(w)},
+                    settings={**self.runtime.described, **self._edited(w)},
                     measures={name: float(values[w]) for name, values in kept.items()},
                 )
             )

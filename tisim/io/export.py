@@ -12,10 +12,13 @@ import numpy as np
 from tisim.errors import must
 from tisim.files.atomic import replace_file, replacing, unfinished
 from tisim.io.reader import Frame, Frames, frames, worlds
+from tisim.io.run_folder import units
 from tisim.io.trajectory import Recording, Trajectory
 from tisim.scene.initial_state import Arrays
 
 FORMATS = ("vtk", "xyz", "h5md")
+_KNOWN = {"position": "pos", "velocity": "velo"}
+"""Names of OVITO's."""
 VERTEX = 1
 """VTK's cell of one point."""
 _VTK_TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
@@ -129,7 +132,9 @@ def _xml(root: ElementTree.Element) -> bytes:
 def _xyz(found: Frames, steps: Iterator[Frame], folder: Path, name: str) -> Path:
     """Extended XYZ: for each frame the number of particles, a line of keys, and a line for each particle.
 
-    Positions are in m, not in the Angstrom that chemistry takes for granted.
+    All particles are of the species X, which is no element. Positions are in m, not in the Angstrom that
+    chemistry takes for granted; the key Units has the unit of each column: "pos:m velo:m/s mass:kg", and
+    "1" where there is none, with dots within a unit.
     """
     low, high = found.scene.domain.bounds()
     box = ""
@@ -143,7 +148,8 @@ def _xyz(found: Frames, steps: Iterator[Frame], folder: Path, name: str) -> Path
     with replacing(path, new), new.open("w") as text:
         for frame in steps:
             columns, properties = _columns(frame.arrays)
-            keys = f"Properties={properties} Time={frame.time!r} Step={frame.step}"
+            keys = f'Properties={properties} Units="{_units(found, frame.arrays)}" '
+            keys += f"Time={frame.time!r} Step={frame.step}"
             text.write(f"{len(columns[0])}\n{box}{keys}\n")
             text.writelines("X " + " ".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
     return path
@@ -151,15 +157,25 @@ def _xyz(found: Frames, steps: Iterator[Frame], folder: Path, name: str) -> Path
 
 def _columns(arrays: Arrays) -> tuple[list[list[float]], str]:
     """Columns of numbers, and what they are; position first, and names as OVITO knows them."""
-    known = {"position": "pos", "velocity": "velo"}
     columns: list[list[float]] = []
     properties = ["species:S:1"]
-    for name in sorted(arrays, key=lambda name: (name != "position", name != "velocity", name)):
+    for name in _order(arrays):
         values = arrays[name].reshape(len(arrays[name]), -1)
         kind = "I" if values.dtype.kind in "iu" else "R"
-        properties.append(f"{known.get(name, name)}:{kind}:{values.shape[1]}")
+        properties.append(f"{_KNOWN.get(name, name)}:{kind}:{values.shape[1]}")
         columns += [column.tolist() for column in values.T]
     return columns, ":".join(properties)
+
+
+def _units(found: Frames, arrays: Arrays) -> str:
+    """The unit of each quantity, as the key Units says it."""
+    known = units(found.scene)
+    spelled = {name: known.get(name, "").replace(" ", ".") or "1" for name in _order(arrays)}
+    return " ".join(f"{_KNOWN.get(name, name)}:{unit}" for name, unit in spelled.items())
+
+
+def _order(arrays: Arrays) -> list[str]:
+    return sorted(arrays, key=lambda name: (name != "position", name != "velocity", name))
 
 
 def _h5md(file: Path, out: Path) -> Path:

@@ -107,7 +107,9 @@ def write(result: Result, folder: Folder) -> list[Path]:
     folder.result.unlink(missing_ok=True)
     paths = {name: folder.path / name for name in ("scene.toml", "versions.json", "cloud.png")}
     replace_file(paths["scene.toml"], result.scene.to_toml().encode())
-    replace_file(paths["versions.json"], (json.dumps(versions(), indent=2) + "\n").encode())
+    replace_file(
+        paths["versions.json"], (json.dumps({**versions(), **result.settings}, indent=2) + "\n").encode()
+    )
     with tempfile.SpooledTemporaryFile() as image:
         cloud.cloud(result).savefig(image, dpi=150, format="png")
         image.seek(0)
@@ -125,9 +127,9 @@ def write_result(result: Result, path: Path) -> None:
             "reason": result.status.reason, "time": result.time, "wall_s": result.wall_s,
             "settings": json.dumps(result.settings), "versions": json.dumps(versions()),
         })  # fmt: skip
-        units = _units(result.scene)
+        unit_of = units(result.scene)
         for name, arrays in (("start", result.start), ("end", result.state)):
-            _write_arrays(file.create_group(name), arrays, units)
+            _write_arrays(file.create_group(name), arrays, unit_of)
         file.create_group("work").attrs.update(result.work)
         file.create_group("measures").attrs.update(result.measures)
 
@@ -152,11 +154,12 @@ def read_result(path: Path) -> Result:
         )
 
 
-def _units(scene: Scene) -> dict[str, str]:
+def units(scene: Scene) -> dict[str, str]:
+    """Of all quantities that particles of a scene have, by name."""
     fields = resolve_fields((*SHARED, *needed_fields(scene.effects, scene.stepper)))
     return {field.name: field.unit for field in fields}
 
 
-def _write_arrays(group: h5py.Group, arrays: Arrays, units: dict[str, str]) -> None:
+def _write_arrays(group: h5py.Group, arrays: Arrays, unit_of: dict[str, str]) -> None:
     for name, values in arrays.items():
-        group.create_dataset(name, data=values).attrs["unit"] = units.get(name, "")
+        group.create_dataset(name, data=values).attrs["unit"] = unit_of.get(name, "")
