@@ -93,6 +93,7 @@ def sequence(chosen: Sequence[Frame]) -> Figure:
     axes = figure.subplots(2, 3)
     for axis, frame in zip(axes.flat, chosen, strict=True):
         snapshot(axis, frame.arrays, square)
+        directions(axis, square, NO_GRAVITY)
         axis.set_title(f"t = {1e3 * frame.time:.0f} ms")
     letters(axes.flat)
     return figure
@@ -121,9 +122,8 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
 
 
 def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
-    """A state as seen in a square, with the axes of space."""
+    """A state as seen in a square."""
     panel(axis, state, square, NO_BOX, None)
-    directions(axis, square, NO_GRAVITY)
 
 
 def envelope(history: BlastHistory) -> Figure:
@@ -178,13 +178,15 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> Figure:
     """The clouds at the end on one scale, and their half axes and contacts in time."""
-    figure = empty(10.4, 6.4)
+    figure = empty(11.6, 6.4)
     grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
     square = common([frame.arrays for frame in ends.values()], NO_BOX)
     for k, (name, frame) in enumerate(ends.items()):
         axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
         snapshot(axis, frame.arrays, square)
         axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"))
+    # Here there is room.
+    directions(figure.axes[-1], square, NO_GRAVITY, share=0.18)
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
     for (name, history), colour in zip(histories.items(), colours, strict=False):

@@ -149,10 +149,14 @@ def gravity(scene: Scene) -> np.ndarray:
     return np.sum([(0.0, 0.0, 0.0), *found], axis=0)
 
 
-def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray) -> None:
-    """The axes of space in the lower right of a panel, and the direction of gravity where there is some."""
+def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray, share: float = 0.07) -> None:
+    """The axes of space in the lower right of a panel, and the direction of gravity where there is some.
+
+    share : of the panel's side, the length of an arrow.
+    """
     left, bottom, side = square
-    origin, length = np.array([left + 0.88 * side, bottom + 0.09 * side]), 0.07 * side
+    length = share * side
+    origin = np.array([left + side - 1.7 * length, bottom + (1.6 if fall.any() else 0.5) * length])
     ends = [(name, end, "0.35") for name, end in zip("xyz", np.eye(3), strict=True)]
     if fall.any():
         ends.append(("g", fall / np.linalg.norm(fall), FALL))
