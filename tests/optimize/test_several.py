@@ -214,7 +214,7 @@ def test_file_of_before_there_were_several_objectives_is_read(path):
 
 def test_what_cannot_be_is_refused(path):
     with pytest.raises(
-        InputError, match="method must be for several objectives: random, nsga2; received 'genetic'"
+        InputError, match="method must be for several objectives: nsga2, random; received 'genetic'"
     ):
         run(path, method="genetic")
     with pytest.raises(InputError, match="target must be left out for several objectives; received 1"):

@@ -15,6 +15,6 @@ from .magnetic.magnets import Body as Body
 from .magnetic.magnets import Magnets as Magnets
 from .magnetic.sphere import MagneticSpheres as MagneticSpheres
 from .magnetic.sphere import Sphere as Sphere
-from .sample import sample as sample
+from .sampling import sample as sample
 from .uniform import ElectricField as ElectricField
 from .uniform import MagneticField as MagneticField

@@ -49,7 +49,7 @@ CROWDED = SCENES[0].model_copy(update={"particles": Cloud(number=4, radius=0.2, 
 def cluster():
     """A real Dask cluster of two processes."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None) as made:
+    with distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=":0") as made:
         yield made
 
 
@@ -390,7 +390,7 @@ def encrypted():
         "distributed.comm.tls.client.key": lets_in.tls_client_key,
     }
     with distributed.LocalCluster(
-        1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tls", security=lets_in
+        1, threads_per_worker=1, processes=False, dashboard_address=":0", protocol="tls", security=lets_in
     ) as made:
         yield made.scheduler_address, settings
 

@@ -49,7 +49,7 @@ def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
     def broken(self, time, places, out):
         raise RuntimeError("does not compile")
 
-    monkeypatch.setattr("tisim.sources.sample._Sum.at", broken)
+    monkeypatch.setattr("tisim.sources.sampling._Sum.at", broken)
     with pytest.raises(RuntimeError, match="does not compile") as told:
         sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [[0.0, 0, 0]])
     assert len(memory.in_use()) == before
