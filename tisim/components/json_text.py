@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 from pydantic_core import to_json
 
-ROWS = 1 << 14
+ROWS = 1 << 10
 """Rows of an array in a piece."""
-MANY = 0.3
-"""Part of the numbers in a piece above which it is quicker to have Python write all."""
 PLAIN = 1e-4, 1e16
 """Magnitudes that Python and pydantic write alike, without an exponent."""
 
@@ -47,12 +46,10 @@ def _array(array: np.ndarray) -> Iterator[str]:
 def _rows(array: np.ndarray) -> str:
     """The shortest decimals that are these numbers."""
     numbers = np.asarray(array, float)
-    size = np.abs(numbers).ravel()
-    other = np.flatnonzero(((size < PLAIN[0]) & (size > 0)) | (size >= PLAIN[1]))
-    if len(other) > MANY * size.size:
-        return json.dumps(numbers.tolist())
-    words = to_json(numbers.tolist()).decode().split(",")
-    for k in other:
-        number = words[k].strip("[]")
-        words[k] = words[k].replace(number, repr(float(number)))
-    return ", ".join(words)
+    size = np.abs(numbers)
+    other = ((size < PLAIN[0]) & (size > 0)) | (size >= PLAIN[1])
+    # Written by Python, in the places that hold no number.
+    written = [repr(number) for number in numbers[other].tolist()]
+    listed = np.where(other, np.nan, numbers).tolist()
+    between = to_json(listed, inf_nan_mode="constants").decode().replace(",", ", ").split("NaN")
+    return "".join(part for pair in zip_longest(between, written, fillvalue="") for part in pair)
