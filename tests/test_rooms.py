@@ -1,5 +1,7 @@
 """The order of the rooms holds: nothing is known to what it stands on."""
 
+import ast
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -54,3 +56,11 @@ def test_listing_cases_loads_no_figures_checks_or_inverse_problems():
 def test_a_circle_is_found():
     with pytest.raises(ValueError, match=r"circle: a > b > a"):
         rooms.floors({"a": {"b"}, "b": {"a"}})
+
+
+def test_no_class_name_stands_for_two():
+    names: Counter[str] = Counter()
+    for file in rooms.modules(Path(__file__).parents[1]).values():
+        nodes = ast.parse(file.read_text(encoding="utf-8")).body
+        names.update(node.name for node in nodes if isinstance(node, ast.ClassDef))
+    assert [name for name, number in names.items() if number > 1] == []

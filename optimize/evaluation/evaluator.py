@@ -10,7 +10,7 @@ from tisim.backend import runtime
 from tisim.engine.batches import Batches
 
 
-class Evaluator:
+class BatchEvaluator:
     """Scenes to results, many worlds at a time; a start that cannot be made gives a failed Result.
 
     batch : most worlds that run side by side. settings : what decides the last bits of a result beside the

@@ -84,7 +84,7 @@ FAMILIES = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class Declaration:
     """A parameter or option. rule : what it must be. default : as people read it; "" where there is none."""
 
     name: str
@@ -109,7 +109,7 @@ class Entry:
     summary: str
     body: str
     source: str
-    settings: tuple[Setting, ...]
+    settings: tuple[Declaration, ...]
     fields: tuple[tuple[str, str], ...]
     needs: tuple[str, ...]
     gives: tuple[str, ...]
@@ -175,16 +175,16 @@ def _suiting(control: Any) -> list[str]:
     return [name for name, kind in known.items() if issubclass(kind, control)]
 
 
-def settings(kind: type[Checked]) -> tuple[Setting, ...]:
+def settings(kind: type[Checked]) -> tuple[Declaration, ...]:
     """Its parameters and options, in order, but for the name of an effect, which is that of its table."""
     shown = template.fields(kind) if issubclass(kind, Component) else kind.model_fields
     return tuple(_setting(name, info) for name, info in shown.items())
 
 
-def _setting(name: str, info: FieldInfo) -> Setting:
+def _setting(name: str, info: FieldInfo) -> Declaration:
     value = info.get_default(call_default_factory=True)
     default = "" if info.is_required() else f'"{value}"' if isinstance(value, str) else shown(value)
-    return Setting(name, unit_of(info), text_of(info), _rule(info), default)
+    return Declaration(name, unit_of(info), text_of(info), _rule(info), default)
 
 
 def _rule(info: FieldInfo) -> str:

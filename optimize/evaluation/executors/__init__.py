@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from optimize.evaluation.evaluator import Evaluator
-from optimize.evaluation.runs import Evaluator as Contract
+from optimize.evaluation.evaluator import BatchEvaluator
+from optimize.evaluation.runs import Evaluator
 from tisim.backend import runtime
 from tisim.errors import must
 
 RULE = "batch, processes:N or dask://HOST:PORT"
 
 
-def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Contract:
+def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Evaluator:
     """The evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
 
     "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
@@ -23,7 +23,7 @@ def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 
     if kind == "batch":
         must(name == "batch", "executor", RULE, name)
         runtime.init(device, precision, threads)
-        return Evaluator()
+        return BatchEvaluator()
     # Imported late: nobody needs the one for the other, and Dask may not be there at all.
     from optimize.evaluation.executors.remote import Remote
     from optimize.evaluation.executors.worker import Wanted

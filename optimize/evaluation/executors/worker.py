@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
-from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.executors import handshake
 from tisim import InputError, Result, RunError, Scene
 from tisim.backend import runtime
@@ -63,7 +63,7 @@ class Answer:
 
 _work = cf.ThreadPoolExecutor(1)
 """The thread in which units of work are run, one at a time, while others listen."""
-_evaluator: list[Evaluator] = []
+_evaluator: list[BatchEvaluator] = []
 
 
 def packed(scenes: Sequence[Scene]) -> bytes:
@@ -110,7 +110,7 @@ def _run(sent: bytes, wanted: Wanted, share: int) -> Answer:
     before = runtime.generation()
     runtime.init(wanted.device, wanted.precision, wanted.threads or share)
     if not _evaluator or runtime.generation() != before:
-        _evaluator[:] = [Evaluator()]
+        _evaluator[:] = [BatchEvaluator()]
     results = dict(_evaluator[0].evaluate(scenes))
     made_by = {**handshake.program(), **runtime.current().settings}
     return Answer(made_by, [results[index] for index in range(len(scenes))])

@@ -7,7 +7,7 @@ from cases.blast import CASE
 from cases.blast import scene as blast
 from cases.blast.problem import DURATION, FLUX, details, field, misfit, problem, start
 from cases.blast.shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
-from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
@@ -88,7 +88,7 @@ def test_no_other_variant_than_the_ellipsoid():
 @pytest.mark.slow
 def test_search_recovers_the_field_up_to_sign(tmp_path):
     """500 particles, 10 generations: within 5 % of 0.7 T, and 4 degrees."""
-    evaluator = Evaluator()
+    evaluator = BatchEvaluator()
     with Cache(tmp_path / "search.h5") as cache:
         outcome = search(problem("small"), evaluator, cache, Settings(**{**blast.SEARCH, "generations": 10}))
     evaluator.close()

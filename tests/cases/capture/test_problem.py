@@ -7,7 +7,7 @@ from cases.capture import problem as filters
 from cases.capture.problem import HEIGHT, WIDTH, WIRE, Filter
 from cases.capture.scene import DIAMETER, SATURATION, SEARCH
 from cases.statistics import Claim, Mean
-from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.runs import start_seed
 from optimize.report.comparison import FRESH
 from optimize.search import search
@@ -178,7 +178,7 @@ def test_what_is_in_the_way_is_all_that_is_caught_of_a_fast_flow():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_search_finds_transverse_and_short(tmp_path, seed):
     """B16's conclusions, by a search that knows nothing of them; and what it found is worse without them."""
-    evaluator = Evaluator()
+    evaluator = BatchEvaluator()
     with Cache(tmp_path / "search.h5") as cache:
         problem = filters.problem("fraction")
         outcome = search(problem, evaluator, cache, Settings(**SEARCH, seed=seed))

@@ -15,7 +15,7 @@ from cases.vibration.problem import (
     scene,
 )
 from cases.vibration.scene import CHARGE, MASS, SEARCH
-from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
@@ -32,7 +32,7 @@ DESIGNS = {
 @pytest.fixture(scope="module")
 def evaluator():
     """One, so that both searches share what it compiles."""
-    made = Evaluator()
+    made = BatchEvaluator()
     yield made
     made.close()
 

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from optimize.evaluation import executors
-from optimize.evaluation.evaluator import Evaluator
+from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.executors import dask_cluster, handshake
 from optimize.evaluation.executors import worker as working
 from optimize.evaluation.executors.processes import Processes
@@ -71,7 +71,7 @@ def away(request):
 @pytest.fixture(scope="module")
 def here():
     """Results of this process."""
-    with closing(Evaluator()) as evaluator:
+    with closing(BatchEvaluator()) as evaluator:
         return dict(evaluator.evaluate([*SCENES, CROWDED])), dict(evaluator.evaluate(LONG))
 
 
@@ -109,7 +109,7 @@ def test_effects_of_the_users_own_act_in_workers(away, own_file):
     for factor in ("", "2.0 * "):
         law = python_file.load(own_file("own_law.py", LAW.replace("-self", f"-{factor}self")))
         scenes = [s.model_copy(update={"effects": (law.Pull(strength=1e-9),)}) for s in SCENES[:2]]
-        with closing(Evaluator()) as local:
+        with closing(BatchEvaluator()) as local:
             same(dict(Remote(evaluator.pool, Wanted()).evaluate(scenes)), dict(local.evaluate(scenes)))
 
 
@@ -176,7 +176,7 @@ def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
             os.kill(pids()[-1], signal.SIGKILL)
 
     there, kept = found(tmp_path / "there.h5", evaluator, kill)
-    with closing(Evaluator()) as local:
+    with closing(BatchEvaluator()) as local:
         here, expected = found(tmp_path / "here.h5", local)
     assert kept == expected
     assert there.evaluations == here.evaluations == len(kept)

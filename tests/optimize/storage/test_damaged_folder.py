@@ -45,7 +45,7 @@ def command(tmp_path, monkeypatch, capsys):
     """Runs a command: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
-    monkeypatch.setattr("optimize.evaluation.executors.Evaluator", FakeEvaluator)
+    monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
 
     def run(words):
         with pytest.raises(SystemExit) as exit_:

@@ -28,7 +28,7 @@ def optimize(tmp_path, monkeypatch, capsys):
     """Runs a search in a fresh folder with more arguments: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
-    monkeypatch.setattr("optimize.evaluation.executors.Evaluator", FakeEvaluator)
+    monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
 
     def command(*arguments):
         with pytest.raises(SystemExit) as exit_:
@@ -81,7 +81,7 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
                     clear(tmp_path / "s", overwrite=True)
             return super().evaluate(scenes, progress)
 
-    monkeypatch.setattr("optimize.evaluation.executors.Evaluator", Joined)
+    monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", Joined)
     assert optimize("--generations", 3)[0] == 0
     assert asked
     assert optimize("--generations", 3, "--fresh", "--overwrite")[0] == 0
