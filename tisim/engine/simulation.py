@@ -189,7 +189,7 @@ class Simulation:
         yield
         # Short enough to be heard from soon, long enough that looking costs little.
         chunk = max(8, FIRST // (self.worlds * self.s.capacity))
-        written = np.empty(0)
+        written = self.s.read("pause_time")
         while self.going_on(stop):
             pauses = watching.pauses(self, stop)
             if not np.array_equal(pauses, written):
