@@ -20,10 +20,18 @@ autodoc_default_options = {"exclude-members": ", ".join(HIDDEN)}
 smartquotes = False
 python_use_unqualified_type_names = True
 # What other projects document, and what stands behind public names.
-OTHERS = ("numpy", "pathlib", "collections", "typing", "matplotlib", "rich", "RenderableType", "DataFrame")
-INNER = (
-    r"(tisim\.(io\.trajectory|backend\.runtime|steppers\.base|worlds\.program)|optimize\.methods\.\w+)\.\w+"
+OTHERS = (
+    "numpy",
+    "np",
+    "pathlib",
+    "collections",
+    "typing",
+    "matplotlib",
+    "rich",
+    "RenderableType",
+    "DataFrame",
 )
+INNER = r"(tisim\.(io\.trajectory|io\.recorder|engine\.particle_state|backend\.runtime|steppers\.base|worlds\.program)|optimize\.methods\.\w+)\.\w+"
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in OTHERS)]
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from tisim.components.component import Checked, Component
 from tisim.engine import reference
-from tisim.engine.reference import Entry, Setting
+from tisim.engine.reference import Declaration, Entry
 
 PACKAGES = ("tisim", "tisim.effects", "tisim.sources", "tisim.operators", "tisim.steppers", "tisim.packing",
             "tisim.accuracy", "tisim.analysis", "optimize")  # fmt: skip
@@ -89,7 +89,7 @@ def signature(_app: Any, _what: str, _name: str, value: Any, *_: Any) -> tuple[s
     return (_call(reference.settings(value)), None) if checked else None
 
 
-def _call(settings: tuple[Setting, ...]) -> str:
+def _call(settings: tuple[Declaration, ...]) -> str:
     """The arguments that make a part: what must be given, then what has a default."""
     needed = [one.name for one in settings if not one.default]
     return f"({', '.join([*needed, *(f'{one.name}={one.default}' for one in settings if one.default)])})"
@@ -152,7 +152,7 @@ def _facts(entry: Entry) -> Iterator[str]:
         yield from (plain(work), "")
 
 
-def _settings(settings: tuple[Setting, ...]) -> Iterator[str]:
+def _settings(settings: tuple[Declaration, ...]) -> Iterator[str]:
     if settings:
         rows = [
             (f"``{one.name}``", *map(plain, (one.unit, one.default or "(required)", one.rule, one.text)))
