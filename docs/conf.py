@@ -31,7 +31,12 @@ OTHERS = (
     "RenderableType",
     "DataFrame",
 )
-INNER = r"(tisim\.(io\.trajectory|io\.recorder|engine\.particle_state|backend\.runtime|steppers\.base|worlds\.program)|optimize\.methods\.\w+)\.\w+"
+INNER = "|".join(
+    (
+        r"tisim\.(io\.(trajectory|recorder)|engine\.particle_state|backend\.runtime)\.\w+",
+        r"(tisim\.(steppers\.base|worlds\.program)|optimize\.methods\.\w+)\.\w+",
+    )
+)
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in OTHERS)]
 
 
