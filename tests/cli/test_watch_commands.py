@@ -129,9 +129,9 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     """The system refuses to let files grow while the run goes on; then there is room again."""
     folder = tmp_path / "out" / "flow"
 
-    def crowded(self, progress=None, steps=None, run=Simulation.run):
-        with files_of_at_most((folder / "trajectory.h5").stat().st_size + 30_000):
-            run(self, progress, steps)
+    def crowded(self, run=Simulation.run, **how):
+        with files_of_at_most((folder / "trajectory.h5").stat().st_size + 60_000):
+            run(self, **how)
 
     with monkeypatch.context() as patch:
         patch.setattr(Simulation, "run", crowded)

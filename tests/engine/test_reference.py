@@ -3,11 +3,13 @@
 import re
 import tomllib
 
+import numpy as np
 import pytest
 
 from tisim import InputError
 from tisim.backend.taichi import ti
 from tisim.components import serialization
+from tisim.components.arrays import Numbers
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.invalid import text_of, unit_of
 from tisim.effects import Force
@@ -18,7 +20,7 @@ ENTRIES = [entry for entry in reference.entries() if entry.kind.__module__.start
 ALL = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
 TABLES = [entry for entry in ENTRIES if entry.toml]
 """Without rows of lists, which stand in the tables of their sources."""
-LISTS = (tuple[float, ...], tuple[float, ...] | None, tuple[Vector, ...])
+LISTS = (tuple[float, ...], tuple[float, ...] | None, tuple[Vector, ...], np.ndarray, Numbers | None)
 PHYSICAL = (float, float | None, Vector, Vector | None, *LISTS)
 
 

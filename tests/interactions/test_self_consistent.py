@@ -53,7 +53,7 @@ class Polarisation(SelfConsistentQuantity):
         return self.chi(w) * s.radius[w, i] ** 3 * field
 
 
-class Pull(Force):
+class TowardsDipole(Force):
     """F = (m . grad) H of the applied field, per unit permeability."""
 
     fields = (DIPOLE,)
@@ -89,7 +89,7 @@ def cloud(seed, n=30, chi=CHI, spread=3.0, **more):
     effects = (
         Ramp(strength=tuple(FIELD), slope=tuple(SLOPE)),
         Polarisation(chi=chi, **more),
-        Pull(),
+        TowardsDipole(),
         DipoleForce(),
     )
     return scene(

@@ -64,7 +64,7 @@ def test_a_result_is_the_same_to_the_bit(ran, tmp_path, world):
     identical(tisim.read(tmp_path), result)
     identical(tisim.read(str(folder.result)), result)
     assert tisim.read(tmp_path / "scene.toml") == result.scene
-    assert tisim.read(tmp_path / "versions.json") == run_folder.versions()
+    assert tisim.read(tmp_path / "versions.json") == {**run_folder.versions(), **result.settings}
 
 
 def test_so_are_one_that_failed_and_one_of_odd_numbers(ran, tmp_path):

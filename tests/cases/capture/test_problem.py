@@ -125,20 +125,20 @@ def test_picture_shows_the_fibres_and_what_they_caught():
     result = outcome_of(scene, caught_by)
     side, front = filters.caught(result).axes
     held = caught_by >= 0
-    assert "25% caught" in side.get_title()
+    assert "25% caught" in side.get_title(loc="left")
     bodies = effect(scene, MagneticCylinders).cylinders
     for axis, k in ((side, 1), (front, 0)):
         boxes = [box.get_bbox() for box in axis.patches]
         corners = [(b.centre[2] - 750e-6, b.centre[k] - 300e-6) for b in bodies]
-        np.testing.assert_allclose([box.min for box in boxes], 1e6 * np.array(corners), atol=1e-6)
-        np.testing.assert_allclose([box.size for box in boxes], [(1500, 600)] * 8)
+        np.testing.assert_allclose([box.min for box in boxes], 1e3 * np.array(corners), atol=1e-9)
+        np.testing.assert_allclose([box.size for box in boxes], [(1.5, 0.6)] * 8)
         for line, (places, which) in zip(
             axis.lines,
             [(result.start, ~held), (result.start, held), (result.state, held)],
             strict=True,
         ):
-            shown = 1e6 * places["position"][which][:, [2, k]]
-            np.testing.assert_allclose(line.get_xydata(), shown, atol=1e-6)
+            shown = 1e3 * places["position"][which][:, [2, k]]
+            np.testing.assert_allclose(line.get_xydata(), shown, atol=1e-9)
     assert [line.get_label() for line in side.lines] == ["passed by", "caught", "where it was caught"]
 
 
