@@ -26,7 +26,14 @@ PRINTED = {"README.md": ["ok=True", "grains, mean radius"], "docs/accuracy.md": 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("page", [page for page, scripts in SCRIPTS.items() if scripts])
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=() if page == "README.md" else pytest.mark.slow)
+        for page, scripts in SCRIPTS.items()
+        if scripts
+    ],
+)
 def test_the_scripts_of_a_page_run_as_they_stand_there(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = {}

@@ -39,7 +39,7 @@ def console(text):
         assert end.value.code == 0, line
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("guide", GUIDES, ids=lambda path: path.stem)
 def test_snippets_run_as_printed(guide, own_file, tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -150,7 +150,7 @@ def captured(variant, designs, starts):
     return np.reshape([filters.captured(result) for result in results], (len(designs), starts))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_hard_magnets_are_best_magnetised_across_in_a_weak_field():
     """A strong one holds the moments of particles where fibres then repel them in places."""
     across = {**FIBRES, "flux": 0.07, "spacing": 3.9, "magnetisation_angle": 90.0}
@@ -160,7 +160,7 @@ def test_hard_magnets_are_best_magnetised_across_in_a_weak_field():
         assert Claim(name, Mean.of(best - other), least=0.03).ok
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_is_in_the_way_is_all_that_is_caught_of_a_fast_flow():
     """The part of the channel's cross-section that fibres cover, none behind another."""
     half = {**FIBRES, "number": 4.0, "speed": 1e-2, "radius": 208.0}
