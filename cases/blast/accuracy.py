@@ -12,7 +12,7 @@ from tisim.scene.initial_state import Arrays
 
 
 def half_axes(state: Arrays) -> np.ndarray:
-    """Of the ellipsoid, along x, y and z, that has the second moments of the cloud: sqrt(5 <r_k^2>). m."""
+    """Half axes, m, of the ellipsoid with the second moments of the cloud: sqrt(5 <r_k^2>) for x, y, z."""
     r = state["position"] - np.average(state["position"], axis=0, weights=state["mass"])
     return np.sqrt(5.0 * np.average(r**2, axis=0, weights=state["mass"]))
 

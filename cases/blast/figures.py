@@ -54,7 +54,7 @@ class BlastHistory:
 
     @classmethod
     def of(cls, found: Frames) -> BlastHistory:
-        """Of all frames, each read once; particles are in the order of their ids in all of them."""
+        """Read the history of all frames, each once; particles are always in the order of their ids."""
         axes, touching, paths, velocities = [], [], [], []
         for frame in found:
             state = frame.arrays

@@ -26,7 +26,7 @@ GENES = tuple(Gene(f"flux_{axis}", "T", -1.0, 1.0) for axis in "xyz")
 
 
 def field(design: Mapping[str, float]) -> np.ndarray:
-    """Of a design, T, shape (3,)."""
+    """Return the magnetic flux density of a design, T, shape (3,)."""
     return np.array([design[gene.name] for gene in GENES])
 
 

@@ -41,7 +41,7 @@ AIR, VISCOSITY = 1.225, 1.8e-5
 """Density of air, kg/m^3, and its viscosity, Pa s (Z16 sections 4.2 and 6.1)."""
 MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
 SPEED = float(np.sqrt(2 * ENERGY / (NUMBER * MASS)))
-"""Of every particle at the start, m/s (Z16 3.4)."""
+"""The speed of every particle at the start, m/s (Z16 3.4)."""
 
 NEIGHBOURS = 3 * RADIUS
 """Distance within which the size "clumps" has a near field, m: half a diameter between surfaces."""

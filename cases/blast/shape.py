@@ -27,7 +27,7 @@ def moments(state: Arrays) -> np.ndarray:
 
 
 def principal_half_axes(tensor: np.ndarray) -> np.ndarray:
-    """Of the full ellipsoid with these second moments, longest first: sqrt(5 eigenvalue), m."""
+    """Half axes of the full ellipsoid with these second moments, longest first: sqrt(5 eigenvalue), m."""
     return np.sqrt(5.0 * np.linalg.eigvalsh(tensor)[::-1])
 
 

@@ -29,7 +29,7 @@ from tisim.engine.batches import Progress, share
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
 REPEATS = 10
-"""Of a setting; the checks take more."""
+"""Repeats of a setting; the checks take more."""
 TIMES = np.linspace(0.0, capture.DURATION, 101)
 """s, of the curves."""
 SOME = (50, 125, 212)
