@@ -22,7 +22,8 @@ from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.sources import Cylinder, MagneticCylinders
-from tisim.worlds.parameter_table import ParameterTable, connect
+from tisim.worlds.bound import connected
+from tisim.worlds.parameter_table import ParameterTable
 
 RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 
@@ -53,10 +54,9 @@ def bound(digits):
         cylinders=[Cylinder(radius=RADIUS, length=LENGTH, magnetisation=M)], table_digits=digits
     )
     table = ParameterTable([source], 1, runtime.current().real)
-    made = table.bind(source)
-    connect([made])
+    (magnets,) = connected([table.bind(source)])
     table.write([[source]])
-    return made
+    return magnets
 
 
 def relative(found, expected):

@@ -5,7 +5,8 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds.parameter_table import ParameterTable, connect
+from tisim.worlds.bound import connected
+from tisim.worlds.parameter_table import ParameterTable
 
 WORLDS = 4
 _bound: dict = {}
@@ -29,8 +30,7 @@ def fields(sources, points):
     key = (runtime.generation(), sources[0].structure())
     if key not in _bound:
         table = ParameterTable(sources[:1], WORLDS, runtime.current().real)
-        _bound[key] = table, table.bind(sources[0])
-        connect([_bound[key][1]])
+        _bound[key] = table, *connected([table.bind(sources[0])])
     table, source = _bound[key]
     table.write([[one] for one in sources])
     points = np.asarray(points, dtype=float)

@@ -10,7 +10,7 @@ from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import Scene
 from tisim.backend.taichi import ti
 from tisim.effects import parameter
-from tisim.steppers import Controller, Stepper
+from tisim.steppers import Controller, Step, Stepper
 from tisim.worlds.program import PerParticle, Phase, Repeat
 from tisim.worlds.state import Field
 
@@ -18,8 +18,8 @@ from tisim.worlds.state import Field
 class Begin(Phase):
     """A step of the controller's length, cut at the end."""
 
-    def __init__(self, parts) -> None:
-        self.s, self.control = parts.s, parts.control
+    def __init__(self, context) -> None:
+        self.s, self.control = context.s, context.control
 
     @ti.func
     def run(self, w, _k):
@@ -43,9 +43,9 @@ class Keep(PerParticle):
 class Correct(PerParticle):
     """v' = v + dt/m (F + F')/2, r' = r + dt (v + v')/2. Lists and forces want places inside the domain."""
 
-    def __init__(self, parts) -> None:
-        super().__init__(parts.s)
-        self.domain = parts.domain
+    def __init__(self, context) -> None:
+        super().__init__(context.s)
+        self.domain = context.domain
 
     @ti.func
     def run(self, w, i):
@@ -62,8 +62,9 @@ class Correct(PerParticle):
 class Judge(Phase):
     """Once more while anything moves; a list of pairs is made anew every time."""
 
-    def __init__(self, parts, tolerance) -> None:
-        self.s, self.near, self.lists, self.tolerance = parts.s, parts.near, bool(parts.lists), tolerance
+    def __init__(self, context) -> None:
+        self.s, self.tolerance = context.s, context.stepper.tolerance
+        self.neighbour_list, self.lists = context.neighbour_list, bool(context.update_lists)
 
     @ti.func
     def run(self, w, _k):
@@ -72,7 +73,7 @@ class Judge(Phase):
         s.unsolved[w] = ti.select(s.largest_change[w] > self.tolerance(w), 1.0, 0.0)
         s.largest_change[w] = 0.0
         if ti.static(self.lists):
-            self.near.stale[w] = 1
+            self.neighbour_list.stale[w] = 1
 
 
 class Iteration(Repeat):
@@ -100,9 +101,9 @@ class Implicit(Stepper):
             Field("force_before", "N", 3, "keep"),
         )
 
-    def step(self, parts):
-        s, judge = parts.s, Judge(parts, self.tolerance)
-        return (Begin(parts), Keep(s), Iteration(s, (*parts.lists, *parts.forces, Correct(parts), judge)))
+    def step(self, context):
+        correct = (*context.update_lists, *context.sum_forces, Correct(context), Judge(context))
+        return Step((Begin(context), Keep(context.s), Iteration(context.s, correct)))
 
 
 def implicit(made: Scene, **more) -> Scene:

@@ -1,6 +1,6 @@
 """The only import of Taichi, or of its maintained fork Quadrants when TISIM_BACKEND=quadrants.
 
-Everything else writes ``from tisim._taichi import ti``. Only what both packages offer is used.
+Everything else writes ``from tisim.backend.taichi import ti``. Only what both packages offer is used.
 """
 
 from __future__ import annotations
@@ -51,4 +51,10 @@ class _Probe:
 DEVICE_FUNCTION: type = type(_Probe.__dict__["function"])
 """The type of a method decorated with ``ti.func`` (the packages differ); validated models let it pass."""
 
-__all__ = ["BACKEND", "DEVICE_FUNCTION", "check_backend", "ti"]
+
+def is_device_function(value: object) -> bool:
+    """Whether this is a function decorated with ``ti.func``."""
+    return bool(getattr(value, f"_is_{ti.__name__}_function", False))
+
+
+__all__ = ["BACKEND", "DEVICE_FUNCTION", "check_backend", "is_device_function", "ti"]

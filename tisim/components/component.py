@@ -158,10 +158,6 @@ class Component(Checked):
         compiled, so of the options that are no parameters. By name, of shape (rows, columns)."""
         return {}
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        """Attributes to set on the bound copy, chosen among the bound effects of the scene."""
-        return {}
-
     contract: ClassVar[bool] = False
     """Set by a class that is no part of a scene itself, only what parts are made after."""
     requires: ClassVar[tuple[type[Component], ...]] = ()

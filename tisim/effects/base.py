@@ -23,8 +23,9 @@ Rules
 8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
    exclusive access to both, earliest first (see collision_rounds.py); it may remove either.
-10. ``connect`` returns what an effect wants to know of the other bound effects; ``requires`` names the
-    effects without which it means nothing. The driver never asks what an effect is called.
+10. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
+    ``requires`` names the effects without which it means nothing. The driver never asks what an effect is
+    called.
 11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may
     ever live at once, given the start.
 12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
@@ -42,6 +43,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, option, parameter
+from tisim.worlds.bound import Peers
 from tisim.worlds.state import Field
 
 __all__ = [
@@ -92,6 +94,10 @@ class Effect(Component):
     def required_fields(self) -> tuple[str | Field, ...]:
         """Return the particle fields that it needs, given its options; by default all of ``fields``."""
         return self.fields
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        """Return attributes to set on its bound object, chosen among the bound effects of the scene."""
+        return {}
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""
@@ -173,7 +179,6 @@ class PairForce(Pairwise):
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
     memory: ClassVar[int] = 0
-    past: ClassVar[Any] = None
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

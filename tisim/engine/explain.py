@@ -122,8 +122,8 @@ def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
     yield Memory("parameter table", simulation.worlds * simulation.table.slots * real, "effects' parameters")
     if simulation.table.array_bytes:
         yield Memory("tables, of all worlds", simulation.table.array_bytes, "effects that look numbers up")
-    for part, name, why in simulation.made.memory:
-        yield Memory(name, part.bytes(), why)
+    for buffer in simulation.made.buffers:
+        yield Memory(buffer.what, buffer.memory.bytes(), buffer.why)
 
 
 def _needs(kind: type[Effect]) -> list[str]:

@@ -21,7 +21,8 @@ from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.parameter_table import ParameterTable, connect
+from tisim.worlds.bound import connected
+from tisim.worlds.parameter_table import ParameterTable
 from tisim.worlds.program import Nest, Program
 from tisim.worlds.state import NEVER, State, WorldStatus, resolve_fields
 
@@ -79,8 +80,7 @@ class Simulation:
         parts = self._parts(scene)
         self.table = ParameterTable(parts, worlds, self.runtime.real)
         *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
-        connect(effects)
-        self.made = Assembly(self.s, stepper, tuple(effects), domain, control)
+        self.made = Assembly(self.s, connected(effects), stepper, domain, control)
 
     @staticmethod
     def _parts(scene: Scene) -> list[Any]:
@@ -153,8 +153,8 @@ class Simulation:
 
     def forget_lists(self) -> None:
         """Pair lists are made anew before they are used again."""
-        if self.made.near is not None:
-            self.made.near.forget()
+        if self.made.neighbour_list is not None:
+            self.made.neighbour_list.forget()
 
     def run(
         self,

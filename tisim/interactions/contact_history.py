@@ -9,6 +9,7 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import PairForce
 from tisim.neighbours.full_list import FullNeighbourList
+from tisim.worlds.bound import Bound
 from tisim.worlds.program import PerParticle
 from tisim.worlds.state import Field, State, WorldStatus
 
@@ -81,7 +82,9 @@ class UpdateContactHistory(PerParticle):
     """Bring up to date what each particle keeps for one effect: pairs that go on touching, then those that
     no longer do, which are forgotten, and last those that have just met."""
 
-    def __init__(self, s: State, domain: Domain, effect: PairForce, full_list: FullNeighbourList) -> None:
+    def __init__(
+        self, s: State, domain: Bound[Domain], effect: Bound[PairForce], full_list: FullNeighbourList
+    ) -> None:
         super().__init__(s)
         self.domain, self.effect, self.full_list = domain, effect, full_list
         self.history = effect.past

@@ -1,9 +1,9 @@
-"""Quantities of particles that are settled before forces are summed (effect.Settled)."""
+"""Quantities of particles that are set before forces are summed (``DerivedQuantity``)."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import DerivedQuantity
+from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle
 from tisim.worlds.state import State
 
@@ -37,11 +37,13 @@ def _same(vector):
 class DerivedSolver:
     """A quantity that follows from what a particle is and where: nothing of the others, and no memory."""
 
-    def __init__(self, s: State, effect: DerivedQuantity) -> None:
+    def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect = s, effect
         declared = [f.components for f in s.fields if f.name == effect.quantity]
         if not declared:
-            raise TypeError(f"{type(effect).__name__}.fields must name its quantity, {effect.quantity!r}")
+            raise TypeError(
+                f"{type(effect.data).__name__}.fields must name its quantity, {effect.quantity!r}"
+            )
         self.value, self.components = getattr(s, effect.quantity), declared[0]
         vector = self.components == 3
         self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)

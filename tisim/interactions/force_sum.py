@@ -1,21 +1,27 @@
 """Force and torque on every particle."""
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.effects.base import Force, PairForce
+from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
 from tisim.neighbours.full_list import FullNeighbourList
+from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.state import Field, State, WorldStatus
 
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
 
 
-def turning(forces: tuple[Force, ...], pair_forces: tuple[PairForce, ...]) -> bool:
-    """Whether any of these exerts torques."""
-    return any(e.offers("torque") for e in forces) or any(e.offers("pair_torque") for e in pair_forces)
+def turning(effects: Sequence[Effect]) -> bool:
+    """Return whether any of these exerts torques."""
+    return any(
+        effect.offers("torque" if isinstance(effect, Force) else "pair_torque")
+        for effect in effects
+        if isinstance(effect, Force | PairForce)
+    )
 
 
 @ti.func
@@ -40,15 +46,15 @@ class SumForces(PairSum):
     def __init__(
         self,
         s: State,
-        domain: Domain,
-        forces: tuple[Force, ...],
-        pair_forces: tuple[PairForce, ...],
+        domain: Bound[Domain],
+        effects: Peers,
         full_list: FullNeighbourList | None,
         derived_solvers: tuple[Any, ...],
     ) -> None:
-        super().__init__(s, domain, pair_forces, full_list)
-        self.forces, self.pair_forces, self.derived_solvers = forces, pair_forces, derived_solvers
-        self.turning = turning(forces, pair_forces)
+        self.forces, self.pair_forces = effects.of(Force), effects.of(PairForce)
+        super().__init__(s, domain, self.pair_forces, full_list)
+        self.derived_solvers = derived_solvers
+        self.turning = turning([effect.data for effect in effects])
         self.fixes = any(field.name == "fixed" for field in s.fields)
         self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
 

@@ -12,6 +12,7 @@ from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.neighbours.full_list import FullNeighbourList
+from tisim.worlds.bound import Bound
 from tisim.worlds.program import PerParticle
 from tisim.worlds.state import State
 
@@ -35,7 +36,7 @@ class PairSum(PerParticle):
     components: int = 3
 
     def __init__(
-        self, s: State, domain: Domain, effects: Sequence[Any], full_list: FullNeighbourList | None
+        self, s: State, domain: Bound[Domain], effects: Sequence[Any], full_list: FullNeighbourList | None
     ) -> None:
         super().__init__(s)
         self.domain, self.full_list = domain, full_list

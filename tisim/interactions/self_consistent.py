@@ -1,4 +1,5 @@
-"""Sweeps that settle a quantity which particles give each other, such as induced dipoles (effect.Mutual)."""
+"""Sweeps that solve for a quantity which particles give each other, such as induced dipoles
+(``SelfConsistentQuantity``)."""
 
 from typing import Any, ClassVar
 
@@ -11,6 +12,7 @@ from tisim.effects.base import DerivedQuantity, SelfConsistentQuantity
 from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.pair_sum import PairSum
 from tisim.neighbours.full_list import FullNeighbourList
+from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State, WorldStatus
 
@@ -24,10 +26,12 @@ class SelfConsistentSolver(DerivedSolver):
     changes : the largest of a particle in this sweep, the last, and the one before.
     """
 
-    effect: SelfConsistentQuantity
-
     def __init__(
-        self, s: State, effect: SelfConsistentQuantity, domain: Domain, full_list: FullNeighbourList | None
+        self,
+        s: State,
+        effect: Bound[Any],
+        domain: Bound[Domain],
+        full_list: FullNeighbourList | None,
     ) -> None:
         super().__init__(s, effect)
         self.domain, self.full_list = domain, full_list
@@ -178,10 +182,12 @@ class JudgeSweep(Phase):
         a.again[w], a.largest[w] = 0, 0.0
 
 
-def solver(s: State, effect: DerivedQuantity, domain: Domain, full_list: FullNeighbourList | None) -> Any:
-    """What settles the quantity of an effect."""
+def solver(
+    s: State, effect: Bound[DerivedQuantity], domain: Bound[Domain], full_list: FullNeighbourList | None
+) -> DerivedSolver:
+    """Return what solves for the quantity of an effect."""
     return (
         SelfConsistentSolver(s, effect, domain, full_list)
-        if isinstance(effect, SelfConsistentQuantity)
+        if isinstance(effect.data, SelfConsistentQuantity)
         else DerivedSolver(s, effect)
     )

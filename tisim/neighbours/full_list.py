@@ -16,29 +16,28 @@ from tisim.worlds.program import PerParticle, Phase
 class FullNeighbourList:
     """Both halves of the neighbours of every particle."""
 
-    def __init__(self, near: NeighbourList) -> None:
-        self.near, self.s = near, near.s
+    def __init__(self, neighbour_list: NeighbourList) -> None:
+        self.neighbour_list, self.s = neighbour_list, neighbour_list.s
         self.larger, self.found = ti.field(ti.i32), ti.field(ti.i32)
         builder = ti.FieldsBuilder()
-        builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).place(self.found)
-        builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity).dense(ti.k, near.room).place(
-            self.larger
-        )
+        particles = builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity)
+        particles.place(self.found)
+        particles.dense(ti.k, neighbour_list.room).place(self.larger)
         self.tree = Tree(builder)
 
     def phases(self) -> tuple[Phase, ...]:
         """Bring both halves up to date where it is due."""
-        *others, last = list_phases(self.near)
+        *others, last = list_phases(self.neighbour_list)
         return (*others, ClearReverseList(self), BuildReverseList(self), SortNeighbours(self), last)
 
     def bytes(self) -> int:
         """Device memory, in bytes."""
-        return 4 * self.s.worlds * self.s.capacity * (1 + self.near.room)
+        return 4 * self.s.worlds * self.s.capacity * (1 + self.neighbour_list.room)
 
     @ti.func
     def size(self, w, i):
         """How many candidates ``candidate`` offers particle i."""
-        return self.near.size(w, i) + self.others(w, i)
+        return self.neighbour_list.size(w, i) + self.others(w, i)
 
     @ti.func
     def candidate(self, w, i, k):
@@ -46,9 +45,9 @@ class FullNeighbourList:
 
         One loop over both halves: what is done with a pair is compiled once.
         """
-        j, own = 0, self.near.size(w, i)
+        j, own = 0, self.neighbour_list.size(w, i)
         if k < own:
-            j = self.near.candidate(w, i, k)
+            j = self.neighbour_list.candidate(w, i, k)
         if k >= own:
             j = self.owner(w, i, k - own)
         return j
@@ -57,7 +56,7 @@ class FullNeighbourList:
     def others(self, w, i):
         """How many candidates ``owner`` offers particle i."""
         n = self.s.count[w]
-        if n > self.near.small and self.found[w, i] >= 0:
+        if n > self.neighbour_list.small and self.found[w, i] >= 0:
             n = self.found[w, i]
         return n
 
@@ -65,9 +64,9 @@ class FullNeighbourList:
     def owner(self, w, i, k):
         """The k-th particle that may be a neighbour and own the pair; i itself where there is none."""
         j = k
-        if self.s.count[w] > self.near.small and self.found[w, i] >= 0:
+        if self.s.count[w] > self.neighbour_list.small and self.found[w, i] >= 0:
             j = self.larger[w, i, k]
-        elif k == i or not self.near.owns(w, k, i):
+        elif k == i or not self.neighbour_list.owns(w, k, i):
             j = i
         return j
 
@@ -83,7 +82,7 @@ class WhenListIsDue(PerParticle):
 
     @ti.func
     def when(self, w):
-        return self.m.near.stale[w] > 0 and self.s.count[w] > self.m.near.small
+        return self.m.neighbour_list.stale[w] > 0 and self.s.count[w] > self.m.neighbour_list.small
 
 
 class ClearReverseList(WhenListIsDue):
@@ -99,7 +98,7 @@ class BuildReverseList(WhenListIsDue):
 
     @ti.func
     def run(self, w, i):
-        n, m = self.m.near, self.m
+        n, m = self.m.neighbour_list, self.m
         for k in range(n.size(w, i)):
             j = n.candidate(w, i, k)
             if j != i:
@@ -113,7 +112,7 @@ class SortNeighbours(WhenListIsDue):
 
     @ti.func
     def run(self, w, i):
-        n, m = self.m.near, self.m
+        n, m = self.m.neighbour_list, self.m
         self.order(n.other, w, i, n.listed[w, i])
         if m.found[w, i] > n.room:
             m.found[w, i] = -1

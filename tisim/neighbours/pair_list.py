@@ -13,7 +13,8 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
-from tisim.effects.base import PairForce
+from tisim.effects.base import Pairwise
+from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
 SMALL = 48
@@ -31,7 +32,9 @@ CELLS_PER_PARTICLE = 2
 class NeighbourList:
     """The pair list of every world."""
 
-    def __init__(self, s: State, domain: Domain, short_ranged: tuple[PairForce, ...] = ()) -> None:
+    def __init__(
+        self, s: State, domain: Bound[Domain], short_ranged: tuple[Bound[Pairwise], ...] = ()
+    ) -> None:
         self.short_ranged = short_ranged
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity

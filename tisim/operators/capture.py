@@ -8,6 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import PairEvent
 from tisim.operators.base import Operator
 from tisim.sources.magnetic.magnets import Magnets
+from tisim.worlds.bound import Peers
 from tisim.worlds.state import Field
 
 
@@ -34,21 +35,21 @@ class Capture(Operator):
     requires: ClassVar = (Magnets,)
     excludes: ClassVar = (PairEvent,)
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        return {"bodies": tuple(peer.bodies() for peer in peers if isinstance(peer, Magnets))}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"magnets": peers.of(Magnets)}
 
     @ti.func
     def particle(self, s, w, i, t, dt):
         if s.fixed[w, i] == 0:
             r, radius = s.position[w, i], s.radius[w, i]
             before, by, least, place = 0, -1, radius, r
-            for bodies in ti.static(self.bodies):
-                for k in range(bodies.size(w)):
-                    distance, normal = bodies.nearest(w, k, r)
+            for magnets in ti.static(self.magnets):
+                for k in range(magnets.each.size(w)):
+                    distance, normal = magnets.each.nearest(w, k, r)
                     if distance <= least:
                         least, by = distance, before + k
                         place = r + (radius - distance) * normal
-                before += bodies.size(w)
+                before += magnets.each.size(w)
             if by >= 0:
                 s.fixed[w, i] = 1
                 s.captured_by[w, i] = by

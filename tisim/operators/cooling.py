@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, parameter
 from tisim.effects.impact.heating import Heating
 from tisim.operators.base import Operator
+from tisim.worlds.bound import Peers
 from tisim.worlds.state import Field
 
 STEFAN_BOLTZMANN = 5.670374419e-8
@@ -40,8 +41,8 @@ class Cooling(Operator):
     convection: float = parameter("W/(m^2 K)", "coefficient h_c of heat transfer by convection", 0.0, ge=0)
     gas: float = parameter("K", "temperature T_gas of the gas", 300.0, ge=0)
 
-    def connect(self, peers):
-        return {"heating": next(peer for peer in peers if isinstance(peer, Heating))}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"heating": peers.of(Heating)[0]}
 
     @ti.func
     def particle(self, s, w, i, t, dt):

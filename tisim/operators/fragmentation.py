@@ -10,6 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import Impact, ImpactLaw
 from tisim.operators.base import Operator, parameter
+from tisim.worlds.bound import Peers
 from tisim.worlds.state import Field, WorldStatus
 
 
@@ -59,8 +60,8 @@ class Fragmentation(ImpactLaw, Operator):
     def _grain(self, masses: np.ndarray) -> float:
         return float(masses.min()) if self.grain_mass is None else self.grain_mass
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        return {"heating": tuple(peer for peer in peers if isinstance(peer, Heating))}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"heating": peers.of(Heating)}
 
     @ti.func
     def fracture(self, s, w, i, absorbed):

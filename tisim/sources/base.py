@@ -6,10 +6,11 @@ A source is an effect (see tisim/effects/base.py) that writes nothing. Whoever f
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
+from tisim.worlds.bound import Bound, Peers
 
 __all__ = ["Source", "option", "parameter", "sources"]
 
@@ -40,6 +41,6 @@ class Source(Effect):
         return self.value(w, r, t), self.gradient(w, r, t)
 
 
-def sources(peers: tuple[Any, ...], quantity: str) -> tuple[Any, ...]:
+def sources(peers: Peers, quantity: str) -> tuple[Bound[Source], ...]:
     """Return the sources of a quantity among the bound effects of a scene, for ``connect``."""
-    return tuple(peer for peer in peers if isinstance(peer, Source) and peer.quantity == quantity)
+    return tuple(source for source in peers.of(Source) if source.data.quantity == quantity)

@@ -13,14 +13,15 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import Effect
 from tisim.errors import must
 from tisim.sources.base import Source
-from tisim.worlds.parameter_table import ParameterTable, connect
+from tisim.worlds.bound import Peers, connected
+from tisim.worlds.parameter_table import ParameterTable
 
 
 @ti.data_oriented
 class _Sum:
     """The sum of bound sources."""
 
-    def __init__(self, fields: tuple[Source, ...]) -> None:
+    def __init__(self, fields: Peers) -> None:
         self.fields = fields
 
     @ti.kernel
@@ -61,8 +62,7 @@ def sample(
 def _sample(given: Sequence[Source], real: Any, time: float, places: np.ndarray, out: np.ndarray) -> None:
     with collected() as trees:
         table = ParameterTable(given, 1, real)
-        bound = tuple(table.bind(source) for source in given)
-        connect(bound)
+        bound = connected([table.bind(source) for source in given])
         table.write([given])
         _Sum(bound).at(time, places, out)
     for tree in trees:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from tisim.components.component import Component, option
@@ -12,44 +11,9 @@ from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, Effect, Force, SelfConsistentQuantity
 from tisim.errors import must
 from tisim.sources.base import Source
+from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import MOST_STEPS, StepControl
-from tisim.worlds.program import Item
-from tisim.worlds.state import Field, State
-
-
-@dataclass(frozen=True)
-class Parts:
-    """What a stepper makes a step of. All are bound to the state; a tuple is empty where nothing is to do.
-
-    control : decides how long the next step may be. domain, operators, near : as bound; near is None
-    without a pair list. singles : forces on single particles. sources : external fields. forced, turning :
-    whether there are forces, and torques. independent : whether the stepper may take each particle by itself.
-    owned : memory that the stepper has allocated, what it is, and for what; it adds to the list.
-
-    lists : bring the pair lists up to date with the positions. remember : bring up to date what touching
-    pairs remember, over ``dt``; once a step. forces : settle what is to be settled, and sum force and torque
-    of the trial state; trial_forces : the same for a state that may be far from any solution, where a force
-    that is not finite is the stepper's to deal with. Lists and forces may stand in an iteration, a
-    ``Repeat``; positions must lie in the domain. summed : the sum itself, for particles by themselves, and to
-    find out which force is at fault.
-    """
-
-    s: State
-    control: Any
-    domain: Any
-    operators: tuple[Any, ...]
-    near: Any
-    lists: tuple[Item, ...]
-    remember: tuple[Item, ...]
-    forces: tuple[Item, ...]
-    trial_forces: tuple[Item, ...]
-    summed: Any
-    singles: tuple[Any, ...]
-    sources: tuple[Any, ...]
-    forced: bool
-    turning: bool
-    independent: bool
-    owned: list[tuple[Any, str, str]] = field(default_factory=list)
+from tisim.worlds.state import Field
 
 
 def single(effect: Effect) -> bool:
@@ -62,16 +26,17 @@ def single(effect: Effect) -> bool:
 class Stepper(Component):
     """A stepper says how time advances, and its control how long the next step is: the contract of both.
 
-    As with effects, in a kernel a parameter is a function of the world. Before the first step ``force`` and
-    ``torque`` are those of the start.
+    Before the first step ``force`` and ``torque`` are those of the start.
 
-    counters : names of the counters that it keeps of a world. world_quantities : names of the quantities that
-    it keeps of a world. random : whether it draws random numbers, so that only statistics converge.
+    counters, world_quantities, flags : names of what it keeps of a world, ``s.NAME[w]``: counters of events
+    (i64), which a Result gives back, quantities (f64) and integers (i32), 0 at the start. random : whether it
+    draws random numbers, so that only statistics converge.
     """
 
     contract: ClassVar[bool] = True
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
+    flags: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
     control: StepControl = option("step control, which chooses the length of the next step")
 
@@ -126,13 +91,14 @@ class Stepper(Component):
         do not feel each other (``independent``)."""
         return ()
 
-    def step(self, parts: Parts) -> tuple[Item, ...]:
+    def step(self, context: StepContext) -> Step:
         """Return the items of a step, up to pair events and what operators do to the world as a whole.
 
         They set ``dt`` and move ``time`` on, to ``end`` at most; count ``steps`` and ``particle_steps``; set
-        ``events`` to 0; once the controller has been asked, set ``approach_time`` to infinity and ``fastest``
-        to 0, for its notes on the next step; call ``particle`` of each operator; put back into the domain
-        what has left it; and say how far particles have moved: ``displacement`` relative to the frame, then
-        ``near.moved(w)``, or simply ``near.stale[w] = 1``. Verlet is a pattern.
+        ``events`` to 0; once the control has been asked, set ``approach_time`` to infinity and ``fastest`` to
+        0, for its notes on the next step; call ``particle`` of each operator; put back into the domain what
+        has left it; and say how far particles have moved: ``displacement`` relative to the frame, then
+        ``neighbour_list.moved(w)``, or simply ``neighbour_list.stale[w] = 1``. Verlet is a pattern. In
+        kernels a parameter of the stepper is read of ``context.stepper``.
         """
         raise NotImplementedError(f"{type(self).__name__} must define step")

@@ -7,11 +7,18 @@ from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force
 from tisim.interactions.force_sum import FORCE
-from tisim.steppers.base import Parts, Stepper
-from tisim.steppers.common import Arrive, BeginStep, Listen, Operate, apply_displacement
+from tisim.steppers.base import Stepper
+from tisim.steppers.common import (
+    AdvanceClock,
+    BeginStep,
+    apply_displacement,
+    apply_operators,
+    report_displacement,
+)
+from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.step_control import Controller, FixedStep
-from tisim.worlds.program import Item, PerParticle, Phase
+from tisim.worlds.program import PerParticle, Phase
 from tisim.worlds.state import Field
 
 
@@ -41,20 +48,18 @@ class Boris(Stepper):
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         return (FORCE,)
 
-    def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, near = parts.s, parts.near
-        listen = (Listen(parts),) if near else ()
-        first, second = (BorisDrift(parts), *listen), (BorisDrift(parts), *listen)
-        kick = (*parts.lists, *parts.remember, *parts.forces, BorisRotation(parts))
-        operate = (Operate(parts), *listen) if parts.operators else ()
-        return (BeginStep(s, parts.control, near), Middle(s), *first, *kick, *second, *operate, Arrive(s))
+    def step(self, context: StepContext) -> Step:
+        drift = (BorisDrift(context), *report_displacement(context))
+        kick = (*context.update_lists, *context.update_history, *context.sum_forces, BorisRotation(context))
+        end = (*apply_operators(context), AdvanceClock(context))
+        return Step((BeginStep(context), Middle(context), *drift, *kick, *drift, *end))
 
 
 class Middle(Phase):
     """Forces are those at the middle of the step."""
 
-    def __init__(self, s) -> None:
-        self.s = s
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
 
     @ti.func
     def run(self, w, _k):
@@ -66,9 +71,9 @@ class Middle(Phase):
 class BorisDrift(PerParticle):
     """r += dt/2 v."""
 
-    def __init__(self, parts) -> None:
-        super().__init__(parts.s)
-        self.domain = parts.domain
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.domain = context.domain
 
     @ti.func
     def run(self, w, i):
@@ -81,9 +86,9 @@ class BorisDrift(PerParticle):
 class BorisRotation(PerParticle):
     """v- to v+ to v', with the forces at the middle of the step."""
 
-    def __init__(self, parts) -> None:
-        super().__init__(parts.s)
-        self.linear, self.turning = with_jacobian(parts.singles), parts.turning
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.linear, self.turning = with_jacobian(context.single_forces), context.turning
 
     @ti.func
     def run(self, w, i):

@@ -1,6 +1,7 @@
 """Phases that several steppers have in common."""
 
 from tisim.backend.taichi import ti
+from tisim.steppers.context import StepContext
 from tisim.worlds.program import PerParticle, Phase
 from tisim.worlds.state import WorldStatus
 
@@ -32,16 +33,17 @@ def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type
 class BeginStep(Phase):
     """Choose the step; the last one ends exactly on time."""
 
-    def __init__(self, s, controller, near) -> None:
-        self.s, self.controller, self.near, self.lists = s, controller, near, near is not None
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.control = context.s, context.control
+        self.neighbour_list, self.lists = context.neighbour_list, context.neighbour_list is not None
 
     @ti.func
     def run(self, w, _k):
         s = self.s
         horizon = ti.cast(0.0, s.real)
         if ti.static(self.lists):
-            horizon = self.near.sure(w)
-        dt = self.controller.next(s, w, horizon)
+            horizon = self.neighbour_list.sure(w)
+        dt = self.control.next(s, w, horizon)
         left = s.end[w] - s.time[w]
         # A remainder as small as rounding leaves is not worth a step of its own.
         if dt * (1.0 + 1e-6) >= left:
@@ -68,25 +70,25 @@ def advance_clock(s, w):
         s.time[w], s.time_carry[w] = s.end[w], 0.0
 
 
-class Listen(Phase):
-    """Tell the pair lists how far particles have moved."""
+class ReportDisplacement(Phase):
+    """Tell the neighbour lists how far particles have moved."""
 
-    def __init__(self, parts) -> None:
-        self.s, self.near = parts.s, parts.near
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.neighbour_list = context.s, context.neighbour_list
 
     @ti.func
     def run(self, w, _k):
-        self.near.moved(w)
+        self.neighbour_list.moved(w)
         for k in ti.static(range(3)):
             self.s.displacement[w, k] = 0.0
 
 
-class Operate(PerParticle):
+class ApplyOperators(PerParticle):
     """What operators do to single particles after the step, which began at ``time_before``."""
 
-    def __init__(self, parts) -> None:
-        super().__init__(parts.s)
-        self.domain, self.operators = parts.domain, parts.operators
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.domain, self.operators = context.domain, context.operators
 
     @ti.func
     def run(self, w, i):
@@ -99,11 +101,11 @@ class Operate(PerParticle):
         apply_displacement(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)
 
 
-class Arrive(Phase):
+class AdvanceClock(Phase):
     """The step is done: time, which was that of a trial state, moves on from where the step began."""
 
-    def __init__(self, s) -> None:
-        self.s = s
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
 
     @ti.func
     def run(self, w, _k):
@@ -121,3 +123,13 @@ class FinishStep(Phase):
     def run(self, w, _k):
         if self.s.time[w] >= self.s.end[w]:
             ti.atomic_max(self.s.status[w], WorldStatus.ENDED)
+
+
+def report_displacement(context: StepContext) -> tuple[Phase, ...]:
+    """Return the phase that does so, where there are neighbour lists."""
+    return (ReportDisplacement(context),) if context.neighbour_list else ()
+
+
+def apply_operators(context: StepContext) -> tuple[Phase, ...]:
+    """Return the phases that let operators act on single particles, where there are operators."""
+    return (ApplyOperators(context), *report_displacement(context)) if context.operators else ()

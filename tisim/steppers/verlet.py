@@ -10,10 +10,11 @@ from typing import Self
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairEvent
-from tisim.steppers.base import Parts, Stepper
+from tisim.steppers.base import Stepper
 from tisim.steppers.common import BeginStep, advance_clock, apply_displacement
+from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
-from tisim.worlds.program import Item, PerParticle, Phase
+from tisim.worlds.program import PerParticle, Phase
 
 
 class Verlet(Stepper):
@@ -37,12 +38,10 @@ class Verlet(Stepper):
         events = any(isinstance(effect, PairEvent) for effect in effects)
         return (cls(control=FixedStep(dt=dt)), *((cls(),) if events else ()))
 
-    def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, near, forced = parts.s, parts.near, parts.forced
-        drift = Move(s, parts.domain, parts.operators, forced, parts.turning)
-        kick = (Kick(s, parts.turning),) if forced else ()
-        start = (BeginStep(s, parts.control, near), drift, Advance(s, near))
-        return (*start, *parts.lists, *parts.remember, *parts.forces, *kick)
+    def step(self, context: StepContext) -> Step:
+        kick = (Kick(context),) if context.forced else ()
+        drift = (BeginStep(context), Move(context), Advance(context))
+        return Step((*drift, *context.update_lists, *context.update_history, *context.sum_forces, *kick))
 
 
 @ti.func
@@ -57,9 +56,10 @@ def half_kick(s, w, i, turning: ti.template()):  # type: ignore[valid-type]
 class Move(PerParticle):
     """Kick, drift, wrap, and what operators do to single particles."""
 
-    def __init__(self, s, domain, operators, forced: bool, turning: bool) -> None:
-        super().__init__(s)
-        self.domain, self.operators, self.forced, self.turning = domain, operators, forced, turning
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.domain, self.operators = context.domain, context.operators
+        self.forced, self.turning = context.forced, context.turning
 
     @ti.func
     def run(self, w, i):
@@ -81,9 +81,9 @@ class Move(PerParticle):
 class Kick(PerParticle):
     """The second half of the kick."""
 
-    def __init__(self, s, turning: bool) -> None:
-        super().__init__(s)
-        self.turning = turning
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.turning = context.turning
 
     @ti.func
     def run(self, w, i):
@@ -93,11 +93,12 @@ class Kick(PerParticle):
 class Advance(Phase):
     """Time moves on, and pair lists hear how far particles have moved."""
 
-    def __init__(self, s, near) -> None:
-        self.s, self.near, self.lists = s, near, near is not None
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.neighbour_list = context.s, context.neighbour_list
+        self.lists = context.neighbour_list is not None
 
     @ti.func
     def run(self, w, _k):
         advance_clock(self.s, w)
         if ti.static(self.lists):
-            self.near.moved(w)
+            self.neighbour_list.moved(w)

@@ -1,6 +1,6 @@
 """From plain data to what kernels see: one parameter table for all worlds.
 
-A bound copy of a Component has, in place of each parameter, a function of the world that reads the table. So
+A bound part (see bound.py) has, in place of each parameter, a function of the world that reads the table. So
 a kernel written ``self.hardness(w)`` sees the value of world w, and loading other designs changes numbers in
 a table, not code.
 """
@@ -8,7 +8,7 @@ a table, not code.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.component import Component, room
 from tisim.errors import must
-
-Part = TypeVar("Part", bound=Component)
+from tisim.worlds.bound import Bound, Kind
 
 
 def _reader(table: Any, slot: int, size: int) -> Any:
@@ -97,18 +96,18 @@ class ParameterTable:
         self.trees = [Tree(builder)]
         self._next, self.array_bytes = 0, 0
 
-    def bind(self, part: Part) -> Part:
-        """A copy of a part, of the same class, whose parameters are functions of the world."""
-        bound, slot = part.model_copy(), self._next
+    def bind(self, part: Kind) -> Bound[Kind]:
+        """Return what kernels see of a part, the next one in the order of the table."""
+        bound, slot = Bound(part), self._next
         for name, size in part.columns():
-            bound.__dict__[name] = _reader(self.field, slot, size)
+            setattr(bound, name, _reader(self.field, slot, size))
             slot += size
         for name, kind in part.lists():
-            bound.__dict__[name] = self._bind_rows(kind, slot)
+            setattr(bound, name, self._bind_rows(kind, slot))
             slot += 1 + _width(kind) * room(len(getattr(part, name)))
         self._next = slot
         for name, values in part.lookups().items():
-            bound.__dict__[name] = self._place(values)
+            setattr(bound, name, self._place(values))
         return bound
 
     @in_taichi_thread
@@ -122,14 +121,14 @@ class ParameterTable:
         self.array_bytes += held.nbytes
         return column
 
-    def _bind_rows(self, kind: type[Component], slot: int) -> Component:
-        """The one bound row that stands for a list."""
-        bound, first = kind.model_construct(), slot + 1
-        bound.__dict__["size"] = _length_reader(self.field, slot)
+    def _bind_rows(self, kind: type[Component], slot: int) -> Bound[Any]:
+        """Return the one object that stands for all rows of a list."""
+        rows, first = Bound(kind.model_construct()), slot + 1
+        rows.size = _length_reader(self.field, slot)
         for name, size in kind.columns():
-            bound.__dict__[name] = _row_reader(self.field, first, size, _width(kind))
+            setattr(rows, name, _row_reader(self.field, first, size, _width(kind)))
             first += size
-        return bound
+        return rows
 
     def write(self, rows: Sequence[Sequence[Component]]) -> None:
         """Set the parameters of each world from its parts, in the order they were bound.
@@ -151,9 +150,3 @@ class ParameterTable:
     @in_taichi_thread
     def _put(self, held: np.ndarray) -> None:
         self.field.from_numpy(held)
-
-
-def connect(bound: Sequence[Any]) -> None:
-    """Let each bound effect know its index and choose what it wants to know of the others."""
-    for index, effect in enumerate(bound):
-        effect.__dict__.update(effect.connect(tuple(bound)), index=index)

@@ -11,6 +11,7 @@ from tisim.effects.base import parameter
 from tisim.effects.contact.normal import NormalContact, area, slip
 from tisim.effects.contact.surface import SurfaceContact
 from tisim.errors import must
+from tisim.worlds.bound import Peers
 
 
 class ContactFriction(SurfaceContact):
@@ -41,8 +42,8 @@ class ContactFriction(SurfaceContact):
         must(self.dynamic <= self.static, "contact_friction.dynamic", "at most static", self.dynamic)
         return self
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        return {"normal": tuple(peer for peer in peers if isinstance(peer, NormalContact))}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"normal": peers.of(NormalContact)}
 
     @ti.func
     def surface_force(self, s, w, i, j, separation, distance):

@@ -8,6 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
 from tisim.effects.contact.normal import NormalContact, area, strain
 from tisim.numerics.powers import Exponent, power
+from tisim.worlds.bound import Peers
 
 
 class ContactLaw(Effect):
@@ -35,8 +36,8 @@ class Contact(NormalContact):
     stiffness: float = parameter("N/m^2", "stiffness K of the material", examples=[1e6], gt=0)
     exponent: Exponent = option("exponent p of the overlap strain; whole ones are fastest", 2, gt=0)
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        return {"laws": tuple(peer for peer in peers if isinstance(peer, ContactLaw))}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"laws": peers.of(ContactLaw)}
 
     @ti.func
     def stiffness_of(self, s, w, i):

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import Force, parameter
 from tisim.sources.base import sources
+from tisim.worlds.bound import Peers
 
 LEAST_SPEED = 1e-30
 """m/s. Stands for a speed of zero where a direction is needed that then has no effect."""
@@ -25,7 +26,7 @@ class Drag(Force):
     contract: ClassVar[bool] = True
     fields = ("radius",)
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+    def connect(self, peers: Peers) -> dict[str, Any]:
         return {"flow": sources(peers, "flow_velocity")}
 
     @ti.func

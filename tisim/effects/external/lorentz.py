@@ -7,6 +7,7 @@ from typing import Any
 from tisim.backend.taichi import ti
 from tisim.effects.base import Force
 from tisim.sources.base import sources
+from tisim.worlds.bound import Peers
 
 
 class Lorentz(Force):
@@ -24,7 +25,7 @@ class Lorentz(Force):
     fields = ("charge",)
     requires_source = ("electric_field", "magnetic_flux_density")
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+    def connect(self, peers: Peers) -> dict[str, Any]:
         return {name: sources(peers, name) for name in self.requires_source}
 
     @ti.func

@@ -41,6 +41,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairEvent, PairForce, option, parameter
 from tisim.effects.impact.resting import press, rests, rounding
 from tisim.errors import must
+from tisim.worlds.bound import Peers
 
 
 class ImpactLaw(Effect):
@@ -130,10 +131,10 @@ class Impact(PairEvent):
         )
         return self
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        laws = [peer for peer in peers if isinstance(peer, ImpactLaw)]
-        offered = {hook: tuple(law for law in laws if type(law).offers(hook)) for hook in HOOKS}
-        return {**offered, "forced": any(isinstance(peer, Force | PairForce) for peer in peers)}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        laws = peers.of(ImpactLaw)
+        offered = {hook: tuple(law for law in laws if law.data.offers(hook)) for hook in HOOKS}
+        return {**offered, "forced": bool(peers.of(Force, PairForce))}
 
     @ti.func
     def contact(self, s, w, i, j, separation):

@@ -7,6 +7,7 @@ from typing import Any
 from tisim.backend.taichi import ti
 from tisim.effects.base import Force, parameter
 from tisim.sources.base import sources
+from tisim.worlds.bound import Peers
 
 
 class MagneticBodyForce(Force):
@@ -24,7 +25,7 @@ class MagneticBodyForce(Force):
 
     gamma: float = parameter("J/T^2", "magnetic parameter gamma of each particle", examples=[1e-6])
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+    def connect(self, peers: Peers) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}
 
     @ti.func

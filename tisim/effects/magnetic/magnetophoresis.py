@@ -8,6 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Force
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.sources.base import sources
+from tisim.worlds.bound import Peers
 
 
 class Magnetophoresis(Force):
@@ -26,7 +27,7 @@ class Magnetophoresis(Force):
     fields = (MOMENT,)
     requires_source = ("magnetic_flux_density",)
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+    def connect(self, peers: Peers) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}
 
     @ti.func

@@ -15,6 +15,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import DerivedQuantity, parameter
 from tisim.numerics.langevin import langevin_ratio
 from tisim.sources.base import sources
+from tisim.worlds.bound import Peers
 from tisim.worlds.state import Field
 
 MOMENT = Field("moment", "A m^2", 3, "sum")
@@ -29,7 +30,7 @@ class Moment(DerivedQuantity):
     quantity = "moment"
     requires_source = ("magnetic_flux_density",)
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
+    def connect(self, peers: Peers) -> dict[str, Any]:
         return {"applied": sources(peers, "magnetic_flux_density")}
 
     @ti.func

@@ -19,6 +19,7 @@ from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_frame import place, split_direction, split_magnetisation
 from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
 from tisim.sources.magnetic.magnets import Body, Magnets
+from tisim.worlds.bound import Peers
 
 
 class Cylinder(Body):
@@ -151,7 +152,7 @@ class MagneticCylinders(Magnets):
     def lookups(self) -> dict[str, np.ndarray]:
         return {} if self.table_digits is None else {"cells": table(self.table_digits)[0]}
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        digits, cells = self.table_digits, self.__dict__.get("cells")
-        self.cylinders.__dict__["ends"] = ClosedEnds() if digits is None else TabulatedEnds(cells, digits)
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        bound, digits = peers.bound(self), self.table_digits
+        bound.cylinders.ends = ClosedEnds() if digits is None else TabulatedEnds(bound.cells, digits)
         return super().connect(peers)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector
 from tisim.sources.base import Source, parameter
+from tisim.worlds.bound import Peers
 
 
 class Body(Component):
@@ -42,11 +43,6 @@ class Magnets(Source):
     contract: ClassVar[bool] = True
     quantity: ClassVar[str] = "magnetic_flux_density"
 
-    def bodies(self) -> Any:
-        """Return the list of bodies; in kernels the one row that stands for it."""
-        ((name, _),) = self.lists()
-        return getattr(self, name)
-
     @ti.func
     def value(self, w, r, t):
         b = 0.0 * r
@@ -67,5 +63,6 @@ class Magnets(Source):
             gradient += slope
         return b, gradient
 
-    def connect(self, peers: tuple[Any, ...]) -> dict[str, Any]:
-        return {"each": self.bodies()}
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        ((bodies, _),) = self.lists()
+        return {"each": getattr(peers.bound(self), bodies)}

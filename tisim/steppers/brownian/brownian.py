@@ -11,7 +11,7 @@ from tisim.effects.base import Effect, Force, PairEvent, PairForce
 from tisim.errors import must
 from tisim.interactions.force_sum import FORCE
 from tisim.operators.base import Operator
-from tisim.steppers.base import Parts, Stepper, single
+from tisim.steppers.base import Stepper, single
 from tisim.steppers.brownian.coupled import BrownianDrift, Proceed, Scatter, Separate
 from tisim.steppers.brownian.drift_limit import DriftLimit
 from tisim.steppers.brownian.exact_noise import GAUSS, Exact
@@ -21,8 +21,8 @@ from tisim.steppers.brownian.independent import OWN, EndWandering, Wander
 from tisim.steppers.brownian.mobility import Mobility, Oseen, RotnePrager
 from tisim.steppers.brownian.vectorised import Abreast, abreast
 from tisim.steppers.common import BeginStep
+from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.independent import KEEPS, Stretch
-from tisim.worlds.program import Item
 from tisim.worlds.state import Field
 
 
@@ -100,25 +100,26 @@ class Brownian(Stepper):
             return (FORCE,)
         return (FORCE, GAUSS) if self.noise == "exact" else (FORCE, *SUMS)
 
-    def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, fluid = parts.s, Fluid(parts, self)
-        if parts.independent:
-            wander = Abreast if abreast(parts) else Wander
-            return (Stretch(s, parts.control), wander(parts, fluid), EndWandering(parts))
-        interaction = self._interaction(parts, fluid)
-        drift = (*interaction.phases(), BrownianDrift(fluid, interaction, parts.control))
-        move = (BeginStep(s, parts.control, parts.near), Scatter(parts, fluid, interaction))
-        return (*drift, *move, Proceed(s, parts.near), *parts.lists, *parts.remember, *parts.forces)
+    def step(self, context: StepContext) -> Step:
+        fluid = Fluid(context)
+        if context.independent:
+            wander = Abreast if abreast(context) else Wander
+            return Step((Stretch(context), wander(context, fluid), EndWandering(context)))
+        interaction = self._interaction(context, fluid)
+        matrix = isinstance(interaction, Exact)
+        drift = (*interaction.phases(), BrownianDrift(context, fluid, interaction))
+        move = (BeginStep(context), Scatter(context, fluid, interaction), Proceed(context))
+        end = (*context.update_lists, *context.update_history, *context.sum_forces)
+        buffers = (Buffer(interaction, "diffusion matrix", self.kind()),) if matrix else ()
+        return Step((*drift, *move, *end), buffers)
 
-    def _interaction(self, parts: Parts, fluid: Fluid) -> Any:
+    def _interaction(self, context: StepContext, fluid: Fluid) -> Any:
         if self.hydrodynamics == "none":
             return Separate(fluid)
         mobility = Mobility(fluid, Oseen() if self.hydrodynamics == "oseen" else RotnePrager())
         if self.noise == "fast":
-            return Fast(fluid, mobility, parts.domain)
-        exact = Exact(fluid, mobility, parts.domain)
-        parts.owned.append((exact, "diffusion matrix", self.kind()))
-        return exact
+            return Fast(fluid, mobility, context.domain)
+        return Exact(fluid, mobility, context.domain)
 
 
 def _one_by_one(effect: Effect) -> bool:

@@ -3,6 +3,7 @@
 from tisim.backend.taichi import ti
 from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.common import advance_clock, apply_displacement
+from tisim.steppers.context import StepContext
 from tisim.worlds.program import PerParticle, Phase
 
 
@@ -31,9 +32,9 @@ class Separate:
 class BrownianDrift(PerParticle):
     """The velocity of drift at the start of a step, and the step that it allows."""
 
-    def __init__(self, fluid, interaction, control) -> None:
-        super().__init__(fluid.s)
-        self.fluid, self.interaction, self.control = fluid, interaction, control
+    def __init__(self, context: StepContext, fluid, interaction) -> None:
+        super().__init__(context.s)
+        self.fluid, self.interaction, self.control = fluid, interaction, context.control
 
     @ti.func
     def run(self, w, i):
@@ -53,10 +54,10 @@ class BrownianDrift(PerParticle):
 class Scatter(PerParticle):
     """r += dt v + sqrt(2 dt) z (B16 Eqs 6.11, 6.15), and what operators do to single particles."""
 
-    def __init__(self, parts, fluid, interaction) -> None:
-        super().__init__(parts.s)
+    def __init__(self, context: StepContext, fluid, interaction) -> None:
+        super().__init__(context.s)
         self.fluid, self.interaction = fluid, interaction
-        self.domain, self.operators = parts.domain, parts.operators
+        self.domain, self.operators = context.domain, context.operators
 
     @ti.func
     def run(self, w, i):
@@ -76,12 +77,13 @@ class Scatter(PerParticle):
 class Proceed(Phase):
     """Time moves on, pair lists hear how far particles have moved, and nothing limits the next step yet."""
 
-    def __init__(self, s, near) -> None:
-        self.s, self.near, self.lists = s, near, near is not None
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.neighbour_list = context.s, context.neighbour_list
+        self.lists = context.neighbour_list is not None
 
     @ti.func
     def run(self, w, _k):
         advance_clock(self.s, w)
         self.s.steepest[w] = 0.0
         if ti.static(self.lists):
-            self.near.moved(w)
+            self.neighbour_list.moved(w)

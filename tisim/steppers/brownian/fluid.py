@@ -5,6 +5,7 @@ import scipy.constants
 from tisim.backend.taichi import ti
 from tisim.numerics import philox
 from tisim.sources.base import sources
+from tisim.steppers.context import StepContext
 
 STREAM = 1
 """Of the random numbers (philox.py)."""
@@ -19,11 +20,12 @@ class Fluid:
     In a scene with the field ``fixed``, particles for which that is not 0 stay where they are.
     """
 
-    def __init__(self, parts, stepper) -> None:
-        self.s, self.temperature, self.viscosity = parts.s, stepper.temperature, stepper.viscosity
-        self.streams = sources(parts.sources, "flow_velocity")
-        self.forced = parts.forced
-        self.holds = any(field.name == "fixed" for field in parts.s.fields)
+    def __init__(self, context: StepContext) -> None:
+        self.s, stepper = context.s, context.stepper
+        self.temperature, self.viscosity = stepper.temperature, stepper.viscosity
+        self.streams = sources(context.effects, "flow_velocity")
+        self.forced = context.forced
+        self.holds = any(field.name == "fixed" for field in context.s.fields)
 
     @ti.func
     def mobile(self, w, i):

@@ -7,6 +7,7 @@ windows or steps a launch takes them through makes no difference to the noise ei
 
 from tisim.backend.taichi import ti
 from tisim.steppers.brownian.drift_limit import fault
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.independent import LITTLE, PLACE, EndStretch, beginning, duration
 from tisim.steppers.implicit.registers import Registers
 from tisim.worlds.program import PerParticle
@@ -36,12 +37,12 @@ class Wander(PerParticle):
 
     long = True
 
-    def __init__(self, parts, fluid) -> None:
-        super().__init__(parts.s)
-        self.registers = Registers(parts.s, ("position", "velocity", "force"), ())
-        self.own, self.control, self.domain = self.registers.state, parts.control, parts.domain
-        self.fluid, self.summed = self.registers.given(fluid), self.registers.given(parts.summed)
-        self.operators, self.forced = parts.operators, parts.forced
+    def __init__(self, context: StepContext, fluid) -> None:
+        super().__init__(context.s)
+        self.registers = Registers(context.s, ("position", "velocity", "force"), ())
+        self.own, self.control, self.domain = self.registers.state, context.control, context.domain
+        self.fluid, self.summed = self.registers.given(fluid), self.registers.given(context.force_sum)
+        self.operators, self.forced = context.operators, context.forced
 
     @ti.func
     def run(self, w, i):
@@ -164,9 +165,9 @@ class Wander(PerParticle):
 class EndWandering(EndStretch):
     """The windows are done; or the first particle to be stopped is found."""
 
-    def __init__(self, parts) -> None:
-        super().__init__(parts)
-        self.forced = parts.forced
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context)
+        self.forced = context.forced
 
     @ti.func
     def accuse(self, w):

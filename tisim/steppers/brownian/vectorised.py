@@ -9,27 +9,28 @@ from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import LANES
 from tisim.steppers.brownian.independent import Wander, stepped
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.independent import beginning
 from tisim.steppers.implicit.registers import Registers
 
 
-def abreast(parts) -> bool:
+def abreast(context: StepContext) -> bool:
     """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
     as what settles and what operators do."""
-    simple = not parts.operators and not parts.summed.derived_solvers
-    return simple and runtime.current().device == "cpu" and parts.s.capacity >= LANES
+    simple = not context.operators and not context.force_sum.derived_solvers
+    return simple and runtime.current().device == "cpu" and context.s.capacity >= LANES
 
 
 class Abreast(Wander):
     """Tiles of particles through the windows of a launch."""
 
-    def __init__(self, parts, fluid) -> None:
-        super().__init__(parts, fluid)
-        self.lane = Registers(parts.s, ("force",), ())
+    def __init__(self, context: StepContext, fluid) -> None:
+        super().__init__(context, fluid)
+        self.lane = Registers(context.s, ("force",), ())
         self.there, self.drop, self.sums = (
             self.lane.state,
             self.lane.given(fluid),
-            self.lane.given(parts.summed),
+            self.lane.given(context.force_sum),
         )
 
     @ti.func

@@ -7,7 +7,7 @@ Forces enter the inner product as the displacement that they would cause. Torque
 """
 
 from tisim.backend.taichi import ti
-from tisim.steppers.base import Parts
+from tisim.steppers.context import StepContext
 from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.program import Item, PerParticle
 from tisim.worlds.state import Field
@@ -23,19 +23,17 @@ def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
     )
 
 
-def accelerated(parts: Parts, forces: tuple[Item, ...]) -> tuple[Item, ...]:
+def accelerated(context: StepContext, forces: tuple[Item, ...], sums: BlockSums) -> tuple[Item, ...]:
     """The phases ``forces`` within an iteration, and those that mix the result with the last one."""
-    sums = BlockSums(parts.s, 2)
-    parts.owned.append((sums, "sums of the acceleration", "trapezoid"))
-    return (Used(parts), *forces, Compare(parts, sums), Mix(parts, sums))
+    return (Used(context), *forces, Compare(context, sums), Mix(context, sums))
 
 
 class Mixed:
     """What is mixed: value, that used, that of the last iterate, its residual; and whether it is a torque."""
 
-    def __init__(self, parts: Parts) -> None:
-        s = parts.s
-        names = ("force", "torque") if parts.turning else ("force",)
+    def __init__(self, context: StepContext) -> None:
+        s = context.s
+        names = ("force", "torque") if context.turning else ("force",)
         self.columns = tuple(
             (*(getattr(s, name + what) for what in ("", "_used", "_last", "_residual")), name == "torque")
             for name in names
@@ -45,9 +43,9 @@ class Mixed:
 class Used(PerParticle):
     """Note the force that the present iterate was made with."""
 
-    def __init__(self, parts: Parts) -> None:
-        super().__init__(parts.s)
-        self.columns = Mixed(parts).columns
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.columns = Mixed(context).columns
 
     @ti.func
     def run(self, w, i):
@@ -58,9 +56,9 @@ class Used(PerParticle):
 class Compare(PerBlock):
     """<r, r - r_last> and |r - r_last|^2, of displacements."""
 
-    def __init__(self, parts: Parts, sums: BlockSums) -> None:
+    def __init__(self, context: StepContext, sums: BlockSums) -> None:
         super().__init__(sums)
-        self.columns = Mixed(parts).columns
+        self.columns = Mixed(context).columns
 
     @ti.func
     def each(self, w, i):
@@ -80,9 +78,9 @@ class Compare(PerBlock):
 class Mix(PerParticle):
     """x = f - theta (f - f_last); f itself when there is no last one."""
 
-    def __init__(self, parts: Parts, sums: BlockSums) -> None:
-        super().__init__(parts.s)
-        self.columns, self.sums = Mixed(parts).columns, sums
+    def __init__(self, context: StepContext, sums: BlockSums) -> None:
+        super().__init__(context.s)
+        self.columns, self.sums = Mixed(context).columns, sums
 
     @ti.func
     def run(self, w, i):

@@ -2,8 +2,9 @@
 
 from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.saved_state import Kept
-from tisim.worlds.program import PerParticle, Phase, Repeat
+from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import WorldStatus
 
 TRIED, ACCEPTED, HOPELESS = range(3)
@@ -16,8 +17,8 @@ SHORTER = 0.8
 class Begin(Phase):
     """A step begins."""
 
-    def __init__(self, s) -> None:
-        self.s = s
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
 
     @ti.func
     def run(self, w, _k):
@@ -48,9 +49,9 @@ class SaveState(PerParticle):
 class StepAttempt(Repeat):
     """Attempts at a step, until one is accepted or all hope is lost."""
 
-    def __init__(self, s, items) -> None:
+    def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
-        self.s = s
+        self.s = context.s
 
     @ti.func
     def pending(self, w):
@@ -108,8 +109,8 @@ class RestoreState(PerParticle):
 class Decide(Phase):
     """Try again, or not."""
 
-    def __init__(self, parts) -> None:
-        self.s = parts.s
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
 
     @ti.func
     def run(self, w, _k):

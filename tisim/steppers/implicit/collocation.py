@@ -7,8 +7,9 @@ from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.force_sum import FORCE
-from tisim.steppers.base import Parts, Stepper
-from tisim.steppers.common import Arrive, Listen, Operate
+from tisim.steppers.base import Stepper
+from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
+from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.attempts import Begin, Decide, RestoreState, SaveState, StepAttempt
 from tisim.steppers.implicit.collocation_phases import (
     ChooseCollocationStep,
@@ -80,24 +81,27 @@ class Collocation(Stepper):
             *Stages.fields(self.stages, turning),
         )
 
-    def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, stages, sums = parts.s, Stages(parts, self.stages), BlockSums(parts.s, 4)
-        parts.owned.append((stages, "coefficients of the stages", self.kind()))
-        parts.owned.append((sums, "sums of the stages", self.kind()))
-        listen = (Listen(parts),) if parts.near else ()
-        take = TakeStages(parts, sums, stages)
-        judge = JudgeStages(parts, sums, stages)
-        sweep = StageSweep(s, (Place(stages), *listen, *parts.lists, *parts.trial_forces, take, judge))
-        attempt = (
-            ChooseCollocationStep(parts, stages),
+    def step(self, context: StepContext) -> Step:
+        stages, sums = Stages(context, self.stages), BlockSums(context.s, 4)
+        report, forces = report_displacement(context), (*context.update_lists, *context.sum_trial_forces)
+        take = (TakeStages(context, sums, stages), JudgeStages(context, sums, stages))
+        sweep = StageSweep(context, (Place(stages), *report, *forces, *take))
+        attempt: tuple[Item, ...] = (
+            ChooseCollocationStep(context, stages),
             PredictStages(stages),
             sweep,
             Conclude(stages),
             RestoreState(stages),
-            *listen,
+            *report,
+            Decide(context),
         )
-        operate = (Operate(parts), *listen) if parts.operators else ()
-        begin = (Forget(s), Begin(s), SaveState(stages))
+        begin = (Forget(context), Begin(context), SaveState(stages))
         note = (Went(stages),) if self.control.at_end else ()
-        step = (StepAttempt(s, (*attempt, Decide(parts))), *note, *parts.remember, *operate, Arrive(s))
-        return (*begin, *step)
+        end = (*note, *context.update_history, *apply_operators(context), AdvanceClock(context))
+        return Step(
+            (*begin, StepAttempt(context, attempt), *end),
+            (
+                Buffer(stages, "coefficients of the stages", self.kind()),
+                Buffer(sums, "sums of the stages", self.kind()),
+            ),
+        )

@@ -4,16 +4,17 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, length
 from tisim.worlds.block_sum import PerBlock
-from tisim.worlds.program import PerParticle, Phase, Repeat
+from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 
 
 class Forget(Phase):
     """After impacts the past says nothing about what is to come."""
 
-    def __init__(self, s) -> None:
-        self.s = s
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
 
     @ti.func
     def run(self, w, _k):
@@ -24,8 +25,8 @@ class Forget(Phase):
 class ChooseCollocationStep(Phase):
     """Choose the step, and begin at the first stage after its beginning."""
 
-    def __init__(self, parts, stages) -> None:
-        self.s, self.control, self.stages = parts.s, parts.control, stages
+    def __init__(self, context: StepContext, stages) -> None:
+        self.s, self.control, self.stages = context.s, context.control, stages
 
     @ti.func
     def run(self, w, _k):
@@ -68,9 +69,9 @@ class PredictStages(OfStages):
 class StageSweep(Repeat):
     """Stage after stage, again and again, until there is a verdict."""
 
-    def __init__(self, s, items) -> None:
+    def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
-        self.s = s
+        self.s = context.s
 
     @ti.func
     def pending(self, w):
@@ -100,9 +101,9 @@ class TakeStages(PerBlock):
     """The rates that the forces at the stage give; sums of their change, as displacements (m), and at the
     last stage of the error, of what both are compared with, and of what displacements are rounded to."""
 
-    def __init__(self, parts, sums, stages) -> None:
+    def __init__(self, context: StepContext, sums, stages) -> None:
         super().__init__(sums)
-        self.control, self.stages = parts.control, stages
+        self.control, self.stages = context.control, stages
         self.eps = float(np.finfo(np.float64 if self.s.real == ti.f64 else np.float32).eps)
 
     @ti.func

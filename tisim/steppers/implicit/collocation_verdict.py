@@ -1,6 +1,7 @@
 """The verdict on an attempt at a step of collocation: from how its sweeps converge, and from its error."""
 
 from tisim.backend.taichi import ti
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse
 from tisim.worlds.program import Phase
 
@@ -13,9 +14,9 @@ DIVERGED = 0.5
 class JudgeStages(Phase):
     """To the next stage; after the last one: is the step solved, to be swept again, or to be given up?"""
 
-    def __init__(self, parts, sums, stages) -> None:
-        self.s, self.control, self.sums, self.stages = parts.s, parts.control, sums, stages
-        self.order = parts.control.order(stages.number)
+    def __init__(self, context: StepContext, sums, stages) -> None:
+        self.s, self.control, self.sums, self.stages = context.s, context.control, sums, stages
+        self.order = context.control.order(stages.number)
 
     @ti.func
     def run(self, w, _k):

@@ -7,6 +7,7 @@ do.
 """
 
 from tisim.backend.taichi import ti
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED
 from tisim.steppers.implicit.registers import Registers
 from tisim.steppers.implicit.saved_state import kept
@@ -36,9 +37,9 @@ class Stretch(Phase):
     The world's time is counted in windows, so that it does not drift.
     """
 
-    def __init__(self, s, control) -> None:
-        self.s, self.control = s, control
-        self.most = max(WINDOWS, LAUNCH // (s.worlds * s.capacity))
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.control = context.s, context.control
+        self.most = max(WINDOWS, LAUNCH // (self.s.worlds * self.s.capacity))
 
     @ti.func
     def run(self, w, _k):
@@ -81,13 +82,13 @@ class Alone(PerParticle):
 
     long = True
 
-    def __init__(self, parts, solve) -> None:
-        super().__init__(parts.s)
-        moving = tuple(field.name.removesuffix("_before") for field in kept(parts.turning))
-        before = tuple(field.name for field in kept(parts.turning))
-        self.registers = Registers(parts.s, ("own_dt", *moving), before)
-        self.own, self.control = self.registers.state, parts.control
-        self.solve, self.summed = self.registers.given(solve), self.registers.given(parts.summed)
+    def __init__(self, context: StepContext, solve) -> None:
+        super().__init__(context.s)
+        moving = tuple(field.name.removesuffix("_before") for field in kept(context.turning))
+        before = tuple(field.name for field in kept(context.turning))
+        self.registers = Registers(context.s, ("own_dt", *moving), before)
+        self.own, self.control = self.registers.state, context.control
+        self.solve, self.summed = self.registers.given(solve), self.registers.given(context.force_sum)
 
     @ti.func
     def run(self, w, i):
@@ -207,8 +208,8 @@ class EndStretch(Phase):
     """The windows are done, or a part of them, or one that is cut; or the first particle to be stuck is
     found."""
 
-    def __init__(self, parts) -> None:
-        self.s, self.control = parts.s, parts.control
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.control = context.s, context.control
 
     @ti.func
     def run(self, w, _k):

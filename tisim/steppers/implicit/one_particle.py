@@ -5,12 +5,13 @@ compared by their velocities, and positions may be wrapped into a box in between
 """
 
 from tisim.backend.taichi import ti
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.saved_state import Kept
 
 
 def with_jacobian(forces):
     """Those forces that say how they depend on velocity."""
-    return tuple(force for force in forces if force.offers("velocity_jacobian"))
+    return tuple(force for force in forces if force.data.offers("velocity_jacobian"))
 
 
 @ti.func
@@ -34,10 +35,10 @@ def solved(a, b):
 class Solve(Kept):
     """One iterate of a particle, given the force at the last one."""
 
-    def __init__(self, parts, phi) -> None:
-        super().__init__(parts)
+    def __init__(self, context: StepContext, phi) -> None:
+        super().__init__(context)
         self.phi = phi
-        self.linear = with_jacobian(parts.singles)
+        self.linear = with_jacobian(context.single_forces)
 
     @ti.func
     def displacement(self, w, i, v, dt):

@@ -1,6 +1,7 @@
 """The state at the beginning of a step, kept until the step is accepted."""
 
 from tisim.backend.taichi import ti
+from tisim.steppers.context import StepContext
 from tisim.worlds.state import Field
 
 BEFORE = (
@@ -25,8 +26,8 @@ def kept(turning: bool) -> tuple[Field, ...]:
 class Kept:
     """Keeps the state of a particle, and gives it back."""
 
-    def __init__(self, parts) -> None:
-        self.s, self.domain, self.turning = parts.s, parts.domain, parts.turning
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.domain, self.turning = context.s, context.domain, context.turning
 
     @ti.func
     def keep(self, w, i):

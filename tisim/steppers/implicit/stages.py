@@ -4,6 +4,7 @@ import numpy as np
 
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.lobatto import highest, integrals, leading, nodes
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.implicit.saved_state import Kept
@@ -19,10 +20,10 @@ class Stages(Kept):
     says of stage i, ``shape[w, i]`` how much it is off there, compared with the other stages.
     """
 
-    def __init__(self, parts, number: int) -> None:
-        super().__init__(parts)
+    def __init__(self, context: StepContext, number: int) -> None:
+        super().__init__(context)
         s, self.number, self.leading = self.s, number, leading(number)
-        self.linear = with_jacobian(parts.singles)
+        self.linear = with_jacobian(context.single_forces)
         rates = [(s.stage_acceleration, s.last_acceleration)]
         if self.turning:
             rates.append((s.stage_turning, s.last_turning))

@@ -7,8 +7,9 @@ from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.force_sum import FORCE
-from tisim.steppers.base import Parts, Stepper
-from tisim.steppers.common import Arrive, Listen, Operate
+from tisim.steppers.base import Stepper
+from tisim.steppers.common import AdvanceClock, apply_operators, report_displacement
+from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.anderson import accelerated, memory_of_iterates
 from tisim.steppers.implicit.attempts import Begin, Decide, RestoreState, SaveState, StepAttempt
 from tisim.steppers.implicit.independent import KEEPS, PLACE, Alone, EndStretch, Stretch
@@ -89,34 +90,28 @@ class Trapezoid(Stepper):
         more = (*spans(self.control.at_end), *(memory_of_iterates(turning) if accelerated else ()))
         return (FORCE, *kept(turning), CHANGE, *more)
 
-    def step(self, parts: Parts) -> tuple[Item, ...]:
-        s, solve = parts.s, Solve(parts, self.phi)
-        if parts.independent:
-            return (Stretch(s, parts.control), Alone(parts, solve), EndStretch(parts))
-        listen = (Listen(parts),) if parts.near else ()
+    def step(self, context: StepContext) -> Step:
+        s, solve = context.s, Solve(context, context.stepper.phi)
+        if context.independent:
+            return Step((Stretch(context), Alone(context, solve), EndStretch(context)))
         sums = BlockSums(s, 4)
-        parts.owned.append((sums, "sums of the iteration", self.kind()))
-        forces = (*parts.lists, *parts.trial_forces)
+        report, forces = report_displacement(context), (*context.update_lists, *context.sum_trial_forces)
+        buffers: tuple[Buffer, ...] = (Buffer(sums, "sums of the iteration", self.kind()),)
         if self.acceleration == "anderson":
-            forces = accelerated(parts, forces)
-        iteration = Iteration(s, (*forces, Correct(parts, sums, solve), *listen, JudgeIteration(parts, sums)))
-        attempt = (
-            ChooseTrapezoidStep(parts),
+            mixing = BlockSums(s, 2)
+            forces = accelerated(context, forces, mixing)
+            buffers += (Buffer(mixing, "sums of the acceleration", self.kind()),)
+        judge = JudgeIteration(context, sums)
+        iteration = Iteration(context, (*forces, Correct(context, sums, solve), *report, judge))
+        attempt: tuple[Item, ...] = (
+            ChooseTrapezoidStep(context),
             PredictEnd(solve),
-            *listen,
+            *report,
             iteration,
             RestoreState(solve),
-            *listen,
-            Decide(parts),
+            *report,
+            Decide(context),
         )
-        operate = (Operate(parts), *listen) if parts.operators else ()
         note = (Went(solve),) if self.control.at_end else ()
-        return (
-            Begin(s),
-            SaveState(solve),
-            StepAttempt(s, attempt),
-            *note,
-            *parts.remember,
-            *operate,
-            Arrive(s),
-        )
+        end = (*note, *context.update_history, *apply_operators(context), AdvanceClock(context))
+        return Step((Begin(context), SaveState(solve), StepAttempt(context, attempt), *end), buffers)

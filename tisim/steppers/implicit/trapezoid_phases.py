@@ -2,17 +2,18 @@
 
 from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
+from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse, length
 from tisim.worlds.block_sum import PerBlock
-from tisim.worlds.program import PerParticle, Phase, Repeat
+from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 
 
 class Iteration(Repeat):
     """Iterations of an attempt, until there is a verdict."""
 
-    def __init__(self, s, items) -> None:
+    def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
-        self.s = s
+        self.s = context.s
 
     @ti.func
     def pending(self, w):
@@ -22,8 +23,8 @@ class Iteration(Repeat):
 class ChooseTrapezoidStep(Phase):
     """Choose the step; the last one ends exactly on time. Forces will be those of the end of the step."""
 
-    def __init__(self, parts) -> None:
-        self.s, self.control = parts.s, parts.control
+    def __init__(self, context: StepContext) -> None:
+        self.s, self.control = context.s, context.control
 
     @ti.func
     def run(self, w, _k):
@@ -56,9 +57,9 @@ class PredictEnd(PerParticle):
 class Correct(PerBlock):
     """The next iterate, and sums of change, displacement, error, and what the error is compared with. m."""
 
-    def __init__(self, parts, sums, solve) -> None:
+    def __init__(self, context: StepContext, sums, solve) -> None:
         super().__init__(sums)
-        self.control, self.solve = parts.control, solve
+        self.control, self.solve = context.control, solve
 
     @ti.func
     def each(self, w, i):
@@ -80,8 +81,8 @@ class Correct(PerBlock):
 class JudgeIteration(Phase):
     """Is the iteration solved, to go on, or to be given up?"""
 
-    def __init__(self, parts, sums) -> None:
-        self.s, self.control, self.sums = parts.s, parts.control, sums
+    def __init__(self, context: StepContext, sums) -> None:
+        self.s, self.control, self.sums = context.s, context.control, sums
 
     @ti.func
     def run(self, w, _k):

@@ -1,0 +1,128 @@
+"""The pairs of a step in which something falls due: a list, and the survey of near pairs that fills it."""
+
+from typing import Any
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.components.domain import Domain
+from tisim.effects.base import PairEvent
+from tisim.neighbours.pair_list import NeighbourList
+from tisim.worlds.bound import Bound
+from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.state import State, WorldStatus
+
+CONTACTS_PER_PARTICLE = 8
+"""Room for pairs that overlap. Spheres that only touch, of any sizes, touch fewer than 14.93 others in the
+mean, and make half as many pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339)."""
+
+
+@ti.data_oriented
+class ContactList:
+    """The pairs of this step in which something falls due."""
+
+    def __init__(self, s: State, domain: Bound[Domain], events: tuple[Bound[PairEvent], ...]) -> None:
+        self.s, self.domain, self.events = s, domain, events
+        self.capacity = CONTACTS_PER_PARTICLE * s.capacity
+        builder = ti.FieldsBuilder()
+        self.first, self.second = ti.field(ti.i32), ti.field(ti.i32)
+        self.bid, self.best = ti.field(ti.i64), ti.field(ti.i64)
+        self.size, self.waiting, self.overlaps = ti.field(ti.i32), ti.field(ti.i32), ti.field(ti.i32)
+        for column in (self.first, self.second, self.bid):
+            builder.dense(ti.i, s.worlds).dense(ti.j, self.capacity).place(column)
+        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.best)
+        for column in (self.size, self.waiting, self.overlaps):
+            builder.dense(ti.i, s.worlds).place(column)
+        self.tree = Tree(builder)
+
+    def bytes(self) -> int:
+        """Device memory, in bytes."""
+        return self.s.worlds * (16 * self.capacity + 8 * self.s.capacity + 12)
+
+    @ti.func
+    def add(self, w, i, j, due):
+        """Enter a pair whose event fell due ``due`` seconds ago (>= 0)."""
+        c = ti.atomic_add(self.size[w], 1)
+        if c < self.capacity:
+            self.first[w, c], self.second[w, c] = i, j
+            # The bits of a positive f32 are ordered as its value; the low half breaks ties.
+            order = ti.cast(ti.bit_cast(ti.cast(due, ti.f32), ti.i32), ti.i64)
+            self.bid[w, c] = ((order + 1) << 31) + i + j
+            self.waiting[w] += 1
+        else:
+            self.overflow(w)
+
+    @ti.func
+    def count(self, w, overlaps):
+        """Count pairs of a particle that overlap; stop a world in which there are too many."""
+        if ti.atomic_add(self.overlaps[w], overlaps) + overlaps > CONTACTS_PER_PARTICLE * self.s.count[w]:
+            self.overflow(w)
+
+    @ti.func
+    def overflow(self, w):
+        """Stop a world, and accuse no particle: whose pair is one too many is up to the order of threads."""
+        ti.atomic_max(self.s.failed[w], WorldStatus.CONTACT_OVERFLOW)
+
+
+class ClearContacts(Phase):
+    """Empty the list before a survey: a step that has failed has left it as it was."""
+
+    def __init__(self, contacts: ContactList) -> None:
+        self.c = contacts
+
+    @ti.func
+    def run(self, w, _k):
+        self.c.size[w] = 0
+        self.c.waiting[w] = 0
+        self.c.overlaps[w] = 0
+
+
+class FindContacts(PerParticle):
+    """Look at every near pair: enter those in contact, and ask the control about all."""
+
+    def __init__(self, neighbour_list: NeighbourList, contacts: ContactList, control: Bound[Any]) -> None:
+        super().__init__(neighbour_list.s)
+        self.neighbour_list, self.contacts, self.control = neighbour_list, contacts, control
+        self.hard = any(event.hard for event in contacts.events)
+
+    @ti.func
+    def enter(self, w, i, j, separation):
+        """Enter a pair in which something falls due; 1 when it overlaps."""
+        due = ti.cast(-1.0, self.s.real)
+        for event in ti.static(self.contacts.events):
+            due = ti.max(due, event.contact(self.s, w, i, j, separation))
+        if due >= 0.0:
+            self.contacts.add(w, i, j, due)
+        reach = self.s.radius[w, i] + self.s.radius[w, j]
+        return ti.cast(separation.norm_sqr() <= reach * reach, ti.i32)
+
+    @ti.func
+    def run(self, w, i):
+        soonest, overlaps = ti.cast(ti.math.inf, ti.f64), 0
+        for k in range(self.neighbour_list.size(w, i)):
+            j = self.neighbour_list.candidate(w, i, k)
+            if j != i:
+                d = self.neighbour_list.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
+                overlaps += self.enter(w, i, j, d)
+                soonest = ti.min(soonest, self.control.pair(self.s, w, i, j, d))
+        self.control.note(self.s, w, i, soonest)
+        if ti.static(self.hard):
+            self.contacts.count(w, overlaps)
+
+
+class FindContactsAgain(FindContacts):
+    """After events: look at every near pair once more, for the control only."""
+
+    conditional = True
+
+    def __init__(self, neighbour_list: NeighbourList, contacts: ContactList, control: Bound[Any]) -> None:
+        super().__init__(neighbour_list, contacts, control)
+        # Those that overlap have been counted.
+        self.hard = False
+
+    @ti.func
+    def when(self, w):
+        return self.s.events[w]
+
+    @ti.func
+    def enter(self, w, i, j, separation):
+        return 0

@@ -1,0 +1,57 @@
+"""What follows a step as a whole: operators act on the world, and slots of removed particles are filled."""
+
+from typing import Any
+
+from tisim.backend.taichi import ti
+from tisim.components.domain import Domain
+from tisim.neighbours.pair_list import NeighbourList
+from tisim.worlds.bound import Bound
+from tisim.worlds.program import Phase
+from tisim.worlds.state import State
+
+
+class Rearrange(Phase):
+    """Let operators act on the world as a whole, and fill the slots of removed particles from the end."""
+
+    def __init__(
+        self,
+        s: State,
+        domain: Bound[Domain],
+        operators: tuple[Bound[Any], ...],
+        neighbour_list: NeighbourList | None,
+    ) -> None:
+        self.s, self.domain = s, domain
+        self.neighbour_list, self.lists = neighbour_list, neighbour_list is not None
+        self.operators = tuple(operator for operator in operators if operator.data.offers("world"))
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        # Before operators too: a slot that a merger has freed has room for a fragment.
+        self.fill(w)
+        for operator in ti.static(self.operators):
+            operator.world(s, w)
+        self.fill(w)
+        if s.events[w] > 0:
+            # What the survey told the controller is no longer true.
+            s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
+
+    @ti.func
+    def fill(self, w):
+        s = self.s
+        if s.changed[w] > 0:
+            i = 0
+            count = s.count[w]
+            while i < count:
+                if s.mass[w, i] > 0.0:
+                    s.position[w, i] = self.domain.wrap(w, s.position[w, i])
+                    i += 1
+                else:
+                    count -= 1
+                    if i < count:
+                        s.copy(w, count, i)
+            s.count[w] = count
+            s.changed[w] = 0
+            s.events[w] = 1
+            if ti.static(self.lists):
+                self.neighbour_list.stale[w] = 1

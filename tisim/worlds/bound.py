@@ -1,0 +1,65 @@
+"""What kernels see of a part of a scene: an object of its own, beside the data that it is made from.
+
+``part.hardness`` is a number in Pa. ``bound.hardness`` is a function of the world, which kernels read.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from tisim.backend.taichi import is_device_function
+from tisim.components.component import Component
+
+Part = TypeVar("Part", bound=Component, covariant=True)
+Kind = TypeVar("Kind", bound=Component)
+
+
+class Bound(Generic[Part]):
+    """A part of a scene, bound to the device memory of a batch of worlds.
+
+    In a method decorated with ``ti.func``, ``self`` is the bound object. There each parameter is a function
+    of the world, ``self.hardness(w)``, each list of parts is one object for all of its rows,
+    ``self.bodies.radius(w, k)``, and what ``connect`` of the part returns stands beside them. Whatever else
+    is asked of it, such as an option or a constant of the class, is that of the data.
+
+    data : the part that it was made from: of the scene that was compiled, so its parameters say nothing of
+        the scenes that are loaded. index : its place among the effects of the scene.
+    """
+
+    data: Part
+    index: int
+
+    def __init__(self, data: Part) -> None:
+        self.data = data
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "data":
+            raise AttributeError(name)
+        own: Any = getattr(type(self.data), name, None)
+        return own.__get__(self, type(self)) if is_device_function(own) else getattr(self.data, name)
+
+    if TYPE_CHECKING:
+
+        def __setattr__(self, name: str, value: Any) -> None: ...
+
+
+class Peers(tuple[Bound[Any], ...]):
+    """The bound effects of a scene, in scene order."""
+
+    def of(self, *kinds: type[Kind]) -> tuple[Bound[Kind], ...]:
+        """Return those whose data is of one of these classes."""
+        return tuple(effect for effect in self if isinstance(effect.data, kinds))
+
+    def bound(self, part: Kind) -> Bound[Kind]:
+        """Return the one that was made from this very part."""
+        return next(effect for effect in self if effect.data is part)
+
+
+def connected(bound: list[Bound[Any]]) -> Peers:
+    """Let each bound effect know its index and what it has chosen to know of the others."""
+    peers = Peers(bound)
+    for index, effect in enumerate(peers):
+        effect.index = index
+        for name, value in effect.data.connect(peers).items():
+            setattr(effect, name, value)
+    return peers
