@@ -68,8 +68,8 @@ BOTH = pytest.mark.parametrize("made", [inert, pytest.param(drifting, marks=pyte
 
 def in_launches(made, monkeypatch, attempts):
     """A simulation of which a launch has a particle make so many attempts at a step."""
-    monkeypatch.setattr(independent, "LAUNCH", 1)
-    monkeypatch.setattr(independent, "WINDOWS", attempts)
+    monkeypatch.setattr(independent, "LAUNCH_ATTEMPTS", 1)
+    monkeypatch.setattr(independent, "LEAST_INTERVALS", attempts)
     return Simulation(made, worlds=2)
 
 
@@ -148,5 +148,5 @@ def test_a_launch_is_of_so_many_steps(made):
     simulation.load([long])
     list(islice(simulation.chunks(), 2))
     steps = simulation.s.read("particle_steps")[0]
-    assert 0.1 * independent.LAUNCH < steps <= independent.LAUNCH
+    assert 0.1 * independent.LAUNCH_ATTEMPTS < steps <= independent.LAUNCH_ATTEMPTS
     assert simulation.fraction() == pytest.approx(steps / (1e7 * len(SPEED)), rel=1e-3)

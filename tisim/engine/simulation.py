@@ -74,9 +74,8 @@ class Simulation:
     def _place(self, scene: Scene, worlds: int, capacity: int) -> None:
         asked = (scene.effects, scene.stepper)
         fields = resolve_fields(needed_fields(*asked))
-        self.s = State(
-            worlds, capacity, fields, declared(*asked, "counters"), declared(*asked, "world_quantities")
-        )
+        names = (declared(*asked, what) for what in ("counters", "world_quantities", "flags"))
+        self.s = State(worlds, capacity, fields, *names)
         parts = self._parts(scene)
         self.table = ParameterTable(parts, worlds, self.runtime.real)
         *effects, domain, stepper, control = (self.table.bind(part) for part in parts)

@@ -69,7 +69,7 @@ class SumForces(PairSum):
         self.check(w, i, taken)
 
     @ti.func
-    def alone(self, w, i, t):
+    def single_particle(self, w, i, t):
         """The force on i, at a time of its own, where particles do not feel each other."""
         for settling in ti.static(self.derived_solvers):
             settling.set(self.s, w, i, t)

@@ -24,7 +24,7 @@ from tisim.errors import must
 from tisim.files import checksum
 from tisim.scene.initial_state import Arrays
 
-FORMAT = "tisim checkpoint 3"
+FORMAT = "tisim checkpoint 4"
 BEFORE = "before"
 
 

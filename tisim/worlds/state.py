@@ -144,7 +144,7 @@ class State:
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
     ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
-    and quantities (f64) that effects and steppers declare.
+    (i64), quantities (f64) and flags (i32) that effects and steppers declare.
 
     A step that takes long may be made in several launches. ``underway`` is the number of particles that have
     not ended it yet: unless that is 0 the particles have no time in common, ``time`` is that of when the step
@@ -159,15 +159,18 @@ class State:
         fields: tuple[Field, ...],
         counters: tuple[str, ...],
         world_quantities: tuple[str, ...] = (),
+        flags: tuple[str, ...] = (),
     ) -> None:
         self.worlds, self.capacity = worlds, capacity
-        self.fields, self.counters, self.world_quantities = fields, (*TALLIES, *counters), world_quantities
+        self.fields, self.counters = fields, (*TALLIES, *counters)
+        self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
         self.real = runtime.current().real
         builder = ti.FieldsBuilder()
         for field in fields:
             setattr(self, field.name, self._place(builder, field))
-        for names, dtype in (((*CLOCK, *world_quantities), ti.f64), (BOOKS, ti.i32), (self.counters, ti.i64)):
+        quantities, integers = (*CLOCK, *world_quantities), (*BOOKS, *flags)
+        for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (self.counters, ti.i64)):
             for name in names:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
@@ -190,7 +193,7 @@ class State:
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
         own = ("seed", "most", "pause_time", "paused", "goal", "step_limit")
-        self.columns = (*CLOCK, *BOOKS, *MOTION, *self.counters, *world_quantities, *own)
+        self.columns = (*quantities, *integers, *MOTION, *self.counters, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -201,8 +204,8 @@ class State:
             for field in fields
             if field.slots
         )
-        self.means = self._ruled("mean")
-        self.sums = self._ruled("sum")
+        self.means = self._by_merge_rule("mean")
+        self.sums = self._by_merge_rule("sum")
 
     if TYPE_CHECKING:
 
@@ -220,7 +223,7 @@ class State:
             builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).place(part)
         return column
 
-    def _ruled(self, rule: str) -> tuple[Any, ...]:
+    def _by_merge_rule(self, rule: str) -> tuple[Any, ...]:
         return tuple(getattr(self, field.name) for field in self.fields if field.merge == rule)
 
     def bytes(self) -> dict[str, int]:
@@ -257,7 +260,8 @@ class State:
     def saved(self) -> tuple[str, ...]:
         """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
         fields = (field.name for field in self.fields)
-        return (*fields, *CLOCK, *BOOKS, *self.counters, *self.world_quantities, "frame", "seed", "goal")
+        worlds = (*CLOCK, *BOOKS, *self.counters, *self.world_quantities, *self.flags)
+        return (*fields, *worlds, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
         """A copy of all worlds as they are, by the names that are saved."""

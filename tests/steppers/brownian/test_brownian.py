@@ -13,8 +13,8 @@ from tisim import Box, InputError, Open, Simulation
 from tisim.effects import ContactDissipation, Force, Hertz, Impact, StokesDrag
 from tisim.io.checkpoint import restore, save
 from tisim.steppers.brownian import brownian
-from tisim.steppers.brownian.independent import Wander
-from tisim.steppers.brownian.vectorised import Abreast
+from tisim.steppers.brownian.independent import IndependentBrownianSteps
+from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps
 
 MANY = 10_000
 
@@ -186,12 +186,12 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
     free = [colloids(place, trap=trap, seed=1, **more) for trap in (2.0, 30.0, 300.0, 1e10)]
     scenes = [*free, colloids(place, trap=2.0, quantities=pinned, **more)]
     found = []
-    for kind in (Abreast, Wander):
-        monkeypatch.setattr(brownian, "abreast", lambda parts, kind=kind: kind is Abreast)
+    for kind in (VectorisedBrownianSteps, IndependentBrownianSteps):
+        monkeypatch.setattr(brownian, "vectorises", lambda context, kind=kind: kind is VectorisedBrownianSteps)
         simulation = Simulation(scenes[0], 5)
         assert kind.__name__ in simulation.program.names()
         simulation.load(scenes)
-        simulation.run(steps=7 if kind is Abreast else None)
+        simulation.run(steps=7 if kind is VectorisedBrownianSteps else None)
         simulation.run()
         found.append(simulation.results())
     for many, single in zip(*found, strict=True):

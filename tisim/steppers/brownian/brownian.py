@@ -17,12 +17,12 @@ from tisim.steppers.brownian.drift_limit import DriftLimit
 from tisim.steppers.brownian.exact_noise import GAUSS, Exact
 from tisim.steppers.brownian.fast_noise import SUMS, Fast
 from tisim.steppers.brownian.fluid import Fluid
-from tisim.steppers.brownian.independent import OWN, EndWandering, Wander
+from tisim.steppers.brownian.independent import OWN, EndBrownianIntervals, IndependentBrownianSteps
 from tisim.steppers.brownian.mobility import Mobility, Oseen, RotnePrager
-from tisim.steppers.brownian.vectorised import Abreast, abreast
+from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps, vectorises
 from tisim.steppers.common import BeginStep
 from tisim.steppers.context import Buffer, Step, StepContext
-from tisim.steppers.implicit.independent import KEEPS, Stretch
+from tisim.steppers.intervals import INTERVAL_FLAGS, INTERVAL_QUANTITIES, BeginIntervals
 from tisim.worlds.state import Field
 
 
@@ -61,7 +61,8 @@ class Brownian(Stepper):
     noise: Literal["exact", "fast"] = option("how noise is made", "exact")
 
     random: ClassVar = True
-    world_quantities: ClassVar = (*KEEPS, "beta")
+    world_quantities: ClassVar = (*INTERVAL_QUANTITIES, "beta")
+    flags: ClassVar = INTERVAL_FLAGS
 
     @property
     def order(self) -> int:
@@ -103,8 +104,8 @@ class Brownian(Stepper):
     def step(self, context: StepContext) -> Step:
         fluid = Fluid(context)
         if context.independent:
-            wander = Abreast if abreast(context) else Wander
-            return Step((Stretch(context), wander(context, fluid), EndWandering(context)))
+            advance = VectorisedBrownianSteps if vectorises(context) else IndependentBrownianSteps
+            return Step((BeginIntervals(context), advance(context, fluid), EndBrownianIntervals(context)))
         interaction = self._interaction(context, fluid)
         matrix = isinstance(interaction, Exact)
         drift = (*interaction.phases(), BrownianDrift(context, fluid, interaction))

@@ -1,24 +1,24 @@
 """Brownian particles that do not feel each other: each takes its own steps, many of them in one go.
 
-They meet at every multiple of the longest step, a window, which is what counts as a step of the world (see
-implicit/independent.py). A step of a particle is numbered by its window and within it, so that how many
-windows or steps a launch takes them through makes no difference to the noise either.
+They meet at every multiple of the longest step, an interval, which is what counts as a step of the world (see
+intervals.py). A step of a particle is numbered by its interval and within it, so that how many
+intervals or steps a launch takes them through makes no difference to the noise either.
 """
 
 from tisim.backend.taichi import ti
 from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.independent import LITTLE, PLACE, EndStretch, beginning, duration
-from tisim.steppers.implicit.registers import Registers
+from tisim.steppers.intervals import LITTLE, OWN_CLOCK, EndIntervals, beginning, duration
+from tisim.steppers.registers import Registers
 from tisim.worlds.program import PerParticle
 from tisim.worlds.state import Field, WorldStatus
 
 OWN = (
-    *PLACE,
+    *OWN_CLOCK,
     Field("own_steps", "", 1, "keep", integer=True, scratch=True),
     Field("own_fault", "", 1, "keep", integer=True, scratch=True),
 )
-"""Where a particle is on its way, after how many steps in its window, and what has stopped it: a status of
+"""Where a particle is on its way, after how many steps in its interval, and what has stopped it: a status of
 the world, or 0."""
 AHEAD = 8
 """Windows for which the noise of the first step, mostly the only one, is drawn at once: in vectors."""
@@ -32,8 +32,8 @@ def stepped(s, fluid: ti.template(), w, i, mobility, pushed, t, dt, g):  # type:
     return velocity, s.position[w, i] + (dt * velocity + width * g)
 
 
-class Wander(PerParticle):
-    """A particle through the windows of a launch."""
+class IndependentBrownianSteps(PerParticle):
+    """A particle through the intervals of a launch."""
 
     long = True
 
@@ -41,33 +41,34 @@ class Wander(PerParticle):
         super().__init__(context.s)
         self.registers = Registers(context.s, ("position", "velocity", "force"), ())
         self.own, self.control, self.domain = self.registers.state, context.control, context.domain
-        self.fluid, self.summed = self.registers.given(fluid), self.registers.given(context.force_sum)
+        self.fluid = self.registers.with_registers(fluid)
+        self.force_sum = self.registers.with_registers(context.force_sum)
         self.operators, self.forced = context.operators, context.forced
 
     @ti.func
     def run(self, w, i):
-        self.alone(w, i)
+        self.advance(w, i)
 
     @ti.func
-    def alone(self, w, i):
-        """Particle i through the windows of the launch, from where it is."""
+    def advance(self, w, i):
+        """Particle i through the intervals of the launch, from where it is."""
         s = self.s
         self.registers.load(w, i)
-        window, end = s.own_window[w, i], s.windows[w] + s.stretch_windows[w]
+        interval, end = s.own_interval[w, i], s.intervals[w] + s.launch_intervals[w]
         elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
         taken, going, short = 0, self.able(w, i), 0
-        allowance, cut = ti.cast(s.allowance[w], ti.i32), s.cut[w]
-        while going > 0 and window < end:
+        attempt_limit, cut = s.attempt_limit[w], s.cut[w]
+        while going > 0 and interval < end:
             kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
             for lane in range(AHEAD):
-                g = self.fluid.normals(w, i, self.number(window + lane))
+                g = self.fluid.normals(w, i, self.number(interval + lane))
                 for k in ti.static(range(3)):
                     kicks[k][lane] = g[k]
-            for lane in range(ti.min(AHEAD, ti.cast(end - window, ti.i32))):
+            for lane in range(ti.min(AHEAD, ti.cast(end - interval, ti.i32))):
                 if going > 0:
                     kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
-                    elapsed, carry, steps, going, over = self.window(
-                        w, i, window, kick, elapsed, carry, before, allowance - taken
+                    elapsed, carry, steps, going, over = self.interval(
+                        w, i, interval, kick, elapsed, carry, before, attempt_limit - taken
                     )
                     taken += steps - before
                     before = steps
@@ -76,21 +77,21 @@ class Wander(PerParticle):
                     elif cut > 0.0:
                         going = 0
                     else:
-                        window, elapsed, carry, before = window + 1.0, 0.0, 0.0, 0
+                        interval, elapsed, carry, before = interval + 1.0, 0.0, 0.0, 0
         if self.able(w, i) == 0 and s.own_fault[w, i] == 0:
             # It waits where the others will meet.
-            window, elapsed, carry, before = end, 0.0, 0.0, 0
+            interval, elapsed, carry, before = end, 0.0, 0.0, 0
         self.registers.store(w, i)
-        s.own_window[w, i], s.own_elapsed[w, i], s.own_carry[w, i] = window, elapsed, carry
+        s.own_interval[w, i], s.own_elapsed[w, i], s.own_carry[w, i] = interval, elapsed, carry
         s.own_steps[w, i] = before
         if short > 0:
             ti.atomic_add(s.underway[w], 1)
         ti.atomic_add(s.particle_steps[w], taken)
 
     @ti.func
-    def number(self, window):
-        """Of the first step in a window."""
-        return ti.cast(window, ti.i64) << 32
+    def number(self, interval):
+        """Return the number of the first step in an interval."""
+        return ti.cast(interval, ti.i64) << 32
 
     @ti.func
     def able(self, w, i):
@@ -100,20 +101,20 @@ class Wander(PerParticle):
         return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
 
     @ti.func
-    def window(self, w, i, window, kick, start, rounding, before, most):
-        """A particle through a window from ``start`` (s) on, ``before`` steps after its beginning: how far it
-        gets, to the end unless stopped, in ``most`` further steps; the rounding error of that; its steps in
-        the window; whether it can go on, and whether it is at the end. ``kick`` are the normal numbers of the
-        first step in the window."""
-        begin = beginning(self.s, self.control, w, window)
-        length = duration(self.s, self.control, w, window, begin)
+    def interval(self, w, i, interval, kick, start, rounding, before, most):
+        """A particle through an interval from ``start`` (s) on, ``before`` steps after its beginning: how far
+        it gets, to the end unless stopped, in ``most`` further steps; the rounding error of that; its steps
+        in the interval; whether it can go on, and whether it is at the end. ``kick`` are the normal numbers
+        of the first step in the interval."""
+        begin = beginning(self.s, self.control, w, interval)
+        length = duration(self.s, self.control, w, interval, begin)
         elapsed, carry = start, rounding
         taken, going, g = before, 1, kick
         while elapsed < length and going > 0 and taken - before < most:
             # An operator may have changed the radius in the last step.
             mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
-                self.summed.alone(w, i, begin + elapsed)
+                self.force_sum.single_particle(w, i, begin + elapsed)
             pushed = self.fluid.pushed(w, i, mobility)
             dt, left = ti.cast(self.control.longest(w), ti.f64), length - elapsed
             if not self.control.easy(self.own, w, i, pushed):
@@ -130,7 +131,7 @@ class Wander(PerParticle):
                 if dt * (1.0 + LITTLE) >= left:
                     dt, total = left, length
                 if taken > 0:
-                    g = self.fluid.normals(w, i, self.number(window) + taken)
+                    g = self.fluid.normals(w, i, self.number(interval) + taken)
                 self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
                 if self.s.own_fault[w, i] == 0:
                     elapsed = total
@@ -159,18 +160,18 @@ class Wander(PerParticle):
         """It goes no further, and its world ends with the launch."""
         s = self.s
         s.own_fault[w, i] = fault
-        ti.atomic_max(s.stuck[w], 1.0)
+        ti.atomic_max(s.halted[w], 1)
 
 
-class EndWandering(EndStretch):
-    """The windows are done; or the first particle to be stopped is found."""
+class EndBrownianIntervals(EndIntervals):
+    """The intervals are done; or the first particle to be stopped is found."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context)
         self.forced = context.forced
 
     @ti.func
-    def accuse(self, w):
+    def report_failure(self, w):
         """The particle that was stopped first, and when."""
         s = self.s
         first = self.slowest(w)

@@ -1,37 +1,34 @@
 """Brownian particles that do not feel each other, many at once: a particle in each lane of the CPU.
 
-While every particle of a tile takes windows in one step each, nothing branches, and compilers vectorise the
-loop over lanes. From the window on in which one of them does not, the tile goes on one by one. The bits are
+While every particle of a tile takes intervals in one step each, nothing branches, and compilers vectorise the
+loop over lanes. From the interval on in which one of them does not, the tile goes on one by one. The bits are
 the same.
 """
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import LANES
-from tisim.steppers.brownian.independent import Wander, stepped
+from tisim.steppers.brownian.independent import IndependentBrownianSteps, stepped
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.independent import beginning
-from tisim.steppers.implicit.registers import Registers
+from tisim.steppers.intervals import beginning
+from tisim.steppers.registers import Registers
 
 
-def abreast(context: StepContext) -> bool:
+def vectorises(context: StepContext) -> bool:
     """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
     as what settles and what operators do."""
     simple = not context.operators and not context.force_sum.derived_solvers
     return simple and runtime.current().device == "cpu" and context.s.capacity >= LANES
 
 
-class Abreast(Wander):
-    """Tiles of particles through the windows of a launch."""
+class VectorisedBrownianSteps(IndependentBrownianSteps):
+    """Tiles of particles through the intervals of a launch."""
 
     def __init__(self, context: StepContext, fluid) -> None:
         super().__init__(context, fluid)
         self.lane = Registers(context.s, ("force",), ())
-        self.there, self.drop, self.sums = (
-            self.lane.state,
-            self.lane.given(fluid),
-            self.lane.given(context.force_sum),
-        )
+        self.lane_state, self.lane_fluid = self.lane.state, self.lane.with_registers(fluid)
+        self.lane_force_sum = self.lane.with_registers(context.force_sum)
 
     @ti.func
     def run(self, w, i):
@@ -41,45 +38,46 @@ class Abreast(Wander):
             if i + LANES <= s.count[w] and self.level(w, i) > 0:
                 done = self.tile(w, i)
                 for j in range(i, i + LANES):
-                    s.own_window[w, j] = s.windows[w] + done
-            if done < s.stretch_windows[w]:
+                    s.own_interval[w, j] = s.intervals[w] + done
+            if done < s.launch_intervals[w]:
                 for j in range(i, ti.min(i + LANES, s.count[w])):
-                    self.alone(w, j)
+                    self.advance(w, j)
 
     @ti.func
     def level(self, w, first):
-        """Whether all particles of a tile are where the launch begins, and have whole windows before them."""
+        """Whether all particles of a tile are where the launch begins, and have whole intervals before
+        them."""
         s = self.s
         level = ti.select(s.cut[w] > 0.0, 0, 1)
         for j in range(first, first + LANES):
-            if s.own_window[w, j] > s.windows[w] or s.own_elapsed[w, j] > 0.0:
+            if s.own_interval[w, j] > s.intervals[w] or s.own_elapsed[w, j] > 0.0:
                 level = 0
         return level
 
     @ti.func
     def tile(self, w, first):
-        """Particles from ``first`` on, through as many windows as all take in one step: that number."""
+        """Particles from ``first`` on, through as many intervals as all take in one step: that number."""
         s = self.s
         place = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
         drift = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
         force = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
-        windows, done, halted = ti.cast(s.stretch_windows[w], ti.i32), 0, 0
-        while done < windows and halted == 0:
-            begin = beginning(s, self.control, w, s.windows[w] + done)
-            dt = beginning(s, self.control, w, s.windows[w] + done + 1) - begin
-            number, step = self.number(s.windows[w] + done), ti.cast(dt, s.real)
+        intervals, done, halted = ti.cast(s.launch_intervals[w], ti.i32), 0, 0
+        while done < intervals and halted == 0:
+            begin = beginning(s, self.control, w, s.intervals[w] + done)
+            dt = beginning(s, self.control, w, s.intervals[w] + done + 1) - begin
+            number, step = self.number(s.intervals[w] + done), ti.cast(dt, s.real)
             if not (dt > 0.0):
                 halted = 1
             for lane in range(LANES):
                 i = first + lane
                 f = 0.0 * s.force[w, i]
-                ti.static(self.lane.hold(f))
+                ti.static(self.lane.assign(f))
                 if ti.static(self.forced):
-                    self.sums.alone(w, i, begin)
-                mobility = self.drop.mobility(w, i)
-                pushed = self.drop.pushed(w, i, mobility)
-                g = self.drop.normals(w, i, number)
-                v, r = stepped(self.there, self.drop, w, i, mobility, pushed, begin, step, g)
+                    self.lane_force_sum.single_particle(w, i, begin)
+                mobility = self.lane_fluid.mobility(w, i)
+                pushed = self.lane_fluid.pushed(w, i, mobility)
+                g = self.lane_fluid.normals(w, i, number)
+                v, r = stepped(self.lane_state, self.lane_fluid, w, i, mobility, pushed, begin, step, g)
                 for k in ti.static(range(3)):
                     place[k][lane], drift[k][lane], force[k][lane] = r[k], v[k], f[k]
                 fine = self.able(w, i) > 0 and self.control.easy(s, w, i, pushed)

@@ -88,7 +88,7 @@ class Mix(PerParticle):
         total = self.sums.total(w)
         theta = ti.cast(0.0, ti.f64)
         # Not so for a NaN.
-        if s.solver_iteration[w] > 1.0 and total[1] > 0.0 and ti.abs(total[0]) < ti.math.inf:
+        if s.solver_iteration[w] > 1 and total[1] > 0.0 and ti.abs(total[0]) < ti.math.inf:
             theta = total[0] / total[1]
         for column in ti.static(self.columns):
             new, last = column[0][w, i], column[2][w, i]

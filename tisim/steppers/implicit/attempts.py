@@ -3,11 +3,11 @@
 from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.saved_state import Kept
+from tisim.steppers.implicit.saved_state import SavedState
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import WorldStatus
 
-TRIED, ACCEPTED, HOPELESS = range(3)
+RETRY, ACCEPTED, HOPELESS = range(3)
 """Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
 
 SHORTER = 0.8
@@ -24,7 +24,7 @@ class Begin(Phase):
     def run(self, w, _k):
         s = self.s
         s.time_before[w] = s.time[w]
-        s.attempting[w] = 1.0
+        s.attempting[w] = 1
         s.approach_time[w] = ti.math.inf
         s.fastest[w] = 0.0
         s.events[w] = 0
@@ -37,13 +37,13 @@ class Begin(Phase):
 class SaveState(PerParticle):
     """Keep the state at the beginning of the step."""
 
-    def __init__(self, kept: Kept) -> None:
-        super().__init__(kept.s)
-        self.kept = kept
+    def __init__(self, saved_state: SavedState) -> None:
+        super().__init__(saved_state.s)
+        self.saved_state = saved_state
 
     @ti.func
     def run(self, w, i):
-        self.kept.keep(w, i)
+        self.saved_state.save(w, i)
 
 
 class StepAttempt(Repeat):
@@ -55,7 +55,7 @@ class StepAttempt(Repeat):
 
     @ti.func
     def pending(self, w):
-        return ti.cast(self.s.attempting[w], ti.i32)
+        return self.s.attempting[w]
 
 
 @ti.func
@@ -70,7 +70,7 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 
 @ti.func
-def accuse(s, w):
+def report_failure(s, w):
     """The particle whose last iterate changed most; which force on it is at fault, see
     failure_attribution.py."""
     worst, most = 0, s.iterate_change[w, 0]
@@ -90,20 +90,20 @@ class RestoreState(PerParticle):
 
     conditional = True
 
-    def __init__(self, kept: Kept) -> None:
-        super().__init__(kept.s)
-        self.kept = kept
+    def __init__(self, saved_state: SavedState) -> None:
+        super().__init__(saved_state.s)
+        self.saved_state = saved_state
 
     @ti.func
     def when(self, w):
-        return ti.select(self.s.verdict[w] == TRIED, 1, 0)
+        return ti.select(self.s.verdict[w] == RETRY, 1, 0)
 
     @ti.func
     def run(self, w, i):
         s = self.s
-        back = self.kept.domain.nearest(w, s.position[w, i], s.position_before[w, i])
+        back = self.saved_state.domain.nearest(w, s.position[w, i], s.position_before[w, i])
         note_displacement(s, w, ti.cast(back, ti.f64))
-        self.kept.give_up(w, i)
+        self.saved_state.restore(w, i)
 
 
 class Decide(Phase):
@@ -120,4 +120,4 @@ class Decide(Phase):
             s.time[w] = s.time_before[w]
         if s.verdict[w] == HOPELESS:
             s.failed[w] = WorldStatus.STEP_TOO_SHORT
-        s.attempting[w] = ti.select(s.verdict[w] == TRIED, 1.0, 0.0)
+        s.attempting[w] = ti.select(s.verdict[w] == RETRY, 1, 0)

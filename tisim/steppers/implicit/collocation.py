@@ -21,8 +21,8 @@ from tisim.steppers.implicit.collocation_phases import (
     TakeStages,
 )
 from tisim.steppers.implicit.collocation_verdict import JudgeStages
-from tisim.steppers.implicit.saved_state import CHANGE, kept
-from tisim.steppers.implicit.span import Went, spans
+from tisim.steppers.implicit.excursion import NoteExcursion, excursion_fields
+from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
 from tisim.steppers.implicit.stage_control import StageControl
 from tisim.steppers.implicit.stages import Stages
 from tisim.worlds.block_sum import BlockSums
@@ -55,9 +55,10 @@ class Collocation(Stepper):
 
     counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
     world_quantities: ClassVar = (
-        "time_before", "attempting", "verdict", "next_dt", "last_dt", "sweeping", "sweep", "stage", "unsound",
-        "sweep_change", "last_change", "contraction", "measured_dt",
-    )  # fmt: skip
+        *("time_before", "next_dt", "last_dt", "measured_dt"),
+        *("sweep_change", "last_change", "contraction"),
+    )
+    flags: ClassVar = ("attempting", "verdict", "sweeping", "sweep", "stage", "out_of_range")
 
     @property
     def order(self) -> int:
@@ -75,9 +76,9 @@ class Collocation(Stepper):
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         return (
             FORCE,
-            *kept(turning),
+            *saved_fields(turning),
             CHANGE,
-            *spans(self.control.at_end),
+            *excursion_fields(self.control.at_end),
             *Stages.fields(self.stages, turning),
         )
 
@@ -96,7 +97,7 @@ class Collocation(Stepper):
             Decide(context),
         )
         begin = (Forget(context), Begin(context), SaveState(stages))
-        note = (Went(stages),) if self.control.at_end else ()
+        note = (NoteExcursion(stages),) if self.control.at_end else ()
         end = (*note, *context.update_history, *apply_operators(context), AdvanceClock(context))
         return Step(
             (*begin, StepAttempt(context, attempt), *end),

@@ -34,8 +34,8 @@ class ChooseCollocationStep(Phase):
         dt = length(s, self.control, w)
         s.dt[w] = dt
         self.stages.extrapolate(w, ti.select(s.last_dt[w] > 0.0, dt / s.last_dt[w], 0.0))
-        s.sweeping[w], s.sweep[w], s.stage[w] = 1.0, 1.0, 1.0
-        s.sweep_change[w], s.last_change[w], s.unsound[w] = 0.0, 0.0, 0.0
+        s.sweeping[w], s.sweep[w], s.stage[w] = 1, 1, 1
+        s.sweep_change[w], s.last_change[w], s.out_of_range[w] = 0.0, 0.0, 0
         s.time[w] = s.time_before[w] + dt * self.stages.c[1]
 
 
@@ -75,7 +75,7 @@ class StageSweep(Repeat):
 
     @ti.func
     def pending(self, w):
-        return ti.cast(self.s.sweeping[w], ti.i32)
+        return self.s.sweeping[w]
 
 
 class Place(OfStages):
@@ -84,7 +84,7 @@ class Place(OfStages):
     @ti.func
     def run(self, w, i):
         s, stages = self.s, self.stages
-        dt, stage = ti.cast(s.dt[w], s.real), ti.cast(s.stage[w], ti.i32)
+        dt, stage = ti.cast(s.dt[w], s.real), s.stage[w]
         r = s.position_before[w, i] + stages.displacement(w, i, stage, dt)
         if stages.sound(w, r):
             here = stages.domain.wrap(w, r)
@@ -94,7 +94,7 @@ class Place(OfStages):
             if ti.static(stages.turning):
                 s.spin[w, i] = stages.spin(w, i, stage, dt)
         else:
-            ti.atomic_max(s.unsound[w], 1.0)
+            ti.atomic_max(s.out_of_range[w], 1)
 
 
 class TakeStages(PerBlock):
@@ -109,7 +109,7 @@ class TakeStages(PerBlock):
     @ti.func
     def each(self, w, i):
         s, stages = self.s, self.stages
-        dt, stage = ti.cast(s.dt[w], s.real), ti.cast(s.stage[w], ti.i32)
+        dt, stage = ti.cast(s.dt[w], s.real), s.stage[w]
         new = stages.newest(w, i, stage, dt, s.time[w])
         change = self.take(s.stage_acceleration, w, i, stage, new)
         error, scale, rounding = ti.cast(0.0, s.real), ti.cast(0.0, s.real), ti.cast(0.0, s.real)
@@ -133,7 +133,7 @@ class TakeStages(PerBlock):
         s, stages = self.s, self.stages
         off = new - stages.at(rate, w, i, stage)
         stages.put(rate, w, i, stage, new)
-        if s.sweep[w] == 1.0:
+        if s.sweep[w] == 1:
             for j in range(stage + 1, stages.number):
                 more = ti.cast(stages.shape[w, j] / stages.shape[w, stage], s.real)
                 stages.put(rate, w, i, j, stages.at(rate, w, i, j) + more * off)

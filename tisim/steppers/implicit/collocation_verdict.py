@@ -2,7 +2,7 @@
 
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse
+from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, report_failure
 from tisim.worlds.program import Phase
 
 GUESS = 0.5
@@ -24,18 +24,18 @@ class JudgeStages(Phase):
         total = self.sums.total(w)
         s.force_evaluations[w] += 1
         # Not below infinity: also true of NaN, which a maximum would lose.
-        if not (total[0] < ti.math.inf) or s.unsound[w] > 0.0:
+        if not (total[0] < ti.math.inf) or s.out_of_range[w] > 0:
             total[0] = ti.math.inf
         s.sweep_change[w] = ti.max(s.sweep_change[w], total[0])
-        stage = ti.cast(s.stage[w], ti.i32)
+        stage = s.stage[w]
         if stage < last and s.sweep_change[w] < ti.math.inf:
             s.stage[w] = stage + 1
         else:
             self.judge(w, total)
-            s.stage[w], s.sweep_change[w] = 1.0, 0.0
-            s.sweep[w] += 1.0
+            s.stage[w], s.sweep_change[w] = 1, 0.0
+            s.sweep[w] += 1
             s.solver_iterations[w] += 1
-        here = self.stages.c[ti.cast(s.stage[w], ti.i32)]
+        here = self.stages.c[s.stage[w]]
         s.time[w] = s.time_before[w] + s.dt[w] * here
 
     @ti.func
@@ -48,7 +48,7 @@ class JudgeStages(Phase):
             change /= total[2]
         if total[1] > 0.0:
             error = total[1] / total[2]
-        first = s.sweep[w] == 1.0
+        first = s.sweep[w] == 1
         contraction = self.foreseen(w)
         if not first and s.last_change[w] > 0.0:
             contraction = change / s.last_change[w]
@@ -77,9 +77,9 @@ class JudgeStages(Phase):
     def decide(self, w, solved, contraction, error):
         """The verdict, and how long the next step is to be."""
         s = self.s
-        s.sweeping[w], s.verdict[w] = 0.0, TRIED
+        s.sweeping[w], s.verdict[w] = 0, RETRY
         # One that is only foreseen may be of long ago: it is no reason for a shorter step.
-        known = ti.select(s.sweep[w] > 1.0 or not solved, contraction, 0.0)
+        known = ti.select(s.sweep[w] > 1 or not solved, contraction, 0.0)
         factor = self.control.factor(w, known, error, self.order)
         if solved and self.control.accepts(w, error):
             s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
@@ -88,5 +88,5 @@ class JudgeStages(Phase):
             factor = ti.min(factor, ti.select(solved, SHORTER, DIVERGED))
             if self.control.hopeless(s, w, s.dt[w]):
                 s.verdict[w] = HOPELESS
-                accuse(s, w)
+                report_failure(s, w)
         s.next_dt[w] = s.dt[w] * factor

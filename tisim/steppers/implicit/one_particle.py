@@ -6,7 +6,7 @@ compared by their velocities, and positions may be wrapped into a box in between
 
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.saved_state import Kept
+from tisim.steppers.implicit.saved_state import SavedState
 
 
 def with_jacobian(forces):
@@ -32,7 +32,7 @@ def solved(a, b):
 
 
 @ti.data_oriented
-class Solve(Kept):
+class Solve(SavedState):
     """One iterate of a particle, given the force at the last one."""
 
     def __init__(self, context: StepContext, phi) -> None:
@@ -46,7 +46,7 @@ class Solve(Kept):
         return dt * (self.phi(w) * v + (1.0 - self.phi(w)) * self.s.velocity_before[w, i])
 
     @ti.func
-    def gone(self, w, i, dt):
+    def step_displacement(self, w, i, dt):
         """The displacement in a step that has been accepted. m."""
         return self.displacement(w, i, self.s.velocity[w, i], dt)
 
@@ -97,6 +97,6 @@ class Solve(Kept):
         return dt * dt / self.s.mass[w, i] * total.norm()
 
     @ti.func
-    def bearable(self, w, i, v, dt):
+    def reachable(self, w, i, v, dt):
         """Whether a particle with v' gets to a place that numbers can tell."""
         return self.sound(w, self.s.position_before[w, i] + self.displacement(w, i, v, dt))

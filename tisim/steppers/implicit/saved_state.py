@@ -17,20 +17,20 @@ TURNING_BEFORE = (
 )
 
 
-def kept(turning: bool) -> tuple[Field, ...]:
+def saved_fields(turning: bool) -> tuple[Field, ...]:
     """The fields it takes, in a scene that has torques or not."""
     return (*BEFORE, *(TURNING_BEFORE if turning else ()))
 
 
 @ti.data_oriented
-class Kept:
+class SavedState:
     """Keeps the state of a particle, and gives it back."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.domain, self.turning = context.s, context.domain, context.turning
 
     @ti.func
-    def keep(self, w, i):
+    def save(self, w, i):
         """Keep the state of a particle at the beginning of a step."""
         s = self.s
         s.position_before[w, i], s.velocity_before[w, i] = s.position[w, i], s.velocity[w, i]
@@ -39,7 +39,7 @@ class Kept:
             s.spin_before[w, i], s.torque_before[w, i] = s.spin[w, i], s.torque[w, i]
 
     @ti.func
-    def give_up(self, w, i):
+    def restore(self, w, i):
         """Back to the beginning of the step."""
         s = self.s
         s.position[w, i], s.velocity[w, i] = s.position_before[w, i], s.velocity_before[w, i]

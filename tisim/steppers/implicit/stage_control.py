@@ -5,7 +5,7 @@ from __future__ import annotations
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
-from tisim.steppers.implicit.span import Per, compared
+from tisim.steppers.implicit.excursion import Per, compared
 from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
 

@@ -7,12 +7,12 @@ from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.lobatto import highest, integrals, leading, nodes
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
-from tisim.steppers.implicit.saved_state import Kept
+from tisim.steppers.implicit.saved_state import SavedState
 from tisim.worlds.state import Field
 
 
 @ti.data_oriented
-class Stages(Kept):
+class Stages(SavedState):
     """``acceleration[w, i, 3 j + k]`` of stage j along axis k, and with torques ``turning`` likewise.
 
     ``c[j]`` is where stage j is, in parts of the step; ``speeds[i, j]`` gives v_i, ``places[i, j]`` r_i, and
@@ -109,7 +109,7 @@ class Stages(Kept):
         return moved + dt * dt * self.sum(self.places, stage, s.stage_acceleration, w, i)
 
     @ti.func
-    def gone(self, w, i, dt):
+    def step_displacement(self, w, i, dt):
         """The displacement in a step that has been accepted. m."""
         return self.displacement(w, i, self.number - 1, dt)
 

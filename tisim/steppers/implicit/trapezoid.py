@@ -12,10 +12,10 @@ from tisim.steppers.common import AdvanceClock, apply_operators, report_displace
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.implicit.anderson import accelerated, memory_of_iterates
 from tisim.steppers.implicit.attempts import Begin, Decide, RestoreState, SaveState, StepAttempt
-from tisim.steppers.implicit.independent import KEEPS, PLACE, Alone, EndStretch, Stretch
+from tisim.steppers.implicit.excursion import NoteExcursion, excursion_fields
+from tisim.steppers.implicit.independent import IndependentSteps
 from tisim.steppers.implicit.one_particle import Solve
-from tisim.steppers.implicit.saved_state import CHANGE, kept
-from tisim.steppers.implicit.span import Went, spans
+from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
 from tisim.steppers.implicit.step_control import ErrorControl, IterationControl
 from tisim.steppers.implicit.trapezoid_phases import (
     ChooseTrapezoidStep,
@@ -24,12 +24,19 @@ from tisim.steppers.implicit.trapezoid_phases import (
     JudgeIteration,
     PredictEnd,
 )
+from tisim.steppers.intervals import (
+    INTERVAL_FLAGS,
+    INTERVAL_QUANTITIES,
+    OWN_CLOCK,
+    BeginIntervals,
+    EndIntervals,
+)
 from tisim.worlds.block_sum import BlockSums
 from tisim.worlds.program import Item
 from tisim.worlds.state import Field
 
-OWN = (Field("own_dt", "s", 1, "keep", scratch=True), *PLACE)
-"""Of a particle alone: its next step, and where it is on its way."""
+OWN = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
+"""The fields of a particle that takes steps of its own: the length of the next one, and its clock."""
 
 
 class Trapezoid(Stepper):
@@ -44,7 +51,7 @@ class Trapezoid(Stepper):
     The part of the force that is linear in velocity, of effects that give ``velocity_jacobian``, is solved
     exactly with each iterate. Anderson's acceleration makes iterates from the last two, which converges in
     fewer of them, and where plain iteration does not. Particles that do not feel each other take their own
-    steps and meet at every multiple of ``control.longest``; a step of the world is then from one to the next.
+    steps and meet at every multiple of ``control.longest``; a step of the world is then such an interval.
 
     Source: Z13 (A1)-(A10); Z16 (8.4), (C.1)-(C.5).
     """
@@ -60,10 +67,8 @@ class Trapezoid(Stepper):
     acceleration: Literal["none", "anderson"] = option("how the iteration is accelerated", "none")
 
     counters: ClassVar = ("rejections", "solver_iterations", "force_evaluations")
-    world_quantities: ClassVar = (
-        *("time_before", "iterating", "attempting", "verdict", "solver_iteration", "next_dt"),
-        *KEEPS,
-    )
+    world_quantities: ClassVar = ("time_before", "next_dt", *INTERVAL_QUANTITIES)
+    flags: ClassVar = ("attempting", "verdict", "iterating", "solver_iteration", *INTERVAL_FLAGS)
 
     @property
     def order(self) -> int:
@@ -85,15 +90,15 @@ class Trapezoid(Stepper):
 
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         if independent:
-            return (FORCE, *OWN, *spans(self.control.at_end))
+            return (FORCE, *OWN, *excursion_fields(self.control.at_end))
         accelerated = self.acceleration == "anderson"
-        more = (*spans(self.control.at_end), *(memory_of_iterates(turning) if accelerated else ()))
-        return (FORCE, *kept(turning), CHANGE, *more)
+        more = (*excursion_fields(self.control.at_end), *(memory_of_iterates(turning) if accelerated else ()))
+        return (FORCE, *saved_fields(turning), CHANGE, *more)
 
     def step(self, context: StepContext) -> Step:
         s, solve = context.s, Solve(context, context.stepper.phi)
         if context.independent:
-            return Step((Stretch(context), Alone(context, solve), EndStretch(context)))
+            return Step((BeginIntervals(context), IndependentSteps(context, solve), EndIntervals(context)))
         sums = BlockSums(s, 4)
         report, forces = report_displacement(context), (*context.update_lists, *context.sum_trial_forces)
         buffers: tuple[Buffer, ...] = (Buffer(sums, "sums of the iteration", self.kind()),)
@@ -112,6 +117,6 @@ class Trapezoid(Stepper):
             *report,
             Decide(context),
         )
-        note = (Went(solve),) if self.control.at_end else ()
+        note = (NoteExcursion(solve),) if self.control.at_end else ()
         end = (*note, *context.update_history, *apply_operators(context), AdvanceClock(context))
         return Step((Begin(context), SaveState(solve), StepAttempt(context, attempt), *end), buffers)

@@ -3,7 +3,7 @@
 from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
-from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, SHORTER, TRIED, accuse, length
+from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, length, report_failure
 from tisim.worlds.block_sum import PerBlock
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 
@@ -17,7 +17,7 @@ class Iteration(Repeat):
 
     @ti.func
     def pending(self, w):
-        return ti.cast(self.s.iterating[w], ti.i32)
+        return self.s.iterating[w]
 
 
 class ChooseTrapezoidStep(Phase):
@@ -32,7 +32,7 @@ class ChooseTrapezoidStep(Phase):
         dt = length(s, self.control, w)
         s.dt[w] = dt
         s.time[w] = s.time_before[w] + dt
-        s.iterating[w], s.solver_iteration[w] = 1.0, 1.0
+        s.iterating[w], s.solver_iteration[w] = 1, 1
 
 
 class PredictEnd(PerParticle):
@@ -47,7 +47,7 @@ class PredictEnd(PerParticle):
         s, solve = self.s, self.solve
         dt = ti.cast(s.dt[w], s.real)
         v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
-        if not solve.bearable(w, i, v, dt):
+        if not solve.reachable(w, i, v, dt):
             v = s.velocity_before[w, i]
         solve.advance(w, i, v, dt)
         moved = ti.cast(solve.displacement(w, i, v, dt), ti.f64)
@@ -68,7 +68,7 @@ class Correct(PerBlock):
         last = s.velocity[w, i]
         v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
         change = ti.cast(ti.math.inf, s.real)
-        if solve.bearable(w, i, v, dt):
+        if solve.reachable(w, i, v, dt):
             step = solve.phi(w) * dt * (v - last)
             change = step.norm() + solve.advance(w, i, v, dt)
             note_displacement(s, w, ti.cast(step, ti.f64))
@@ -94,11 +94,11 @@ class JudgeIteration(Phase):
             change = total[0] / total[1]
         if total[2] > 0.0:
             error = total[2] / total[3]
-        k = s.solver_iteration[w] + 1.0
+        k = s.solver_iteration[w] + 1
         s.solver_iteration[w] = k
         s.solver_iterations[w] += 1
         s.force_evaluations[w] += 1
-        s.verdict[w] = TRIED
+        s.verdict[w] = RETRY
         solved = self.control.solved(w, change)
         # Not below infinity: also true of NaN.
         if solved or k >= self.control.iterations or not (change < ti.math.inf):
@@ -106,8 +106,8 @@ class JudgeIteration(Phase):
                 s.verdict[w] = ACCEPTED
             elif self.control.hopeless(s, w, s.dt[w]):
                 s.verdict[w] = HOPELESS
-                accuse(s, w)
-            factor = self.control.factor(w, self.control.aim(w), change, k, error)
+                report_failure(s, w)
+            factor = self.control.factor(w, self.control.aim(w), change, ti.cast(k, ti.f64), error)
             # A step that was not accepted would fail again in the same way if it were as long.
             s.next_dt[w] = s.dt[w] * ti.select(s.verdict[w] == ACCEPTED, factor, ti.min(factor, SHORTER))
-            s.iterating[w] = 0.0
+            s.iterating[w] = 0

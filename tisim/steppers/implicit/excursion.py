@@ -15,15 +15,15 @@ from tisim.worlds.state import Field
 Per = Literal["step", "run"]
 """What an error that is asked for is of: a step, over the displacement in it, or the end of a run, over the
 size of the motion."""
-GONE = Field("gone", "m", 3, "keep", scratch=True)
+TOTAL_DISPLACEMENT = Field("total_displacement", "m", 3, "keep", scratch=True)
 """The displacement of a particle since its start, through faces of a box too."""
-SPAN = Field("span", "m", 1, "keep", scratch=True)
+EXCURSION = Field("excursion", "m", 1, "keep", scratch=True)
 """The largest of its distances from its start, at the ends of steps."""
 
 
-def spans(at_end: bool) -> tuple[Field, ...]:
+def excursion_fields(at_end: bool) -> tuple[Field, ...]:
     """The fields that it takes."""
-    return (GONE, SPAN) if at_end else ()
+    return (TOTAL_DISPLACEMENT, EXCURSION) if at_end else ()
 
 
 @ti.func
@@ -31,18 +31,18 @@ def compared(control: ti.template(), s, w, i, moved, dt):  # type: ignore[valid-
     """What the error is compared with of a particle that has moved so far in a step of dt (s). m."""
     size, share = moved, ti.cast(1.0, s.real)
     if ti.static(control.at_end):
-        size, share = ti.max(s.span[w, i], moved), dt / ti.cast(s.end[w], s.real)
+        size, share = ti.max(s.excursion[w, i], moved), dt / ti.cast(s.end[w], s.real)
     return share * (size + control.resolution(w) * s.radius[w, i])
 
 
 @ti.func
-def went(s, w, i, moved):
+def note_excursion(s, w, i, moved):
     """Note the displacement (m, a vector) in a step that is accepted."""
-    s.gone[w, i] += moved
-    s.span[w, i] = ti.max(s.span[w, i], s.gone[w, i].norm())
+    s.total_displacement[w, i] += moved
+    s.excursion[w, i] = ti.max(s.excursion[w, i], s.total_displacement[w, i].norm())
 
 
-class Went(PerParticle):
+class NoteExcursion(PerParticle):
     """Note the displacements in a step. ``solve`` tells them."""
 
     def __init__(self, solve) -> None:
@@ -51,4 +51,4 @@ class Went(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        went(self.s, w, i, self.solve.gone(w, i, ti.cast(self.s.dt[w], self.s.real)))
+        note_excursion(self.s, w, i, self.solve.step_displacement(w, i, ti.cast(self.s.dt[w], self.s.real)))

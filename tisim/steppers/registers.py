@@ -14,7 +14,7 @@ class Local:
 
     value: Any = None
 
-    def hold(self, value: Any) -> None:
+    def assign(self, value: Any) -> None:
         self.value = value
 
     def __getitem__(self, _index: Any) -> Any:
@@ -36,7 +36,7 @@ class Registers:
         for name, local in zip((*loaded, *own), (*(x for _, x in self.loaded), *self.own), strict=True):
             setattr(self.state, name, local)
 
-    def given(self, part: Part) -> Part:
+    def with_registers(self, part: Part) -> Part:
         """The same part of a step, at work on this state."""
         copied: Any = copy(part)
         copied.s = self.state
@@ -47,15 +47,15 @@ class Registers:
         """Take a particle out of memory, into variables of the block that calls this."""
         for field, local in ti.static(self.loaded):
             value = field[w, i]
-            ti.static(local.hold(value))
+            ti.static(local.assign(value))
         for local in ti.static(self.own):
             value = ti.Vector.zero(self.state.real, 3)
-            ti.static(local.hold(value))
+            ti.static(local.assign(value))
 
-    def hold(self, *values: Any) -> None:
+    def assign(self, *values: Any) -> None:
         """Take these for what ``load`` would take from memory."""
         for (_, local), value in zip(self.loaded, values, strict=True):
-            local.hold(value)
+            local.assign(value)
 
     @ti.func
     def store(self, w, i):
