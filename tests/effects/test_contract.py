@@ -1,15 +1,18 @@
 """The core takes effects it has never heard of: those of tests/throwaway.py."""
 
+import copy
 import time
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from tests.scenes import fixed, scene
+from tests import extremes
+from tests.scenes import fixed, scene, simulate
 from tests.throwaway import K_E, WORLDS, Coulomb, RandomKicks, Trap, charges, run
 from tisim import InputError, Scene, Simulation
-from tisim.effects import Agglomeration, Impact
+from tisim.effects import Agglomeration, ContactFriction, Force, Impact, PairForce, Tether
+from tisim.engine.explain import known_effects
 
 
 def test_forces_are_their_numpy_twin(rng):
@@ -141,3 +144,35 @@ def test_a_scene_finds_them_by_name():
     assert again.digest() == made.digest()
     assert [type(e) for e in again.effects] == [Coulomb, Trap]
     assert again.stepper == fixed(1e-9)
+
+
+FORCES = sorted(
+    (k for k in known_effects() if issubclass(k, Force | PairForce)), key=lambda kind: kind.kind()
+)
+
+
+@pytest.mark.parametrize("kind", FORCES, ids=[kind.kind() for kind in FORCES])
+def test_a_force_that_gives_its_derivatives_by_velocity_depends_on_it(kind):
+    assert kind.depends_on_velocity or not (issubclass(kind, Force) and kind.offers("velocity_jacobian"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FORCES, ids=[kind.kind() for kind in FORCES])
+def test_a_force_says_whether_it_depends_on_velocity(kind):
+    """Forces after a step that moves nothing, from the same places with and without velocity and spin."""
+    data = copy.deepcopy(extremes.scenes()[f"effects.{kind.kind()}"])
+    control = {"kind": "fixed_step", "dt": 1e-12}
+    data |= {"duration": 1e-12, "stepper": {"kind": "verlet", "control": control}}
+    data["particles"]["quantities"] |= {"anchor": [[0.0, 0.0, 1e-3]] * 3} if kind is Tether else {}
+    if kind is ContactFriction:
+        # Its grip carries the time step.
+        data["effects"]["contact_friction"]["stiffness"] = 1e18
+    effects = Scene.from_dict(data).effects
+    at_rest = copy.deepcopy(data)
+    at_rest["particles"]["velocity"] = [[0.0, 0.0, 0.0]] * 3
+    if "spin" in at_rest["particles"]["quantities"]:
+        at_rest["particles"]["quantities"]["spin"] = [[0.0, 0.0, 0.0]] * 3
+    moving, resting = (simulate([Scene.from_dict(one)])[0].state["force"] for one in (data, at_rest))
+    depends = any(one.depends_on_velocity for one in effects if isinstance(one, Force | PairForce))
+    assert np.abs(moving).max() > 0
+    assert (np.abs(moving - resting).max() > 1e-6 * np.abs(moving).max()) == depends

@@ -161,7 +161,12 @@ def _steppers(scene: Scene, dt: float) -> list[Stepper]:
     serialization.load(steppers)
     asked = {_kind(scene.stepper)}
     found = []
-    for stepper in scene.stepper.rivals(scene.effects, dt):
+    rivals = scene.stepper.rivals(scene.effects, dt)
+    if rivals is None:
+        # By name, whatever has been imported first.
+        kinds = [kind for _, kind in sorted(Stepper.known().items())]
+        rivals = tuple(stepper for kind in kinds for stepper in kind.alternatives(scene.effects, dt))
+    for stepper in rivals:
         if type(stepper.control) is type(scene.stepper.control):
             stepper = stepper.model_copy(update={"control": scene.stepper.control})
         if _kind(stepper) not in asked:

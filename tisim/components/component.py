@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from tisim.backend.taichi import DEVICE_FUNCTION
-from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.cost_hints import AccuracyHints
 from tisim.components.invalid import explain_invalid, unit_of
 from tisim.components.ranges import WHOLE, check_magnitude
 from tisim.errors import InputError, must
@@ -61,7 +61,7 @@ class Checked(BaseModel):
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
 
-class Component(Checked):
+class Component(AccuracyHints, Checked):
     """A part of a scene."""
 
     model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
@@ -166,8 +166,6 @@ class Component(Checked):
     """Effects that cannot be in a scene with this one."""
     incompatible_controls: ClassVar[tuple[str, ...]] = ()
     """Kinds of step control that do not see what this effect needs them to."""
-    accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = ()
-    """Settings that trade accuracy for time."""
 
 
 def _descendants(cls: type[Any]) -> Iterator[type[Any]]:

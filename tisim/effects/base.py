@@ -1,36 +1,45 @@
 """The contract of an effect. One effect is one file: its law, its source, its parameters.
 
-Rules
+What a scene holds is plain data; what kernels hold is a bound object (tisim/worlds/bound.py).
 1. An effect is a frozen ``Component``: validated data, its source and equation in the docstring.
-2. Every float or Vector parameter may differ per world; in a kernel it is a function, ``self.name(w)``. So
-   may a list of parts, in number too: ``self.list.name(w, k)``, k below ``self.list.size(w)``.
-   Every other option (bool, int, text) is compiled in, and the same for all worlds of a batch.
-3. ``fields`` names the particle fields it reads or writes; a field that nobody needs is not allocated.
-   A field that no other effect has ever needed is declared by putting a ``Field`` there; effects that
-   share one declare it alike. Where the effect's options decide, ``required_fields`` returns those of
-   this one.
+2. Every float or Vector parameter may differ per world: in a kernel it is a function, ``self.name(w)``. So
+   may a list of parts, in number too: ``self.list.name(w, k)``, k below ``self.list.size(w)``. Every other
+   option (bool, int, text) is compiled in, and the same for all worlds of a batch.
+3. ``fields`` names the particle fields it reads or writes; a field that nobody needs is not allocated. One
+   that no other effect has ever needed is declared by putting a ``Field`` there; effects that share one
+   declare it alike. Where the options decide, ``required_fields`` returns those of this one.
+   ``depends_on_velocity`` says whether it reads or changes velocities or spins, which steppers without
+   inertia do not have.
 4. ``counters`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
-   back.
+   back. Of several effects of one kind they are summed, as all write the same.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
-   are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them by
-   the driver, and changed by ``remember`` only, once a step.
+   are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them, and
+   changed by ``remember`` only, once a step.
 6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
    ``requires_source`` the quantities of which a scene must have at least one source.
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field
-   where the particle is; the driver sets it before forces are summed. A ``SelfConsistentQuantity`` depends on
-   that of all others too, such as an induced dipole.
+   where the particle is; it is set before forces are summed. A ``SelfConsistentQuantity`` depends on that of
+   all others too, such as an induced dipole.
 8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
-9. A ``PairEvent`` changes two particles at once. The driver hands it each pair in ``contact`` with
-   exclusive access to both, earliest first (see collision_rounds.py); it may remove either.
+9. A ``PairEvent`` changes two particles at once. It is handed each pair in ``contact`` with exclusive access
+   to both, earliest first (see tisim/interactions/collision_rounds.py); it may remove either.
 10. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
-    ``requires`` names the effects without which it means nothing. The driver never asks what an effect is
-    called.
-11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may
-    ever live at once, given the start.
+    ``requires`` names the effects without which it means nothing. Nobody asks what an effect is called.
+11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may ever
+    live at once, given the start.
 12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
     say with ``s.invalidate_lists(w)`` that they have moved or resized one. Indices move only between steps.
     Nothing may depend on the order of parallel work: no float atomics.
+
+What Taichi asks of a method with ``ti.func``:
+- One return, at the end: none within an ``if`` or a loop. A variable has the type of its first value.
+- In ``pair_force`` and what it calls, over all pairs, ``ti.select`` in place of ``if`` keeps the loop without
+  a branch, so that it is vectorised; both values are computed, so neither may be harmful.
+- Positions, forces and parameters are ``s.real``, f32 or f64. Times are f64 always: cast what is made of
+  them, ``ti.cast(ti.sin(omega * t), s.real)``.
+- What is known when it is compiled is asked with ``ti.static``: ``if ti.static(self.option)``, ``for source
+  in ti.static(self.applied)``. A loop over particles or lists is a plain ``range``.
 """
 
 from __future__ import annotations
@@ -43,6 +52,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, option, parameter
+from tisim.components.cost_hints import LawHints
 from tisim.worlds.bound import Peers
 from tisim.worlds.state import Field
 
@@ -59,15 +69,16 @@ __all__ = [
 ]
 
 
-class Effect(Component):
+class Effect(LawHints, Component):
     """An effect is anything physical that a scene can call for: the contract of all of them.
 
     Laws are made after one of its kinds: ``Force``, ``PairForce``, ``PairEvent``, ``DerivedQuantity``,
     ``SelfConsistentQuantity``, ``Source`` or ``Operator``. A scene has each name once, so that it can hold
     two of a kind where they make sense: each acts with its own parameters, and what both count is added up.
 
-    fields : the particle fields that it reads or writes, by name or as a ``Field``. counters : names of the
-    integer counters that it keeps of a world. world_quantities : names of the quantities that it keeps of a
+    fields : the particle fields that it reads or writes, by name or as a ``Field``. depends_on_velocity :
+    whether it reads or changes velocities or spins. counters : names of the integer counters that it keeps of
+    a world. world_quantities : names of the quantities that it keeps of a
     world. requires_source : the quantities of which a scene must have at least one source. repeatable :
     whether a scene can hold two of its kind.
     """
@@ -82,6 +93,7 @@ class Effect(Component):
     )
 
     fields: ClassVar[tuple[str | Field, ...]] = ()
+    depends_on_velocity: ClassVar[bool] = False
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
     requires_source: ClassVar[tuple[str, ...]] = ()
@@ -107,11 +119,6 @@ class Effect(Component):
         """Return how many particles may ever live at once, given the masses of those of the start (kg); by
         default there are never more than at the start."""
         return len(masses)
-
-    def approximations(self, extent: float) -> tuple[Effect, ...]:
-        """Return cheaper laws that ``tisim cost`` tries in its place, the coarsest first, for particles that
-        are up to ``extent`` (m) apart; by default none."""
-        return ()
 
     @classmethod
     def offers(cls, hook: str) -> bool:
@@ -162,7 +169,11 @@ class Pairwise(Effect):
 
     @ti.func
     def reach(self, s, w, i):
-        """Return the widest gap (m) at which it acts between i and a particle that is no larger."""
+        """Return the widest gap (m) between surfaces at which it acts between i and a particle no larger.
+
+        A pair is looked for by its larger particle, so it is the reach of that one that counts, whatever the
+        smaller one would return.
+        """
         return 0.0
 
 
@@ -182,7 +193,11 @@ class PairForce(Pairwise):
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
-        """Return the force on i by j, in N; ``separation`` is r_j - r_i (m), ``distance`` its length."""
+        """Return the force on i by j, in N; ``separation`` is r_j - r_i (m), ``distance`` its length.
+
+        Two particles in one place have a distance of 0. A law that has a limit there must return it; one that
+        divides by the distance gives what is not finite, and the world stops and names the law.
+        """
         return 0.0 * separation
 
     @ti.func

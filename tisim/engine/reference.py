@@ -161,6 +161,8 @@ def _needs(kind: type[Component]) -> Iterator[str]:
         yield f"a source of {' or '.join(quantities)}"
     for other in kind.excludes:
         yield f"no {' or '.join(sorted(other.known()))}"
+    if getattr(kind, "depends_on_velocity", False):
+        yield "a stepper with inertia, not brownian"
     if kind.incompatible_controls:
         yield f"another step control than {' or '.join(kind.incompatible_controls)}"
     for source_ in FAMILIES["sources"].kinds().values():

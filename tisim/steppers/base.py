@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 from tisim.components.component import Component, option
+from tisim.components.cost_hints import StepperHints
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, Effect, Force, SelfConsistentQuantity
 from tisim.errors import must
@@ -23,7 +24,7 @@ def single(effect: Effect) -> bool:
     )
 
 
-class Stepper(Component):
+class Stepper(StepperHints, Component):
     """A stepper says how time advances, and its control how long the next step is: the contract of both.
 
     Before the first step ``force`` and ``torque`` are those of the start.
@@ -64,23 +65,6 @@ class Stepper(Component):
         """Return whether it may take each particle by itself: by default, when they feel nothing of each
         other and only forces change them."""
         return all(single(effect) for effect in effects)
-
-    @classmethod
-    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
-        """Return those of this kind that ``tisim cost`` tries in a scene of these effects, with steps of some
-        dt (s); by default none."""
-        return ()
-
-    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
-        """Return what ``tisim cost`` tries beside this one: by default the alternatives of every kind."""
-        # By name, whatever has been imported first.
-        kinds = [kind for _, kind in sorted(Stepper.known().items())]
-        return tuple(stepper for kind in kinds for stepper in kind.alternatives(effects, dt))
-
-    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
-        """Forces summed for a particle, the mean over particles, from the counts of a run; one a step by
-        default."""
-        return work["particle_steps"] / particles
 
     def structure(self) -> tuple[Any, ...]:
         own = tuple(option for option in super().structure() if option != ("control", self.control))

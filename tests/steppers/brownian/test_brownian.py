@@ -187,7 +187,9 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
     scenes = [*free, colloids(place, trap=2.0, quantities=pinned, **more)]
     found = []
     for kind in (VectorisedBrownianSteps, IndependentBrownianSteps):
-        monkeypatch.setattr(brownian, "vectorises", lambda context, kind=kind: kind is VectorisedBrownianSteps)
+        monkeypatch.setattr(
+            brownian, "vectorises", lambda context, kind=kind: kind is VectorisedBrownianSteps
+        )
         simulation = Simulation(scenes[0], 5)
         assert kind.__name__ in simulation.program.names()
         simulation.load(scenes)

@@ -22,6 +22,7 @@ class ContactDissipation(PairForce):
 
     short_ranged: ClassVar[bool] = True
     fields = ("radius", "velocity")
+    depends_on_velocity: ClassVar[bool] = True
     requires: ClassVar = (NormalContact,)
 
     damping: float = parameter("N s/m^3", "damping coefficient c_cd per contact area", examples=[1e3], ge=0)

@@ -13,6 +13,7 @@ class SurfaceContact(PairForce):
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
     fields = ("radius", "velocity", "spin")
+    depends_on_velocity: ClassVar[bool] = True
     requires: ClassVar = (NormalContact,)
 
     @ti.func

@@ -24,7 +24,8 @@ class Drag(Force):
     """The contract of a drag law, F = g u, where g is a multiple of a power of |u| and u = v_f - v."""
 
     contract: ClassVar[bool] = True
-    fields = ("radius",)
+    depends_on_velocity: ClassVar[bool] = True
+    fields = ("radius", "velocity")
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"flow": sources(peers, "flow_velocity")}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Force
@@ -22,7 +22,8 @@ class Lorentz(Force):
     Source: Z13 Eqs (1)-(5).
     """
 
-    fields = ("charge",)
+    depends_on_velocity: ClassVar[bool] = True
+    fields = ("charge", "velocity")
     requires_source = ("electric_field", "magnetic_flux_density")
 
     def connect(self, peers: Peers) -> dict[str, Any]:

@@ -103,6 +103,7 @@ class Impact(PairEvent):
 
     hard: ClassVar[bool] = True
     fields = ("radius", "mass", "velocity")
+    depends_on_velocity: ClassVar[bool] = True
     counters = ("impacts", "contacts", "bonds", "iterations", "unsettled")
     forced: ClassVar[bool] = False
 

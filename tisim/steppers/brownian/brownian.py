@@ -74,10 +74,8 @@ class Brownian(Stepper):
             turns = effect.offers("torque") if isinstance(effect, Force) else False
             turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
             must(not turns, name, "without torques in a scene stepped by brownian", name)
-            drags = isinstance(effect, Force) and effect.offers("velocity_jacobian")
-            drags = drags or isinstance(effect, PairEvent) or "velocity" in effect.required_fields()
             rule = "one that does not depend on velocity in a scene stepped by brownian"
-            must(not drags, name, rule, name)
+            must(not (effect.depends_on_velocity or isinstance(effect, PairEvent)), name, rule, name)
         fits = self.hydrodynamics == "none" or not domain.periodic()
         must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
 

@@ -1,0 +1,50 @@
+"""What parts of a scene say to ``tisim cost`` alone: nothing else asks for it.
+
+A part that says nothing of this runs as well; it is only not compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel
+
+from tisim.components.accuracy_parameter import AccuracyParameter
+
+
+class AccuracyHints(BaseModel):
+    """Hints of any part of a scene.
+
+    accuracy_parameters : its settings that trade accuracy for time.
+    """
+
+    accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = ()
+
+
+class LawHints(AccuracyHints):
+    """Hints of an effect."""
+
+    def approximations(self, extent: float) -> tuple[Any, ...]:
+        """Return cheaper laws to try in its place, the coarsest first, for particles that are up to
+        ``extent`` (m) apart; by default none."""
+        return ()
+
+
+class StepperHints(AccuracyHints):
+    """Hints of a stepper."""
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Any], dt: float) -> tuple[Self, ...]:
+        """Return those of this kind to try in a scene of these effects, with steps of some dt (s); by default
+        none."""
+        return ()
+
+    def rivals(self, effects: Sequence[Any], dt: float) -> tuple[Any, ...] | None:
+        """Return what to try beside this one; None, the default, for the alternatives of every kind."""
+        return None
+
+    def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
+        """Return how often forces were summed for a particle, the mean over particles, given the counts of a
+        run; one a step by default."""
+        return work["particle_steps"] / particles
