@@ -54,7 +54,7 @@ def rebounds_of_cold_grains():
             Impact(hardness=hardness), Heating(heat_capacity=1e9), Softening(activation_energy=activation)
         )  # fmt: skip
         (result,) = simulate([head_on(0.01, effects, quantities={"temperature": temperature})])
-        found.append([result.status.ok, *(result.work[name] for name in ("impacts", "bonds", "unsettled"))])
+        found.append([result.status.ok, *(result.work[name] for name in ("impacts", "bonds", "unconverged"))])
     return found
 
 

@@ -50,7 +50,7 @@ def test_iterations_across_the_bond_threshold_settle():
     results = simulate([coupled(v) for v in speeds], worlds=300, capacity=2)
     e = []
     for v, result in zip(speeds, results, strict=True):
-        assert result.work["unsettled"] == 0
+        assert result.work["unconverged"] == 0
         assert 1 <= result.work["iterations"] <= 200
         u = result.state["velocity"][:, 0]
         e.append((u[1] - u[0]) / (2 * v))
@@ -61,7 +61,7 @@ def test_iterations_across_the_bond_threshold_settle():
 
 
 @pytest.mark.slow
-def test_unsettled_impacts_are_bounded_and_counted():
+def test_unconverged_impacts_are_bounded_and_counted():
     """With too few iterations allowed the run goes on, within its bound, and it is reported."""
     results = simulate(
         [coupled(v, iterations=2, tolerance=1e-15) for v in (3.0, 5.0, 8.0)], worlds=3, capacity=2
@@ -70,7 +70,7 @@ def test_unsettled_impacts_are_bounded_and_counted():
         assert result.status.ok
         assert result.work["iterations"] <= 2
         assert energy(result.state) == pytest.approx(energy(result.start), rel=1e-13)
-    assert sum(result.work["unsettled"] for result in results) >= 1
+    assert sum(result.work["unconverged"] for result in results) >= 1
 
 
 @pytest.mark.long
@@ -86,7 +86,7 @@ def test_extreme_temperatures(temperature):
     assert (result.state["temperature"] >= 0).all()
     assert energy(result.state) == pytest.approx(energy(result.start), rel=1e-11)
     assert result.work["impacts"] > 10
-    assert result.work["unsettled"] == 0
+    assert result.work["unconverged"] == 0
 
 
 @pytest.mark.slow

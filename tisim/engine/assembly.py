@@ -20,7 +20,7 @@ from tisim.neighbours.pair_list import NeighbourList
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import FinishStep
-from tisim.steppers.context import Buffer, StepContext
+from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.step_control import StepControl
 from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.program import Item
@@ -96,8 +96,8 @@ class Assembly:
             force_sum=self._sum(SumForces),
         )
         self.failure_attribution = FailureAttribution(context.force_sum)
-        made = stepper.data.step(context)
-        step, first = [*made.items], [*lists, *context.sum_forces]
+        own: Step = stepper.data.step(context)
+        step, first = [*own.items], [*lists, *context.sum_forces]
         if near and contacts:
             survey = FindContacts(near, contacts, control)
             step += [ClearContacts(contacts), survey]
@@ -121,7 +121,7 @@ class Assembly:
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),
             *self._sweeps(),
-            *made.buffers,
+            *own.buffers,
         )
 
     def _sweeps(self) -> Iterator[Buffer]:

@@ -122,7 +122,7 @@ def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
     yield Memory("parameter table", simulation.worlds * simulation.table.slots * real, "effects' parameters")
     if simulation.table.array_bytes:
         yield Memory("tables, of all worlds", simulation.table.array_bytes, "effects that look numbers up")
-    for buffer in simulation.made.buffers:
+    for buffer in simulation.assembly.buffers:
         yield Memory(buffer.what, buffer.memory.bytes(), buffer.why)
 
 
@@ -164,30 +164,30 @@ def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, 
             yield f"{within}{name}", reference.shown(value), unit_of(info), text_of(info)
 
 
-def render(found: Explanation) -> RenderableType:
+def render(explanation: Explanation) -> RenderableType:
     """The explanation for a terminal."""
     head = Text.assemble(
-        (found.name, "bold"),
-        f": {found.particles} particles, room for {found.capacity}; {found.precision}; "
-        f"schedule '{found.schedule}'; {_bytes(found.bytes)} per world; "
-        f"at least {found.steps:.3g} steps",
+        (explanation.name, "bold"),
+        f": {explanation.particles} particles, room for {explanation.capacity}; {explanation.precision}; "
+        f"schedule '{explanation.schedule}'; {_bytes(explanation.bytes)} per world; "
+        f"at least {explanation.steps:.3g} steps",
     )
     what = _table("It has", "effect", "what it is", "source")
-    for part in (*found.effects, *found.others):
+    for part in (*explanation.effects, *explanation.others):
         what.add_row(part.name, part.summary, part.source)
         for name, value, unit, text in part.parameters:
             what.add_row("", f"{name} = {value} {unit}".rstrip(), text)
     memory = _table("It allocates", "", "bytes", "for")
     memory.columns[1].justify = "right"
-    for item in found.memory:
+    for item in explanation.memory:
         memory.add_row(item.name, f"{item.bytes:,}", item.why)
-    phases = Text.assemble(("A step runs  ", "italic"), " > ".join(found.phases))
+    phases = Text.assemble(("A step runs  ", "italic"), " > ".join(explanation.phases))
     absent = _table("It leaves out (not compiled, nothing allocated)", "effect", "what it is", "source")
-    for part in found.absent_effects:
+    for part in explanation.absent_effects:
         absent.add_row(part.name, part.summary, part.source)
-    fields = [f"{name} (of {kinds_})" for name, kinds_ in found.absent_fields]
+    fields = [f"{name} (of {kinds_})" for name, kinds_ in explanation.absent_fields]
     lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
-    left_out = absent if found.absent_effects else Text("It leaves out no effect that tisim knows.")
+    left_out = absent if explanation.absent_effects else Text("It leaves out no effect that tisim knows.")
     return Group(head, "", what, "", memory, "", phases, "", left_out, lacking)
 
 

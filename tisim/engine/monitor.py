@@ -21,7 +21,7 @@ REASONS: dict[int, str] = {
     WorldStatus.NOT_FINITE: "a quantity is not finite",
     WorldStatus.OUT_OF_ROOM: "more fragments than there is room for",
     WorldStatus.CONTACT_OVERFLOW: "more simultaneous contacts than there is room for",
-    WorldStatus.NOT_CONVERGED: "a quantity that particles settle among themselves does not converge",
+    WorldStatus.NOT_CONVERGED: "a quantity that particles give each other does not converge",
     WorldStatus.POSITION_LOST: "a step so long or so fast that rounding loses the place in the box",
     WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",
     WorldStatus.FORCE_TOO_STEEP: "a force so strong that it asks for a step shorter than the shortest",
@@ -42,27 +42,27 @@ class Monitor:
         is not its start."""
         self.simulation, self.s = simulation, simulation.s
         self.replay = Replay(simulation, image)
-        names = (*self._told(), "time", "count")
+        names = (*self._names(), "time", "count")
         self.good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
         self.faults: dict[int, tuple[float, str]] = {}
 
-    def look(self) -> None:
+    def check_worlds(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
         now = self._snapshot()
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
-        wrong = ~self._sound(now) | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
+        wrong = ~self._finite(now) | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
         known = ~wrong & (now["underway"] == 0)
-        for name, kept in self.good.items():
-            kept[known] = now[name][known]
+        for name, saved in self.good.items():
+            saved[known] = now[name][known]
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))
-        self.replay.keep()
+        self.replay.save_image()
 
     def _snapshot(self) -> Image:
-        return self.s.snapshot((*self._told(), *self.s.columns))
+        return self.s.snapshot((*self._names(), *self.s.columns))
 
-    def _told(self) -> tuple[str, ...]:
+    def _names(self) -> tuple[str, ...]:
         return tuple(f.name for f in self.s.reported)
 
     def _stop(self, worlds: np.ndarray) -> None:
@@ -70,9 +70,9 @@ class Monitor:
         checkpoint holds that too, and why they have failed is found once more when it is restored."""
         live = self.s.image()
         try:
-            good = self.replay.last_good(worlds, self._sound)
+            good = self.replay.last_good(worlds, self._finite)
             if (self.s.read("failing_effect") == ASKED).any():
-                self.simulation.made.failure_attribution.hold()
+                self.simulation.assembly.failure_attribution.name_failing_effect()
             then = self._snapshot()
             for name, values in live.items():
                 values[worlds] = good[name][worlds]
@@ -82,21 +82,21 @@ class Monitor:
             self.simulation.put(live)
         for w in map(int, worlds):
             self.faults[w] = float(then["time"][w]), self._fault(w, then)
-        for name, kept in self.good.items():
-            kept[worlds] = good[name][worlds]
+        for name, saved in self.good.items():
+            saved[worlds] = good[name][worlds]
 
-    def _spoilt(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
+    def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
         """Each quantity with the live particles, (worlds, capacity), of which it is not finite."""
         live = np.arange(self.s.capacity) < now["count"][:, None]
         for f in self.s.reported:
             yield f.name, live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
 
-    def _sound(self, now: Image) -> np.ndarray:
+    def _finite(self, now: Image) -> np.ndarray:
         """Whether no step has failed and every quantity is finite, by world."""
-        sound = now["failed"] == 0
-        for _, spoilt in self._spoilt(now):
-            sound &= ~spoilt.any(axis=1)
-        return sound
+        finite = now["failed"] == 0
+        for _, broken in self._not_finite(now):
+            finite &= ~broken.any(axis=1)
+        return finite
 
     def status(self, w: int, code: int) -> Status:
         """How a world whose status field holds ``code`` has ended, or that it runs."""
@@ -109,9 +109,9 @@ class Monitor:
         """What is wrong with a world: what the kernels have recorded of it, or what is not finite."""
         code = int(then["failed"][w])
         if code == 0:
-            for name, spoilt in self._spoilt(then):
-                if spoilt[w].any():
-                    return f"{name} of particle {then['id'][w][spoilt[w]].min()} is not finite"
+            for name, broken in self._not_finite(then):
+                if broken[w].any():
+                    return f"{name} of particle {then['id'][w][broken[w]].min()} is not finite"
         failing_effect, who = int(then["failing_effect"][w]), int(then["failing_particle"][w])
         effects = self.simulation.scenes[w].effects
         reason = REASONS[code or WorldStatus.NOT_FINITE]

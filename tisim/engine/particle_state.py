@@ -113,4 +113,4 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
         old[w] = status[w] if column == "status" else after[column][w]
     simulation.edits[w].append(f"{name} at t = {float(after['time'][w]):.6g} s")
     simulation.monitor = Monitor(simulation, before)
-    simulation.monitor.look()
+    simulation.monitor.check_worlds()

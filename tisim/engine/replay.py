@@ -6,10 +6,10 @@ known, and from there by bisection to the last step after which they were good: 
 each to its own. That takes no longer than about twice the way from there to the failure did, and what is
 found does not depend on when anybody looked, nor on what else is in the batch.
 
-Particles that do not feel each other have no state in common but at the end of a window of their longest
-step (steppers/alone.py), which is a step here. One in which a particle fails is made once more, and cut where
-the last good step of that particle ended: the others go as far, in a last step that is cut short. There the
-world is known, and from there it must fail again, or the window's beginning is what is good.
+Particles that do not feel each other have no state in common but at the end of an interval of their longest
+step (steppers/intervals.py), which is a step here. One in which a particle fails is made once more, and cut
+where the last good step of that particle ended: the others go as far, in a last step that is cut short. There
+the world is known, and from there it must fail again, or the interval's beginning is what is good.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class Replay:
     """
 
     def __init__(self, simulation: Simulation, base: Image | None) -> None:
-        self.simulation, self.base, self.made = simulation, base, time.perf_counter()
+        self.simulation, self.base, self.saved_at = simulation, base, time.perf_counter()
 
-    def keep(self) -> None:
+    def save_image(self) -> None:
         """Make the image anew, where that is due; every world that runs must be good."""
-        if time.perf_counter() - self.made > EVERY:
-            self.base, self.made = self.whole(), time.perf_counter()
+        if time.perf_counter() - self.saved_at > EVERY:
+            self.base, self.saved_at = self.whole(), time.perf_counter()
 
     def whole(self) -> Image:
         """An image of worlds as they are, or as they were, where a step is under way."""

@@ -41,8 +41,8 @@ def run(
         return run([scenes], progress, record)[0]
     with runtime.turn:
         if record is None:
-            found = dict(_batches.run(scenes, progress))
+            results = dict(_batches.run(scenes, progress))
         else:
             with record.begun(scenes, runtime.current().precision) as trajectory:
-                found = dict(_batches.run(scenes, progress, trajectory=trajectory))
-    return [found[index] for index in range(len(scenes))]
+                results = dict(_batches.run(scenes, progress, trajectory=trajectory))
+    return [results[index] for index in range(len(scenes))]

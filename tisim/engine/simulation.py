@@ -63,8 +63,8 @@ class Simulation:
         with collected() as trees:
             self._place(scene, worlds, capacity)
         self.schedule = schedule or self._choose(capacity)
-        self.program = Program(self.s, self.made.step, self.schedule)
-        self.first = Program(self.s, self.made.first, self.schedule)
+        self.program = Program(self.s, self.assembly.step, self.schedule)
+        self.first = Program(self.s, self.assembly.first, self.schedule)
         self.s.write("status", WorldStatus.ENDED)
         self.program.compile()
         if self.first.items:
@@ -79,14 +79,14 @@ class Simulation:
         parts = self._parts(scene)
         self.table = ParameterTable(parts, worlds, self.runtime.real)
         *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
-        self.made = Assembly(self.s, connected(effects), stepper, domain, control)
+        self.assembly = Assembly(self.s, connected(effects), stepper, domain, control)
 
     @staticmethod
     def _parts(scene: Scene) -> list[Any]:
         return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
 
     def _choose(self, capacity: int) -> str:
-        if any(phase.long for phase, _ in Nest().phases(self.made.step)):
+        if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):
             return "particle"
         # A world per thread needs as many worlds as threads; one small world is faster without launches.
         small = capacity * self.worlds <= 20_000
@@ -122,7 +122,7 @@ class Simulation:
         self.begin()
         self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
-        self.monitor.look()
+        self.monitor.check_worlds()
 
     @property
     def state(self) -> ParticleState:
@@ -152,8 +152,8 @@ class Simulation:
 
     def forget_lists(self) -> None:
         """Pair lists are made anew before they are used again."""
-        if self.made.neighbour_list is not None:
-            self.made.neighbour_list.forget()
+        if self.assembly.neighbour_list is not None:
+            self.assembly.neighbour_list.forget()
 
     def run(
         self,
@@ -196,7 +196,7 @@ class Simulation:
                 written = pauses
             began = time.perf_counter()
             self.program.advance(chunk)
-            self.monitor.look()
+            self.monitor.check_worlds()
             taken = time.perf_counter() - began
             self.wall_s += taken
             if taken < CHUNK_SECONDS / 2:
@@ -237,26 +237,26 @@ class Simulation:
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
         """Loaded worlds read back: those asked for, or all of them, in order."""
         now, good = self.s.snapshot(self.s.columns), self.monitor.good
-        tallies = {name: now[name] for name in self.s.counters}
-        kept = {name: now[name] for e in self.scenes[0].effects for name in e.world_quantities}
+        counts = {name: now[name] for name in self.s.counters}
+        measures = {name: now[name] for e in self.scenes[0].effects for name in e.world_quantities}
         status = now["status"]
-        found = []
+        results = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
             n = int(good["count"][w])
-            found.append(
+            results.append(
                 Result(
                     scene=self.scenes[w],
                     state={f.name: good[f.name][w, :n].copy() for f in self.s.reported},
                     start=self.starts[w],
                     time=float(good["time"][w]),
-                    work={name: int(tally[w]) for name, tally in tallies.items()},
+                    work={name: int(count[w]) for name, count in counts.items()},
                     status=self.monitor.status(w, int(status[w])),
                     wall_s=self.wall_s / len(self.scenes),
                     settings={**self.runtime.described, **self._edited(w)},
-                    measures={name: float(values[w]) for name, values in kept.items()},
+                    measures={name: float(values[w]) for name, values in measures.items()},
                 )
             )
-        return found
+        return results
 
     def _edited(self, w: int) -> dict[str, str]:
         """What has been written to a world besides its scene."""

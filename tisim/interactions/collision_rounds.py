@@ -7,9 +7,9 @@ event fell due, so earlier events go first. Why this is right:
 
 - Exclusive: a particle has one highest bid, so pairs of one round share no particle, and each is a binary
   event as the laws define it. Momentum and mass are conserved pair by pair, hence in all.
-- Complete: the waiting pair with the highest bid of all always wins, so every round settles at least one
-  pair, and each pair is settled once; the rounds end.
-- Ordered: a pair waits until every earlier pair of either of its particles is settled, and then sees what
+- Complete: the waiting pair with the highest bid of all always wins, so every round resolves at least one
+  pair, and each pair is resolved once; the rounds end.
+- Ordered: a pair waits until every earlier pair of either of its particles is resolved, and then sees what
   those have done to velocity, size and temperature. The outcome is that of resolving the whole list one
   after another, earliest first.
 - Deterministic: bids are integers, compared by atomic maxima, which do not depend on order. Two pairs that

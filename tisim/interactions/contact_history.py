@@ -91,25 +91,25 @@ class UpdateContactHistory(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        met, known = self.visit(w, i, False)
+        met, known = self.update_pairs(w, i, False)
         for k in range(PARTNERS):
             if not (known >> k) & 1:
                 self.history.partners[w, i, k] = NO_PARTNER
         if met > 0:
-            self.visit(w, i, True)
+            self.update_pairs(w, i, True)
 
     @ti.func
-    def visit(self, w, i, new: ti.template()):  # type: ignore[valid-type]
+    def update_pairs(self, w, i, new: ti.template()):  # type: ignore[valid-type]
         """Go through the pairs that i keeps; returns how many are new to it, and the slots of the others."""
         met, known = 0, 0
         for k in range(self.full_list.size(w, i)):
-            slot = self.look(w, i, self.full_list.candidate(w, i, k), new)
+            slot = self.update_pair(w, i, self.full_list.candidate(w, i, k), new)
             met += ti.select(slot == UNKNOWN, 1, 0)
             known |= ti.select(slot >= 0, 1 << ti.max(slot, 0), 0)
         return met, known
 
     @ti.func
-    def look(self, w, i, j, new: ti.template()):  # type: ignore[valid-type]
+    def update_pair(self, w, i, j, new: ti.template()):  # type: ignore[valid-type]
         """Remember a pair that is known, or, when it is their turn, one that is new; where i keeps it."""
         s, h = self.s, self.history
         place = NO_SLOT

@@ -50,13 +50,13 @@ class DerivedSolver:
         self.size = _length if vector else _magnitude
 
     def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
-        """Settle it; ``again``, only in worlds where events have changed who is where; ``trial``, in a state
+        """Set it; ``again``, only in worlds where events have changed who is where; ``trial``, in a state
         that may be far from any solution: what is not finite is then left to the forces to show."""
         return ((SetDerivedAgain if again else SetDerived)(self, trial),)
 
     @ti.func
     def set(self, s, w, i, t):
-        """Settle that of particle i, as it is in s."""
+        """Set that of particle i, as it is in s."""
         nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
@@ -64,19 +64,19 @@ class DerivedSolver:
 class SetDerived(PerParticle):
     """value_i = response(0)."""
 
-    def __init__(self, settling: DerivedSolver, trial: bool) -> None:
-        super().__init__(settling.s)
-        self.settling, self.trial = settling, trial
+    def __init__(self, solver: DerivedSolver, trial: bool) -> None:
+        super().__init__(solver.s)
+        self.solver, self.trial = solver, trial
 
     @ti.func
     def run(self, w, i):
-        self.settling.set(self.s, w, i, self.s.time[w])
+        self.solver.set(self.s, w, i, self.s.time[w])
         if ti.static(not self.trial):
             self.check(w, i)
 
     @ti.func
     def check(self, w, i):
-        a = self.settling
+        a = self.solver
         # Not below infinity: also true of NaN.
         if not (a.size(a.value[w, i]) < ti.math.inf):
             self.s.fault(w, i, a.effect.index)

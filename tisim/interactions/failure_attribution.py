@@ -19,13 +19,13 @@ class FailureAttribution:
         self.s, self.summed = summed.s, summed
 
     @in_taichi_thread
-    def hold(self) -> None:
+    def name_failing_effect(self) -> None:
         """Name the effect whose force on the failing particle is largest, or not finite, where it was when
         asked."""
-        self._hold()
+        self._name()
 
     @ti.kernel
-    def _hold(self):
+    def _name(self):
         for w in range(self.s.worlds):
             if self.s.failing_effect[w] == ASKED:
                 for i in range(self.s.count[w]):

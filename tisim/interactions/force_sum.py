@@ -71,8 +71,8 @@ class SumForces(PairSum):
     @ti.func
     def single_particle(self, w, i, t):
         """The force on i, at a time of its own, where particles do not feel each other."""
-        for settling in ti.static(self.derived_solvers):
-            settling.set(self.s, w, i, t)
+        for solver in ti.static(self.derived_solvers):
+            solver.set(self.s, w, i, t)
         self.write(w, i, self.singles(w, i, t))
 
     @ti.func
@@ -121,23 +121,23 @@ class SumForces(PairSum):
 
     @ti.func
     def largest(self, w, i, t):
-        """Index of the effect whose force on i is largest, or not finite, or settles to nothing finite."""
+        """Index of the effect whose force on i is largest, or not finite, or is set to nothing finite."""
         s = self.s
-        most, found = ti.cast(-1.0, s.real), 0
+        most, index = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces):
             size = self.single(effect, w, i, t).norm()
             if most < ti.math.inf and not (size <= most):
-                most, found = size, effect.index
+                most, index = size, effect.index
         for effect in ti.static(self.pair_forces):
             total = ti.Vector.zero(s.real, self.components)
             for j in range(s.count[w]):
                 total += self.of((effect,), w, i, j, t)
             if most < ti.math.inf and not (total.norm() <= most):
-                most, found = total.norm(), effect.index
-        for settling in ti.static(self.derived_solvers):
-            if not (settling.size(settling.value[w, i]) < ti.math.inf):
-                found = settling.effect.index
-        return found
+                most, index = total.norm(), effect.index
+        for solver in ti.static(self.derived_solvers):
+            if not (solver.size(solver.value[w, i]) < ti.math.inf):
+                index = solver.effect.index
+        return index
 
 
 class SumTrialForces(SumForces):

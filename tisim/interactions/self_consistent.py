@@ -58,11 +58,11 @@ class BeginSweeps(PerParticle):
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         super().__init__(solver.s)
-        self.settling = solver
+        self.solver = solver
 
     @ti.func
     def run(self, w, i):
-        a = self.settling
+        a = self.solver
         if i == 0:
             a.pending[w], a.sweeps[w], a.again[w] = 1, 0, 0
             a.largest[w] = 0.0
@@ -83,15 +83,15 @@ class BeginSweepsAgain(BeginSweeps):
 
 
 class SweepUntilConverged(Repeat):
-    """Sweep until it has settled."""
+    """Sweeps of a world until it has converged."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__((JacobiSweep(solver, trial), TakeSweep(solver, trial), JudgeSweep(solver)))
-        self.settling = solver
+        self.solver = solver
 
     @ti.func
     def pending(self, w):
-        return self.settling.pending[w]
+        return self.solver.pending[w]
 
 
 class JacobiSweep(PairSum):
@@ -99,16 +99,16 @@ class JacobiSweep(PairSum):
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s, solver.domain, (solver.effect,), solver.full_list)
-        self.settling, self.effect, self.trial = solver, solver.effect, trial
+        self.solver, self.effect, self.trial = solver, solver.effect, trial
         self.components = solver.components
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        return self.settling.packed(effect.influence(self.s, w, i, j, separation, distance, t))
+        return self.solver.packed(effect.influence(self.s, w, i, j, separation, distance, t))
 
     @ti.func
     def finish(self, w, i, total, t):
-        a, part = self.settling, self.effect.relaxation(w)
+        a, part = self.solver, self.effect.relaxation(w)
         new = self.effect.response(self.s, w, i, a.unpacked(total), t)
         a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
         size = a.size(new)
@@ -122,7 +122,7 @@ class JacobiSweep(PairSum):
         """What is not finite in the first sweep never was; what becomes so has not converged."""
         # Not below infinity: also true of NaN.
         if not (size < ti.math.inf):
-            if self.settling.sweeps[w] == 0:
+            if self.solver.sweeps[w] == 0:
                 self.s.fault(w, i, self.effect.index)
             else:
                 fail_to_converge(self.s, w, i, self.effect)
@@ -133,12 +133,12 @@ class TakeSweep(PerParticle):
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s)
-        self.settling, self.effect, self.trial = solver, solver.effect, trial
+        self.solver, self.effect, self.trial = solver, solver.effect, trial
         self.least = ROUNDING * float(np.finfo(np.float64 if solver.s.real == ti.f64 else np.float32).eps)
 
     @ti.func
     def run(self, w, i):
-        a, s = self.settling, self.s
+        a, s = self.solver, self.s
         change = a.size(a.next[w, i] - a.value[w, i])
         a.value[w, i] = a.next[w, i]
         if change > a.changes[0][w]:
@@ -166,11 +166,11 @@ class JudgeSweep(Phase):
     """One sweep more, or none."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
-        self.settling = solver
+        self.solver = solver
 
     @ti.func
     def run(self, w, _k):
-        a, s = self.settling, self.settling.s
+        a, s = self.solver, self.solver.s
         s.mutual_sweeps[w] += 1
         now, last, before = ti.static(a.changes)
         if before[w] > 0.0 and now[w] < ti.math.inf:

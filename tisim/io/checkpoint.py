@@ -101,7 +101,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     simulation.wall_s = wall_s
     simulation.edits = edits
     simulation.monitor = Monitor(simulation, before)
-    simulation.monitor.look()
+    simulation.monitor.check_worlds()
 
 
 class PeriodicCheckpoint(Observer):

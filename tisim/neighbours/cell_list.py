@@ -94,14 +94,14 @@ class SearchCells(PerParticle):
             reach = near + radius + skin
             first = ti.floor((r - reach - n.corner[w]) / n.cell[w], ti.i32)
             last = ti.floor((r + reach - n.corner[w]) / n.cell[w], ti.i32)
-            found = 0
+            count = 0
             if ti.static(n.joined):
                 # What reaches around the box may meet one image or another: it looks at all.
-                found = ti.select((last - first >= dims).any(), n.room + 1, 0)
+                count = ti.select((last - first >= dims).any(), n.room + 1, 0)
             else:
                 first, last = ti.max(first, 0), ti.min(last, dims - 1)
             z = first[2]
-            while z <= last[2] and found <= n.room:
+            while z <= last[2] and count <= n.room:
                 for y in range(first[1], last[1] + 1):
                     row = (n.around(z, dims[2]) * dims[1] + n.around(y, dims[1])) * dims[0]
                     # Cells of a row follow each other in memory; across a joined face it is two stretches.
@@ -116,11 +116,11 @@ class SearchCells(PerParticle):
                             limit = near + size
                             mine = (radius > size) | ((radius == size) & (i < j))
                             # Written whether it counts or not: a branch that cannot be foreseen costs more.
-                            n.other[w, i, ti.min(found, n.room)] = j
-                            found += ti.select(mine & (d.norm_sqr() <= limit * limit), 1, 0)
+                            n.neighbour_index[w, i, ti.min(count, n.room)] = j
+                            count += ti.select(mine & (d.norm_sqr() <= limit * limit), 1, 0)
                         x += end - begin + 1
                 z += 1
-            n.listed[w, i] = found if found <= n.room else -1
+            n.neighbour_count[w, i] = count if count <= n.room else -1
 
 
 class DeclareFresh(Phase):

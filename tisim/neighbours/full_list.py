@@ -18,11 +18,11 @@ class FullNeighbourList:
 
     def __init__(self, neighbour_list: NeighbourList) -> None:
         self.neighbour_list, self.s = neighbour_list, neighbour_list.s
-        self.larger, self.found = ti.field(ti.i32), ti.field(ti.i32)
+        self.larger_index, self.larger_count = ti.field(ti.i32), ti.field(ti.i32)
         builder = ti.FieldsBuilder()
         particles = builder.dense(ti.i, self.s.worlds).dense(ti.j, self.s.capacity)
-        particles.place(self.found)
-        particles.dense(ti.k, neighbour_list.room).place(self.larger)
+        particles.place(self.larger_count)
+        particles.dense(ti.k, neighbour_list.room).place(self.larger_index)
         self.tree = Tree(builder)
 
     def phases(self) -> tuple[Phase, ...]:
@@ -56,16 +56,16 @@ class FullNeighbourList:
     def others(self, w, i):
         """How many candidates ``owner`` offers particle i."""
         n = self.s.count[w]
-        if n > self.neighbour_list.small and self.found[w, i] >= 0:
-            n = self.found[w, i]
+        if n > self.neighbour_list.small and self.larger_count[w, i] >= 0:
+            n = self.larger_count[w, i]
         return n
 
     @ti.func
     def owner(self, w, i, k):
         """The k-th particle that may be a neighbour and own the pair; i itself where there is none."""
         j = k
-        if self.s.count[w] > self.neighbour_list.small and self.found[w, i] >= 0:
-            j = self.larger[w, i, k]
+        if self.s.count[w] > self.neighbour_list.small and self.larger_count[w, i] >= 0:
+            j = self.larger_index[w, i, k]
         elif k == i or not self.neighbour_list.owns(w, k, i):
             j = i
         return j
@@ -90,7 +90,7 @@ class ClearReverseList(WhenListIsDue):
 
     @ti.func
     def run(self, w, i):
-        self.m.found[w, i] = 0
+        self.m.larger_count[w, i] = 0
 
 
 class BuildReverseList(WhenListIsDue):
@@ -102,9 +102,9 @@ class BuildReverseList(WhenListIsDue):
         for k in range(n.size(w, i)):
             j = n.candidate(w, i, k)
             if j != i:
-                slot = ti.atomic_add(m.found[w, j], 1)
+                slot = ti.atomic_add(m.larger_count[w, j], 1)
                 if slot < n.room:
-                    m.larger[w, j, slot] = i
+                    m.larger_index[w, j, slot] = i
 
 
 class SortNeighbours(WhenListIsDue):
@@ -113,10 +113,10 @@ class SortNeighbours(WhenListIsDue):
     @ti.func
     def run(self, w, i):
         n, m = self.m.neighbour_list, self.m
-        self.order(n.other, w, i, n.listed[w, i])
-        if m.found[w, i] > n.room:
-            m.found[w, i] = -1
-        self.order(m.larger, w, i, m.found[w, i])
+        self.order(n.neighbour_index, w, i, n.neighbour_count[w, i])
+        if m.larger_count[w, i] > n.room:
+            m.larger_count[w, i] = -1
+        self.order(m.larger_index, w, i, m.larger_count[w, i])
 
     @ti.func
     def order(self, column: ti.template(), w, i, size):  # type: ignore[valid-type]

@@ -20,7 +20,7 @@ from tisim.worlds.state import State
 SMALL = 48
 """Worlds of at most this many particles look at all pairs."""
 MOST_NEIGHBOURS = 24
-"""NeighbourList a particle can list; one with more looks at all particles."""
+"""The neighbours that a particle can list; one with more of them looks at all particles."""
 HORIZON = 0.15
 """Gap within which every pair is sure to be offered, in mean distances between particles."""
 STEPS_OF_SKIN = 2.0
@@ -41,8 +41,8 @@ class NeighbourList:
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
         self.small, self.room, self.ahead = SMALL, MOST_NEIGHBOURS, STEPS_OF_SKIN
         builder = ti.FieldsBuilder()
-        self.cell_start, self.cell_of, self.order, self.listed = (ti.field(ti.i32) for _ in range(4))
-        self.other = ti.field(ti.i32)
+        self.cell_start, self.cell_of, self.order, self.neighbour_count = (ti.field(ti.i32) for _ in range(4))
+        self.neighbour_index = ti.field(ti.i32)
         self.dims = ti.Vector.field(3, ti.i32)
         self.corner, self.cell = ti.Vector.field(3, s.real), ti.Vector.field(3, s.real)
         self.sorted_position, self.sorted_radius = ti.Vector.field(3, s.real), ti.field(s.real)
@@ -50,9 +50,17 @@ class NeighbourList:
         self.gap = ti.field(s.real)
         self.stale = ti.field(ti.i32)
         builder.dense(ti.i, worlds).dense(ti.j, self.max_cells + 1).place(self.cell_start)
-        for column in (self.cell_of, self.order, self.listed, self.sorted_position, self.sorted_radius):
+        for column in (
+            self.cell_of,
+            self.order,
+            self.neighbour_count,
+            self.sorted_position,
+            self.sorted_radius,
+        ):
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(column)
-        builder.dense(ti.i, worlds).dense(ti.j, capacity).dense(ti.k, self.room + 1).place(self.other)
+        builder.dense(ti.i, worlds).dense(ti.j, capacity).dense(ti.k, self.room + 1).place(
+            self.neighbour_index
+        )
         for column in (self.dims, self.corner, self.cell, self.skin, self.gap, self.stale):
             builder.dense(ti.i, worlds).place(column)
         self.tree = Tree(builder)
@@ -78,16 +86,16 @@ class NeighbourList:
     def size(self, w, i):
         """How many candidates ``candidate`` offers particle i."""
         n = self.s.count[w]
-        if n > self.small and self.listed[w, i] >= 0:
-            n = self.listed[w, i]
+        if n > self.small and self.neighbour_count[w, i] >= 0:
+            n = self.neighbour_count[w, i]
         return n
 
     @ti.func
     def candidate(self, w, i, k):
         """The k-th particle that may be a neighbour owned by i; i itself where there is none."""
         j = k
-        if self.s.count[w] > self.small and self.listed[w, i] >= 0:
-            j = self.other[w, i, k]
+        if self.s.count[w] > self.small and self.neighbour_count[w, i] >= 0:
+            j = self.neighbour_index[w, i, k]
         elif not self.owns(w, i, k):
             j = i
         return j

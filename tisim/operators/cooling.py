@@ -14,8 +14,8 @@ from tisim.worlds.state import Field
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W/(m^2 K^4), exact in SI to these digits; Z04 uses 5.67e-8. scipy.constants has more
 digits, with which the last bits of results would be others."""
-SETTLED = {ti.f64: 1e-7, ti.f32: 1e-4}
-"""Relative change at which Newton's iteration has settled. The error left is below 1.5 times its square, as
+CONVERGED = {ti.f64: 1e-7, ti.f32: 1e-4}
+"""Relative change at which Newton's iteration has converged. The error left is below 1.5 times its square, as
 f''/(2 f') < 1.5/t for the equation below; a change below rounding would be waited for in vain."""
 
 
@@ -55,7 +55,7 @@ class Cooling(Operator):
         known = before + c * self.gas(w) + a * self.surroundings(w) ** 4
         t = ti.max(before, ti.max(self.surroundings(w), self.gas(w)))
         change = t
-        while change > ti.static(SETTLED[s.real]) * t:
+        while change > ti.static(CONVERGED[s.real]) * t:
             cube = a * t * t * t
             change = (t + c * t + cube * t - known) / (1.0 + c + 4.0 * cube)
             t -= change

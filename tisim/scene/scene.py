@@ -105,11 +105,11 @@ class Scene(Component):
         seed, and the files that define parts of the scene that are not tisim's own."""
         order = [effect.label for effect in self.effects]
         files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
-        made = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
+        digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
         for piece in json_pieces(self._data(serialization.to_dict(self.particles, arrays=True))):
-            made.update(piece.encode())
-        made.update((f", {json.dumps(files, sort_keys=True)}]" if files else "]").encode())
-        return made.hexdigest()
+            digest.update(piece.encode())
+        digest.update((f", {json.dumps(files, sort_keys=True)}]" if files else "]").encode())
+        return digest.hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, as in a TOML file; ``from_dict`` is the inverse."""
@@ -132,16 +132,16 @@ class Scene(Component):
         rest = serialization.table(data, "scene")
         must("particles" in rest, "scene.particles", "given", "nothing")
         plugins.load_parts()
-        made: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "particles": serialization.from_dict(Start, rest.pop("particles"), "particles")
         }
         if "domain" in rest:
-            made["domain"] = serialization.from_dict(Domain, rest.pop("domain"), "domain")
+            fields["domain"] = serialization.from_dict(Domain, rest.pop("domain"), "domain")
         if "stepper" in rest:
-            made["stepper"] = cls._stepper(rest.pop("stepper"))
+            fields["stepper"] = cls._stepper(rest.pop("stepper"))
         listed = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
-        made["effects"] = tuple(_effect(name, values) for name, values in listed.items())
-        return cls(**made, **rest)
+        fields["effects"] = tuple(_effect(name, values) for name, values in listed.items())
+        return cls(**fields, **rest)
 
     @staticmethod
     def _stepper(data: Any) -> Stepper:
@@ -194,8 +194,8 @@ class Scene(Component):
         for name in names:
             known = ", ".join(data["effects"]) or "none, as this scene has none"
             must(name in data["effects"], "effect to leave out", f"one of {known}", name)
-        kept = {kind: values for kind, values in data["effects"].items() if kind not in names}
-        return type(self).from_dict({**data, "effects": kept})
+        others = {kind: values for kind, values in data["effects"].items() if kind not in names}
+        return type(self).from_dict({**data, "effects": others})
 
 
 def _table(effect: Effect) -> dict[str, Any]:

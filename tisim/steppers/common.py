@@ -19,14 +19,14 @@ def note_displacement(s, w, moved):
 def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type: ignore[valid-type]
     """Put a particle at r, wherever that is in the domain; ``moved`` relative to the frame, and ``grown`` in
     radius: for pair lists a surface that grows is one that moves. m; the last two in f64."""
-    stride = ti.abs(moved) + ti.abs(grown)
+    change = ti.abs(moved) + ti.abs(grown)
     # Not below infinity: also true of NaN.
-    if not (stride.sum() < ti.math.inf):
+    if not (change.sum() < ti.math.inf):
         s.fail(w, WorldStatus.NOT_FINITE, i)
     elif domain.lost(w, r):
         s.fail(w, WorldStatus.POSITION_LOST, i)
     else:
-        note_displacement(s, w, stride)
+        note_displacement(s, w, change)
         s.position[w, i] = domain.wrap(w, r)
 
 

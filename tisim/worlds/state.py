@@ -248,10 +248,10 @@ class State:
         """
         names = tuple(names)
         particles = tuple(name for name in names if name not in self.columns)
-        found = self._exchange(particles).read() if particles else {}
+        arrays = self._exchange(particles).read() if particles else {}
         if len(particles) < len(names):
-            found |= self._exchange(self.columns).read()
-        return {name: found[name] for name in names}
+            arrays |= self._exchange(self.columns).read()
+        return {name: arrays[name] for name in names}
 
     def read(self, name: str) -> np.ndarray:
         """A field as an array of its full shape."""

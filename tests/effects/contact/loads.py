@@ -54,7 +54,7 @@ def jacobians(scenes, step, capacity=16):
     """velocity_jacobian of the only force of these scenes, and its central difference; step in m/s."""
     simulation = compiled(scenes[0], worlds=WORLDS, capacity=capacity)
     simulation.load(scenes)
-    (force,) = simulation.made.forces
+    (force,) = simulation.assembly.forces
     assert force.offers("velocity_jacobian")
     claimed = np.zeros((WORLDS, capacity, 3, 3))
     _jacobians(simulation.s, force, claimed)

@@ -21,7 +21,7 @@ def impacts(request):
     pairs = [draw(rng) for _ in range(PAIRS)]
     results = simulate([as_scene(pair, kinds) for pair in pairs], worlds=PAIRS, capacity=2)
     assert all(result.work["impacts"] == 1 for result in results)
-    assert all(result.work["unsettled"] == 0 for result in results)
+    assert all(result.work["unconverged"] == 0 for result in results)
     return kinds, pairs, results
 
 

@@ -220,7 +220,7 @@ def test_only_what_is_needed_is_allocated():
     fields = {f.name for f in alone.s.fields}
     assert "own_dt" in fields
     assert not fields & {"spin", "torque", "iterate_change", "force_used"}
-    assert not alone.made.buffers
+    assert not alone.assembly.buffers
     alone.close()
 
 

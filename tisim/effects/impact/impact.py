@@ -104,7 +104,7 @@ class Impact(PairEvent):
     hard: ClassVar[bool] = True
     fields = ("radius", "mass", "velocity")
     depends_on_velocity: ClassVar[bool] = True
-    counters = ("impacts", "contacts", "bonds", "iterations", "unsettled")
+    counters = ("impacts", "contacts", "bonds", "iterations", "unconverged")
     forced: ClassVar[bool] = False
 
     hardness: float = parameter(
@@ -205,7 +205,7 @@ class Impact(PairEvent):
         return (a0 + (self.final_area(w) - a0) * x) * ti.math.pi * smaller * smaller
 
     @ti.func
-    def settle(self, s, w, i, j, reduced, v_n, v_t, smaller):
+    def solve_restitution(self, s, w, i, j, reduced, v_n, v_t, smaller):
         """x = 1 - e at which hardness, heat and restitution agree."""
         pressure = reduced * v_n * v_n / (4.0 * ti.math.pi * self.deformation_length(w) * smaller**3)
         x = ti.cast(1.0, s.real)
@@ -226,7 +226,7 @@ class Impact(PairEvent):
                 change, x, k = ti.abs(new - x), new, k + 1
             ti.atomic_add(s.iterations[w], k)
             if change > self.tolerance(w):
-                ti.atomic_add(s.unsettled[w], 1)
+                ti.atomic_add(s.unconverged[w], 1)
         return x
 
     @ti.func
@@ -277,7 +277,7 @@ class Impact(PairEvent):
         slip -= v_n * n
         v_t = slip.norm()
 
-        x = self.settle(s, w, i, j, reduced, v_n, v_t, smaller)
+        x = self.solve_restitution(s, w, i, j, reduced, v_n, v_t, smaller)
         impulse = reduced * v_n * (2.0 - x) * n
         if v_t > 0.0:
             impulse += self.tangential(w, reduced, v_n, v_t, x) * slip / v_t

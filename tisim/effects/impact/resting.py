@@ -9,9 +9,9 @@ Both are found from the forces at its end: with d = r_j - r_i, u = v_i - v_j and
     u . d <= SHARE dt a . d          the approach is that of the forces
 
 The forces are those of contacts too, once these are known: what presses a grain presses the next one. SHARE
-is above 1 since forces change within a step, and since contacts are settled one after another: the later ones
-leave some approach to the earlier ones, that many times dt a in a row of some four grains. Whatever it is, a
-pair that meets in this step collides, and what SHARE takes for rest goes to zero with dt.
+is above 1 since forces change within a step, and since contacts are resolved one after another: the later
+ones leave some approach to the earlier ones, that many times dt a in a row of some four grains. Whatever it
+is, a pair that meets in this step collides, and what SHARE takes for rest goes to zero with dt.
 """
 
 from tisim.backend.taichi import ti

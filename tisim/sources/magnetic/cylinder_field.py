@@ -72,7 +72,7 @@ def gradient(six, rho, outward, axis, m_across, m_along):
     half = outward.outer_product(mixed) + axis.outer_product(
         tilt + 0.5 * (bend * m_out + six[4] * m_along - spread) * axis
     )
-    found = half + half.transpose()
+    symmetric = half + half.transpose()
     for i in ti.static(range(3)):
-        found[i, i] += spread
-    return found
+        symmetric[i, i] += spread
+    return symmetric

@@ -1,6 +1,6 @@
 """Hydrodynamic interaction with noise of exactly the covariance it must have, by a Cholesky decomposition.
 
-D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 multiplications; the matrix is kept.
+D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 operations; the matrix is kept.
 """
 
 from tisim.backend import runtime

@@ -9,8 +9,8 @@ rho_ij = D_ij / sqrt(D_ii D_jj) and N particles:
 Variances are exact, and covariances are where all rho_ij are equal. N and the mean, of tr rho_ij / 3, are
 those of one axis, as the elements between axes have mean 0: with all 3 N coordinates in one mean, covariances
 of two spheres that touch are off by 9 % of D_ii instead of 2 %. In clouds they are off by much more, as one
-beta cannot suit all distances: by a quarter of D_ij in one of 5 % of spheres (tests/steppers/
-test_hydrodynamics.py). Nothing is stored but sums.
+beta cannot suit all distances: by a quarter of D_ij in one of 5 % of spheres
+(tests/steppers/brownian/test_hydrodynamics.py). Nothing is stored but sums.
 """
 
 from tisim.backend.taichi import ti

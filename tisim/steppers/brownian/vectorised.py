@@ -16,7 +16,7 @@ from tisim.steppers.registers import Registers
 
 def vectorises(context: StepContext) -> bool:
     """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
-    as what settles and what operators do."""
+    as derived quantities and what operators do."""
     simple = not context.operators and not context.force_sum.derived_solvers
     return simple and runtime.current().device == "cpu" and context.s.capacity >= LANES
 

@@ -52,9 +52,9 @@ class JudgeStages(Phase):
         contraction = self.foreseen(w)
         if not first and s.last_change[w] > 0.0:
             contraction = change / s.last_change[w]
-            # For later steps no less than can be told: what is rounded away now is not 0 in longer ones.
-            told = total[3] / total[2] / s.last_change[w]
-            s.contraction[w] = ti.select(told > contraction, told, contraction)
+            # For later steps no less than can be resolved: what is rounded away now is not 0 in longer ones.
+            resolved = total[3] / total[2] / s.last_change[w]
+            s.contraction[w] = ti.select(resolved > contraction, resolved, contraction)
             s.measured_dt[w] = s.dt[w]
         s.last_change[w] = change
         solved = change * contraction < ti.math.inf and self.control.solved(w, change * contraction)

@@ -24,11 +24,11 @@ def nodes(stages: int) -> np.ndarray:
 
 def lagrange(c: np.ndarray) -> list[Polynomial]:
     """The polynomials that are 1 at one node and 0 at all others."""
-    found = []
+    polynomials = []
     for j, here in enumerate(c):
         others = np.delete(c, j)
-        found.append(Polynomial.fromroots(others) / np.prod(here - others))
-    return found
+        polynomials.append(Polynomial.fromroots(others) / np.prod(here - others))
+    return polynomials
 
 
 def integrals(stages: int) -> np.ndarray:
