@@ -100,7 +100,7 @@ def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
         *iteration,
         "RestoreState*",
         "Decide*",
-        "Arrive",
+        "AdvanceClock",
         "FinishStep",
     ]
     assert list(found.phases) == step

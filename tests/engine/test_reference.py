@@ -112,8 +112,8 @@ def test_families_share_nothing_and_leave_nothing_out():
 def test_what_a_part_needs():
     needs = {entry.name: entry.needs for entry in ENTRIES}
     assert needs["friction"] == ("impact",)
-    assert needs["contact_bond"] == ("contact or hertz",)
-    assert needs["lorentz"] == ("a source of electric_field or magnetic_flux_density",)
+    assert needs["contact_bond"] == ("contact or hertz", "a stepper with inertia, not brownian")
+    assert needs["lorentz"][0] == "a source of electric_field or magnetic_flux_density"
     assert needs["sphere"] == ("magnetic_spheres, a row of its spheres",)
     assert needs["collocation"] == ("a step control: stage_control",)
     assert "no impact" in needs["capture"]

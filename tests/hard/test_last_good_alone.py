@@ -12,8 +12,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import Force, parameter
 from tisim.io.checkpoint import restore, save
 from tisim.sources import UniformFlow
-from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
-from tisim.steppers.implicit import independent
+from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid, intervals
 
 SPEED = np.resize([1.0, 0.5, 0.25], 10)
 """m/s; some particles arrive at the cliff at 0.783 s, others never. More than a tile that goes together."""
@@ -68,8 +67,8 @@ BOTH = pytest.mark.parametrize("made", [inert, pytest.param(drifting, marks=pyte
 
 def in_launches(made, monkeypatch, attempts):
     """A simulation of which a launch has a particle make so many attempts at a step."""
-    monkeypatch.setattr(independent, "LAUNCH_ATTEMPTS", 1)
-    monkeypatch.setattr(independent, "LEAST_INTERVALS", attempts)
+    monkeypatch.setattr(intervals, "LAUNCH_ATTEMPTS", 1)
+    monkeypatch.setattr(intervals, "LEAST_INTERVALS", attempts)
     return Simulation(made, worlds=2)
 
 
@@ -148,5 +147,5 @@ def test_a_launch_is_of_so_many_steps(made):
     simulation.load([long])
     list(islice(simulation.chunks(), 2))
     steps = simulation.s.read("particle_steps")[0]
-    assert 0.1 * independent.LAUNCH_ATTEMPTS < steps <= independent.LAUNCH_ATTEMPTS
+    assert 0.1 * intervals.LAUNCH_ATTEMPTS < steps <= intervals.LAUNCH_ATTEMPTS
     assert simulation.fraction() == pytest.approx(steps / (1e7 * len(SPEED)), rel=1e-3)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tisim.backend import runtime
+from tisim.effects.base import PairEvent
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -30,6 +31,8 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     if missing:
         names = ", ".join(sorted(missing))
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
+    if any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
+        scene.stepper.control.suits_start(start["radius"], start["velocity"])
     n = len(start["mass"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
