@@ -205,7 +205,7 @@ def test_results_do_not_depend_on_the_skin(rng, outcome):
     usual = outcome(start)
     assert usual.work["merges"] > 50
     assert usual.work["impacts"] > usual.work["merges"]
-    same(usual, outcome(start, AHEAD=0.0, LISTED=2))
+    same(usual, outcome(start, STEPS_OF_SKIN=0.0, MOST_NEIGHBOURS=2))
 
 
 @pytest.mark.slow

@@ -208,7 +208,7 @@ WRONG = {
                 placement=RandomAroundCylinder(radius=1.0, length=1.0, thickness=1.0),
             )
         ),
-        "volume fraction must be at most 1; received",
+        r"cloud.number must be at most what finds room around the cylinder, less than",
     ),
     "velocities beyond numbers": (
         lambda: arrays(

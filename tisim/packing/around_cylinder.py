@@ -54,8 +54,9 @@ class RandomAroundCylinder(Placement):
         must(self.part != "side" or self.length > 2 * radius, "length", rule, self.length)
         farthest = np.abs(self.centre) + self.radius + self.length / 2 + self.thickness
         check_resolved("places around the cylinder", farthest, radius)
-        fraction = number * 4 / 3 * np.pi * radius**3 / self.volume()
-        must(fraction <= 1, "volume fraction", "at most 1", float(f"{fraction:.4g}"))
+        most = self.volume() / (4 / 3 * np.pi * radius**3)
+        rule = f"at most what finds room around the cylinder, less than {most:.4g}"
+        must(number <= most, "cloud.number", rule, number)
         generator = np.random.default_rng([seed, 0x6C61796572])
         found = np.empty((0, 3))
         for _ in range(ROUNDS):
