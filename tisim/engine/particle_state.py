@@ -25,7 +25,8 @@ class ParticleState(Mapping[str, np.ndarray]):
     The arrays are those of a Result at this moment, and are not writeable: ``state["velocity"] = 2.0 *
     state["velocity"]`` writes. What is written must be finite and what a start may be, for the particles that
     there are; ``id``, forces and derived quantities follow from the rest. Then pair lists are made anew, and
-    derived quantities and forces are summed as at a start. Time, counters and other worlds stay as they are.
+    derived quantities and forces are summed as at a start. Time, counters, other worlds, and what an implicit
+    stepper goes on with, such as the length of its next step, stay as they are.
 
     A world that has been written to is not what its scene describes: its Result says what was written and
     when under ``settings["edited"]``; ``Result.start`` stays what was loaded.
