@@ -16,7 +16,7 @@ from tisim import Result, RunError, Scene
 from tisim.backend.runtime import Runtime
 from tisim.cli.main import main
 from tisim.engine.monitor import REASONS
-from tisim.worlds.state import WorldStatus
+from tisim.worlds.status import WorldStatus
 
 ACCEPTED = "accepted"
 """What a command says in place of running."""

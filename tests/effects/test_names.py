@@ -14,7 +14,7 @@ from tisim.engine.assembly import needed_fields
 from tisim.operators import Cooling
 from tisim.sources import ElectricField
 from tisim.steppers import IterationControl, Trapezoid, Verlet
-from tisim.worlds.state import Field, resolve_fields
+from tisim.worlds.fields import Field, resolve_fields
 
 CORE, SHELL = Mie(name="core", epsilon=1.0), Mie(name="shell", epsilon=0.3, n=9, m=4, cutoff=2.0)
 ONE = ([[0, 0, 0]], [[0, 0, 0]])

@@ -9,7 +9,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects import Force, PairForce, SelfConsistentQuantity, parameter
 from tisim.sources import Source, sources
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 DIPOLE = Field("dipole", "A m^2", 3, "sum")
 

@@ -12,7 +12,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import Agglomeration, Impact
 from tisim.operators import Operator
 from tisim.steppers import ApproachTime, Verlet
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class Census(Operator):

@@ -13,7 +13,7 @@ from tests.soak.apart import Apart, Came
 from tisim import InputError, Scene, Simulation
 from tisim.backend import runtime
 from tisim.engine.monitor import REASONS
-from tisim.worlds.state import WorldStatus
+from tisim.worlds.status import WorldStatus
 
 STEPS = 50
 """Of a run, at most."""

@@ -11,8 +11,8 @@ from tisim import Scene
 from tisim.backend.taichi import ti
 from tisim.effects import parameter
 from tisim.steppers import Controller, Step, Stepper
+from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle, Phase, Repeat
-from tisim.worlds.state import Field
 
 
 class Begin(Phase):

@@ -97,7 +97,8 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def kinds(cls) -> Iterator[type[Self]]:
-        """The same, without their names; not those of a file of which another version has been loaded."""
+        """Every part made after this contract, but those of a file of which another version has been
+        loaded."""
         for kind in (cls, *_descendants(cls)):
             if not kind.__dict__.get("contract") and not python_file.superseded(kind):
                 yield kind

@@ -54,7 +54,7 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, option, parameter
 from tisim.components.cost_hints import LawHints
 from tisim.worlds.bound import Peers
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 __all__ = [
     "DerivedQuantity",

@@ -23,8 +23,9 @@ from tisim.steppers.common import FinishStep
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.step_control import StepControl
 from tisim.worlds.bound import Bound, Peers
+from tisim.worlds.fields import Field
 from tisim.worlds.program import Item
-from tisim.worlds.state import Field, State
+from tisim.worlds.state import State
 
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:

@@ -16,7 +16,7 @@ from tisim.engine import reference
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.scene.scene import Scene
-from tisim.worlds.state import CORE
+from tisim.worlds.fields import CORE
 
 SHOWN = 3
 """Rows of a list that are shown."""

@@ -12,7 +12,8 @@ from tisim.effects.base import PairEvent
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.state import NO_ONE, SHARED, Field, WorldStatus
+from tisim.worlds.fields import SHARED, Field
+from tisim.worlds.status import NO_ONE, WorldStatus
 
 
 def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
@@ -110,7 +111,7 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
 
 
 def volume(scene: Scene, start: Arrays) -> float:
-    """Of the domain, or of the box around the particles where it has no bounds. m^3."""
+    """Return the volume (m^3) of the domain, or of the box around the particles where it has no bounds."""
     low, high = scene.domain.bounds()
     if low is None or high is None:
         reach = start["radius"].max()

@@ -8,7 +8,7 @@ import numpy as np
 
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import Status
-from tisim.worlds.state import ASKED, NO_ONE, WorldStatus
+from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

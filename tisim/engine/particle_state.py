@@ -13,7 +13,7 @@ from tisim.engine.monitor import Monitor
 from tisim.errors import must
 from tisim.interactions.force_sum import FORCE, TORQUE
 from tisim.scene.initial_state import check_sizes
-from tisim.worlds.state import NEVER, WorldStatus
+from tisim.worlds.status import NEVER, WorldStatus
 
 if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation
@@ -37,7 +37,7 @@ class ParticleState(Mapping[str, np.ndarray]):
 
     @property
     def time(self) -> float:
-        """s."""
+        """The time (s) that the world has come to."""
         return float(self._simulation.monitor.good["time"][self._world])
 
     def __getitem__(self, name: str) -> np.ndarray:

@@ -31,7 +31,7 @@ from tisim.sources.base import Source
 from tisim.sources.magnetic.magnets import Body
 from tisim.steppers.base import Stepper
 from tisim.steppers.step_control import StepControl
-from tisim.worlds.state import resolve_fields
+from tisim.worlds.fields import resolve_fields
 
 PUBLICATIONS = {
     "Z04": "T. I. Zohdi, A computational framework for agglomeration in thermochemically reacting granular "
@@ -80,7 +80,7 @@ FAMILIES = {
     "pulses": Family("Pulses", Pulse, "particles.pulse"),
     "domains": Family("Domains", Domain, "domain"),
 }
-"""By name."""
+"""The families by name."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """Of all that is known, family by family."""
+    """Return the entries of all parts that are known, family by family."""
     return [describe(kind, name) for name, family in FAMILIES.items() for kind in family.kinds().values()]
 
 

@@ -22,9 +22,11 @@ from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.bound import connected
+from tisim.worlds.fields import resolve_fields
 from tisim.worlds.parameter_table import ParameterTable
 from tisim.worlds.program import Nest, Program
-from tisim.worlds.state import NEVER, State, WorldStatus, resolve_fields
+from tisim.worlds.state import State
+from tisim.worlds.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
 """Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; steps of all
@@ -132,7 +134,7 @@ class Simulation:
 
     @property
     def states(self) -> list[ParticleState]:
-        """The same of each loaded world, in order."""
+        """The particles of each loaded world, in order, to be read and written by name between runs, SI."""
         return [ParticleState(self, w) for w in range(len(self.scenes))]
 
     def begin(self) -> None:
@@ -176,7 +178,8 @@ class Simulation:
         steps: int | None = None,
         observers: Sequence[Observing] = (),
     ) -> Iterator[None]:
-        """The same a part at a time: yields wherever observers have looked, first before the first step."""
+        """Run as ``run`` does, a part at a time: yields wherever observers have looked, first before the
+        first step."""
         self.s.check()
         must(len(self.scenes) > 0, "simulation", "loaded before it is run", "no scene")
         rule = "a number of s of simulated time, at least 0"

@@ -10,8 +10,10 @@ from tisim.components.domain import Domain
 from tisim.effects.base import PairForce
 from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.bound import Bound
+from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle
-from tisim.worlds.state import Field, State, WorldStatus
+from tisim.worlds.state import State
+from tisim.worlds.status import WorldStatus
 
 PARTNERS = 16
 """Pairs that a particle can keep. Thirteen spheres of its size or larger do not find room around it."""

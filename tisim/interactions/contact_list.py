@@ -9,7 +9,8 @@ from tisim.effects.base import PairEvent
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import State, WorldStatus
+from tisim.worlds.state import State
+from tisim.worlds.status import WorldStatus
 
 CONTACTS_PER_PARTICLE = 8
 """Room for pairs that overlap. Spheres that only touch, of any sizes, touch fewer than 14.93 others in the

@@ -83,7 +83,7 @@ class SetDerived(PerParticle):
 
 
 class SetDerivedAgain(SetDerived):
-    """The same after events."""
+    """Set it anew in worlds where events have changed who is where."""
 
     conditional: ClassVar[bool] = True
 

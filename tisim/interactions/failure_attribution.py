@@ -8,12 +8,12 @@ from __future__ import annotations
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.interactions.force_sum import SumForces
-from tisim.worlds.state import ASKED
+from tisim.worlds.status import ASKED
 
 
 @ti.data_oriented
 class FailureAttribution:
-    """Of the worlds of a batch that have failed by a force."""
+    """Names the force that has stopped each world of a batch that failed by one."""
 
     def __init__(self, summed: SumForces) -> None:
         self.s, self.summed = summed.s, summed

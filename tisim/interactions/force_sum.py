@@ -9,7 +9,9 @@ from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
 from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.bound import Bound, Peers
-from tisim.worlds.state import Field, State, WorldStatus
+from tisim.worlds.fields import Field
+from tisim.worlds.state import State
+from tisim.worlds.status import WorldStatus
 
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
@@ -141,7 +143,8 @@ class SumForces(PairSum):
 
 
 class SumTrialForces(SumForces):
-    """The same for a trial state, which may be one that is to be given up."""
+    """Sum the forces of a trial state, which may be one that is to be given up: whatever is not finite may
+    stay."""
 
     trial = True
 

@@ -14,7 +14,8 @@ from tisim.interactions.pair_sum import PairSum
 from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
-from tisim.worlds.state import State, WorldStatus
+from tisim.worlds.state import State
+from tisim.worlds.status import WorldStatus
 
 ROUNDING = 4.0
 """Changes of so many units in the last place are none: sweeps in f32 may go on with them for ever."""
@@ -73,7 +74,7 @@ class BeginSweeps(PerParticle):
 
 
 class BeginSweepsAgain(BeginSweeps):
-    """The same after events."""
+    """Begin sweeps in worlds where events have changed who is where."""
 
     conditional: ClassVar[bool] = True
 

@@ -21,7 +21,7 @@ import numpy as np
 from tisim.components.domain import Domain
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 VERSION = (1, 1)
 ABSENT = -1

@@ -31,7 +31,7 @@ from tisim.io.reader import RESULT, undamaged
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.state import SHARED, resolve_fields
+from tisim.worlds.fields import SHARED, resolve_fields
 
 NAMES = (
     "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,

@@ -36,7 +36,7 @@ from tisim.io import h5md
 from tisim.io.reader import Frame, frames
 from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
-from tisim.worlds.state import Field, resolve_fields
+from tisim.worlds.fields import Field, resolve_fields
 
 LIBRARY = ("v110", "v110")
 """The versions of HDF5 that can read the file; earlier ones have no checksums of its structure."""

@@ -3,7 +3,7 @@
 from tisim.backend.taichi import ti
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import WorldStatus
+from tisim.worlds.status import WorldStatus
 
 
 def list_phases(neighbours: NeighbourList) -> tuple[Phase, ...]:

@@ -120,7 +120,7 @@ class NeighbourList:
 
     @ti.func
     def sure(self, w):
-        """The same where only near pairs are offered; 0, for no limit, where all pairs are. m."""
+        """Return that gap (m) where only near pairs are offered; 0, for no limit, where all pairs are."""
         return ti.select(self.s.count[w] > self.small, self.horizon(w), 0.0)
 
     @ti.func

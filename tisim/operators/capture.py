@@ -9,7 +9,7 @@ from tisim.effects.base import PairEvent
 from tisim.operators.base import Operator
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.worlds.bound import Peers
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class Capture(Operator):

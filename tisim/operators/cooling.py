@@ -9,7 +9,7 @@ from tisim.effects.base import Effect, parameter
 from tisim.effects.impact.heating import Heating
 from tisim.operators.base import Operator
 from tisim.worlds.bound import Peers
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W/(m^2 K^4), exact in SI to these digits; Z04 uses 5.67e-8. scipy.constants has more

@@ -11,7 +11,8 @@ from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import Impact, ImpactLaw
 from tisim.operators.base import Operator, parameter
 from tisim.worlds.bound import Peers
-from tisim.worlds.state import Field, WorldStatus
+from tisim.worlds.fields import Field
+from tisim.worlds.status import WorldStatus
 
 
 class Fragmentation(ImpactLaw, Operator):

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.operators.base import Operator
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class PeakDisplacement(Operator):
@@ -31,5 +31,5 @@ class PeakDisplacement(Operator):
         farthest = ti.cast(shift.norm() / mass, ti.f64)
         # Not below infinity: also true of NaN, which the maximum would drop.
         if not (farthest < ti.math.inf):
-            s.spoilt(w, self.index)
+            s.fault_of_world(w, self.index)
         s.peak_displacement[w] = ti.max(s.peak_displacement[w], farthest)

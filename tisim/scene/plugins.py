@@ -51,7 +51,7 @@ def versions() -> dict[str, str]:
 
 
 def installed() -> dict[str, str]:
-    """The same of packages alone; they are not imported."""
+    """Return the plugins of installed packages alone; they are not imported."""
     return {f"plugin {entry.module}": _checksum(entry) for entry in entry_points(group=GROUP)}
 
 

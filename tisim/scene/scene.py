@@ -223,7 +223,7 @@ def _step(place: Any, step: str, key: str) -> Any:
 
 
 def _names(kind: type[Component]) -> list[str]:
-    """Of an effect in files, or of those known that are made after a contract; its own if none are."""
+    """Return the name of an effect in files, or the names of those that are made after a contract."""
     if not kind.__dict__.get("contract"):
         return [f"effects.{kind.kind()}"]
     return [f"effects.{name}" for name in sorted(kind.known())] or [kind.kind()]

@@ -14,11 +14,11 @@ from tisim.errors import must
 from tisim.sources.base import Source
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import MOST_STEPS, StepControl
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 def single(effect: Effect) -> bool:
-    """Whether it is of each particle by itself."""
+    """Return whether an effect acts on each particle by itself."""
     return isinstance(effect, Force | Source | DerivedQuantity) and not isinstance(
         effect, SelfConsistentQuantity
     )

@@ -18,8 +18,8 @@ from tisim.steppers.common import (
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.step_control import Controller, FixedStep
+from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import Field
 
 
 class Boris(Stepper):
@@ -69,7 +69,7 @@ class Middle(Phase):
 
 
 class BorisDrift(PerParticle):
-    """r += dt/2 v."""
+    """Half a drift: r += dt/2 v."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)

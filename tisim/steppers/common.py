@@ -3,7 +3,7 @@
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import WorldStatus
+from tisim.worlds.status import WorldStatus
 
 
 @ti.func

@@ -7,8 +7,9 @@ end anywhere: where each particle is on its way is in its own clock.
 
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
+from tisim.worlds.fields import Field
 from tisim.worlds.program import Phase
-from tisim.worlds.state import Field, WorldStatus
+from tisim.worlds.status import WorldStatus
 
 LAUNCH_ATTEMPTS = 2**20
 """The most intervals of a launch, and the most attempts at a step, of all particles together: about a
@@ -59,7 +60,7 @@ class BeginIntervals(Phase):
 
 @ti.func
 def beginning(s, control: ti.template(), w, interval):  # type: ignore[valid-type]
-    """When an interval begins; none does after the end, and the first of all at 0. s, f64."""
+    """Return the time (s, f64) at which an interval begins: none after the end, and the first of all at 0."""
     length = ti.cast(control.longest(w), ti.f64)
     over = interval > 0.0 and (interval + LITTLE) * length >= s.end[w]
     return ti.select(over, s.end[w], interval * length)
@@ -67,14 +68,14 @@ def beginning(s, control: ti.template(), w, interval):  # type: ignore[valid-typ
 
 @ti.func
 def duration(s, control: ti.template(), w, interval, begin):  # type: ignore[valid-type]
-    """Of an interval that begins then; one that is cut ends there. s, f64."""
+    """Return the length (s, f64) of an interval that begins at ``begin`` (s); one that is cut ends there."""
     length = beginning(s, control, w, interval + 1.0) - begin
     return ti.select(s.cut[w] > 0.0, ti.min(length, s.cut[w]), length)
 
 
 @ti.func
 def own_time(s, control: ti.template(), w, i):  # type: ignore[valid-type]
-    """How far a particle has come. s, f64."""
+    """Return the time (s, f64) that a particle has come to."""
     return beginning(s, control, w, s.own_interval[w, i]) + s.own_elapsed[w, i]
 
 

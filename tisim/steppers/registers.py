@@ -37,7 +37,7 @@ class Registers:
             setattr(self.state, name, local)
 
     def with_registers(self, part: Part) -> Part:
-        """The same part of a step, at work on this state."""
+        """Return a copy of a part of a step that works on this state."""
         copied: Any = copy(part)
         copied.s = self.state
         return copied
@@ -59,6 +59,6 @@ class Registers:
 
     @ti.func
     def store(self, w, i):
-        """Put it back."""
+        """Put the particle back into memory."""
         for field, local in ti.static(self.loaded):
             field[w, i] = local[w, i]

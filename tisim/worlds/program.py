@@ -18,7 +18,8 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds.state import State, WorldStatus
+from tisim.worlds.state import State
+from tisim.worlds.status import WorldStatus
 
 TASK = 512
 """Iterations that Taichi and Quadrants hand to a CPU thread at once, whatever block size is asked for

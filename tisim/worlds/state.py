@@ -5,9 +5,7 @@ which the compiler can vectorise over particles.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from enum import IntEnum
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,127 +13,24 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
-from tisim.errors import RunError, must
-
-
-@dataclass(frozen=True)
-class Field:
-    """A quantity that particles carry.
-
-    merge : what becomes of it when two particles become one: "mean" by mass, "sum", "volume" (a radius),
-        or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
-    slots : a particle has so many values, ``s.NAME[w, i, k]``; 0 for one value or vector, ``s.NAME[w, i]``.
-        They are its own: a piece that breaks off starts with the default.
-    default : what a particle starts with where the start does not say: a number, or the name of a field of
-        which it is a copy then, such as "position"; None where the start must say.
-    minimum : the least value that a start may give.
-    scratch : of use to a stepper only: results do not have it. double : in f64 also in single precision.
-    """
-
-    name: str
-    unit: str
-    components: Literal[1, 3] = 1
-    merge: Literal["mean", "sum", "volume", "keep"] = "mean"
-    integer: bool = False
-    slots: int = 0
-    default: float | str | None = 0.0
-    minimum: float | None = None
-    scratch: bool = False
-    double: bool = False
-
-    def __post_init__(self) -> None:
-        if self.slots and (self.merge != "keep" or self.components != 1):
-            raise TypeError(f"field {self.name} with slots must have one component and be merged as 'keep'")
-        if self.integer and self.merge != "keep":
-            raise TypeError(f"field {self.name} of integers must be merged as 'keep'")
-
-    def shape(self, *particles: int) -> tuple[int, ...]:
-        """Of an array of it, for an array of particles of this shape."""
-        return (*particles, *((3,) if self.components == 3 else ()), *((self.slots,) if self.slots else ()))
-
-
-CORE = (
-    Field("position", "m", 3, "keep", default=None),
-    Field("velocity", "m/s", 3, default=None),
-    Field("mass", "kg", 1, "sum", default=None),
-    Field("radius", "m", 1, "volume", default=None),
-    Field("id", "", 1, "keep", integer=True),
-)
-SHARED = {
-    field.name: field
-    for field in (
-        *CORE,
-        Field("temperature", "K", default=None, minimum=0.0),
-        Field("spin", "rad/s", 3),
-        Field("charge", "C", 1, "sum", default=None),
-        Field("fixed", "", 1, "keep", integer=True, minimum=0.0),
-    )
-}
-"""Fields that several effects share by name."""
-
-
-class WorldStatus(IntEnum):
-    """How a world is doing; of several failures in one phase, the one with the highest number counts."""
-
-    RUNNING = 0
-    ENDED = 1
-    """The world has reached its end."""
-    NOT_FINITE = 2
-    """A quantity of a particle is not finite."""
-    OUT_OF_ROOM = 3
-    """There is no free slot for another particle."""
-    CONTACT_OVERFLOW = 4
-    """There are more simultaneous contacts than there is room for."""
-    NOT_CONVERGED = 5
-    """A self-consistent quantity of the particles does not converge."""
-    POSITION_LOST = 6
-    """A particle has left the box so far that rounding loses its position."""
-    STEP_TOO_SHORT = 7
-    """The implicit equations of a step cannot be solved even at the shortest step."""
-    FORCE_TOO_STEEP = 8
-    """A force asks for a step shorter than the shortest."""
-    NOT_POSITIVE_DEFINITE = 9
-    """A diffusion matrix is not positive definite."""
-
-
-NO_ONE = 2**31 - 1
-"""For the particle that has stopped a world, and the index of the effect that is to failing_effect: none."""
-ASKED = NO_ONE - 1
-"""The same: a force, not yet known which."""
-
-NEVER = 2**62
-"""A number of steps that no world gets to."""
+from tisim.errors import RunError
+from tisim.worlds.fields import Field
+from tisim.worlds.status import ASKED, WorldStatus
 
 CLOCK = (
     *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
     *("reached", "cut"),
 )
+"""The quantities of a world that tell its time and how its steps go, f64."""
 BOOKS = (
-    "count",
-    "status",
-    "failed",
-    "failing_particle",
-    "failing_effect",
-    "changed",
-    "events",
-    "next_id",
-    "underway",
+    *("count", "status", "failed", "failing_particle", "failing_effect"),
+    *("changed", "events", "next_id", "underway"),
 )
+"""The integers of a world that tell how many particles it has and how it is doing, i32."""
 MOTION = ("frame", "displacement", "displacement_since_list")
+"""The vectors of a world that tell how far its particles have moved, f64."""
 TALLIES = ("steps", "particle_steps")
-
-
-def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
-    """The core and everything needed, each once, in a fixed order.
-
-    InputError for a field that two parts declare differently.
-    """
-    wanted = {field.name: field for field in CORE}
-    for need in needs:
-        field = SHARED[need] if isinstance(need, str) else need
-        known = wanted.setdefault(field.name, field)
-        must(known == field, f"field {field.name}", f"declared as everywhere, {known}", field)
-    return tuple(wanted.values())
+"""The counters that every world keeps, i64."""
 
 
 @ti.data_oriented
@@ -364,7 +259,8 @@ class State:
         ti.atomic_min(self.failing_effect[w], effect)
 
     @ti.func
-    def spoilt(self, w, effect):
-        """The same of a quantity of the world, which is of no particle."""
+    def fault_of_world(self, w, effect):
+        """Stop a world in which an effect, by its index in the scene, has made a quantity of the world not
+        finite."""
         ti.atomic_max(self.failed[w], WorldStatus.NOT_FINITE)
         ti.atomic_min(self.failing_effect[w], effect)

@@ -6,7 +6,7 @@ from tests.scenes import compiled, scene
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine.assembly import needed_fields
-from tisim.worlds.state import CORE, resolve_fields
+from tisim.worlds.fields import CORE, resolve_fields
 
 WORLDS = 8
 """At a time: one number for all, so that each structure is compiled once."""

@@ -11,7 +11,7 @@ from tisim.effects import Gravity
 from tisim.operators import Operator
 from tisim.sources import Source
 from tisim.steppers import Brownian, DriftLimit
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 RADIUS, TEMPERATURE, VISCOSITY = 1e-7, 298.0, 1e-3
 HEAT = 1.380649e-23 * TEMPERATURE

@@ -24,19 +24,19 @@ from tisim.effects.base import PairForce
 
 @ti.func
 def overlap(s, w, i, j, distance):
-    """delta, m; negative when they do not touch."""
+    """Return the overlap delta (m), negative when the two do not touch."""
     return s.radius[w, i] + s.radius[w, j] - distance
 
 
 @ti.func
 def strain(s, w, i, j, distance):
-    """E, where they touch."""
+    """Return the overlap strain E of two that touch."""
     return overlap(s, w, i, j, distance) / (s.radius[w, i] + s.radius[w, j])
 
 
 @ti.func
 def area(s, w, i, j, distance):
-    """A, m^2, where they touch."""
+    """Return the contact area A (m^2) of two that touch."""
     delta, step = overlap(s, w, i, j, distance), s.radius[w, i] - s.radius[w, j]
     around = (distance + s.radius[w, i] + s.radius[w, j]) * delta
     apart = ti.max(distance * distance - step * step, 0.0)
@@ -45,14 +45,15 @@ def area(s, w, i, j, distance):
 
 @ti.func
 def arm(s, w, i, j, distance):
-    """L_i, m."""
+    """Return the arm L_i (m), from the centre of i to the point of contact."""
     a, b = s.radius[w, i], s.radius[w, j]
     return 0.5 * (distance + (a - b) * (a + b) / distance)
 
 
 @ti.func
 def slip(s, w, i, j, separation, distance):
-    """Velocity of the surface of j past that of i at the point of contact, spin included (7.9, 7.14). m/s."""
+    """Return the velocity (m/s) of the surface of j past that of i at their point of contact, spin included
+    (7.9, 7.14)."""
     n = separation / distance
     turn = arm(s, w, i, j, distance) * s.spin[w, i] + arm(s, w, j, i, distance) * s.spin[w, j]
     past = s.velocity[w, j] - s.velocity[w, i] - turn.cross(n)
@@ -70,7 +71,7 @@ class NormalContact(PairForce):
 
     @ti.func
     def compression(self, s, w, i, j, distance):
-        """How hard they push where they touch, >= 0. N."""
+        """Return the force (N, >= 0) with which two spheres that touch push each other apart."""
         return 0.0 * distance
 
     @ti.func

@@ -18,7 +18,7 @@ class SurfaceContact(PairForce):
 
     @ti.func
     def surface_force(self, s, w, i, j, separation, distance):
-        """On i by j, where they touch. N."""
+        """Return the force (N) on i by j, which touch."""
         return 0.0 * separation
 
     @ti.func

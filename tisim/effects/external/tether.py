@@ -5,7 +5,7 @@ from __future__ import annotations
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects.base import Force, parameter
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class Tether(Force):

@@ -7,7 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.impact import Impact, ImpactLaw
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class Heating(ImpactLaw):

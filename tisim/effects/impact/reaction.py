@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import ImpactLaw
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class Reaction(ImpactLaw):

@@ -22,7 +22,7 @@ class MutualMoment(SelfConsistentQuantity, Moment):
 
     contract: ClassVar[bool] = True
     alone: ClassVar[type[Moment]]
-    """The same law without the others."""
+    """The law of a particle that the others do not magnetise."""
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         options = {name: getattr(self, name) for name in self.alone.model_fields}

@@ -18,7 +18,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects.base import Effect, PairForce, option, parameter
 from tisim.numerics.powers import Exponent, power
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 CUTS = (0.1, 0.2, 0.5, 1.0)
 """Cut-offs worth a try, as parts of the largest distance."""
@@ -62,7 +62,7 @@ class NearField(PairForce):
 
     @ti.func
     def own(self, s, w, i):
-        """c_i s_i."""
+        """Return c_i s_i, what a particle brings to the law of a pair."""
         size = ti.cast(1.0, s.real)
         if ti.static(self.strength == "mass"):
             size = s.mass[w, i]

@@ -37,7 +37,8 @@ def _ends(places: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[
 
 
 def _numbers(octave: np.ndarray, part: np.ndarray, side: np.ndarray, slant: np.ndarray) -> tuple[Any, Any]:
-    """Of points with (d/R)^2 = part 2^octave, 1 <= part < 2: rho / R, and the six numbers; of one shape."""
+    """Return rho / R and the six numbers of points with (d/R)^2 = part 2^octave, 1 <= part < 2; of one
+    shape."""
     d = np.sqrt(np.ldexp(part, octave)) / np.hypot(1 - slant, slant)
     places = np.stack([1 + side * d * (1 - slant), d * slant], axis=-1)
     out = np.zeros((*places.shape[:-1], 6))
@@ -90,7 +91,8 @@ def _table(digits: int, settings: runtime.Runtime) -> tuple[np.ndarray, tuple[in
 
 
 def table(digits: int) -> tuple[np.ndarray, tuple[int, int, int]]:
-    """The same, made once for the running settings. InputError where no table is so accurate."""
+    """Return the table of so many digits, made once for the running settings; InputError where none is so
+    accurate."""
     return _table(digits, runtime.current())
 
 

@@ -23,7 +23,7 @@ from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps, vectoris
 from tisim.steppers.common import BeginStep
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.intervals import INTERVAL_FLAGS, INTERVAL_QUANTITIES, BeginIntervals
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 class Brownian(Stepper):

@@ -11,7 +11,7 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.errors import must
 from tisim.steppers.step_control import SHORTEST_STEP, Controller
-from tisim.worlds.state import WorldStatus
+from tisim.worlds.status import WorldStatus
 
 LARGEST_DRIFT = 1e9
 """Steps of one longest step at most: a particle by itself numbers them with 32 bits."""

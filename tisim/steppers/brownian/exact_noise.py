@@ -8,8 +8,9 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.errors import must
 from tisim.interactions.pair_sum import PairSum
+from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle, Phase
-from tisim.worlds.state import Field, WorldStatus
+from tisim.worlds.status import WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)
 """Three standard normal numbers of a particle in a step."""

@@ -16,8 +16,9 @@ beta cannot suit all distances: by a quarter of D_ij in one of 5 % of spheres
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import PairSum
 from tisim.steppers.brownian.exact_noise import GAUSS, Draw
+from tisim.worlds.fields import Field
 from tisim.worlds.program import Phase
-from tisim.worlds.state import Field, WorldStatus
+from tisim.worlds.status import WorldStatus
 
 SUMS = (
     GAUSS,
@@ -25,7 +26,7 @@ SUMS = (
     Field("coupling_squares", "", 3, "keep", scratch=True),
     Field("coupling", "", 1, "keep", scratch=True),
 )
-"""Of a particle: sum_j rho_ij g_j, sum_j rho_ij^2 for each coordinate, and the sum of traces of rho_ij."""
+"""The sums of a particle: sum_j rho_ij g_j, sum_j rho_ij^2 for each coordinate, and the traces of rho_ij."""
 
 
 @ti.data_oriented

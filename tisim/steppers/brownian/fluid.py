@@ -8,7 +8,7 @@ from tisim.sources.base import sources
 from tisim.steppers.context import StepContext
 
 STREAM = 1
-"""Of the random numbers (philox.py)."""
+"""The number of the random stream (philox.py)."""
 PER_KELVIN = scipy.constants.k
 """Boltzmann's constant, J/K."""
 
@@ -42,7 +42,7 @@ class Fluid:
 
     @ti.func
     def heat(self, w):
-        """kT. J."""
+        """Return the thermal energy kT (J)."""
         return PER_KELVIN * self.temperature(w)
 
     @ti.func

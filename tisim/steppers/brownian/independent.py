@@ -10,8 +10,9 @@ from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import LITTLE, OWN_CLOCK, EndIntervals, beginning, duration
 from tisim.steppers.registers import Registers
+from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle
-from tisim.worlds.state import Field, WorldStatus
+from tisim.worlds.status import WorldStatus
 
 OWN = (
     *OWN_CLOCK,

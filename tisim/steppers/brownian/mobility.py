@@ -7,7 +7,7 @@ They are of an infinite fluid.
 from tisim.backend.taichi import ti
 
 NEAR = 1e-9
-"""Of the sum of radii: spheres nearer than this are in one place, without a direction between them."""
+"""Spheres nearer than this part of the sum of their radii are in one place: no direction is between them."""
 
 
 @ti.data_oriented

@@ -9,8 +9,8 @@ Forces enter the inner product as the displacement that they would cause. Torque
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
 from tisim.worlds.block_sum import BlockSums, PerBlock
+from tisim.worlds.fields import Field
 from tisim.worlds.program import Item, PerParticle
-from tisim.worlds.state import Field
 
 
 def memory_of_iterates(turning: bool) -> tuple[Field, ...]:

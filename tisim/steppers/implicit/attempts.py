@@ -5,7 +5,7 @@ from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.saved_state import SavedState
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
-from tisim.worlds.state import WorldStatus
+from tisim.worlds.status import WorldStatus
 
 RETRY, ACCEPTED, HOPELESS = range(3)
 """Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
@@ -60,7 +60,7 @@ class StepAttempt(Repeat):
 
 @ti.func
 def length(s, control: ti.template(), w):  # type: ignore[valid-type]
-    """Of the next attempt (s, f64); the last step ends exactly on time."""
+    """Return the length (s, f64) of the next attempt; the last step ends exactly on time."""
     dt = control.step(s, w, s.next_dt[w])
     left = s.end[w] - s.time_before[w]
     # A remainder as small as rounding leaves is not worth a step of its own.

@@ -26,8 +26,8 @@ from tisim.steppers.implicit.saved_state import CHANGE, saved_fields
 from tisim.steppers.implicit.stage_control import StageControl
 from tisim.steppers.implicit.stages import Stages
 from tisim.worlds.block_sum import BlockSums
+from tisim.worlds.fields import Field
 from tisim.worlds.program import Item
-from tisim.worlds.state import Field
 
 
 class Collocation(Stepper):

@@ -91,7 +91,7 @@ class Solve(SavedState):
 
     @ti.func
     def error(self, w, i, dt):
-        """Of a step, to leading order: (phi - 1/2) dt^2 a + (phi^2 - 1/6) dt^3 da/dt. m."""
+        """Return the error (m) of a step, to leading order: (phi - 1/2) dt^2 a + (phi^2 - 1/6) dt^3 da/dt."""
         a, b, phi = self.s.force_before[w, i], self.s.force[w, i], self.phi(w)
         total = (phi - 0.5) * (phi * b + (1.0 - phi) * a) + (phi * phi - 1.0 / 6.0) * (b - a)
         return dt * dt / self.s.mass[w, i] * total.norm()

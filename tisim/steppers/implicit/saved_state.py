@@ -2,7 +2,7 @@
 
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 BEFORE = (
     Field("position_before", "m", 3, "keep", scratch=True),

@@ -8,7 +8,7 @@ from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.lobatto import highest, integrals, leading, nodes
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.implicit.saved_state import SavedState
-from tisim.worlds.state import Field
+from tisim.worlds.fields import Field
 
 
 @ti.data_oriented
@@ -115,7 +115,7 @@ class Stages(SavedState):
 
     @ti.func
     def spin(self, w, i, stage, dt):
-        """As the velocity. rad/s."""
+        """Return the spin (rad/s) at a stage, made of the rates as the velocity is."""
         return self.s.spin_before[w, i] + dt * self.sum(self.speeds, stage, self.s.stage_turning, w, i)
 
     @ti.func

@@ -32,8 +32,8 @@ from tisim.steppers.intervals import (
     EndIntervals,
 )
 from tisim.worlds.block_sum import BlockSums
+from tisim.worlds.fields import Field
 from tisim.worlds.program import Item
-from tisim.worlds.state import Field
 
 OWN = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
 """The fields of a particle that takes steps of its own: the length of the next one, and its clock."""

@@ -1,0 +1,36 @@
+"""How the worlds of a batch are doing, and what their books say where nothing is to be said."""
+
+from enum import IntEnum
+
+
+class WorldStatus(IntEnum):
+    """How a world is doing; of several failures in one phase, the one with the highest number counts."""
+
+    RUNNING = 0
+    ENDED = 1
+    """The world has reached its end."""
+    NOT_FINITE = 2
+    """A quantity of a particle is not finite."""
+    OUT_OF_ROOM = 3
+    """There is no free slot for another particle."""
+    CONTACT_OVERFLOW = 4
+    """There are more simultaneous contacts than there is room for."""
+    NOT_CONVERGED = 5
+    """A self-consistent quantity of the particles does not converge."""
+    POSITION_LOST = 6
+    """A particle has left the box so far that rounding loses its position."""
+    STEP_TOO_SHORT = 7
+    """The implicit equations of a step cannot be solved even at the shortest step."""
+    FORCE_TOO_STEEP = 8
+    """A force asks for a step shorter than the shortest."""
+    NOT_POSITIVE_DEFINITE = 9
+    """A diffusion matrix is not positive definite."""
+
+
+NO_ONE = 2**31 - 1
+"""The value of failing_particle and failing_effect of a world that no particle, or no effect, has stopped."""
+ASKED = NO_ONE - 1
+"""The value of failing_effect where a force has stopped a world and which of them is not yet known."""
+
+NEVER = 2**62
+"""A number of steps that no world gets to."""
