@@ -20,9 +20,9 @@ from cases.case import size_named
 from tisim import Recording, RunError, run
 from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frame, Frames, frames
-from tisim.plotting.cloud import SEEN, common, corners, directions, panel
+from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
 from tisim.plotting.style import empty, legend_above, letters, plain
-from tisim.plotting.time_series import COLOURS
+from tisim.plotting.time_series import AXIS_COLOURS
 from tisim.scene.initial_state import Arrays
 
 SHOWN = 6
@@ -109,9 +109,18 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
     scale = 8.0 * fastest / side
     axes = figure.subplots(2, 3)
     for axis, frame in zip(axes.flat, chosen, strict=True):
-        (x, y), (u, v) = ((frame.arrays[name] @ SEEN)[:, :2].T for name in ("position", "velocity"))
+        (x, y), (u, v) = ((frame.arrays[name] @ PROJECTION)[:, :2].T for name in ("position", "velocity"))
         axis.quiver(
-            x, y, u, v, angles="xy", scale_units="xy", scale=scale, color=COLOURS[0], width=0.0025, alpha=0.6
+            x,
+            y,
+            u,
+            v,
+            angles="xy",
+            scale_units="xy",
+            scale=scale,
+            color=AXIS_COLOURS[0],
+            width=0.0025,
+            alpha=0.6,
         )
         axis.set(xlim=(left, left + side), ylim=(bottom, bottom + side), aspect="equal", xticks=[], yticks=[])
         directions(axis, (left, bottom, side), NO_GRAVITY)
@@ -130,7 +139,7 @@ def envelope(history: BlastHistory) -> Figure:
     """Half axes of the cloud in time; velocities across the field (Z16 Fig. 6); paths along and across it."""
     figure = empty(10.4, 7.4)
     (left, right), (along, across) = figure.subplots(2, 2)
-    for k, colour in enumerate(COLOURS):
+    for k, colour in enumerate(AXIS_COLOURS):
         left.plot(history.time, history.axes[:, k], "--" if k == 2 else "-", color=colour, label="xyz"[k])
     left.set(xlabel="time (s)", ylabel="half axes of the cloud (m)", ylim=(0, None))
     left.set_title("half axes")
@@ -139,14 +148,14 @@ def envelope(history: BlastHistory) -> Figure:
     line = "-" if history.dense(fastest) else "."
     for k in (1, 2):
         speed = history.velocities[:, fastest, k]
-        right.plot(history.time, speed, line, ms=3, color=COLOURS[k], lw=1.0, label="xyz"[k])
+        right.plot(history.time, speed, line, ms=3, color=AXIS_COLOURS[k], lw=1.0, label="xyz"[k])
     right.set(xlabel="time (s)", ylabel="velocity (m/s)", title="one particle")
     legend_above(right)
-    along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=COLOURS[0], lw=0.7)
+    along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=AXIS_COLOURS[0], lw=0.7)
     along.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"paths of {PATHS} particles")
     # The one that starts fastest across the field, from near: its circle is far smaller than the cloud.
     across.plot(
-        history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=COLOURS[0], lw=0.8
+        history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=AXIS_COLOURS[0], lw=0.8
     )
     across.set(xlabel="y (m)", ylabel="z (m)", title="path of one particle")
     across.set_aspect("equal", "datalim")

@@ -18,10 +18,10 @@ from tisim.sources import ElectricField
 def test_every_size_of_every_case_says_what_is_compared(name):
     case = every()[name]
     for size in case.sizes:
-        found = case.quantities(case.scene(size, 0))
-        assert found
-        assert len({quantity.random for quantity in found}) == 1
-        assert len({quantity.name for quantity in found}) == len(found)
+        quantities = case.quantities(case.scene(size, 0))
+        assert quantities
+        assert len({quantity.random for quantity in quantities}) == 1
+        assert len({quantity.name for quantity in quantities}) == len(quantities)
 
 
 def test_paths_that_are_chaotic_are_not_compared():
@@ -46,11 +46,11 @@ def test_the_array_follows_its_closed_form():
 
 
 def test_a_closed_form_is_claimed_only_where_it_holds():
-    def known(scene):
+    def closed_forms(scene):
         return [q.exact is not None for q in find("vibration").quantities(scene)]
 
-    assert known(vibration.scene(near_field="none")) == [True, True]
-    assert known(vibration.scene()) == [False, True]
+    assert closed_forms(vibration.scene(near_field="none")) == [True, True]
+    assert closed_forms(vibration.scene()) == [False, True]
     for change in (
         {"effects.electric_field.constant": [1.0, 0.0, 0.0]},
         {"effects.electric_field.amplitude": [0.1, 0.1, 0.0]},
@@ -59,7 +59,7 @@ def test_a_closed_form_is_claimed_only_where_it_holds():
         {"particles.mean_velocity": [1.0, 0.0, 0.0]},
         {"particles.deviation": [0.0, 1e-3, 0.0]},
     ):
-        assert known(vibration.scene().replace(change)) == [False, False], change
+        assert closed_forms(vibration.scene().replace(change)) == [False, False], change
     rest = vibration.scene(near_field="none", sites=2)
     arrays = rest.particles.arrays(rest.domain, 0)
     for change, holds in (
@@ -71,8 +71,8 @@ def test_a_closed_form_is_claimed_only_where_it_holds():
         values = {**arrays, **change}
         given = {name: values.pop(name) for name in ("position", "velocity", "radius", "mass")}
         start = Particles(**given, quantities=values)
-        assert known(rest.model_copy(update={"particles": start})) == [holds, holds], change
+        assert closed_forms(rest.model_copy(update={"particles": start})) == [holds, holds], change
     around = Box(low=(-1.0,) * 3, high=(1.0,) * 3)
-    assert known(rest.model_copy(update={"domain": around})) == [False, False]
+    assert closed_forms(rest.model_copy(update={"domain": around})) == [False, False]
     bare = vibration.scene().model_copy(update={"effects": (ElectricField(),)})
-    assert known(bare) == [False, False]
+    assert closed_forms(bare) == [False, False]

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tisim import InputError
-from tisim.packing.random_sequential import SATURATION, sequential_addition
+from tisim.packing.random_sequential import SATURATION_FRACTION, sequential_addition
 from tisim.packing.region import box
 from tisim.packing.saturation import fill
 
@@ -50,7 +50,7 @@ def test_what_is_just_beyond_reach_says_what_was_reached():
         sequential_addition(2280, RADIUS, LOW, HIGH, 0, periodic=True)
     reached = float(str(refused.value).split("at most ")[1][:6])
     # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
-    assert reached == pytest.approx(SATURATION, abs=0.006)
+    assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
 
 
 def saturated(region, radius, seed=0):
@@ -73,10 +73,10 @@ def test_saturated_packing_has_no_room_left(rng, periodic):
 def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
     """0.38413; for 700 spheres a single packing is off by about 0.002."""
     region = box(np.zeros(3), np.ones(3), periodic=True)
-    radius = (3 * SATURATION / (4 * np.pi * 700)) ** (1 / 3)
+    radius = (3 * SATURATION_FRACTION / (4 * np.pi * 700)) ** (1 / 3)
     sphere = 4 / 3 * np.pi * radius**3
     fractions = [len(saturated(region, radius, seed)) * sphere for seed in range(12)]
-    assert np.mean(fractions) == pytest.approx(SATURATION, abs=0.002)
+    assert np.mean(fractions) == pytest.approx(SATURATION_FRACTION, abs=0.002)
 
 
 @pytest.mark.slow

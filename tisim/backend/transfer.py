@@ -13,13 +13,13 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 
-MOST = 32
-"""Entries of a loop that Taichi unrolls without a warning."""
+UNROLL_LIMIT = 32
+"""A loop may have so many entries for Taichi to unroll it without a warning."""
 TYPES = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32, ti.i64: np.int64}
 
 
 def _divided(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
-    return tuple(entries[k : k + MOST] for k in range(0, len(entries), MOST))
+    return tuple(entries[k : k + UNROLL_LIMIT] for k in range(0, len(entries), UNROLL_LIMIT))
 
 
 @ti.data_oriented

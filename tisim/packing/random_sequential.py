@@ -17,12 +17,12 @@ from tisim.packing.region import Region, box
 from tisim.packing.saturation import fill
 
 STREAM = 0x52534100
-SATURATION = 0.3841
-"""Volume fraction at which no further sphere fits, in the bulk."""
-PATIENCE = 5_000
-"""Failures in a row after which places are no longer tried everywhere, only where there is room."""
-CELLS = 64
-"""Cells along an axis, at most."""
+SATURATION_FRACTION = 0.3841
+"""The volume fraction at which no further sphere fits, in the bulk."""
+MAX_CONSECUTIVE_FAILURES = 5_000
+"""After so many failures in a row places are no longer tried everywhere, only where there is room."""
+MAX_CELLS = 64
+"""The list of neighbours has so many cells along an axis at most."""
 
 
 @in_taichi_thread
@@ -34,7 +34,7 @@ def _add(
     spheres: ti.i32,
     radius: ti.f64,
     seed: ti.u64,
-    patience: ti.i32,
+    max_failures: ti.i32,
     x_low: ti.f64,
     y_low: ti.f64,
     z_low: ti.f64,
@@ -62,7 +62,7 @@ def _add(
         for i in range(spheres):
             free = False
             tries = 0
-            while not free and tries < patience and not stuck:
+            while not free and tries < max_failures and not stuck:
                 a = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 0))
                 b = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 1))
                 u = ti.Vector([a[0], a[1], b[0]])
@@ -124,10 +124,10 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     check_resolved("places of the packing", np.stack([region.low, region.high]), radius)
     sphere = 4 / 3 * np.pi * radius**3
     # Refused at once where no choice of places would do: a few spheres can exceed the limit of many.
-    most = (SATURATION + count**-0.5) * region.covered(radius) / region.volume
-    wanted = count * sphere / region.volume
-    rule = f"at most {SATURATION:.3f}, where random sequential addition of many spheres ends"
-    must(wanted <= most, "volume fraction", rule, float(f"{wanted:.4g}"))
+    most = (SATURATION_FRACTION + count**-0.5) * region.covered(radius) / region.volume
+    fraction = count * sphere / region.volume
+    rule = f"at most {SATURATION_FRACTION:.3f}, where random sequential addition of many spheres ends"
+    must(fraction <= most, "volume fraction", rule, float(f"{fraction:.4g}"))
     centres = _everywhere(count, radius, region, seed)
     if len(centres) < count:
         generator = np.random.Generator(np.random.Philox(key=[seed, STREAM]))
@@ -135,7 +135,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     if len(centres) < count:
         raise InputError(
             f"volume fraction must be at most {len(centres) * sphere / region.volume:.4f}, where no further "
-            f"sphere fits ({len(centres)} of {count} were placed); received {wanted:.4f}"
+            f"sphere fits ({len(centres)} of {count} were placed); received {fraction:.4f}"
         )
     return centres
 
@@ -143,7 +143,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
 def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     """The first centres, found by trying places in all of the region."""
     # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
-    dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, CELLS).astype(int)
+    dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, MAX_CELLS).astype(int)
     heads = np.full(int(np.prod(dims)), -1, dtype=np.int32)
     centres, follow = np.zeros((count, 3)), np.full(count, -1, dtype=np.int32)
     placed = _add(
@@ -153,7 +153,7 @@ def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndar
         count,
         radius,
         seed,
-        PATIENCE,
+        MAX_CONSECUTIVE_FAILURES,
         *region.low.tolist(),
         *region.side.tolist(),
         *dims.tolist(),

@@ -7,7 +7,7 @@ from cases.blast.figures import SHOWN, BlastHistory, beside, pictures, table
 from cases.blast.scene import scene
 from tisim import Recording, run
 from tisim.io.reader import frames
-from tisim.plotting.cloud import SEEN
+from tisim.plotting.cloud import PROJECTION
 
 
 @pytest.mark.slow
@@ -23,7 +23,7 @@ def test_pictures_of_a_run(tmp_path):
         last = found[-1]
     assert len(figures["sequence.png"].axes) == SHOWN
     arrows = figures["velocities.png"].axes[-1].collections[0]
-    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ SEEN)[:, 0])
+    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ PROJECTION)[:, 0])
     left, right, *_ = figures["envelope.png"].axes
     np.testing.assert_array_equal(left.lines[0].get_ydata(), history.axes[:, 0])
     assert history.axes[-1, 0] > 1.1 * history.axes[0, 0]
