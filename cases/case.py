@@ -110,10 +110,3 @@ def every() -> dict[str, Case]:
     """All cases by name."""
     modules = (importlib.import_module(f"cases.{m.name}") for m in pkgutil.iter_modules(cases.__path__))
     return {module.CASE.name: module.CASE for module in modules if hasattr(module, "CASE")}
-
-
-def find(name: str) -> Case:
-    """A case by name; InputError naming the known ones when there is none."""
-    known = every()
-    must(name in known, "case", f"one of {', '.join(known)}", name)
-    return known[name]

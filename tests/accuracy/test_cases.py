@@ -5,7 +5,7 @@ import pytest
 
 from cases.agglomeration import scene as agglomeration
 from cases.blast import scene as blast
-from cases.case import every, find
+from cases.case import every
 from cases.vibration import scene as vibration
 from tests.scenes import simulate
 from tisim import Box, Particles
@@ -25,16 +25,18 @@ def test_every_size_of_every_case_says_what_is_compared(name):
 
 
 def test_paths_that_are_chaotic_are_not_compared():
-    assert [q.random for q in find("blast").quantities(blast.scene())] == [False]
-    assert [q.random for q in find("blast").quantities(blast.scene(contact=True))] == [True]
-    assert [q.random for q in find("agglomeration").quantities(agglomeration.scene_for("small", 0))] == [True]
+    assert [q.random for q in every()["blast"].quantities(blast.scene())] == [False]
+    assert [q.random for q in every()["blast"].quantities(blast.scene(contact=True))] == [True]
+    assert [q.random for q in every()["agglomeration"].quantities(agglomeration.scene_for("small", 0))] == [
+        True
+    ]
 
 
 @pytest.mark.long
 def test_the_array_follows_its_closed_form():
     """Of a single particle, and of the array's centre whatever the near field."""
     scene = vibration.scene(near_field="none", sites=2, duration=0.004)
-    positions, centre = find("vibration").quantities(scene)
+    positions, centre = every()["vibration"].quantities(scene)
     (result,) = simulate([scene], capacity=8)
     for quantity in (positions, centre):
         truth = closed_form(quantity, result)
@@ -47,7 +49,7 @@ def test_the_array_follows_its_closed_form():
 
 def test_a_closed_form_is_claimed_only_where_it_holds():
     def closed_forms(scene):
-        return [q.exact is not None for q in find("vibration").quantities(scene)]
+        return [q.exact is not None for q in every()["vibration"].quantities(scene)]
 
     assert closed_forms(vibration.scene(near_field="none")) == [True, True]
     assert closed_forms(vibration.scene()) == [False, True]

@@ -13,10 +13,10 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.components.ranges import check_resolved
 from tisim.errors import InputError, must
 from tisim.numerics import philox
-from tisim.packing.region import Region, box
+from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
+from tisim.packing.region import Region
 from tisim.packing.saturation import fill
 
-STREAM = 0x52534100
 SATURATION_FRACTION = 0.3841
 """The volume fraction at which no further sphere fits, in the bulk."""
 MAX_CONSECUTIVE_FAILURES = 5_000
@@ -63,8 +63,8 @@ def _add(
             free = False
             tries = 0
             while not free and tries < max_failures and not stuck:
-                a = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 0))
-                b = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 1))
+                a = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 0))
+                b = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 1))
                 u = ti.Vector([a[0], a[1], b[0]])
                 attempt += ti.cast(1, ti.u64)
                 if ball == 0 or (u - 0.5).norm_sqr() <= 0.25:
@@ -103,17 +103,6 @@ def _add(
     return placed
 
 
-def sequential_addition(
-    count: int, radius: float, low: np.ndarray, high: np.ndarray, seed: int, periodic: bool = False
-) -> np.ndarray:
-    """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) that do not overlap.
-
-    Centres lie anywhere in the box ``low``..``high`` (m); spheres may reach over its faces, and where the box
-    is ``periodic`` they do not overlap across them either. Further as ``place``.
-    """
-    return place(count, radius, box(low, high, periodic), seed)
-
-
 def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) in a region, none overlapping.
 
@@ -130,7 +119,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     must(fraction <= most, "volume fraction", rule, float(f"{fraction:.4g}"))
     centres = _everywhere(count, radius, region, seed)
     if len(centres) < count:
-        generator = np.random.Generator(np.random.Philox(key=[seed, STREAM]))
+        generator = np.random.Generator(np.random.Philox(key=[seed, SEQUENTIAL_ADDITION]))
         centres = fill(centres, count, 2 * radius, region, generator)
     if len(centres) < count:
         raise InputError(
