@@ -32,8 +32,8 @@ from tisim.files.ownership import writable
 from tisim.io.run_folder import versions
 
 FORMAT = "tisim cost 2"
-CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-NAMES = (CSV, HDF5, PICTURE, lock.LOCK)
+COST_CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
+NAMES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
@@ -41,9 +41,9 @@ _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "reje
 def write(study: Study, folder: Path) -> list[Path]:
     """Write cost.csv and cost.h5, in place of any before; returns their paths. RunError on a full disk."""
     writable(folder)
-    replace_file(folder / CSV, table(study).encode())
+    replace_file(folder / COST_CSV, table(study).encode())
     _write_rows(study, folder / HDF5)
-    return [folder / CSV, folder / HDF5]
+    return [folder / COST_CSV, folder / HDF5]
 
 
 def table(study: Study) -> str:
