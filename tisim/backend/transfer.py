@@ -57,7 +57,7 @@ class Exchange:
     def read(self) -> dict[str, np.ndarray]:
         """Every field as an array of its full shape."""
         buffers = self._buffers()
-        self._launch_read(buffers)
+        self._launch(True, buffers)
         return self._views(buffers)
 
     def write(self, values: Mapping[str, Any]) -> None:
@@ -65,16 +65,11 @@ class Exchange:
         buffers = self._buffers()
         for name, view in self._views(buffers).items():
             view[...] = values[name]
-        self._launch_write(buffers)
+        self._launch(False, buffers)
 
     @in_taichi_thread
-    def _launch_read(self, buffers: tuple[np.ndarray, ...]) -> None:
-        self._read(*buffers)
-        ti.sync()
-
-    @in_taichi_thread
-    def _launch_write(self, buffers: tuple[np.ndarray, ...]) -> None:
-        self._write(*buffers)
+    def _launch(self, reads: bool, buffers: tuple[np.ndarray, ...]) -> None:
+        self._copy(reads, *buffers)
         ti.sync()
 
     @ti.func
@@ -86,33 +81,22 @@ class Exchange:
         return at
 
     @ti.kernel
-    def _read(
+    def _copy(
         self,
+        reads: ti.template(),  # type: ignore[valid-type]
         f32: ti.types.ndarray(),  # type: ignore[valid-type]
         f64: ti.types.ndarray(),  # type: ignore[valid-type]
         i32: ti.types.ndarray(),  # type: ignore[valid-type]
         i64: ti.types.ndarray(),  # type: ignore[valid-type]
     ):
+        """From the fields to the arrays where it reads, else from the arrays to the fields."""
         for group in ti.static(self.groups):
             for where in ti.grouped(group[1][0][0][1]):
                 at = self._at(group[0], where)
                 for entries in ti.static(group[1]):
                     for entry in ti.static(entries):
                         buffer = ti.static((f32, f64, i32, i64)[entry[0]])
-                        buffer[entry[2] + at * entry[3]] = entry[1][where]
-
-    @ti.kernel
-    def _write(
-        self,
-        f32: ti.types.ndarray(),  # type: ignore[valid-type]
-        f64: ti.types.ndarray(),  # type: ignore[valid-type]
-        i32: ti.types.ndarray(),  # type: ignore[valid-type]
-        i64: ti.types.ndarray(),  # type: ignore[valid-type]
-    ):
-        for group in ti.static(self.groups):
-            for where in ti.grouped(group[1][0][0][1]):
-                at = self._at(group[0], where)
-                for entries in ti.static(group[1]):
-                    for entry in ti.static(entries):
-                        buffer = ti.static((f32, f64, i32, i64)[entry[0]])
-                        entry[1][where] = buffer[entry[2] + at * entry[3]]
+                        if ti.static(reads):
+                            buffer[entry[2] + at * entry[3]] = entry[1][where]
+                        else:
+                            entry[1][where] = buffer[entry[2] + at * entry[3]]
