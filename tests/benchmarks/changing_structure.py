@@ -71,7 +71,7 @@ def main() -> None:
     runtime.init(threads=given.threads)
     print(f"{runtime.backend()}\n{'scenes':>8}{'s each':>9}{'MB':>8}{'trees':>8}{'starts':>8}")
     for done, seconds, size in soak(given.scenes, given.every):
-        made, starts = memory.made(), runtime.generation()
+        made, starts = memory.trees_made(), runtime.generation()
         print(f"{done:8d}{seconds:9.2f}{size:8.0f}{made:8d}{starts:8d}", flush=True)
 
 

@@ -87,7 +87,7 @@ def collected() -> Iterator[list[Tree]]:
         _collecting.pop()
 
 
-def made() -> int:
+def trees_made() -> int:
     """Trees that have been made in this process."""
     return _made.total()
 
