@@ -86,7 +86,7 @@ def test_resonance_curve_of_runs_is_that_of_the_closed_form():
     left, right, beats, lines = figure.axes
     np.testing.assert_array_equal(left.lines[1].get_ydata(), slow.peaks)
     np.testing.assert_array_equal(right.lines[1].get_ydata(), fast.peaks)
-    assert "65.7" in beats.get_title()
+    assert "65.7" in beats.get_title(loc="left")
     assert lines.get_xlabel().startswith("angular frequency")
     rows = table(("one", slow), ("two", fast)).splitlines()
     assert len(rows) == 1 + 9 + 9
