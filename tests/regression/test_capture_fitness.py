@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.capture.problem import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED, GENES, problem
+from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED
+from cases.capture.problem import GENES, problem
 from tisim.backend import runtime
 
 CAUGHT = {

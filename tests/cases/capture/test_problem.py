@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cases.capture import problem as filters
-from cases.capture.problem import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
+from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
 from cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
 from cases.statistics import Claim, Mean
 from optimize.evaluation.evaluator import BatchEvaluator
