@@ -1,7 +1,6 @@
 """The contract of a case: a package in ``cases`` with a ``CASE``. Found by looking; registered nowhere.
 
-What a ``CASE`` names imports figures, checks and the inverse problem when it is called, so that listing the
-cases stays quick.
+A ``CASE`` names its figures, checks and inverse problem as ``Late``, so that listing the cases stays quick.
 """
 
 from __future__ import annotations
@@ -65,6 +64,22 @@ def size_named(name: str, sizes: Mapping[str, Size]) -> Size:
 
 
 @dataclass(frozen=True)
+class Late:
+    """A function of a case's module that is imported when it is called first."""
+
+    module: str
+    name: str
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The function itself, for which its module is imported."""
+        return getattr(importlib.import_module(self.module), self.name)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.function(*arguments)
+
+
+@dataclass(frozen=True)
 class Case:
     """A runnable scenario, and the inverse problem on it where there is one.
 
@@ -107,13 +122,6 @@ class Case:
 
 
 def every() -> dict[str, Case]:
-    """All cases by name."""
+    """All cases by their names."""
     modules = (importlib.import_module(f"cases.{m.name}") for m in pkgutil.iter_modules(cases.__path__))
     return {module.CASE.name: module.CASE for module in modules if hasattr(module, "CASE")}
-
-
-def find(name: str) -> Case:
-    """A case by name; InputError naming the known ones when there is none."""
-    known = every()
-    must(name in known, "case", f"one of {', '.join(known)}", name)
-    return known[name]

@@ -19,7 +19,7 @@ class Mean:
 
     @classmethod
     def of(cls, runs: ArrayLike) -> Mean:
-        """Of two runs or more, by Student's t."""
+        """The mean of two runs or more, its interval by Student's t."""
         return cls(float(np.mean(np.asarray(runs, float))), float(half_width(runs)))
 
     def over(self, other: Mean) -> Mean:

@@ -28,12 +28,12 @@ class Hall:
         for string in (*self.strings, *population):
             if not string.failed:
                 different.setdefault(tuple(string), string)
-        known = list(different.values())
-        if known and len(known[0].fitness.values) > 1:
-            front = tools.sortNondominated(known, len(known), first_front_only=True)[0]
+        candidates = list(different.values())
+        if candidates and len(candidates[0].fitness.values) > 1:
+            front = tools.sortNondominated(candidates, len(candidates), first_front_only=True)[0]
             self.strings = sorted(front, key=lambda string: string.fitness.values)
             return any(tuple(string) not in before for string in self.strings)
-        self.strings = sorted(known, key=lambda string: string.fitness.values)[: self.size]
+        self.strings = sorted(candidates, key=lambda string: string.fitness.values)[: self.size]
         return bool(self.strings) and (not leader or self.strings[0].fitness.values < leader)
 
 

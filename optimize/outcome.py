@@ -60,9 +60,9 @@ class Outcome:
     """What a search found.
 
     hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
-    succeeded); of several objectives the front. Failed designs never enter. seen : the estimates
+    succeeded); of several objectives the front. Failed designs never enter. estimates : those
     of each design that succeeded, by its string, in the order they were first estimated.
-    logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations asked for),
+    logbook : one row per finished generation: gen, designs (newly estimated), starts (evaluations requested),
     failed, box (mean width of the search box it drew from), recentred (box moved after it), best (so far;
     infinitely bad if there is none), and for one objective mean and std of the successful designs in the
     population (NaN if there is none), for several the number of designs in the front, and best for each.
@@ -74,7 +74,7 @@ class Outcome:
     settings: Settings
     identity: Mapping[str, Any]
     hall: list[Individual] = field(default_factory=list)
-    seen: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
+    estimates: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0
     hits: int = 0
@@ -87,7 +87,7 @@ class Outcome:
 
     @property
     def best(self) -> Individual | None:
-        """Of one objective the best; of several the one of the front that is nearest to the best of each."""
+        """The best design; of several objectives the one of the front that is nearest to the best of each."""
         if self.hall and self.problem.several:
             return compromise(self.hall)
         return self.hall[0] if self.hall else None

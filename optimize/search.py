@@ -89,15 +89,15 @@ class _Search:
             return
         last = len(self.outcome.logbook) - 1
         designs = [self.problem.genome.decode(string) for string in self.hall.strings]
-        found = self.ensemble.confirm(designs, lambda fraction: self._report(last, 1.0))
-        for string, estimates in zip(self.hall.strings, found, strict=True):
+        confirmed = self.ensemble.confirm(designs, lambda fraction: self._report(last, 1.0))
+        for string, estimates in zip(self.hall.strings, confirmed, strict=True):
             string.confirmed = estimates
         self.ranked = sorted(self.hall.strings, key=lambda s: [estimate.mean for estimate in s.confirmed])
 
     def _generations(self) -> None:
         for generation in range(self.settings.generations + 1):
             width = self.method.width
-            asked = self.ensemble.asked
+            requested_before = self.ensemble.requested
             population = self.method.ask()
             fresh = self._estimate(population, generation)
             population = [string for string in population if string.fitness.valid]
@@ -109,7 +109,7 @@ class _Search:
             self.outcome.logbook.record(
                 gen=generation,
                 designs=fresh,
-                starts=self.ensemble.asked - asked,
+                starts=self.ensemble.requested - requested_before,
                 failed=sum(string.failed for string in population),
                 box=width,
                 recentred=self.method.moved and not self.ensemble.exhausted,
@@ -126,12 +126,12 @@ class _Search:
         """Estimate the strings whose fitness is not known, as far as the budget goes; how many they were."""
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
-        found = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
-        for string, estimates in zip(fresh, found, strict=True):
+        new_estimates = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
+        for string, estimates in zip(fresh, new_estimates, strict=True):
             if estimates is not None:
                 string.know(estimates)
                 if not string.failed:
-                    self.outcome.seen[tuple(string)] = estimates
+                    self.outcome.estimates[tuple(string)] = estimates
         return sum(string.fitness.valid for string in fresh)
 
     def _race(self, population: list[Individual], generation: int) -> None:
@@ -140,12 +140,12 @@ class _Search:
             return
         racing = self.hall.strings
         designs = [self.problem.genome.decode(string) for string in racing]
-        found = self.ensemble.race(designs, lambda fraction: self._report(generation, 1.0))
-        known = {tuple(string): estimates for string, estimates in zip(racing, found, strict=True)}
-        self.outcome.seen |= known
+        raced = self.ensemble.race(designs, lambda fraction: self._report(generation, 1.0))
+        by_string = {tuple(string): estimates for string, estimates in zip(racing, raced, strict=True)}
+        self.outcome.estimates |= by_string
         for string in (*racing, *population):
-            if tuple(string) in known:
-                string.know(known[tuple(string)])
+            if tuple(string) in by_string:
+                string.know(by_string[tuple(string)])
         self.hall.update(population)
 
     def _report(self, generation: int, fraction: float) -> None:
@@ -155,16 +155,16 @@ class _Search:
             raise _OutOfTime
 
     def _stop(self, generation: int) -> Stopped:
-        wish = self.settings
-        if wish.target is not None and self.hall.strings:
-            (goal,) = self.problem.costs([wish.target])
+        settings = self.settings
+        if settings.target is not None and self.hall.strings:
+            (goal,) = self.problem.costs([settings.target])
             if self.hall.strings[0].fitness.values[0] <= goal:
                 return "target"
-        if wish.patience is not None and self.waited >= wish.patience:
+        if settings.patience is not None and self.waited >= settings.patience:
             return "patience"
-        if self.ensemble.exhausted or self.ensemble.asked >= self.ensemble.budget:
+        if self.ensemble.exhausted or self.ensemble.requested >= self.ensemble.budget:
             return "evaluations"
-        if generation == wish.generations:
+        if generation == settings.generations:
             return "generations"
         return "wall clock" if self._out_of_time() else ""
 

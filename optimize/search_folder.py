@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from optimize.search_records import searches
-from optimize.settings import FORMAT, search_name
+from optimize.settings import IDENTITY_FORMAT, search_name
 from optimize.storage.cache import Cache
 from optimize.storage.record import canonical
 from tisim import InputError
@@ -39,15 +39,15 @@ BESIDE = (
     "best_run.csv",
 )
 MAIN = (FILE, f"{FILE}.journal")
-"""What there is to go on from."""
-NAMES = (*MAIN, f"{FILE}.lock", *BESIDE, lock.LOCK)
+"""The files that a search goes on from."""
+SEARCH_FILES = (*MAIN, f"{FILE}.lock", *BESIDE, lock.LOCK)
 HOW = "--fresh --overwrite"
 """The options that let a search replace what is there."""
 
 
 def clear(folder: Path, overwrite: bool) -> None:
     """Make way for a new search; InputError when there is one already that goes on, or is to be kept."""
-    ownership.check(folder, NAMES, overwrite, HOW)
+    ownership.check(folder, SEARCH_FILES, overwrite, HOW)
     begun = any(status(folder / name) is not None for name in MAIN)
     must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
     # The lock file stays: without it two processes could lock two different files.
@@ -60,11 +60,11 @@ def clear(folder: Path, overwrite: bool) -> None:
 
 def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:
     """InputError when the file in the folder is of another search than the one wished, by their identity."""
-    known = searches(cache)
-    if known and search_name(wished) not in known:
-        old = json.loads(next(iter(known.values()))["identity"])
+    stored = searches(cache)
+    if stored and search_name(wished) not in stored:
+        old = json.loads(next(iter(stored.values()))["identity"])
         must(
-            old.get("format") == FORMAT,
+            old.get("format") == IDENTITY_FORMAT,
             "output folder",
             "of a search of this version of the program (or give --out, or --fresh --overwrite)",
             str(folder),
@@ -81,8 +81,8 @@ def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:
 
 def _leaves(settings: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     """Nested settings by their dotted names."""
-    found: dict[str, Any] = {}
+    leaves: dict[str, Any] = {}
     for name, value in settings.items():
         inside = isinstance(value, Mapping)
-        found |= _leaves(value, f"{above}{name}.") if inside else {f"{above}{name}": value}
-    return found
+        leaves |= _leaves(value, f"{above}{name}.") if inside else {f"{above}{name}": value}
+    return leaves

@@ -31,5 +31,5 @@ def store(cache: Cache, outcome: Outcome) -> None:
 
 def searches(cache: Cache) -> dict[str, Mapping[str, Any]]:
     """Name and attributes of each search in the file."""
-    found = cache.attributes()
-    return {name: attributes for name, attributes in found.items() if "identity" in attributes}
+    tables = cache.attributes()
+    return {name: attributes for name, attributes in tables.items() if "identity" in attributes}

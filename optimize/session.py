@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from optimize.evaluation.executors import made
+from optimize.evaluation.executors import evaluator_named
 from optimize.evaluation.runs import Evaluator, start_seed
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome, Progress
@@ -18,7 +18,7 @@ from optimize.problem.problem import Problem
 from optimize.report import report
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import FILE, HOW, NAMES, check
+from optimize.search_folder import FILE, HOW, SEARCH_FILES, check
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from tisim.backend import runtime
@@ -52,7 +52,7 @@ def run(
     fit(problem, wished)
     running = runtime.current()
     threads = running.threads if executor == "batch" else 0
-    with closing(made(executor, running.device, running.precision, threads)) as evaluator:
+    with closing(evaluator_named(executor, running.device, running.precision, threads)) as evaluator:
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
             return session(problem, wished, evaluator, Path(out), say, bar, stopping)
@@ -79,7 +79,7 @@ def session(
     InputError when the folder is another search's, has such files, or cannot be written. Other processes may
     join the search, but not begin anew.
     """
-    take(folder, NAMES, overwrite, HOW)
+    take(folder, SEARCH_FILES, overwrite, HOW)
     with lock.held(folder, exclusive=False):
         with Cache(folder / FILE) as cache:
             check(folder, cache, identity(problem, settings, evaluator.settings))
@@ -134,5 +134,5 @@ def _show_best(
         replace_file(paths[-1], report.details_csv(details))
     if problem.picture is not None:
         paths.append(folder / "best_cloud.png")
-        replace_file(paths[-1], report.drawn(problem.picture(scene, result), "png", dpi=150))
+        replace_file(paths[-1], report.figure_bytes(problem.picture(scene, result), "png", dpi=150))
     return paths

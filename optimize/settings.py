@@ -15,8 +15,8 @@ from optimize.storage.record import canonical
 from tisim.components.component import Checked
 from tisim.errors import must
 
-FORMAT = 2
-"""Of the identity below; raised when a search of before cannot be gone on with."""
+IDENTITY_FORMAT = 2
+"""The version of the identity below; raised when a search of before cannot be gone on with."""
 
 
 class Settings(Checked):
@@ -28,7 +28,7 @@ class Settings(Checked):
     Stopping rules, None = off, looked at after each generation: target - best fitness as good as that;
     patience - generations without improvement; wall_clock_s - seconds, looked at after every evaluation too:
     the generation under way is then dropped, its evaluations stay cached.
-    max_evaluations : different runs asked for, whether run or found in the cache (so that a resumed search
+    max_evaluations : different runs requested, whether run or found in the cache (so that a resumed search
     stops at the same place); never more: the last generation is cut short.
     """
 
@@ -52,11 +52,11 @@ class Settings(Checked):
     @classmethod
     def _options_of_the_method(cls, data: dict[str, Any]) -> dict[str, Any]:
         kind = find(data.get("method", "genetic")).Options
-        given = data.get("options", {})
-        if not isinstance(given, kind):
-            must(isinstance(given, Mapping), "search.options", "settings of the method, by name", given)
-            given = kind(**given)
-        return {**data, "options": given}
+        options = data.get("options", {})
+        if not isinstance(options, kind):
+            must(isinstance(options, Mapping), "search.options", "settings of the method, by name", options)
+            options = kind(**options)
+        return {**data, "options": options}
 
 
 _STOPPING = {"generations", "hall_of_fame", "target", "patience", "max_evaluations", "wall_clock_s"}
@@ -70,7 +70,7 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
     """
     left_out = dict.fromkeys(_STOPPING, True) | {"ensemble": _AFTERWARDS}
     return {
-        "format": FORMAT,
+        "format": IDENTITY_FORMAT,
         "problem": problem.name,
         "problem_version": problem.version,
         **({"problem_code": problem.identity} if problem.identity else {}),
@@ -91,8 +91,8 @@ def followed(usual: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
     """
     method = find(given.get("method", usual.get("method", "genetic")))
     chosen = [names for option, names in method.followers.items() if f"options.{option}" in given]
-    left = {name for names in chosen for name in names}
-    options = {name: value for name, value in usual.get("options", {}).items() if name not in left}
+    replaced = {name for names in chosen for name in names}
+    options = {name: value for name, value in usual.get("options", {}).items() if name not in replaced}
     return {**usual, "options": options}
 
 

@@ -7,18 +7,20 @@ from rich import progress as bars
 from rich.console import Console
 from rich.table import Table
 
-WIDTH = 110
-"""Of tables that do not go to a terminal, where rich would assume 80 columns."""
+FILE_WIDTH = 110
+"""Tables that do not go to a terminal have so many columns, where rich would assume 80."""
+TERMINAL_WIDTH = 80
+"""Tables for a terminal have at most so many columns: every terminal has as many."""
 
 
 def out() -> Console:
     """For results."""
-    return Console(markup=False, width=None if sys.stdout.isatty() else WIDTH)
+    return Console(markup=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
 
 
 def err() -> Console:
     """For progress."""
-    return Console(stderr=True, markup=False, width=None if sys.stderr.isatty() else WIDTH)
+    return Console(stderr=True, markup=False, width=None if sys.stderr.isatty() else FILE_WIDTH)
 
 
 def progress_bar(before: str, after: str = "", console: Console | None = None) -> bars.Progress:

@@ -7,7 +7,7 @@ from tisim.accuracy import Quantity
 
 
 def mean_radius(result: Result) -> float:
-    """m."""
+    """The mean radius of the grains at the end, m."""
     return float(result.state["radius"].mean())
 
 

@@ -21,11 +21,11 @@ from tisim.scene.initial_state import Arrays
 from tisim.steppers import FixedStep, Verlet
 
 HARDNESS, DENSITY, RADIUS, LENGTH = 3e5, 2000.0, 1e-3, 0.8
-"""H (Pa), rho (kg/m^3), b_0 (m) and beta of the grains here."""
-BOUND = 1e-10
-"""Relative error allowed to a closed form."""
-ROUNDING = 1e-12
-"""Relative change allowed to a conserved sum of a thousand terms."""
+"""The grains of the checks: hardness H (Pa), density rho (kg/m^3), radius b_0 (m), length beta."""
+CLOSED_FORM_BOUND = 1e-10
+"""Runs may differ from a closed form by this part of it."""
+CONSERVATION_BOUND = 1e-12
+"""A conserved sum of a thousand terms may change by this part of it, by rounding."""
 
 
 def pair(speed: float, *effects: Effect, radius: float = RADIUS) -> Scene:
@@ -90,7 +90,9 @@ def closed_forms() -> Iterator[Check]:
         ends = _run([pair(v, impact(initial, final)) for v in speeds])
         measured = np.array([r.state["velocity"][1, 0] - r.state["velocity"][0, 0] for r in ends])
         error = np.abs(measured / (2 * speeds) - restitution(speeds, initial, final)).max()
-        yield Check(f"restitution, a0 = {initial}, af = {final}: largest error", error, 0.0, BOUND)
+        yield Check(
+            f"restitution, a0 = {initial}, af = {final}: largest error", error, 0.0, CLOSED_FORM_BOUND
+        )
 
     for final in (1.0, 2.5):
         expected = adhesion_speed(final)
@@ -100,7 +102,7 @@ def closed_forms() -> Iterator[Check]:
             return np.array([r.work["merges"] > 0 for r in ends])
 
         speed = onset(bonded, 0.5 * expected, 1.5 * expected)
-        yield Check(f"adhesion speed, af = {final} (m/s)", speed, expected, BOUND * expected)
+        yield Check(f"adhesion speed, af = {final} (m/s)", speed, expected, CLOSED_FORM_BOUND * expected)
 
     gamma = 20.0
 
@@ -115,7 +117,7 @@ def closed_forms() -> Iterator[Check]:
     top = 0.999 * adhesion_speed()
     expected = onset(deficit, 0.01 * top, top)
     speed = onset(broken, 0.01 * top, top)
-    yield Check("fragmentation speed (m/s)", speed, expected, BOUND * expected)
+    yield Check("fragmentation speed (m/s)", speed, expected, CLOSED_FORM_BOUND * expected)
 
     fastest = adhesion_speed() * (1 + 1e-13)
 
@@ -128,22 +130,23 @@ def closed_forms() -> Iterator[Check]:
 
     expected = 4 * gamma / (HARDNESS * LENGTH)
     size = onset(breaks, 0.3 * expected, 3 * expected)
-    yield Check("largest radius that sticks (m)", size, expected, BOUND * expected)
+    yield Check("largest radius that sticks (m)", size, expected, CLOSED_FORM_BOUND * expected)
 
 
 def energy(result: Result) -> tuple[float, float]:
-    """Books of a flow at the start and the end, J: kinetic, thermal, radiated and fracture energy, less
+    """The energy of a flow at the start and the end, J: kinetic, thermal, radiated and fracture energy, less
     what reaction and deformation work have supplied."""
     capacity = next(e for e in result.scene.effects if isinstance(e, Heating)).heat_capacity
 
-    def held(s: Arrays) -> float:
+    def energy_of_grains(s: Arrays) -> float:
         kinetic = 0.5 * (s["mass"] * (s["velocity"] ** 2).sum(axis=1)).sum()
         return float(kinetic + (s["mass"] * capacity * s["temperature"]).sum())
 
     books = {name: float(result.state[name].sum()) for name in
              ("cooling_loss", "fracture_energy", "reaction_heat", "deformation_work")}  # fmt: skip
     spent = books["cooling_loss"] + books["fracture_energy"]
-    return held(result.start), held(result.state) + spent - books["reaction_heat"] - books["deformation_work"]
+    end = energy_of_grains(result.state) + spent - books["reaction_heat"] - books["deformation_work"]
+    return energy_of_grains(result.start), end
 
 
 def conservation() -> Iterator[Check]:
@@ -153,18 +156,18 @@ def conservation() -> Iterator[Check]:
     yield Check("the flow reaches its end (1 = yes)", float(result.status.ok), 1.0, 0.0)
     before, after = result.start, result.state
     mass = before["mass"].sum()
-    yield Check("mass (kg)", after["mass"].sum(), mass, ROUNDING * mass)
+    yield Check("mass (kg)", after["mass"].sum(), mass, CONSERVATION_BOUND * mass)
     momentum = [(s["mass"][:, None] * s["velocity"]).sum(axis=0) for s in (before, after)]
     scale = float((before["mass"] * np.linalg.norm(before["velocity"], axis=1)).sum())
     for axis in range(3):
-        bound = ROUNDING * scale
+        bound = CONSERVATION_BOUND * scale
         yield Check(f"momentum along {'xyz'[axis]} (kg m/s)", momentum[1][axis], momentum[0][axis], bound)
     start, end = energy(result)
     turned_over = float(result.state["cooling_loss"].sum() + result.state["reaction_heat"].sum()) + start
-    yield Check("energy, all books (J)", end, start, ROUNDING * turned_over)
+    yield Check("energy, all books (J)", end, start, CONSERVATION_BOUND * turned_over)
 
 
 def check() -> Iterator[Check]:
-    """All of them."""
+    """The closed forms, then the conservation laws."""
     yield from closed_forms()
     yield from conservation()

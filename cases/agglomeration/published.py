@@ -16,7 +16,7 @@ from rich.table import Table
 
 import tisim
 from cases.agglomeration.problem import cost
-from cases.agglomeration.published_strings import PUBLISHED, designs
+from cases.agglomeration.published_strings import PUBLISHED_COSTS, designs
 from cases.agglomeration.scene import scene
 from tisim import Scene
 from tisim.numerics.statistics import half_width
@@ -24,12 +24,12 @@ from tisim.steppers import ApproachTime, Verlet
 
 
 def changed(control: ApproachTime) -> Callable[[Scene], Scene]:
-    """Another step control."""
+    """A change of a scene to another step control."""
     return lambda s: s.model_copy(update={"stepper": Verlet(control=control)})
 
 
 def setting(key: str, value: float | bool) -> Callable[[Scene], Scene]:
-    """One setting changed."""
+    """A change of one setting of a scene, by its dotted key."""
     return lambda s: s.replace({key: value})
 
 
@@ -55,7 +55,7 @@ def estimate(scenes: list[Scene]) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Run and print."""
+    """Run the published strings and print them beside what Z04 has."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--grains", type=int, default=1000)
     parser.add_argument("--starts", type=int, default=48)
@@ -66,7 +66,7 @@ def main() -> None:
     table = Table(
         "rank", "Pi of Z04", "Pi here, 95 % CI", "n_f of Z04", "n_f here", title="Published strings"
     )
-    for rank, (design, published) in enumerate(zip(designs(), PUBLISHED, strict=True), start=1):
+    for rank, (design, published) in enumerate(zip(designs(), PUBLISHED_COSTS, strict=True), start=1):
         mean, half = estimate([scene(design, seed, options.grains) for seed in range(options.starts)])
         table.add_row(
             str(rank), f"{published:.3f}", f"{mean:.4f} ± {half:.4f}",

@@ -20,12 +20,12 @@ TITLE = "Agglomeration in thermochemically reacting granular flow"
 HALF_SIDE = 0.01
 """D, half the side of the control volume, m (Z04 section 8)."""
 DURATION = 0.01
-"""s (Z04 section 8)."""
+"""The simulated time of a flow, s (Z04 section 8)."""
 MEAN_VELOCITY = (100.0, 10.0, 10.0)
-"""m/s (Z04 section 7)."""
+"""The mean velocity of the grains at the start, m/s (Z04 section 7)."""
 
 BEST = designs()[0]
-"""The string of rank 1 of Z04."""
+"""The design of rank 1 that Z04 publishes, in SI units."""
 
 SIZES = {
     "small": Size(

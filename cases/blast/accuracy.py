@@ -18,7 +18,7 @@ def half_axes(state: Arrays) -> np.ndarray:
 
 
 def of_the_end(result: Result) -> np.ndarray:
-    """Half axes at the end, m."""
+    """Half axes of the cloud at the end of a run, m."""
     return half_axes(result.state)
 
 

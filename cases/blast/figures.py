@@ -20,17 +20,17 @@ from cases.case import size_named
 from tisim import Recording, RunError, run
 from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frame, Frames, frames
-from tisim.plotting.cloud import SEEN, common, corners, directions, panel
+from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
 from tisim.plotting.style import empty, legend_above, letters, plain
-from tisim.plotting.time_series import COLOURS
+from tisim.plotting.time_series import AXIS_COLOURS
 from tisim.scene.initial_state import Arrays
 
-SHOWN = 6
-"""Frames of a sequence."""
+SEQUENCE_FRAMES = 6
+"""A sequence shows so many frames."""
 NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
 """The blast is in open space and weightless."""
 PATHS = 40
-"""Particles whose paths are drawn."""
+"""The paths of so many particles are drawn."""
 RUNS = {
     "no_field": "no field (Z16 Fig. 7)",
     "default": "in the field, no interaction (Fig. 5)",
@@ -38,7 +38,7 @@ RUNS = {
     "near_field": "contact and near field as printed (Fig. 9)",
     "clumps": "contact and near field of neighbours",
 }
-"""Set side by side, by size."""
+"""The runs that are set side by side, and what they show, by size."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,18 @@ class BlastHistory:
     velocities: np.ndarray
 
     @classmethod
-    def of(cls, found: Frames) -> BlastHistory:
+    def of(cls, trajectory: Frames) -> BlastHistory:
         """Read the history of all frames, each once; particles are always in the order of their ids."""
         axes, touching, paths, velocities = [], [], [], []
-        for frame in found:
+        for frame in trajectory:
             state = frame.arrays
             axes.append(half_axes(state))
             touching.append(contacts(state))
             paths.append(state["position"][:PATHS])
             velocities.append(state["velocity"][:PATHS])
-        return cls(found.times, np.array(axes), np.array(touching), np.array(paths), np.array(velocities))
+        return cls(
+            trajectory.times, np.array(axes), np.array(touching), np.array(paths), np.array(velocities)
+        )
 
     def dense(self, k: int) -> bool:
         """Whether frames of a particle are so near in time that a line may join them: 8 a circle or more."""
@@ -70,19 +72,19 @@ class BlastHistory:
         return bool(np.median(np.abs(np.angle(v[1:] * v[:-1].conj()))) < np.pi / 4)
 
 
-def pictures(found: Frames) -> Mapping[str, Figure]:
+def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     """sequence.png: the cloud at six times; velocities.png: its velocities then; envelope.png: half axes,
     velocities of one particle, and paths.
 
-    None of a file with fewer frames than SHOWN, such as a result.h5.
+    None of a file with fewer frames than SEQUENCE_FRAMES, such as a result.h5.
     """
-    if len(found) < SHOWN:
+    if len(trajectory) < SEQUENCE_FRAMES:
         return {}
-    chosen = [found[k] for k in np.linspace(0, len(found) - 1, SHOWN).round().astype(int)]
+    chosen = [trajectory[k] for k in np.linspace(0, len(trajectory) - 1, SEQUENCE_FRAMES).round().astype(int)]
     return {
         "sequence.png": sequence(chosen),
         "velocities.png": velocities(chosen),
-        "envelope.png": envelope(BlastHistory.of(found)),
+        "envelope.png": envelope(BlastHistory.of(trajectory)),
     }
 
 
@@ -109,9 +111,18 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
     scale = 8.0 * fastest / side
     axes = figure.subplots(2, 3)
     for axis, frame in zip(axes.flat, chosen, strict=True):
-        (x, y), (u, v) = ((frame.arrays[name] @ SEEN)[:, :2].T for name in ("position", "velocity"))
+        (x, y), (u, v) = ((frame.arrays[name] @ PROJECTION)[:, :2].T for name in ("position", "velocity"))
         axis.quiver(
-            x, y, u, v, angles="xy", scale_units="xy", scale=scale, color=COLOURS[0], width=0.0025, alpha=0.6
+            x,
+            y,
+            u,
+            v,
+            angles="xy",
+            scale_units="xy",
+            scale=scale,
+            color=AXIS_COLOURS[0],
+            width=0.0025,
+            alpha=0.6,
         )
         axis.set(xlim=(left, left + side), ylim=(bottom, bottom + side), aspect="equal", xticks=[], yticks=[])
         directions(axis, (left, bottom, side), NO_GRAVITY)
@@ -122,7 +133,7 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
 
 
 def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
-    """A state as seen in a square."""
+    """Draw a state as it is seen in a square: left, bottom and side, m."""
     panel(axis, state, square, NO_BOX, None)
 
 
@@ -130,7 +141,7 @@ def envelope(history: BlastHistory) -> Figure:
     """Half axes of the cloud in time; velocities across the field (Z16 Fig. 6); paths along and across it."""
     figure = empty(10.4, 7.4)
     (left, right), (along, across) = figure.subplots(2, 2)
-    for k, colour in enumerate(COLOURS):
+    for k, colour in enumerate(AXIS_COLOURS):
         left.plot(history.time, history.axes[:, k], "--" if k == 2 else "-", color=colour, label="xyz"[k])
     left.set(xlabel="time (s)", ylabel="half axes of the cloud (m)", ylim=(0, None))
     left.set_title("half axes")
@@ -139,14 +150,14 @@ def envelope(history: BlastHistory) -> Figure:
     line = "-" if history.dense(fastest) else "."
     for k in (1, 2):
         speed = history.velocities[:, fastest, k]
-        right.plot(history.time, speed, line, ms=3, color=COLOURS[k], lw=1.0, label="xyz"[k])
+        right.plot(history.time, speed, line, ms=3, color=AXIS_COLOURS[k], lw=1.0, label="xyz"[k])
     right.set(xlabel="time (s)", ylabel="velocity (m/s)", title="one particle")
     legend_above(right)
-    along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=COLOURS[0], lw=0.7)
+    along.plot(history.paths[:, :, 0], history.paths[:, :, 1], color=AXIS_COLOURS[0], lw=0.7)
     along.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"paths of {PATHS} particles")
     # The one that starts fastest across the field, from near: its circle is far smaller than the cloud.
     across.plot(
-        history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=COLOURS[0], lw=0.8
+        history.paths[:, fastest, 1], history.paths[:, fastest, 2], line, ms=3, color=AXIS_COLOURS[0], lw=0.8
     )
     across.set(xlabel="y (m)", ylabel="z (m)", title="path of one particle")
     across.set_aspect("equal", "datalim")
@@ -160,19 +171,19 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """blast.png, blast.csv: the runs of Z16 side by side, of 500 particles at size small, else of 2000."""
     number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
     histories, ends = {}, {}
-    for done, name in enumerate(RUNS):
+    for finished, name in enumerate(RUNS):
         settings = {**size_named(name, blast.SIZES).scene, "number": number}
         with TemporaryDirectory() as folder:
             path = Path(folder) / "trajectory.h5"
             result = run(
                 blast.scene(**settings),
-                share(progress, done, len(RUNS)),
+                share(progress, finished, len(RUNS)),
                 Recording(path, frames=50),
             )
             if not result.status.ok:
                 raise RunError(f"{name}: {result.status.reason}")
-            with frames(path) as found:
-                histories[name], ends[name] = BlastHistory.of(found), found[-1]
+            with frames(path) as trajectory:
+                histories[name], ends[name] = BlastHistory.of(trajectory), trajectory[-1]
     return {"blast.png": beside(histories, ends), "blast.csv": table(histories)}
 
 
@@ -217,7 +228,7 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
 
 
 def table(histories: Mapping[str, BlastHistory]) -> str:
-    """All of it as CSV."""
+    """Half axes and contacts of all runs in time as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["run", "time_s", "half_axis_x_m", "half_axis_y_m", "half_axis_z_m", "pairs_that_touch"])

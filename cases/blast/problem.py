@@ -2,7 +2,8 @@
 
 A field of one strength gives an ellipsoid of revolution about it, so its direction is the long axis of the
 wanted one, up to sign, and its strength follows from the others. By default the wanted ellipsoid is what
-FLUX gives in closed form, in the direction and with the half axes that it has; the search must find FLUX.
+TARGET_FLUX gives in closed form, in the direction and with the half axes that it has: the search must find
+that field.
 """
 
 from __future__ import annotations
@@ -17,11 +18,15 @@ from cases.case import size_named
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from tisim import Result, Scene
+from tisim.errors import must
 from tisim.plotting.cloud import cloud
 
-FLUX = np.array([0.6, 0.3, -0.2])
-"""T. Within DURATION particles go a third of a circle."""
+VARIANTS = ("ellipsoid",)
+"""The inverse problems: a wanted shape of the cloud."""
+TARGET_FLUX = np.array([0.6, 0.3, -0.2])
+"""The field that the search must find, T. Within DURATION particles go a third of a circle in it."""
 DURATION = 0.3
+"""The simulated time after which the cloud has the wanted shape, s."""
 GENES = tuple(Gene(f"flux_{axis}", "T", -1.0, 1.0) for axis in "xyz")
 
 
@@ -38,9 +43,9 @@ def scene(design: Mapping[str, float], seed: int, number: int = blast.NUMBER) ->
     return blast.scene(field(design), number=number, duration=DURATION, seed=seed, first=5e-3, longest=5e-3)
 
 
-def misfit(tensor: np.ndarray, wanted: np.ndarray) -> float:
-    """|S - S_wanted|/|S_wanted| of second moments (Frobenius norm)."""
-    return float(np.linalg.norm(tensor - wanted) / np.linalg.norm(wanted))
+def misfit(tensor: np.ndarray, target: np.ndarray) -> float:
+    """|S - S_target|/|S_target| of second moments (Frobenius norm)."""
+    return float(np.linalg.norm(tensor - target) / np.linalg.norm(target))
 
 
 def start(number: int, starts: int = 8) -> float:
@@ -49,14 +54,15 @@ def start(number: int, starts: int = 8) -> float:
     Centres are a radius or more within the ball that spheres are put in; random addition fills it somewhat
     more towards its surface.
     """
-    made = [blast.scene(number=number, seed=seed) for seed in range(starts)]
-    return float(np.mean([ball(moments(s.particles.arrays(s.domain, s.seed))) for s in made]))
+    scenes = [blast.scene(number=number, seed=seed) for seed in range(starts)]
+    return float(np.mean([ball(moments(s.particles.arrays(s.domain, s.seed))) for s in scenes]))
 
 
-def problem(size: str = "default", wanted: np.ndarray | None = None) -> Problem:
-    """The field that gives the ellipsoid of these second moments (m^2, (3, 3)); that of FLUX by default."""
+def problem(size: str = "default", variant: str = "ellipsoid", goal: np.ndarray | None = None) -> Problem:
+    """The field that gives an ellipsoid of second moments ``goal`` (m^2, (3, 3)); by default TARGET_FLUX."""
+    must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
-    target = ellipsoid(FLUX, DURATION, start(number)) if wanted is None else wanted
+    target = ellipsoid(TARGET_FLUX, DURATION, start(number)) if goal is None else goal
     axes = ", ".join(f"{a:.3f}" for a in principal_half_axes(target))
     return Problem(
         name=f"blast-{size}",
@@ -72,17 +78,17 @@ def problem(size: str = "default", wanted: np.ndarray | None = None) -> Problem:
     )
 
 
-def details(design: Mapping[str, float], result: Result, wanted: np.ndarray) -> dict[str, float]:
+def details(design: Mapping[str, float], result: Result, target: np.ndarray) -> dict[str, float]:
     """Half axes wanted and reached, and the angle of the field to the long axis that was wanted."""
     reached = moments(result.state)
-    axis = np.linalg.eigh(wanted)[1][:, -1]
+    axis = np.linalg.eigh(target)[1][:, -1]
     flux = field(design)
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for k, (a, b) in enumerate(
-        zip(principal_half_axes(wanted), principal_half_axes(reached), strict=True), start=1
+        zip(principal_half_axes(target), principal_half_axes(reached), strict=True), start=1
     ):
-        found[f"half axis {k} wanted, m"], found[f"half axis {k} reached, m"] = float(a), float(b)
+        values[f"half axis {k} wanted, m"], values[f"half axis {k} reached, m"] = float(a), float(b)
     cosine = abs(flux @ axis) / np.linalg.norm(flux)
-    found["field to the long axis wanted, degrees"] = float(np.degrees(np.arccos(min(1.0, cosine))))
-    found["strength of the field, T"] = float(np.linalg.norm(flux))
-    return found
+    values["field to the long axis wanted, degrees"] = float(np.degrees(np.arccos(min(1.0, cosine))))
+    values["strength of the field, T"] = float(np.linalg.norm(flux))
+    return values

@@ -36,7 +36,7 @@ TITLE = "A blast of charged particles in a magnetic field"
 NUMBER, RADIUS, DENSITY, BALL = 2000, 0.05, 7000.0, 1.0
 """Particles, their radius (m) and density (kg/m^3), radius of the ball at the start (m) (Z16 section 6.1)."""
 ENERGY, FLUX, SPECIFIC_CHARGE = 1e4, 10.0, 10.0
-"""W (J), B along x (T), charge per mass (C/kg) (Z16 section 6.1)."""
+"""Energy W of the blast (J), field B along x (T), charge per mass (C/kg) (Z16 section 6.1)."""
 AIR, VISCOSITY = 1.225, 1.8e-5
 """Density of air, kg/m^3, and its viscosity, Pa s (Z16 sections 4.2 and 6.1)."""
 MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
@@ -46,14 +46,14 @@ SPEED = float(np.sqrt(2 * ENERGY / (NUMBER * MASS)))
 NEIGHBOURS = 3 * RADIUS
 """Distance within which the size "clumps" has a near field, m: half a diameter between surfaces."""
 
-SEARCH = {
+SEARCH_SETTINGS = {
     "generations": 24,
     "ensemble": {"tolerance": 1e-2, "min_starts": 2, "block": 2, "max_starts": 4, "confirm": 8},
 }  # fmt: skip
 
 SIZES = {
-    "small": Size("500 particles that do not feel each other, 1 s", {"number": 500}, SEARCH),
-    "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}, SEARCH),
+    "small": Size("500 particles that do not feel each other, 1 s", {"number": 500}, SEARCH_SETTINGS),
+    "default": Size("2000 particles that do not feel each other, 1 s, in the field", {}, SEARCH_SETTINGS),
     "no_field": Size("the same without the field", {"flux": 0.0}),
     "contact": Size("2000 particles in contact, 1 s", {"contact": True}),
     "contact_no_field": Size("the same without the field", {"contact": True, "flux": 0.0}),
@@ -126,5 +126,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The blast of a size."""
+    """The blast of a size, from the random start of a seed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -28,33 +28,33 @@ from tisim import Result
 from tisim.engine.batches import Progress, share
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
-REPEATS = 10
-"""Repeats of a setting; the checks take more."""
+CURVE_REPEATS = 10
+"""Curves are means over so many starts of a setting; the checks take more."""
 TIMES = np.linspace(0.0, capture.DURATION, 101)
-"""s, of the curves."""
+"""The times of the points of a curve, s."""
 SOME = (50, 125, 212)
-"""nm, for which the aspect ratio is varied."""
+"""The radii of particles for which the aspect ratio of the cylinder is varied, nm."""
 
 Row = tuple[Settings, Sequence[Result]]
 """A setting, and what has come of it."""
 
 
 def figures(progress: Progress) -> Mapping[str, Figure | str]:
-    """capture.png, capture.csv."""
+    """The files capture.png and capture.csv: captured fractions by angle, size and aspect ratio."""
     angles: list[Settings] = [
         {"nanometres": n, "angle": a, "aspect": 20.0, "part": part}
         for n in (75, 212) for part in ("top", "side") for a in ANGLES
     ]  # fmt: skip
     sizes: list[Settings] = [
-        {"nanometres": n, "angle": a, "aspect": 20.0} for n in capture.MOMENT for a in ANGLES
+        {"nanometres": n, "angle": a, "aspect": 20.0} for n in capture.SATURATION_MOMENTS for a in ANGLES
     ]
     aspects: list[Settings] = [
         {"nanometres": n, "angle": a, "aspect": r} for n in SOME for r in ASPECTS for a in ANGLES
     ]
     parts = []
-    for done, settings in enumerate((angles, sizes, aspects)):
-        found = results(settings, REPEATS, share(progress, done, 3))
-        parts.append(list(zip(settings, found, strict=True)))
+    for finished, settings in enumerate((angles, sizes, aspects)):
+        groups = results(settings, CURVE_REPEATS, share(progress, finished, 3))
+        parts.append(list(zip(settings, groups, strict=True)))
     return {"capture.png": captured(*parts), "capture.csv": table([row for part in parts for row in part])}
 
 
@@ -82,36 +82,38 @@ def captured(angles: Sequence[Row], sizes: Sequence[Row], aspects: Sequence[Row]
     return figure
 
 
-def curve(found: Iterable[Result]) -> np.ndarray:
+def curve(group: Iterable[Result]) -> np.ndarray:
     """Captured fraction at TIMES, the mean over repeats."""
-    return np.mean([[fraction(result.state, t) for t in TIMES] for result in found], axis=0)
+    return np.mean([[fraction(result.state, t) for t in TIMES] for result in group], axis=0)
 
 
 def in_time_by_angle(axis: Axes, rows: Sequence[Row]) -> None:
-    for (settings, found), colour in zip(rows, _colours("viridis", len(rows)), strict=True):
-        axis.plot(TIMES, curve(found), color=colour, lw=1.4, label=f"{settings['angle']:.0f}°")
+    for (settings, group), colour in zip(rows, _colours("viridis", len(rows)), strict=True):
+        axis.plot(TIMES, curve(group), color=colour, lw=1.4, label=f"{settings['angle']:.0f}°")
     settings = rows[0][0]
     axis.set_title(f"{settings['nanometres']} nm, {str(settings['part']).upper()}, L/D = 20")
 
 
 def in_time_by_size(axis: Axes, rows: Sequence[Row]) -> None:
-    for (settings, found), colour in zip(rows, _colours("plasma", len(rows)), strict=True):
-        axis.plot(TIMES, curve(found), color=colour, lw=1.4, label=f"{settings['nanometres']} nm")
+    for (settings, group), colour in zip(rows, _colours("plasma", len(rows)), strict=True):
+        axis.plot(TIMES, curve(group), color=colour, lw=1.4, label=f"{settings['nanometres']} nm")
     axis.set_title("transverse, L/D = 20, by radius")
     legend_beside(axis)
 
 
 def in_time_by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
     for aspect, colour in zip(ASPECTS, _colours("cividis", len(ASPECTS)), strict=True):
-        curves = [curve(found) for settings, found in rows if settings["aspect"] == aspect]
+        curves = [curve(group) for settings, group in rows if settings["aspect"] == aspect]
         axis.plot(TIMES, even(np.array(curves)), color=colour, lw=1.4, label=f"L/D = {aspect:.3g}")
     axis.set_title("125 nm, even mean over angles, by aspect ratio")
     legend_beside(axis)
 
 
 def by_size(axis: Axes, rows: Sequence[Row]) -> None:
-    for n, colour in zip(capture.MOMENT, _colours("plasma", len(capture.MOMENT)), strict=True):
-        means = [mean(found) for settings, found in rows if settings["nanometres"] == n]
+    for n, colour in zip(
+        capture.SATURATION_MOMENTS, _colours("plasma", len(capture.SATURATION_MOMENTS)), strict=True
+    ):
+        means = [mean(group) for settings, group in rows if settings["nanometres"] == n]
         bars(axis, ANGLES, means, colour, f"{n} nm")
     axis.set(xlabel="angle of the axis to the field (°)", ylabel="captured fraction after 50 s")
     axis.set(ylim=(0, 1.02), title="L/D = 20, by radius; 95 % intervals")
@@ -121,7 +123,7 @@ def by_size(axis: Axes, rows: Sequence[Row]) -> None:
 def by_aspect(axis: Axes, rows: Sequence[Row]) -> None:
     for n, colour in zip(SOME, ("#228833", "#4477aa", "#cc6677"), strict=True):
         groups = [
-            np.array([fractions(found) for s, found in rows if (s["nanometres"], s["aspect"]) == (n, aspect)])
+            np.array([fractions(group) for s, group in rows if (s["nanometres"], s["aspect"]) == (n, aspect)])
             for aspect in ASPECTS
         ]
         bars(axis, ASPECTS, [Mean.of(even(group)) for group in groups], colour, f"{n} nm")
@@ -149,10 +151,10 @@ def table(rows: Sequence[Row]) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"])
-    for settings, found in rows:
-        m = mean(found)
+    for settings, group in rows:
+        m = mean(group)
         part = settings.get("part", "all")
-        writer.writerow([settings["nanometres"], settings["angle"], settings["aspect"], part, len(found),
+        writer.writerow([settings["nanometres"], settings["angle"], settings["aspect"], part, len(group),
                          m.value, m.half])  # fmt: skip
     return text.getvalue()
 

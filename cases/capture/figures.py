@@ -20,13 +20,13 @@ from tisim.plotting.style import TIME, empty, letters, plain
 from tisim.sources import Cylinder, MagneticCylinders, sample
 
 LEAST_FORCE = 0.5e-15
-"""N, of what counts as capture volume (B16 section 6.4.1)."""
+"""What draws a particle at least with this force counts as capture volume, N (B16 section 6.4.1)."""
 PLANE, SPACE = 181, 96
-"""Points along a side of a map, and of the box in which capture volume is counted."""
-EVERY = (-2000, 0, 2000)
-"""µm, that maps of forces have marks at."""
+"""There are so many points along a side of a map, and of the box in which capture volume is counted."""
+MARKS = (-2000, 0, 2000)
+"""Maps of forces have marks at these places along both axes, µm."""
 BEYOND = 2.5e-3
-"""m, farther than the capture volume of 50 nm reaches."""
+"""The capture volume of particles of 50 nm reaches less far from the cylinder than this, m."""
 
 
 def cylinder(scene: Scene) -> Cylinder:
@@ -43,24 +43,24 @@ def outline(axis: Axes, body: Cylinder) -> None:
     axis.fill(*corners.T, facecolor="0.75", edgecolor="0.35", lw=0.8, zorder=3)
 
 
-def pictures(found: Frames) -> Mapping[str, Figure]:
+def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     """trajectories.png: paths in the xz plane coloured by time (B16 Fig. 6.5), and captured fraction in time.
 
     None of a file with fewer than three frames, such as a result.h5.
     """
-    if len(found) < 3:
+    if len(trajectory) < 3:
         return {}
-    frames = list(found)
+    frames = list(trajectory)
     places = np.array([frame.arrays["position"] for frame in frames]) / MICRO
     figure = empty(9.4, 4.6)
     left, right = figure.subplots(1, 2, width_ratios=(0.8, 1.0))
-    norm = Normalize(0.0, found.times[-1])
+    norm = Normalize(0.0, trajectory.times[-1])
     pieces = np.stack([places[:-1], places[1:]], axis=2)[..., [0, 2]].reshape(-1, 2, 2)
-    when = np.repeat(found.times[1:], places.shape[1])
+    when = np.repeat(trajectory.times[1:], places.shape[1])
     lines = LineCollection(list(pieces), cmap=TIME, norm=norm, lw=0.8)
     lines.set_array(when)
     left.add_collection(lines)
-    outline(left, cylinder(found.scene))
+    outline(left, cylinder(trajectory.scene))
     left.autoscale()
     left.set(xlabel="x, along the field (µm)", ylabel="z (µm)", aspect="equal")
     figure.colorbar(lines, ax=left, label="time (s)", shrink=0.8)
@@ -68,7 +68,7 @@ def pictures(found: Frames) -> Mapping[str, Figure]:
     at = np.sort(state["captured_at"][state["captured_at"] >= 0])
     number = len(state["captured_at"])
     right.step(
-        [0.0, *at, found.times[-1]],
+        [0.0, *at, trajectory.times[-1]],
         np.array([*range(len(at) + 1), len(at)]) / number,
         where="post", color="#4477aa", lw=1.6,
     )  # fmt: skip
@@ -103,7 +103,7 @@ def field() -> Figure:
         b, _ = sample(scene.effects, "magnetic_flux_density", points.reshape(-1, 3))
         b = b.reshape(points.shape)
         line = points[0, :, 0] / MICRO
-        drawn = axis.pcolormesh(line, line, np.linalg.norm(b, axis=-1), cmap="viridis", vmin=0.3, vmax=2.0,
+        mesh = axis.pcolormesh(line, line, np.linalg.norm(b, axis=-1), cmap="viridis", vmin=0.3, vmax=2.0,
                                 shading="auto", rasterized=True)  # fmt: skip
         axis.streamplot(line, line, b[..., 0], b[..., 2], color="white", linewidth=0.6, arrowsize=0.7,
                         density=1.1)  # fmt: skip
@@ -115,7 +115,7 @@ def field() -> Figure:
         axis.set(xlim=(line[0], line[-1]), ylim=(line[0], line[-1]))
     axes[0].set_ylabel("z (µm)")
     letters(axes)
-    figure.colorbar(drawn, ax=axes, label="magnetic flux density |B| (T)", shrink=0.8)
+    figure.colorbar(mesh, ax=axes, label="magnetic flux density |B| (T)", shrink=0.8)
     return figure
 
 
@@ -131,13 +131,13 @@ def volume() -> Figure:
             points = plane(0.6 * body.length + 1.5e-3)
             inward = pull(scene, points)
             line = points[0, :, 0] / MICRO
-            shown = axis.pcolormesh(
+            mesh = axis.pcolormesh(
                 line, line, np.ma.masked_less(inward, LEAST_FORCE), cmap="magma_r", shading="auto",
                 norm=LogNorm(LEAST_FORCE, 1e3 * LEAST_FORCE), rasterized=True,
             )  # fmt: skip
             outline(axis, body)
             axis.set(aspect="equal", xlim=(line[0], line[-1]), ylim=(line[0], line[-1]))
-            axis.set(xticks=EVERY, yticks=EVERY)
+            axis.set(xticks=MARKS, yticks=MARKS)
             own = capture_volume(scene)
             axis.set_title(f"L/D = {aspect:.3g}, {angle:.0f}°:\n{own:.1f} times its own volume")
     for axis in grid[-1]:
@@ -145,7 +145,7 @@ def volume() -> Figure:
     for axis in grid[:, 0]:
         axis.set_ylabel("z (µm)")
     letters(grid.flat)
-    figure.colorbar(shown, ax=grid, label="force towards the cylinder (N)", shrink=0.7)
+    figure.colorbar(mesh, ax=grid, label="force towards the cylinder (N)", shrink=0.7)
     return figure
 
 
@@ -159,7 +159,7 @@ def pull(scene: Scene, points: np.ndarray) -> np.ndarray:
 
 
 def capture_volume(scene: Scene) -> float:
-    """In which the cylinder draws a particle with LEAST_FORCE or more, over its own volume (B16 6.4.1).
+    """The volume in which the cylinder draws a particle with LEAST_FORCE or more, over its own (B16 6.4.1).
 
     From the middles of cells, SPACE along each side of a box that reaches BEYOND the cylinder.
     """

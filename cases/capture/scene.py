@@ -22,19 +22,26 @@ from tisim.sources import Cylinder, MagneticCylinders, MagneticField
 from tisim.sources.magnetic.stoner_wohlfarth import magnetisation
 from tisim.steppers import Brownian, DriftLimit
 
-DIAMETER, SATURATION, FLUX = 600e-6, 985e3, 1.0
-"""Of the cylinder, m and A/m; of the field along x, T (B16 section 6.3)."""
+DIAMETER, SATURATION_MAGNETISATION, FLUX = 600e-6, 985e3, 1.0
+"""The cylinder's diameter, m, and magnetisation, A/m; the flux density along x, T (B16 section 6.3)."""
 TEMPERATURE, VISCOSITY, DURATION, NUMBER = 298.0, 1e-3, 50.0, 100
-"""K, Pa s, s, and particles of a run (B16 section 6.3)."""
-MOMENT = {25: 0.016e-16, 50: 0.344e-16, 75: 0.870e-16, 100: 0.662e-16, 125: 5.151e-16, 212: 19.35e-16}
-"""A m^2, by hydrodynamic radius in nm (B16 table 6.1)."""
+"""The water's temperature, K, and viscosity, Pa s; time, s, and particles of a run (B16 section 6.3)."""
+SATURATION_MOMENTS = {
+    25: 0.016e-16,
+    50: 0.344e-16,
+    75: 0.870e-16,
+    100: 0.662e-16,
+    125: 5.151e-16,
+    212: 19.35e-16,
+}
+"""The saturation moment of a particle, A m^2, by its hydrodynamic radius in nm (B16 table 6.1)."""
 DENSITY = 1500.0
-"""kg/m^3. Without inertia and gravity it makes no difference."""
-STRIDE, LONGEST = 2e-6, 0.05
+"""The density of particles, kg/m^3. Without inertia and gravity it makes no difference."""
+LONGEST_MOVE, LONGEST_STEP = 2e-6, 0.05
 """How far (m) and how long (s) a particle goes in a step at most: the field changes over 300 um."""
 
 
-SEARCH = {
+SEARCH_SETTINGS = {
     "method": "cma-es",
     "generations": 40,
     "options": {"population": 16},
@@ -43,7 +50,7 @@ SEARCH = {
 """Starts are few for all, and many for the designs that compete: captured fractions are noisy."""
 
 SIZES = {
-    "default": Size("100 particles of 125 nm about a short transverse cylinder, 50 s", {}, SEARCH),
+    "default": Size("100 particles of 125 nm about a short transverse cylinder, 50 s", {}, SEARCH_SETTINGS),
     "longitudinal": Size("the same about one along the field", {"angle": 0.0}),
     "long": Size("about a transverse cylinder of length 20 D", {"aspect": 20.0}),
     "25nm": Size("100 particles of 25 nm, which take far longer", {"nanometres": 25}),
@@ -51,14 +58,14 @@ SIZES = {
 
 
 def axis(angle: float) -> Vector:
-    """Of a cylinder at an angle (degrees) to the field, which is along x."""
+    """The axis of a cylinder at an angle (degrees) to the field, which is along x."""
     return float(np.cos(np.radians(angle))), 0.0, float(np.sin(np.radians(angle)))
 
 
 def fibre(along: Vector, aspect: float, flux: Vector = (FLUX, 0.0, 0.0)) -> Cylinder:
     """A saturated cylinder of length over diameter ``aspect`` at the origin, in a field (T)."""
     radius, length = DIAMETER / 2, aspect * DIAMETER
-    m = magnetisation(along, radius, length, SATURATION, flux)
+    m = magnetisation(along, radius, length, SATURATION_MAGNETISATION, flux)
     return Cylinder(axis=along, radius=radius, length=length, magnetisation=m)
 
 
@@ -88,7 +95,7 @@ def scene(
             placement=RandomAroundCylinder(
                 axis=body.axis, radius=body.radius, length=body.length, thickness=body.radius, part=part
             ),
-            quantities={"saturation_moment": MOMENT[nanometres]},
+            quantities={"saturation_moment": SATURATION_MOMENTS[nanometres]},
         ),
         effects=(
             MagneticField(constant=(FLUX, 0.0, 0.0)),
@@ -100,7 +107,7 @@ def scene(
         stepper=Brownian(
             temperature=TEMPERATURE,
             viscosity=VISCOSITY,
-            control=DriftLimit(longest=LONGEST, shortest=1e-9, drift=STRIDE / radius),
+            control=DriftLimit(longest=LONGEST_STEP, shortest=1e-9, drift=LONGEST_MOVE / radius),
         ),
         duration=duration,
         seed=seed,
@@ -108,5 +115,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The scene of a size."""
+    """Capture of a size, from the random start of a seed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -21,11 +21,13 @@ from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
-"""Of the cylinder to the field, degrees (B16 section 6.4.2)."""
+"""The angles of the cylinder to the field that are swept, degrees (B16 section 6.4.2)."""
 ASPECTS = (5 / 3, 10 / 3, 20 / 3, 20.0)
-REPEATS = 30
-"""As B16 section 6.3."""
+"""The lengths of the cylinder over its diameter that are swept (B16 section 6.4.3)."""
+CHECK_REPEATS = 30
+"""Checks run each setting from so many starts, as B16 section 6.3 does."""
 MICRO = 1e-6
+"""A micrometre, m."""
 
 Settings = Mapping[str, Any]
 
@@ -33,34 +35,34 @@ Settings = Mapping[str, Any]
 def results(
     settings: Sequence[Settings], repeats: int, progress: Progress | None = None
 ) -> list[list[Result]]:
-    """Of the scene of capture with each of the settings, from as many starts; RunError when one fails."""
-    scenes = [capture.scene(**given, seed=seed) for given in settings for seed in range(repeats)]
+    """Results of the scene of capture with each setting, from as many starts; RunError when one fails."""
+    scenes = [capture.scene(**setting, seed=seed) for setting in settings for seed in range(repeats)]
     return grouped(scenes, repeats, progress)
 
 
 def grouped(scenes: Sequence[Scene], repeats: int, progress: Progress | None = None) -> list[list[Result]]:
     """Results of scenes, repeats of one thing after the other; RunError when one fails."""
-    found = run(scenes, progress)
-    for result in found:
+    runs = run(scenes, progress)
+    for result in runs:
         if not result.status.ok:
             raise RunError(f"{result.scene.name}: {result.status.reason}")
-    return [found[k : k + repeats] for k in range(0, len(found), repeats)]
+    return [runs[k : k + repeats] for k in range(0, len(runs), repeats)]
 
 
 def fraction(state: Arrays, time: float = np.inf) -> float:
-    """Of the particles, captured by a time (s)."""
+    """The fraction of the particles that is captured by a time (s)."""
     at = state["captured_at"]
     return float(((at >= 0) & (at <= time)).mean())
 
 
-def fractions(found: Sequence[Result], time: float = np.inf) -> np.ndarray:
-    """Captured fraction by a time of each start."""
-    return np.array([fraction(result.state, time) for result in found])
+def fractions(group: Sequence[Result], time: float = np.inf) -> np.ndarray:
+    """The captured fraction by a time (s) of each start."""
+    return np.array([fraction(result.state, time) for result in group])
 
 
-def mean(found: Sequence[Result], time: float = np.inf) -> Mean:
-    """Captured fraction by a time, over repeats."""
-    return Mean.of(fractions(found, time))
+def mean(group: Sequence[Result], time: float = np.inf) -> Mean:
+    """The captured fraction by a time (s), the mean over repeats."""
+    return Mean.of(fractions(group, time))
 
 
 def isotropic(by_angle: np.ndarray) -> np.ndarray:
@@ -76,7 +78,7 @@ def even(by_angle: np.ndarray) -> np.ndarray:
     return by_angle.mean(axis=0)
 
 
-def check(repeats: int = REPEATS) -> Iterator[Check | Claim]:
+def check(repeats: int = CHECK_REPEATS) -> Iterator[Check | Claim]:
     """What B16 concludes of one cylinder, each with its confidence interval."""
     yield from of_orientation(repeats)
     yield from of_aspect(repeats)
@@ -92,10 +94,10 @@ def of_orientation(repeats: int) -> Iterator[Claim]:
         for part in ("all", *parts)
         for angle in (0.0, 90.0)
     ]
-    found = iter(results(settings, repeats))
+    groups = iter(results(settings, repeats))
     for size in sizes:
         for part, name in (("all", "both regions"), ("top", "TOP"), ("side", "SIDE")):
-            along, across = fractions(next(found)), fractions(next(found))
+            along, across = fractions(next(groups)), fractions(next(groups))
             limits = {"most": 0.0} if part == "top" else {"least": 0.0}
             gain = Mean.of(across - along)
             yield Claim(f"{size} nm, {name}: transverse minus longitudinal", gain, **limits)
@@ -108,8 +110,8 @@ def of_aspect(repeats: int) -> Iterator[Claim]:
     settings = [
         {"nanometres": 125, "angle": angle, "aspect": aspect} for aspect in ASPECTS for angle in ANGLES
     ]
-    found = np.array([fractions(group) for group in results(settings, repeats)])
-    shortest, short, medium, long = found.reshape(len(ASPECTS), len(ANGLES), repeats)
+    by_setting = np.array([fractions(group) for group in results(settings, repeats)])
+    shortest, short, medium, long = by_setting.reshape(len(ASPECTS), len(ANGLES), repeats)
     gain = shortest - long
     yield Claim("125 nm, L/D 5/3 minus 20, longitudinal", Mean.of(gain[0]), least=0.0)
     yield Claim("125 nm, L/D 5/3 minus 20, transverse", Mean.of(gain[-1]), most=0.0)
@@ -121,11 +123,11 @@ def of_aspect(repeats: int) -> Iterator[Claim]:
 
 def of_size(repeats: int) -> Iterator[Claim]:
     """Sections 6.4.2 and 6.4.4: from 50 nm on captured within 50 s, 25 nm not."""
-    sizes = tuple(capture.MOMENT)
+    sizes = tuple(capture.SATURATION_MOMENTS)
     settings = [{"nanometres": size, "angle": 90.0, "aspect": 5 / 3} for size in sizes]
-    found = dict(zip(sizes, results(settings, repeats), strict=True))
+    by_size = dict(zip(sizes, results(settings, repeats), strict=True))
     for size in sizes[1:]:
-        yield Claim(f"{size} nm captured within 50 s, transverse, L/D 5/3", mean(found[size]), least=0.7)
-    yield Claim("25 nm", mean(found[25]), most=0.5)
-    late = Mean.of([fraction(r.state) - fraction(r.state, 25.0) for r in found[25]])
+        yield Claim(f"{size} nm captured within 50 s, transverse, L/D 5/3", mean(by_size[size]), least=0.7)
+    yield Claim("25 nm", mean(by_size[25]), most=0.5)
+    late = Mean.of([fraction(r.state) - fraction(r.state, 25.0) for r in by_size[25]])
     yield Claim("25 nm: part captured in the second half of the time", late, least=0.05)

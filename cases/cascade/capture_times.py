@@ -10,21 +10,21 @@ from cases.cascade.scene import Cascade
 from tisim import RunError, run
 from tisim.engine.batches import Progress
 
-SHARE = 0.9
-"""Of the particles, up to which capture is timed."""
-MOST = 1000
-"""Stages after which a cascade is given up."""
+CAPTURED_SHARE = 0.9
+"""Capture is timed until this share of the particles is captured."""
+MAX_STAGES = 1000
+"""A cascade is given up after so many stages."""
 
 
 def captured_at(
     cascades: Sequence[Cascade],
     repeats: int,
-    share: float = SHARE,
+    share: float = CAPTURED_SHARE,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> list[np.ndarray]:
     """When each particle was captured, s from the start of the cascade; inf for those still free when
-    ``share`` had been, or after MOST stages. One array (repeats, number) for each cascade, rows sorted.
+    ``share`` had been, or after MAX_STAGES. One array (repeats, number) for each cascade, rows sorted.
 
     A stage of all cascades and repeats that are not done is one batch of worlds. RunError when one fails.
     """
@@ -34,12 +34,12 @@ def captured_at(
         for k, one in enumerate(cascades)
         for repeat in range(repeats)
     ]
-    for passed in range(MOST):
+    for passed in range(MAX_STAGES):
         going = [row for row in rows if np.isfinite(row[1]).mean() < share]
         if not going:
             break
-        found = run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going])
-        for (one, at, _), result in zip(going, found, strict=True):
+        results = run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going])
+        for (one, at, _), result in zip(going, results, strict=True):
             if not result.status.ok:
                 raise RunError(f"cascade: {result.status.reason}")
             when = result.state["captured_at"]

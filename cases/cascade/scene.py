@@ -23,7 +23,7 @@ from tisim.sources import MagneticCylinders
 
 Orientation = Literal["optimal", "directions", "angles"]
 STAGE = {25: 10.0, 125: 0.5}
-"""Delta t_run, s, by radius in nm (B16 section 6.4.5)."""
+"""The time of a stage, Delta t_run, s, by radius in nm (B16 section 6.4.5)."""
 
 SIZES = {
     "default": Size("100 particles of 125 nm about a random cylinder of L/D 20, 0.5 s", {}),
@@ -45,17 +45,17 @@ class Cascade:
     number: int = capture.NUMBER
 
     def angle(self, generator: np.random.Generator) -> float:
-        """Of the next cylinder to the field, degrees."""
-        drawn = generator.uniform()
+        """The angle of the next cylinder to the field, degrees."""
+        uniform = generator.uniform()
         return {
             "optimal": 90.0,
-            "directions": float(np.degrees(np.arccos(drawn))),
-            "angles": 90.0 * drawn,
+            "directions": float(np.degrees(np.arccos(uniform))),
+            "angles": 90.0 * uniform,
         }[self.orientation]
 
     def scene(self, number: int, generator: np.random.Generator) -> Scene:
         """The stage of ``number`` particles about the next cylinder."""
-        made = capture.scene(
+        scene = capture.scene(
             nanometres=self.nanometres,
             angle=self.angle(generator),
             aspect=self.aspect,
@@ -63,7 +63,7 @@ class Cascade:
             duration=self.stage,
             seed=int(generator.integers(2**62)),
         )
-        (body,) = next(e for e in made.effects if isinstance(e, MagneticCylinders)).cylinders
+        (body,) = next(e for e in scene.effects if isinstance(e, MagneticCylinders)).cylinders
         away = self.gap * body.radius
         layer = RandomAroundCylinder(
             axis=body.axis,
@@ -71,8 +71,8 @@ class Cascade:
             length=body.length + 2 * away,
             thickness=self.thickness * body.radius,
         )
-        cloud = made.particles.model_copy(update={"placement": layer})
-        return made.model_copy(update={"name": "cascade", "particles": cloud})
+        cloud = scene.particles.model_copy(update={"placement": layer})
+        return scene.model_copy(update={"name": "cascade", "particles": cloud})
 
 
 def scene_for(size: str, seed: int) -> Scene:

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from cases.capture.statistics import REPEATS
-from cases.cascade.capture_times import SHARE, captured_at, time_to
+from cases.capture.statistics import CHECK_REPEATS
+from cases.cascade.capture_times import CAPTURED_SHARE, captured_at, time_to
 from cases.cascade.scene import STAGE, Cascade, Orientation
 from cases.statistics import Claim, Mean
 
-PUBLISHED = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
-"""s to 90 %, random and optimal, by radius in nm (B16 section 6.4.5)."""
+PUBLISHED_TIMES = {25: (1100.0, 500.0), 125: (12.5, 5.5)}
+"""The time to 90 %, s, of random and optimal cascades by radius in nm (B16 section 6.4.5)."""
 SHORT, LONG = 0.1, 10.0
-"""Stages of 125 nm, s, beside 0.5 s (B16 Fig. 6.11b)."""
+"""A shorter and a longer stage of 125 nm than 0.5 s, s (B16 Fig. 6.11b)."""
 OFF = 0.15
 """Gap, in radii of the cylinder, with which the optimal cascades take as long as in B16, at both sizes: the
 larger it is, the longer that of 25 nm takes beside that of 125 nm."""
@@ -25,50 +25,52 @@ Means = dict[Cascade, Mean]
 
 
 def means(cascades: Sequence[Cascade], repeats: int) -> Means:
-    """Of the time to 90 % (s) of each cascade."""
-    found = captured_at(cascades, repeats)
-    return {one: Mean.of(time_to(SHARE, times)) for one, times in zip(cascades, found, strict=True)}
+    """The mean time to 90 % (s) of each cascade."""
+    times_of = captured_at(cascades, repeats)
+    return {
+        one: Mean.of(time_to(CAPTURED_SHARE, times)) for one, times in zip(cascades, times_of, strict=True)
+    }
 
 
-def check(repeats: int = REPEATS) -> Iterator[Claim]:
+def check(repeats: int = CHECK_REPEATS) -> Iterator[Claim]:
     """The random cascade beside the optimal one, and the length of a stage; with confidence intervals."""
-    bases = [Cascade(n, STAGE[n], "optimal", gap=gap) for gap in GAPS for n in PUBLISHED]
+    bases = [Cascade(n, STAGE[n], "optimal", gap=gap) for gap in GAPS for n in PUBLISHED_TIMES]
     short = [replace(base, aspect=5 / 3) for base in bases[:2]]
-    wanted = [replace(one, orientation=how) for one in bases for how in ORIENTATIONS]
-    wanted += [replace(one, orientation=how) for one in short for how in ORIENTATIONS]
+    cascades = [replace(one, orientation=how) for one in bases for how in ORIENTATIONS]
+    cascades += [replace(one, orientation=how) for one in short for how in ORIENTATIONS]
     stages = [
         Cascade(125, stage, how, gap=gap)
         for gap in GAPS for stage in (SHORT, LONG) for how in ORIENTATIONS[:2]
     ]  # fmt: skip
-    found = means([*wanted, *stages], repeats)
+    mean_times = means([*cascades, *stages], repeats)
     for base in bases:
-        yield from of_orientation(found, base)
+        yield from of_orientation(mean_times, base)
     for base in short:
-        ratio = found[replace(base, orientation="directions")].over(found[base])
+        ratio = mean_times[replace(base, orientation="directions")].over(mean_times[base])
         yield Claim(f"{base.nanometres} nm, L/D 5/3, all directions: random over optimal", ratio, 1.0, 1.5)
     for one in stages:
-        yield stage_claim(found, one)
+        yield stage_claim(mean_times, one)
 
 
 def name_of(one: Cascade) -> str:
-    """Size and layer, for people."""
+    """Size and layer of a cascade, for people."""
     return f"{one.nanometres} nm, {one.gap:g} R off"
 
 
-def of_orientation(found: Means, base: Cascade) -> Iterator[Claim]:
+def of_orientation(mean_times: Means, base: Cascade) -> Iterator[Claim]:
     """Random over optimal, L/D 20: the published ratio lies between what the two kinds of random give."""
-    random, best = PUBLISHED[base.nanometres]
+    random, best = PUBLISHED_TIMES[base.nanometres]
     name, ratio = name_of(base), random / best
     bounds = (0.75 * best, 1.25 * best) if base.gap else (0.0, 0.75 * best)
-    yield Claim(f"{name}: s to 90 %, optimal (B16 {best:g})", found[base], *bounds)
+    yield Claim(f"{name}: s to 90 %, optimal (B16 {best:g})", mean_times[base], *bounds)
     for how, bounds in zip(RANDOM, ((1.0, 1.25 * ratio), (0.75 * ratio, 2 * ratio)), strict=True):
-        ours = found[replace(base, orientation=how)].over(found[base])
+        ours = mean_times[replace(base, orientation=how)].over(mean_times[base])
         yield Claim(f"{name}: random over optimal, all {how} alike (B16 {ratio:.1f})", ours, *bounds)
 
 
-def stage_claim(found: Means, one: Cascade) -> Claim:
+def stage_claim(mean_times: Means, one: Cascade) -> Claim:
     """A stage that is too long is worse; one that is too short only where particles have some way to go."""
-    ours = found[one].over(found[replace(one, stage=STAGE[125])])
+    ours = mean_times[one].over(mean_times[replace(one, stage=STAGE[125])])
     name = f"{name_of(one)}, {one.orientation}: s to 90 % with stages of {one.stage:g} s over 0.5 s"
     worse = one.stage == LONG or one.gap > 0
     return Claim(name, ours, least=1.0) if worse else Claim(name, ours, most=1.0)

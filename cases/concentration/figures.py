@@ -1,4 +1,4 @@
-"""Figures of the case concentration."""
+"""Figures of the case concentration: chains, and captured fractions in time."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
+from cases.capture.statistics import MICRO
 from cases.concentration import scene as concentration
 from cases.concentration.scene import coupling
-from cases.concentration.statistics import CAPTURE, chain, held
+from cases.concentration.statistics import CAPTURE, chain, held_fraction
 from tisim import Recording, run
 from tisim.analysis import head_to_tail, labels
 from tisim.engine.batches import Progress, share
@@ -25,27 +26,26 @@ from tisim.io.reader import Frames, frames
 from tisim.plotting.style import empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
-MICRO = 1e-6
-SHOWN: dict[str, Any] = {"number": 125, "duration": 2e-3}
-"""What snapshots are of."""
+SNAPSHOT: dict[str, Any] = {"number": 125, "duration": 2e-3}
+"""Snapshots are of runs with these settings."""
 CONCENTRATIONS = (0.005, 0.5, 2.0)
-"""g/mL, of the curves."""
-SPAN = 0.6
-"""s, of the curves."""
-FEW, FRAMES = 2, 90
-"""Repeats of a curve, and its points."""
+"""The concentrations that have a curve, g/mL."""
+CURVE_DURATION = 0.6
+"""The simulated time that curves span, s."""
+CURVE_REPEATS, CURVE_FRAMES = 2, 90
+"""A curve is the mean over so many repeats, and has so many points."""
 
 
-def pictures(found: Frames) -> Mapping[str, Figure]:
+def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     """chains.png: the particles at the end, and mean chain length and captured part in time."""
-    every = list(found)
+    every = list(trajectory)
     last = every[-1].arrays
     if "moment" not in last:
         return {}
     figure = empty(10.4, 4.6)
     left, right = figure.subplots(1, 2)
     snapshot(left, last)
-    times = 1e3 * found.times
+    times = 1e3 * trajectory.times
     moment = last["moment"]
     right.plot(times, [chain(frame.arrays, moment) for frame in every], color="#4477aa")
     right.set(xlabel="time (ms)", ylabel="mean number of particles of a chain", ylim=(0, None))
@@ -77,17 +77,17 @@ def snapshot(axis: Axes, state: Arrays) -> None:
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """snapshots.png (B16 Fig. 6.12); captured.png, captured.csv (Fig. 6.13), for all whatever ``size`` is."""
     keys = [(size, c) for c in (0.5, 2.0) for size in (25, 75)]
-    scenes = [concentration.scene(nanometres=n, concentration=c, **SHOWN) for n, c in keys]
+    scenes = [concentration.scene(nanometres=n, concentration=c, **SNAPSHOT) for n, c in keys]
     figure = empty(8.8, 8.4)
-    found = run(scenes, share(progress, 0, 2))
+    results = run(scenes, share(progress, 0, 2))
     grid = figure.subplots(2, 2)
-    for axis, (n, c), result in zip(grid.flat, keys, found, strict=True):
+    for axis, (n, c), result in zip(grid.flat, keys, results, strict=True):
         snapshot(axis, result.state)
         length = chain(result.state, result.state["moment"])
         axis.set_title(f"{n} nm, {c:g} g/mL, coupling Γ = {coupling(n):.3g}: mean chain {length:.1f}")
     letters(grid.flat)
     curves = captured(share(progress, 1, 2))
-    return {"snapshots.png": figure, "captured.png": drawn(curves), "captured.csv": table(curves)}
+    return {"snapshots.png": figure, "captured.png": captured_figure(curves), "captured.csv": table(curves)}
 
 
 Curves = Mapping[tuple[float, float], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -96,27 +96,28 @@ Curves = Mapping[tuple[float, float], tuple[np.ndarray, np.ndarray, np.ndarray]]
 def captured(progress: Progress) -> Curves:
     """Times (s), part that touched the cylinder and part held by it, by angle (degrees) and g/mL."""
     keys = [(angle, c) for angle in (0.0, 90.0) for c in CONCENTRATIONS]
+    settings = {**CAPTURE, "duration": CURVE_DURATION}
     scenes = [
-        concentration.scene(angle=angle, concentration=c, seed=seed, **{**CAPTURE, "duration": SPAN})
-        for angle, c in keys for seed in range(FEW)
+        concentration.scene(angle=angle, concentration=c, seed=seed, **settings)
+        for angle, c in keys for seed in range(CURVE_REPEATS)
     ]  # fmt: skip
     curves = {}
     with TemporaryDirectory() as folder:
         path = Path(folder) / "runs.h5"
-        run(scenes, progress, Recording(path, frames=FRAMES))
+        run(scenes, progress, Recording(path, frames=CURVE_FRAMES))
         for k, key in enumerate(keys):
             touched, hanging = [], []
-            for world in range(k * FEW, (k + 1) * FEW):
-                with frames(path, world) as found:
-                    every = [frame.arrays for frame in found]
+            for world in range(k * CURVE_REPEATS, (k + 1) * CURVE_REPEATS):
+                with frames(path, world) as trajectory:
+                    every = [frame.arrays for frame in trajectory]
                     touched.append([float((state["captured_at"] >= 0).mean()) for state in every])
-                    hanging.append([held(state) for state in every])
-                    times = found.times
+                    hanging.append([held_fraction(state) for state in every])
+                    times = trajectory.times
             curves[key] = (times, np.mean(touched, axis=0), np.mean(hanging, axis=0))
     return curves
 
 
-def drawn(curves: Curves) -> Figure:
+def captured_figure(curves: Curves) -> Figure:
     """Longitudinal and transverse side by side."""
     figure = empty(10.4, 4.4)
     axes = figure.subplots(1, 2, sharey=True)
@@ -128,7 +129,7 @@ def drawn(curves: Curves) -> Figure:
             axis.plot(times, touched, color=colour, lw=1.0, ls=":", label=f"{name}, captured")
         axis.set(xlabel="time (s)", ylim=(0, 1.02), title=f"axis at {angle:.0f}° to the field")
         plain(axis)
-    axes[0].set_ylabel(f"fraction of the particles,\nmean of {FEW} starts")
+    axes[0].set_ylabel(f"fraction of the particles,\nmean of {CURVE_REPEATS} starts")
     letters(axes)
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", frameon=False, fontsize=8, ncols=3)
@@ -136,7 +137,7 @@ def drawn(curves: Curves) -> Figure:
 
 
 def table(curves: Curves) -> str:
-    """The curves as CSV."""
+    """The captured fractions in time as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["angle_deg", "g_per_mL", "time_s", "touched", "held"])

@@ -28,15 +28,15 @@ from tisim.sources import MagneticCylinders, MagneticField
 from tisim.steppers import Brownian, DriftLimit
 
 DENSITY = 5000.0
-"""kg/m^3 (B16 section 6.4.6)."""
+"""The density of particles, kg/m^3 (B16 section 6.4.6)."""
 ASPECT, DISTANCE, CUTOFF = 20.0, 100e-6, 30.0
-"""L/D; m from the end of the cylinder to the cube; radii within which dipoles act on each other."""
+"""The cylinder's L/D; the way from its end to the cube, m; the cutoff of dipole forces, radii."""
 WELL = 100 * Boltzmann * capture.TEMPERATURE
-"""J: eps of the Mie potential."""
+"""The depth eps of the Mie potential, J."""
 DRIFT, DIFFUSION = 0.05, 0.03
-"""Radii that forces, and noise (its standard deviation), move a particle in a step at most."""
-DIGITS = 5
-"""Of the cylinder's field, from its table."""
+"""Forces, and noise by its standard deviation, move a particle by so many radii in a step at most."""
+FIELD_DIGITS = 5
+"""The field of the cylinder is tabulated to so many digits."""
 
 SIZES = {
     "default": Size("64 particles of 75 nm at 0.5 g/mL above a transverse cylinder, 10 ms", {}),
@@ -60,7 +60,7 @@ def side(number: int, radius: float, concentration: float) -> float:
 
 def coupling(nanometres: int) -> float:
     """Gamma = mu_0 mu^2 / (2 pi d^3 k T), d the diameter (B16 Eq. 6.25)."""
-    moment, diameter = capture.MOMENT[nanometres], 2e-9 * nanometres
+    moment, diameter = capture.SATURATION_MOMENTS[nanometres], 2e-9 * nanometres
     return float(mu_0 * moment**2 / (2 * np.pi * diameter**3 * Boltzmann * capture.TEMPERATURE))
 
 
@@ -109,11 +109,11 @@ def scene(
             radius=radius,
             density=DENSITY,
             placement=RandomInBox(low=tuple(low.tolist()), high=tuple(high.tolist())),
-            quantities={"saturation_moment": capture.MOMENT[nanometres]},
+            quantities={"saturation_moment": capture.SATURATION_MOMENTS[nanometres]},
         ),
         effects=(
             MagneticField(constant=(capture.FLUX, 0.0, 0.0)),
-            MagneticCylinders(cylinders=(body,), table_digits=DIGITS),
+            MagneticCylinders(cylinders=(body,), table_digits=FIELD_DIGITS),
             FixedMoment(),
             Magnetophoresis(),
             TruncatedDipoleDipole(cutoff=CUTOFF),
@@ -133,5 +133,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The scene of a size."""
+    """A sample of a size, from the random start of a seed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -17,24 +17,24 @@ from tisim.analysis import head_to_tail, labels, mean_size, near
 from tisim.scene.initial_state import Arrays
 
 GAMMA = {25: 1.0, 125: 825.0}
-"""B16 Eq. (6.25) by radius in nm, as the text gives it."""
-SIZES = (25, 75, 125)
-"""nm."""
+"""The coupling Gamma of B16 Eq. (6.25) by radius in nm, as the text gives it."""
+RADII = (25, 75, 125)
+"""The radii of particles whose chains are compared, nm."""
 CONTACT = 1.15
-"""Diameters within which particles count as in contact."""
+"""Particles count as in contact within so many diameters."""
 CHAINS: dict[str, Any] = {"number": 48, "duration": 1e-3}
 """While chains form, nothing comes near the cylinder: 75 nm go 0.1 um in that time."""
 FORMING = 1e-4
-"""s, after which the first chains have formed, and not all of them."""
+"""The first chains have formed after this time, and not all of them, s."""
 CAPTURE: dict[str, Any] = {"number": 16, "duration": 0.45, "hydrodynamics": "rotne-prager", "coarse": 3.0}
 LATE = 0.8
-"""s, by which also dilute particles have reached the cylinder."""
+"""By this time also dilute particles have reached the cylinder, s."""
 DILUTE, DENSE, DENSEST = 0.005, 0.5, 2.0
-"""g/mL."""
-ANGLES = {0.0: "longitudinal", 90.0: "transverse"}
-"""Degrees."""
-EARLY = 0.05
-"""s, in which none of 75 nm is captured."""
+"""The concentrations that are compared, g/mL."""
+ORIENTATIONS = {0.0: "longitudinal", 90.0: "transverse"}
+"""The orientations of the cylinder by its angle to the field, degrees."""
+NO_CAPTURE_BEFORE = 0.05
+"""Before this time none of 75 nm is captured, s."""
 
 
 def chain(state: Arrays, moment: np.ndarray) -> float:
@@ -49,7 +49,7 @@ def grown(result: Result) -> float:
     return chain(result.state, moment) - chain(result.start, moment)
 
 
-def held(state: Arrays) -> float:
+def held_fraction(state: Arrays) -> float:
     """Part of the particles that are captured, or hang on one that is, in contact with each other.
 
     A chain that stands on the cylinder touches it with one particle only.
@@ -68,13 +68,13 @@ def first(result: Result) -> float:
 
 
 def firsts(group: Sequence[Result]) -> np.ndarray:
-    """The same of several runs."""
+    """When the first particle of each of several runs was captured, s."""
     return np.array([first(result) for result in group])
 
 
 def results(settings: Sequence[dict[str, Any]], repeats: int) -> list[list[Result]]:
-    """Of the scene of concentration with each of the settings, from as many starts."""
-    scenes = [concentration.scene(**given, seed=seed) for given in settings for seed in range(repeats)]
+    """Results of the scene of concentration with each setting, from as many starts."""
+    scenes = [concentration.scene(**setting, seed=seed) for setting in settings for seed in range(repeats)]
     return grouped(scenes, repeats)
 
 
@@ -89,11 +89,11 @@ def check(repeats: int = 4) -> Iterator[Check | Claim]:
 def of_chains(repeats: int) -> Iterator[Claim]:
     """Chains for Gamma >> 1, none for 25 nm; of 75 nm more, where they are more concentrated."""
     settings = [
-        {"nanometres": size, "concentration": c, **CHAINS} for size in SIZES for c in (DENSE, DENSEST)
+        {"nanometres": size, "concentration": c, **CHAINS} for size in RADII for c in (DENSE, DENSEST)
     ]
-    for given, found in zip(settings, results(settings, repeats), strict=True):
-        size, c = int(given["nanometres"]), float(given["concentration"])
-        longer = Mean.of([grown(result) for result in found])
+    for setting, group in zip(settings, results(settings, repeats), strict=True):
+        size, c = int(setting["nanometres"]), float(setting["concentration"])
+        longer = Mean.of([grown(result) for result in group])
         name = f"{size} nm, {c:g} g/mL: chains after 1 ms longer by (Eq. 6.26: {chain_length(size, c):.1g})"
         yield Claim(name, longer, most=0.5) if size == 25 else Claim(name, longer, least=1.0)
     early = [{"concentration": c, **CHAINS, "duration": FORMING} for c in (DENSE, DENSEST)]
@@ -111,31 +111,31 @@ def of_capture(repeats: int) -> Iterator[Claim]:
 
     Start k lies alike in all settings, so they are compared start by start.
     """
-    keys = [(angle, c) for angle in ANGLES for c in (DILUTE, DENSE)] + [(90.0, DENSEST)]
+    keys = [(angle, c) for angle in ORIENTATIONS for c in (DILUTE, DENSE)] + [(90.0, DENSEST)]
     settings = [
         {"angle": angle, "concentration": c, **CAPTURE, **({"duration": LATE} if c == DILUTE else {})}
         for angle, c in keys
     ]
-    found = dict(zip(keys, map(firsts, results(settings, repeats)), strict=True))
-    along, across = found[0.0, DENSE], found[90.0, DENSE]
+    first_captures = dict(zip(keys, map(firsts, results(settings, repeats)), strict=True))
+    along, across = first_captures[0.0, DENSE], first_captures[90.0, DENSE]
     name = "75 nm, 0.5 g/mL, longitudinal: first capture, s (B16 0.1 to 0.25)"
-    yield Claim(name, Mean.of(along), least=EARLY)
+    yield Claim(name, Mean.of(along), least=NO_CAPTURE_BEFORE)
     yield Claim("transverse over longitudinal (B16: almost 2)", Mean.of(across / along), least=1.5)
     by = f"first capture at {DENSE:g} g/mL, sooner by, s, than"
-    for (angle, name), lone in zip(ANGLES.items(), alone(repeats), strict=True):
-        late, soon = found[angle, DILUTE], found[angle, DENSE]
+    for (angle, name), lone in zip(ORIENTATIONS.items(), alone(repeats), strict=True):
+        late, soon = first_captures[angle, DILUTE], first_captures[angle, DENSE]
         yield Claim(f"{name}: {by} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
         than = f"{name}: {by} of particles that feel nothing of each other"
         yield Claim(than, Mean.of(lone - soon), least=0.0)
     name = f"transverse: first capture at {DENSEST:g} g/mL, sooner by, s, than at {DENSE:g} g/mL"
-    yield Claim(name, Mean.of(across - found[90.0, DENSEST]), least=0.0)
+    yield Claim(name, Mean.of(across - first_captures[90.0, DENSEST]), least=0.0)
 
 
 def alone(repeats: int) -> list[np.ndarray]:
     """Times of the first capture (s) of as many particles that feel nothing of each other, by angle."""
-    given = {**CAPTURE, "hydrodynamics": "none", "duration": 1.5, "concentration": DENSE}
+    setting = {**CAPTURE, "hydrodynamics": "none", "duration": 1.5, "concentration": DENSE}
     scenes = [
-        concentration.scene(angle=angle, seed=seed, **given).without("truncated_dipole_dipole", "mie")
-        for angle in ANGLES for seed in range(repeats)
+        concentration.scene(angle=angle, seed=seed, **setting).without("truncated_dipole_dipole", "mie")
+        for angle in ORIENTATIONS for seed in range(repeats)
     ]  # fmt: skip
     return [firsts(group) for group in grouped(scenes, repeats)]

@@ -35,8 +35,8 @@ def exact(result: Result) -> np.ndarray:
 def constants(scene: Scene) -> dict[str, float] | None:
     """w, k_m, push and omega of ``response``; None where that does not describe the centre of gravity.
 
-    It does where nothing but pairs and an observer is added to the array of Z13, in a constant field along z
-    and one along x that oscillates, and all particles, alike, begin at rest at their anchors.
+    It does where nothing but pair forces and PeakDisplacement is added to the array of Z13, in a constant
+    field along z and one along x that oscillates, and all particles, alike, begin at rest at their anchors.
     """
     alone = (e for e in scene.effects if not isinstance(e, PairForce | PeakDisplacement))
     have: dict[type, Any] = {type(effect): effect for effect in alone}
@@ -63,13 +63,13 @@ def _alike_at_rest(start: Arrays) -> bool:
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Where every particle is, and where their centre of gravity."""
-    known = constants(scene) is not None
-    alone = known and not any(isinstance(effect, PairForce) for effect in scene.effects)
+    described = constants(scene) is not None
+    alone = described and not any(isinstance(effect, PairForce) for effect in scene.effects)
 
     def alike(result: Result) -> np.ndarray:
         return np.tile(exact(result), (len(result.start["mass"]), 1))
 
     return (
         Quantity("positions", displacement, alike if alone else None, returns=True),
-        Quantity("centre of gravity", centre, exact if known else None, returns=True),
+        Quantity("centre of gravity", centre, exact if described else None, returns=True),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from cases.case import Check
 from cases.vibration.accuracy import centre, exact
 from cases.vibration.closed_forms import resonances
-from cases.vibration.response import DRIVE, FAST, SLOW, Sweep, beats, fast_scenes, slow_scenes
+from cases.vibration.response import BEAT_DRIVE, FAST, SLOW, Sweep, beats, fast_scenes, slow_scenes
 from cases.vibration.scene import ATTRACTION, CYCLOTRON, MASS, RATIOS, REPULSION, STIFFNESS, scene
 from tisim import Result, run
 from tisim.steppers import Collocation, StageControl
@@ -17,8 +17,8 @@ from tisim.steppers import Collocation, StageControl
 
 def deviation(results: list[Result]) -> float:
     """Largest distance of the centre of gravity from its closed form, over the largest displacement."""
-    found, true = (np.array([f(result) for result in results]) for f in (centre, exact))
-    return float(np.linalg.norm(found - true, axis=1).max() / np.linalg.norm(true, axis=1).max())
+    computed, true = (np.array([f(result) for result in results]) for f in (centre, exact))
+    return float(np.linalg.norm(computed - true, axis=1).max() / np.linalg.norm(true, axis=1).max())
 
 
 def check() -> Iterator[Check]:
@@ -44,5 +44,5 @@ def check() -> Iterator[Check]:
     slowly = Sweep.of(slow_scenes(np.linspace(0.3, 0.7, 21)))
     yield Check("largest displacement within 60 s, 0.3 to 0.7 1/s: off by", slowly.deviation, 0.0, 1e-4)
     yield Check("Omega of the largest over the slow resonance", slowly.top() / SLOW, 1.0, 2e-2)
-    beat = FAST * (1 - DRIVE)
+    beat = FAST * (1 - BEAT_DRIVE)
     yield Check("beat period at 0.9 of the fast resonance, s", beats().beat_period(), 2 * np.pi / beat, 3e-4)

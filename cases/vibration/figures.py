@@ -15,7 +15,7 @@ from cases.vibration import scene as vibration
 from cases.vibration.accuracy import constants
 from cases.vibration.closed_forms import resonances, response
 from cases.vibration.response import (
-    DRIVE,
+    BEAT_DRIVE,
     FAST,
     SLOW,
     CentreOfGravityHistory,
@@ -28,54 +28,56 @@ from tisim.engine.batches import Progress, share
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, legend_above, letters, plain, quantity
 
-LEAST = 9
-"""Frames that make a spectrum."""
+MIN_SPECTRUM_FRAMES = 9
+"""A spectrum takes at least so many frames."""
 FLOOR = 1e-4
-"""Of the highest line, what is drawn of a spectrum: below are side lobes of its window."""
-FOUND, EXACT, MARK, OTHER = "#4477aa", "0.25", "#cc6677", "#228833"
+"""A spectrum is drawn down to this part of its highest line: below are side lobes of its window."""
+RUN_COLOUR, EXACT_COLOUR, MARK_COLOUR, OTHER_COLOUR = "#4477aa", "0.25", "#cc6677", "#228833"
 
 
-def pictures(found: Frames) -> Mapping[str, Figure]:
+def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     """response.png: the centre of gravity of a run in time, beside its closed form, and its spectrum.
 
-    None of a file with fewer frames than LEAST, such as a result.h5.
+    None of a file with fewer frames than MIN_SPECTRUM_FRAMES, such as a result.h5.
     """
-    if len(found) < LEAST:
+    if len(trajectory) < MIN_SPECTRUM_FRAMES:
         return {}
-    history, known = CentreOfGravityHistory.of(found), constants(found.scene)
+    history, parameters = CentreOfGravityHistory.of(trajectory), constants(trajectory.scene)
     figure = empty(7.2, 6.8)
     above, below = figure.subplots(2, 1)
-    for part, name, colour in ((np.real, "x", FOUND), (np.imag, "y", MARK)):
+    for part, name, colour in ((np.real, "x", RUN_COLOUR), (np.imag, "y", MARK_COLOUR)):
         above.plot(history.time, part(history.place), color=colour, lw=1.6, label=f"{name}, as run")
-        if known:
-            closed = part(response(history.time, **known))
+        if parameters:
+            closed = part(response(history.time, **parameters))
             label = "closed form" if name == "x" else None
-            above.plot(history.time, closed, ":", color=EXACT, lw=1.4, label=label)
+            above.plot(history.time, closed, ":", color=EXACT_COLOUR, lw=1.4, label=label)
     quantity(above.xaxis, "time", "s")
     quantity(above.yaxis, "displacement of the\ncentre of gravity", "m")
     legend_above(above)
     plain(above)
-    spectrum(below, history, known)
+    spectrum(below, history, parameters)
     below.set_title("spectrum of the displacement")
     letters((above, below))
     return {"response.png": figure}
 
 
-def spectrum(axis: Axes, history: CentreOfGravityHistory, known: Mapping[str, float] | None) -> None:
+def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[str, float] | None) -> None:
     """Amplitudes of circular motion against its angular frequency, with the lines that are to be expected."""
     omega, lines = history.spectrum()
-    axis.semilogy(omega, lines, color=FOUND, lw=1.4)
+    axis.semilogy(omega, lines, color=RUN_COLOUR, lw=1.4)
     reach = omega.max()
-    if known:
-        slow, fast = resonances(known["w"], known["k_m"])
+    if parameters:
+        slow, fast = resonances(parameters["w"], parameters["k_m"])
         marks = (
-            (slow, "resonances", OTHER), (-fast, None, OTHER),
-            (known["omega"], r"$\pm\Omega$", MARK), (-known["omega"], None, MARK),
+            (slow, "resonances", OTHER_COLOUR), (-fast, None, OTHER_COLOUR),
+            (parameters["omega"], r"$\pm\Omega$", MARK_COLOUR), (-parameters["omega"], None, MARK_COLOUR),
         )  # fmt: skip
         for at, label, colour in marks:
-            axis.axvline(at, color=colour, ls="--" if colour == MARK else ":", lw=1.2, label=label, zorder=0)
+            axis.axvline(
+                at, color=colour, ls="--" if colour == MARK_COLOUR else ":", lw=1.2, label=label, zorder=0
+            )
         legend_above(axis)
-        reach = min(reach, 3.0 * max(fast, known["omega"]))
+        reach = min(reach, 3.0 * max(fast, parameters["omega"]))
     axis.set_xlim(-reach, reach)
     shown = lines[np.abs(omega) <= reach]
     axis.set_ylim(FLOOR * shown.max(), 3 * shown.max())
@@ -96,10 +98,10 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
         fast_scenes(vibration.RATIOS, near, sites=3),
     )
     fast, slow, arrays = (
-        Sweep.of(scenes, share(progress, done, len(lots))) for done, scenes in enumerate(lots)
+        Sweep.of(scenes, share(progress, finished, len(lots))) for finished, scenes in enumerate(lots)
     )
     return {
-        "resonance.png": drawn(slow, fast, arrays, near, beats()),
+        "resonance.png": resonance_figure(slow, fast, arrays, near, beats()),
         "resonance.csv": table(
             ("one particle", slow), ("one particle", fast), (f"27, near field {near}", arrays)
         ),
@@ -107,46 +109,50 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def table(*sweeps: tuple[str, Sweep]) -> str:
-    """All of the sweeps as CSV."""
+    """The largest displacements of all sweeps as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["particles", "duration_s", "omega_1_s", "omega_over_w", "peak_m", "closed_form_m"])
     for what, sweep in sweeps:
-        for row in zip(sweep.omega, sweep.omega / vibration.CYCLOTRON, sweep.found, sweep.exact, strict=True):
+        for row in zip(sweep.omega, sweep.omega / vibration.CYCLOTRON, sweep.peaks, sweep.exact, strict=True):
             writer.writerow([what, sweep.duration, *map(float, row)])
     return text.getvalue()
 
 
-def drawn(slow: Sweep, fast: Sweep, arrays: Sweep, near: str, history: CentreOfGravityHistory) -> Figure:
+def resonance_figure(
+    slow: Sweep, fast: Sweep, arrays: Sweep, near: str, history: CentreOfGravityHistory
+) -> Figure:
     """Resonance curves over both resonances, beats beside their closed form, and their spectrum."""
     figure = empty(10.4, 8.4)
     (left, right), (below, lines) = figure.subplots(2, 2)
-    known = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
+    parameters = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
              "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
     for axis, sweep, at, name in ((left, slow, SLOW, "slow"), (right, fast, FAST, "fast")):
-        axis.semilogy(sweep.omega, sweep.exact, color=EXACT, lw=1.0, label="closed form")
-        axis.semilogy(sweep.omega, sweep.found, ".", color=FOUND, ms=5, label="one particle, as run")
-        axis.axvline(at, color=OTHER, ls=":", lw=1.2, label=f"{name} resonance, {at:.4g} 1/s", zorder=0)
+        axis.semilogy(sweep.omega, sweep.exact, color=EXACT_COLOUR, lw=1.0, label="closed form")
+        axis.semilogy(sweep.omega, sweep.peaks, ".", color=RUN_COLOUR, ms=5, label="one particle, as run")
+        axis.axvline(
+            at, color=OTHER_COLOUR, ls=":", lw=1.2, label=f"{name} resonance, {at:.4g} 1/s", zorder=0
+        )
         axis.set_title(f"largest displacement within {sweep.duration:g} s")
         axis.set_xlabel(r"drive frequency $\Omega$ (1/s)")
         axis.set_ylabel("displacement of the centre of gravity (m)")
         plain(axis)
     label = f"27 particles, near field {near}:\nthe ratios of Z13 Fig. 3"
-    right.semilogy(arrays.omega, arrays.found, "o", mfc="none", color=MARK, ms=8, label=label)
+    right.semilogy(arrays.omega, arrays.peaks, "o", mfc="none", color=MARK_COLOUR, ms=8, label=label)
     for axis in (left, right):
         axis.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
-    below.plot(1e3 * history.time, np.abs(history.velocity), color=FOUND, lw=0.9)
-    expected, period = 2 * np.pi / (FAST * (1 - DRIVE)), history.beat_period()
+    below.plot(1e3 * history.time, np.abs(history.velocity), color=RUN_COLOUR, lw=0.9)
+    expected, period = 2 * np.pi / (FAST * (1 - BEAT_DRIVE)), history.beat_period()
     for k in range(int(history.time[-1] / expected + 0.5) + 1):
-        below.axvline(1e3 * k * expected, color=OTHER, ls=":", lw=1.2, zorder=0)
+        below.axvline(1e3 * k * expected, color=OTHER_COLOUR, ls=":", lw=1.2, zorder=0)
     below.set_title(
-        rf"beats at $\Omega$ = {DRIVE:g} of the fast resonance: {1e3 * period:.2f} ms as run;"
+        rf"beats at $\Omega$ = {BEAT_DRIVE:g} of the fast resonance: {1e3 * period:.2f} ms as run;"
         f"\ndotted, $2\\pi/|\\Omega - \\omega|$ = {1e3 * expected:.2f} ms"
     )  # fmt: skip
     below.set_ylabel("speed (m/s)")
     below.set_xlabel("time (ms)")
     plain(below)
-    spectrum(lines, history, {**known, "omega": DRIVE * FAST})
+    spectrum(lines, history, {**parameters, "omega": BEAT_DRIVE * FAST})
     lines.set_title("spectrum of the displacement")
     letters((left, right, below, lines))
     return figure

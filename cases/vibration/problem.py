@@ -25,7 +25,7 @@ VARIANTS = ("resonate", "avoid")
 DRIVE = 0.8 * vibration.CYCLOTRON
 """Omega of Z13 figure 3(d), 1/s: far from resonance with the paper's field and binder."""
 DURATION = 0.2
-"""s, 24 periods of the drive."""
+"""The simulated time of a run, s: 24 periods of the drive."""
 
 GENES = (
     Gene("flux", "T", 0.2, 2.0),
@@ -45,12 +45,12 @@ def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = D
 
 
 def displacement(result: Result) -> float:
-    """Largest of the centre of gravity, m."""
+    """The largest displacement of the centre of gravity, m."""
     return result.measures["peak_displacement"]
 
 
 def closed_form(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> float:
-    """The same without a run, m."""
+    """The largest displacement of a design in closed form, without a run, m."""
     w, k_m = CHARGE * design["flux"] / MASS, design["stiffness"] / MASS
     return peak(duration, w, k_m, CHARGE * FIELD / MASS, drive)
 

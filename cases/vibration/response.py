@@ -1,7 +1,7 @@
 """The centre of gravity of the case vibration: its sweep over drive frequencies, its beats and its spectrum.
 
 Z13 shows eight drive frequencies Omega, over w = q B/m. Here as many as one likes run as the worlds of one
-batch, and each has an observer of the largest displacement. With a tether along x and y there are two
+batch, and each has an operator that keeps the largest displacement. With a tether along x and y there are two
 resonances, sqrt(w^2/4 + k/m) +- w/2: the fast one of Z13's figure 3(e), and a slow one, a drift about the
 anchor with a period of 12.6 s, of which Z13's runs are far too short to show anything.
 """
@@ -26,9 +26,9 @@ from tisim.plotting.time_series import history
 from tisim.sources import ElectricField
 
 SLOW, FAST = resonances(CYCLOTRON, STIFFNESS / MASS)
-"""0.49974 and 955.429 1/s."""
-DRIVE = 0.9
-"""Omega over the fast resonance, of the beats: their period is a tenth of that, 2 pi/|Omega - FAST|."""
+"""The two resonances of the paper's particles, 1/s: 0.49974 and 955.429."""
+BEAT_DRIVE = 0.9
+"""The drive frequency of the beats over the fast resonance: the beats have a tenth of it, |Omega - FAST|."""
 
 
 def peak(t_end: float, w: float, k_m: float, push: float, omega: float) -> float:
@@ -48,12 +48,12 @@ class Sweep:
 
     duration: float
     omega: np.ndarray
-    found: np.ndarray
+    peaks: np.ndarray
     exact: np.ndarray
 
     @classmethod
     def of(cls, scenes: Sequence[Scene], progress: Progress | None = None) -> Sweep:
-        """Run scenes of the case with an observer, which differ in their drive frequency only."""
+        """Run scenes with the operator PeakDisplacement, which differ in their drive frequency only."""
         results = run(scenes, progress)
         for result in results:
             if not result.status.ok:
@@ -61,18 +61,18 @@ class Sweep:
         omega = np.array([drive(scene) for scene in scenes])
         duration = scenes[0].duration
         exact = [peak(duration, CYCLOTRON, STIFFNESS / MASS, CHARGE * FIELD / MASS, o) for o in omega]
-        found = np.array([result.measures["peak_displacement"] for result in results])
-        return cls(duration, omega, found, np.array(exact))
+        peaks = np.array([result.measures["peak_displacement"] for result in results])
+        return cls(duration, omega, peaks, np.array(exact))
 
     @property
     def deviation(self) -> float:
         """Largest relative difference of the two."""
-        return float(np.abs(self.found / self.exact - 1).max())
+        return float(np.abs(self.peaks / self.exact - 1).max())
 
     def top(self, above: float = 0.0) -> float:
         """Drive frequency (1/s) of the largest response as run, of a parabola through the three largest."""
-        k = int(np.where(self.omega > above, self.found, 0.0)[:-1].argmax())
-        return vertex(self.omega[k - 1 : k + 2], self.found[k - 1 : k + 2])
+        k = int(np.where(self.omega > above, self.peaks, 0.0)[:-1].argmax())
+        return vertex(self.omega[k - 1 : k + 2], self.peaks[k - 1 : k + 2])
 
 
 def drive(scene: Scene) -> float:
@@ -109,14 +109,14 @@ class CentreOfGravityHistory:
     velocity: np.ndarray
 
     @classmethod
-    def of(cls, found: Frames) -> CentreOfGravityHistory:
-        """Of a trajectory, at even times: between frames along the cubic of their places and velocities."""
-        seen = history(found)
-        x, v = (a[:, 0] + 1j * a[:, 1] for a in (seen.shift, seen.drift))
-        even = np.linspace(seen.time[0], seen.time[-1], len(seen.time))
-        k = np.clip(np.searchsorted(seen.time, even, side="right") - 1, 0, len(even) - 2)
-        h = np.diff(seen.time)[k]
-        u = (even - seen.time[k]) / h
+    def of(cls, trajectory: Frames) -> CentreOfGravityHistory:
+        """The history of a trajectory at even times, between frames by the cubic of places and velocities."""
+        series = history(trajectory)
+        x, v = (a[:, 0] + 1j * a[:, 1] for a in (series.shift, series.drift))
+        even = np.linspace(series.time[0], series.time[-1], len(series.time))
+        k = np.clip(np.searchsorted(series.time, even, side="right") - 1, 0, len(even) - 2)
+        h = np.diff(series.time)[k]
+        u = (even - series.time[k]) / h
         # Hermite's cubic, and its derivative.
         p0, p1, m0, m1 = x[k], x[k + 1], h * v[k], h * v[k + 1]
         place = p0 + u * m0 + u**2 * (3 * (p1 - p0) - 2 * m0 - m1) + u**3 * (2 * (p0 - p1) + m0 + m1)
@@ -126,8 +126,8 @@ class CentreOfGravityHistory:
     def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
         """Angular frequencies (1/s, both signs: the sense of rotation) and amplitudes (m) of the place.
 
-        Of |FFT| with the window of Blackman and Harris, whose side lobes are below 3e-5 of a line; a line of
-        amplitude A stands at A. Filled up with zeros, so that the curve is smooth.
+        They are |FFT| with the window of Blackman and Harris, whose side lobes are below 3e-5 of a line; a
+        line of amplitude A stands at A. Filled up with zeros, so that the curve is smooth.
         """
         window = blackmanharris(len(self.time), sym=False)
         n = 8 * len(window)
@@ -137,9 +137,9 @@ class CentreOfGravityHistory:
         return omega[order], lines[order]
 
     def beat_period(self) -> float:
-        """Of the speed, whose square is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two circular motions. s.
+        """The period of the speed, s: its square is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two circles.
 
-        From the highest line of its spectrum below half of the fast resonance.
+        It is that of the highest line of its spectrum below half of the fast resonance.
         """
         power = np.abs(self.velocity) ** 2
         n = 16 * len(power)
@@ -150,17 +150,17 @@ class CentreOfGravityHistory:
 
 
 def beats(periods: float = 6.0, frames_a_period: int = 20) -> CentreOfGravityHistory:
-    """One particle, driven at DRIVE times the fast resonance for some beats."""
-    duration = periods * 2 * np.pi / (FAST * (1 - DRIVE))
-    made = vibration.scene(DRIVE * FAST / CYCLOTRON, "none", duration, sites=1, observed=True)
+    """One particle, driven at BEAT_DRIVE times the fast resonance for some beats."""
+    duration = periods * 2 * np.pi / (FAST * (1 - BEAT_DRIVE))
+    driven = vibration.scene(BEAT_DRIVE * FAST / CYCLOTRON, "none", duration, sites=1, observed=True)
     count = int(frames_a_period * duration * FAST / (2 * np.pi))
-    return recorded(made, count)
+    return recorded(driven, count)
 
 
 def recorded(scene: Scene, count: int) -> CentreOfGravityHistory:
-    """Run a scene, look so many times."""
+    """Run a scene, and read so many frames of it."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "trajectory.h5"
         run(scene, record=Recording(path, frames=count))
-        with frames(path) as found:
-            return CentreOfGravityHistory.of(found)
+        with frames(path) as trajectory:
+            return CentreOfGravityHistory.of(trajectory)

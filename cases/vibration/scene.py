@@ -29,20 +29,20 @@ TITLE = "Electromagnetically induced vibration of particles in a binder"
 CUBE, SITES = 0.2, 7
 """Side of the array, m, and particles along it (Z13 section 4)."""
 DENSITY, RADIUS, CHARGE = 2000.0, 0.005, 1.0
-"""kg/m^3, m, C (Z13 section 4)."""
+"""The particles' density, kg/m^3, radius, m, and charge, C (Z13 section 4)."""
 FLUX, FIELD, STIFFNESS = 1.0, 0.1, 0.5
-"""B_3 (T), E_0 (N/C), k (N/m) (Z13 section 4)."""
+"""The fields B_3, T, and E_0, N/C, and the stiffness k of the tethers, N/m (Z13 section 4)."""
 ATTRACTION, REPULSION = 2.0, 1.0
-"""alpha_1 (N m) and alpha_2 (N m^2) with exponents 1 and 2 (Z13 section 4)."""
+"""The near field: alpha_1, N m, and alpha_2, N m^2, with exponents 1 and 2 (Z13 section 4)."""
 RATIOS = (0.1, 0.2, 0.4, 0.8, 1.0, 1.2, 1.4, 1.8)
-"""Omega/w of Z13 Fig. 3."""
+"""The drive frequencies of Z13 Fig. 3 over the cyclotron frequency, Omega/w."""
 
 MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
 CYCLOTRON = CHARGE * FLUX / MASS
 """w = q B/m: 954.930 1/s. Z13 prints 1819.385 1/s for the same data, which is wrong."""
 SPACING = CUBE / (SITES - 1)
 
-SEARCH = {
+SEARCH_SETTINGS = {
     "generations": 16, "options": {"population": 24, "parents": 8},
     # Nothing is random: a second start is the first.
     "ensemble": {"min_starts": 2, "block": 2, "max_starts": 2},
@@ -52,7 +52,7 @@ SIZES = {
     "alone": Size(
         "343 particles that do not feel each other, 0.05 s", {"near_field": "none", "duration": 0.05}
     ),
-    "default": Size("343 particles, the near field as printed, 0.005 s", {}, SEARCH),
+    "default": Size("343 particles, the near field as printed, 0.005 s", {}, SEARCH_SETTINGS),
     "equilibrium": Size(
         "343 particles, near field in balance with the six neighbours, 0.05 s",
         {"near_field": "equilibrium", "duration": 0.05},

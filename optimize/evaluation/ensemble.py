@@ -62,7 +62,8 @@ class Ensemble:
     """Estimates the objectives of designs; each design is known once it has been estimated.
 
     budget : most runs that estimates and races may ask for (None: no end); exhausted : it has cut one short.
-    runs : counts them. An estimate is a tuple, one Estimate of the cost for each objective.
+    runs : counts them. An estimate is a tuple, one FitnessEstimate of the cost for each
+    objective.
     """
 
     def __init__(
@@ -81,28 +82,28 @@ class Ensemble:
         self._known: dict[bytes, Sample] = {}
 
     @property
-    def asked(self) -> int:
-        """Different runs asked for."""
+    def requested(self) -> int:
+        """How many different runs have been requested."""
         return self.runs.evaluations + self.runs.hits
 
     def estimate(
         self, designs: Sequence[Design], progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...] | None]:
-        """Of each design, in order; None where the budget was spent before its first block of starts.
+        """The estimates of each design, in order; None where the budget was spent before its first block.
 
         progress is called with the finished fraction, never decreasing. A design with any failed start has
         cost +inf.
         """
-        wish = self.settings
+        settings = self.settings
         samples = [self._sample(design) for design in designs]
         different = list(dict.fromkeys(samples))
-        size = max(wish.block, wish.min_starts)
+        size = max(settings.block, settings.min_starts)
         first, shown = 0, 0.0
         while running := [sample for sample in different if sample.open]:
-            last = min(first + size, wish.max_starts)
+            last = min(first + size, settings.max_starts)
             afforded = self._afforded(running, last - first)
-            done = sum(1.0 if not sample.open else first / wish.max_starts for sample in different)
-            share = len(afforded) * (last - first) / wish.max_starts
+            done = sum(1.0 if not sample.open else first / settings.max_starts for sample in different)
+            share = len(afforded) * (last - first) / settings.max_starts
 
             def report(fraction: float, done: float = done, share: float = share) -> None:
                 nonlocal shown
@@ -117,10 +118,10 @@ class Ensemble:
                 if sample.reason:
                     sample.open = False
                     continue
-                settled = settled_after(sample.costs, wish.tolerance, wish.min_starts)
+                settled = settled_after(sample.costs, settings.tolerance, settings.min_starts)
                 sample.used, sample.settled = settled or len(sample.costs), settled is not None
-                sample.open = settled is None and last < wish.max_starts
-            first, size = last, wish.block
+                sample.open = settled is None and last < settings.max_starts
+            first, size = last, settings.block
         if progress is not None:
             progress(1.0)
         return [self._summary(sample) if sample.used or sample.reason else None for sample in samples]
@@ -140,11 +141,15 @@ class Ensemble:
         purse = self.settings.race
         while len(racing) > 1:
             goals = {s: min(s.used + self.settings.block, self.settings.max_starts) for s in racing}
-            wanted = [(s, range(len(s.costs), goal)) for s, goal in goals.items()]
-            price = sum(len(starts) for _, starts in wanted)
-            if price > purse or price > self.budget - self.asked or all(s.used == goals[s] for s in racing):
+            additions = [(s, range(len(s.costs), goal)) for s, goal in goals.items()]
+            price = sum(len(starts) for _, starts in additions)
+            if (
+                price > purse
+                or price > self.budget - self.requested
+                or all(s.used == goals[s] for s in racing)
+            ):
                 break
-            self.runs.add(wanted, progress or (lambda fraction: None))
+            self.runs.add(additions, progress or (lambda fraction: None))
             purse -= price
             for sample, goal in goals.items():
                 sample.used = goal
@@ -154,7 +159,7 @@ class Ensemble:
     def confirm(
         self, designs: Sequence[Design], progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """Of each design from `confirm` starts that no estimate has used; the budget is not looked at.
+        """The estimates of each design from `confirm` starts that no other has used; the budget is not asked.
 
         A winner has won by being good and by being lucky in its starts; this is without the luck.
         """
@@ -170,7 +175,7 @@ class Ensemble:
         return self._known.setdefault(canonical(dict(design)), Sample(design))
 
     def _afforded(self, running: list[Sample], starts: int) -> list[Sample]:
-        room = (self.budget - self.asked) // starts
+        room = (self.budget - self.requested) // starts
         if room < len(running):
             self.exhausted = True
             return running[: int(room)]

@@ -55,7 +55,8 @@ class Sample:
     """The starts of one design so far.
 
     costs : of each start, (starts, objectives). used : how many of them, from the first, its estimate
-    stands on. settled : see Estimate. reason : "" or why the design failed. open : more starts are to come.
+    stands on. settled : see FitnessEstimate. reason : "" or why the design failed. open : more starts are to
+    come.
     """
 
     design: Mapping[str, float]
@@ -67,8 +68,8 @@ class Sample:
 
 
 class Runs:
-    """Runs what is asked for and not known. evaluations, hits : runs made, and found in the cache instead;
-    together they are the different runs that were asked for, the same for a search that was resumed.
+    """Runs what is requested and not known. evaluations, hits : runs made, and found in the cache instead;
+    together they are the different runs that were requested, the same for a search that was resumed.
 
     common : start k is the same for every design.
     """
@@ -80,10 +81,12 @@ class Runs:
         self.seed, self.common, self.code = seed, common, problem.identity
         self.evaluations = 0
         self.hits = 0
-        self._asked: set[str] = set()
+        self._requested: set[str] = set()
 
     def add(
-        self, wanted: Iterable[tuple[Sample, range]], report: Callable[[float], None] = lambda fraction: None
+        self,
+        additions: Iterable[tuple[Sample, range]],
+        report: Callable[[float], None] = lambda fraction: None,
     ) -> None:
         """Add to each sample the costs of these starts; all that is not in the cache in one call.
 
@@ -91,9 +94,9 @@ class Runs:
         through; what was finished by then is in the cache.
         """
         self.cache.refresh()
-        found: list[tuple[Sample, int, int, str]] = []
+        requested: list[tuple[Sample, int, int, str]] = []
         missing: dict[str, tuple[Scene, Sample, int]] = {}
-        for sample, starts in wanted:
+        for sample, starts in additions:
             for start in starts:
                 seed = start_seed(self.seed, start, None if self.common else sample.design)
                 try:
@@ -103,14 +106,14 @@ class Runs:
                     break
                 objective = self.problem.name, self.problem.version, self.code
                 key = evaluation_key(scene.digest(), self.evaluator.settings, *objective)
-                found.append((sample, start, seed, key))
+                requested.append((sample, start, seed, key))
                 if self.cache.get(key) is None:
                     missing.setdefault(key, (scene, sample, seed))
-                elif key not in self._asked:
+                elif key not in self._requested:
                     self.hits += 1
-                self._asked.add(key)
+                self._requested.add(key)
         self._run(missing, report)
-        for sample, start, seed, key in found:
+        for sample, start, seed, key in requested:
             record = self.cache.get(key)
             if record is None:
                 raise RunError(

@@ -45,16 +45,16 @@ class SearchMethod(ABC):
 
     @abstractmethod
     def ask(self) -> list[Individual]:
-        """The next generation."""
+        """The strings of the next generation."""
 
     @abstractmethod
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        """What the strings of the last ``ask`` are worth."""
+        """Learn what the strings of the last ``ask`` are worth."""
 
 
 def every() -> dict[str, type[SearchMethod]]:
-    """All methods by name."""
-    found: dict[str, type[SearchMethod]] = {}
+    """All search methods by their names."""
+    by_name: dict[str, type[SearchMethod]] = {}
     for entry in pkgutil.iter_modules(methods.__path__):
         module = importlib.import_module(f"{methods.__name__}.{entry.name}")
         for kind in vars(module).values():
@@ -63,12 +63,12 @@ def every() -> dict[str, type[SearchMethod]]:
                 and issubclass(kind, SearchMethod)
                 and kind.__module__ == module.__name__ != __name__
             ):
-                found[kind.name] = kind
-    return found
+                by_name[kind.name] = kind
+    return by_name
 
 
 def find(name: str) -> type[SearchMethod]:
     """A method by name; InputError naming the known ones when there is none."""
-    known = every()
-    must(isinstance(name, str) and name in known, "method", f"one of {', '.join(known)}", name)
-    return known[name]
+    by_name = every()
+    must(isinstance(name, str) and name in by_name, "method", f"one of {', '.join(by_name)}", name)
+    return by_name[name]

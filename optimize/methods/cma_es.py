@@ -15,7 +15,9 @@ from tisim.components.component import Checked
 
 
 class CmaOptions(Checked):
-    """population : strings per generation (None: 4 + 3 ln(genes)). sigma : first standard deviation, in
+    """The settings of CMA-ES.
+
+    population : strings per generation (None: 4 + 3 ln(genes)). sigma : first standard deviation, in
     widths of the search range. smallest : the standard deviation along the widest axis at which the search
     has converged and begins again elsewhere.
     """
@@ -49,7 +51,7 @@ class CmaEs(SearchMethod):
 
     @property
     def width(self) -> float:  # type: ignore[override]
-        """Of the interval of +- one standard deviation, the mean of the genes, at most the whole range."""
+        """The width of the interval of +- one standard deviation, the mean over genes; 1 at most."""
         spread = 2 * self.strategy.sigma * np.sqrt(np.diag(self.strategy.C))
         return float(np.minimum(spread, 1.0).mean())
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from optimize.methods.base import SearchMethod
-from optimize.methods.breeding import Breeder, Breeding
+from optimize.methods.breeding import Breeder
+from optimize.methods.breeding_settings import Breeding
 from optimize.methods.individual import Individual
 
 
@@ -21,7 +22,7 @@ class Genetic(SearchMethod):
 
     def __init__(self, genes: int, objectives: int, options: Breeding, seed: int) -> None:
         self.options, self.breeder = options, Breeder(genes, options, seed)
-        self.told = 0
+        self.generation = 0
         self.following: list[Individual] = []
 
     @property
@@ -33,8 +34,8 @@ class Genetic(SearchMethod):
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         every = self.options.recentre_every
-        self.moved = bool(every and self.told and self.told % every == 0 and hall)
+        self.moved = bool(every and self.generation and self.generation % every == 0 and hall)
         if self.moved:
             self.breeder.recentre(hall[0])
-        self.told += 1
+        self.generation += 1
         self.following = self.breeder.following(population)

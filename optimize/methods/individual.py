@@ -17,7 +17,7 @@ def minimised(objectives: int) -> type:
 
 
 class Individual(list[float]):
-    """A genetic string: a point of the unit cube, its DEAP fitness (invalid until known) and its Estimates.
+    """A genetic string: a point of the unit cube, its DEAP fitness (invalid until known) and its estimates.
 
     estimates, confirmed : of the cost of each objective, from the search and from fresh starts; else ().
     """

@@ -18,7 +18,9 @@ from tisim.errors import must
 
 
 class Nsga2Options(Checked):
-    """population : strings per generation, a multiple of 4. crossover : probability that a pair is mated;
+    """The settings of NSGA-II.
+
+    population : strings per generation, a multiple of 4. crossover : probability that a pair is mated;
     mutation : that a gene is changed (None: 1/genes). eta : distribution index of both; the larger, the
     nearer are children to their parents. Defaults are those of the paper, the population's excepted.
     """
@@ -68,14 +70,14 @@ class Nsga2(SearchMethod):
         del self.parents[self.options.population :]
 
     def _offspring(self) -> list[Individual]:
-        wish = self.options
-        mutation = 1 / self.genes if wish.mutation is None else wish.mutation
+        options = self.options
+        mutation = 1 / self.genes if options.mutation is None else options.mutation
         with self.random:
-            chosen = tools.selTournamentDCD(self.parents, wish.population)
+            chosen = tools.selTournamentDCD(self.parents, options.population)
             children = [copy.deepcopy(list(string)) for string in chosen]
             for one, two in zip(children[::2], children[1::2], strict=True):
-                if random.random() < wish.crossover:
-                    tools.cxSimulatedBinaryBounded(one, two, wish.eta, 0.0, 1.0)
+                if random.random() < options.crossover:
+                    tools.cxSimulatedBinaryBounded(one, two, options.eta, 0.0, 1.0)
                 for child in (one, two):
-                    tools.mutPolynomialBounded(child, wish.eta, 0.0, 1.0, mutation)
+                    tools.mutPolynomialBounded(child, options.eta, 0.0, 1.0, mutation)
         return [Individual(np.clip(child, 0.0, 1.0), self.objectives) for child in children]

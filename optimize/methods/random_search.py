@@ -13,7 +13,7 @@ from tisim.components.component import Checked
 
 
 class RandomSearchOptions(Checked):
-    """population : strings per generation."""
+    """The settings of random search. population : strings per generation."""
 
     population: int = Field(20, ge=1)
 
@@ -38,4 +38,4 @@ class RandomSearch(SearchMethod):
         return [Individual(point, self.objectives) for point in self.rng.random(self.shape)]
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
-        """Nothing is learnt."""
+        """Random search learns nothing from what its strings are worth."""

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from optimize.methods.breeding import Breeding
+from optimize.methods.breeding_settings import Breeding
 from optimize.methods.genetic import Genetic
 from optimize.methods.individual import Individual
 from optimize.problem.genome import SearchBox
 
 
 class RestartOptions(Breeding):
-    """As of ``genetic``, and when to begin again.
+    """The settings of ``genetic``, and when to begin again.
 
     stalled : generations without a better best, after which the search is taken to have converged.
     smallest : width of the search box below which the next restart is in the whole range.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Objective:
-    """One quantity to be made small, or large.
+    """A quantity that is to be made small, or large.
 
     name : heading in tables and plots; unit : of the values, "" if they have none.
     of : Result -> value in that unit. Called for runs that ended well only; NaN and inf never win.

@@ -14,12 +14,15 @@ from optimize.storage.cache import existing
 from optimize.storage.record import Record
 from tisim.console import plain_table
 
-SHOWN = 5
-"""Reasons of failures that are spelled out."""
+MAX_REASONS = 5
+"""So many reasons of failures are spelled out."""
 
 
-def listing(path: str | Path) -> RenderableType:
-    """Evaluations by problem, searches, and why evaluations failed. InputError if there is no such file."""
+def summary(path: str | Path) -> RenderableType:
+    """The evaluations in a cache file by problem, its searches, and why evaluations failed.
+
+    InputError if there is no such file.
+    """
     cache = existing(path)
     records = cache.records()
     table = plain_table("search", "generations", "best", "ended by")
@@ -48,6 +51,8 @@ def _evaluations(records: Sequence[Record]) -> Table:
 
 def _failures(records: Sequence[Record]) -> list[RenderableType]:
     failed = [record for record in records if not record.ok]
-    lines: list[RenderableType] = [Text(f"seed {record.seed}: {record.reason}") for record in failed[:SHOWN]]
-    more = [f"and {len(failed) - SHOWN} more"] if len(failed) > SHOWN else []
+    lines: list[RenderableType] = [
+        Text(f"seed {record.seed}: {record.reason}") for record in failed[:MAX_REASONS]
+    ]
+    more = [f"and {len(failed) - MAX_REASONS} more"] if len(failed) > MAX_REASONS else []
     return ["", "failed:", *lines, *more] if failed else []

@@ -26,7 +26,7 @@ from tisim.errors import must
 FILE, CSV = "compare.h5", "compare.csv"
 NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV)
 FRESH = 10**6
-"""Seed of the starts from which what was found is run again: that of no search."""
+"""The seed of the starts from which the best designs are run again: no search has it."""
 NOTE = (
     "median, lowest, highest: of the best designs of the searches, from fresh starts; claimed: what the "
     "searches held them for, the median; 95 % +-: half of the interval from fresh starts, the median"
@@ -34,8 +34,8 @@ NOTE = (
 
 
 @dataclass(frozen=True)
-class Found:
-    """What one search found: its best design's estimate, and that of fresh starts (costs)."""
+class MethodResult:
+    """What one search has found: its best design's estimate, and that of fresh starts (costs)."""
 
     method: str
     repeat: int
@@ -47,14 +47,14 @@ class Found:
 def settings_of(
     problem: Problem, base: Mapping[str, Any], method: str, evaluations: int, repeat: int
 ) -> Settings:
-    """Of one search: those of the case with another method, stopped by the number of runs alone."""
-    wish = proposed(problem, base, method)
+    """The settings of one search: the case's with another method, stopped by the number of runs alone."""
+    chosen = proposed(problem, base, method)
     for rule in ("target", "patience", "wall_clock_s"):
-        wish.pop(rule, None)
-    ensemble = {**wish.get("ensemble", {}), "confirm": 0}
+        chosen.pop(rule, None)
+    ensemble = {**chosen.get("ensemble", {}), "confirm": 0}
     # every generation asks for a run or more, unless a method has nothing new to propose: then it ends, too
     stop = {"generations": evaluations, "max_evaluations": evaluations}
-    settings = Settings(**{**wish, "ensemble": ensemble, "seed": repeat, **stop})
+    settings = Settings(**{**chosen, "ensemble": ensemble, "seed": repeat, **stop})
     fit(problem, settings)
     return settings
 
@@ -69,7 +69,7 @@ def compare(
     evaluator: Evaluator,
     cache: Cache,
     on_progress: Callable[[Progress], None] | None = None,
-) -> Iterator[Found]:
+) -> Iterator[MethodResult]:
     """Yield what each search has found; repeat k of every method has the same random starts.
 
     base : settings of a search, as of a case. fresh : starts from which each best design is run again, the
@@ -91,28 +91,28 @@ def compare(
         outcome = search(problem, evaluator, cache, settings, on_progress=on_progress)
         if outcome.interrupted:
             raise KeyboardInterrupt
-        yield _found(method, repeat, outcome, anew)
+        yield _result(method, repeat, outcome, anew)
 
 
-def _found(method: str, repeat: int, outcome: Outcome, anew: Ensemble) -> Found:
+def _result(method: str, repeat: int, outcome: Outcome, anew: Ensemble) -> MethodResult:
     if outcome.best is None:
         raise RunError(f"{method}, repeat {repeat}: no design has run to its end")
     (estimates,) = anew.estimate([outcome.problem.genome.decode(outcome.best)])
     assert estimates is not None  # this ensemble has no budget
     (claimed,) = outcome.best.estimates
-    return Found(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0])
+    return MethodResult(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0])
 
 
-def table(problem: Problem, found: Sequence[Found]) -> Table:
+def table(problem: Problem, results: Sequence[MethodResult]) -> Table:
     """A line for each method, the best median first: the best of its searches from fresh starts, and what the
     searches themselves held it for.
     """
     (objective,) = problem.objectives
     meaning = problem.meanings.get(objective.name, "")
-    made = plain_table("method", "searches", "runs each", "median", "lowest", "highest", "claimed", "95 % +-")
-    made.title, made.title_justify = objective.label + (f": {meaning}" if meaning else ""), "left"
-    made.caption, made.caption_justify = NOTE, "left"
-    by_method = {f.method: [g for g in found if g.method == f.method] for f in found}
+    grid = plain_table("method", "searches", "runs each", "median", "lowest", "highest", "claimed", "95 % +-")
+    grid.title, grid.title_justify = objective.label + (f": {meaning}" if meaning else ""), "left"
+    grid.caption, grid.caption_justify = NOTE, "left"
+    by_method = {f.method: [g for g in results if g.method == f.method] for f in results}
     for method, mine in sorted(
         by_method.items(), key=lambda item: np.median([f.fresh.mean for f in item[1]])
     ):
@@ -124,11 +124,11 @@ def table(problem: Problem, found: Sequence[Found]) -> Table:
         )  # fmt: skip
         runs = sorted({f.evaluations for f in mine})
         each = str(runs[0]) if len(runs) == 1 else f"{runs[0]}..{runs[-1]}"
-        made.add_row(method, str(len(mine)), each, *(f"{number:.4g}" for number in numbers))
-    return made
+        grid.add_row(method, str(len(mine)), each, *(f"{number:.4g}" for number in numbers))
+    return grid
 
 
-def as_csv(problem: Problem, found: Sequence[Found]) -> bytes:
+def as_csv(problem: Problem, results: Sequence[MethodResult]) -> bytes:
     """A line for each search, all digits."""
     (objective,) = problem.objectives
     text = io.StringIO(newline="")
@@ -144,7 +144,7 @@ def as_csv(problem: Problem, found: Sequence[Found]) -> bytes:
             "95 % +- claimed",
         )
     )
-    for f in found:
+    for f in results:
         means = objective.sign * f.fresh.mean, f.fresh.half_width, objective.sign * f.claimed.mean
         writer.writerow((f.method, f.repeat, f.evaluations, *means, f.claimed.half_width))
     return text.getvalue().encode()

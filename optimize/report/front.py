@@ -18,7 +18,12 @@ from optimize.evaluation.estimate import FitnessEstimate
 from optimize.outcome import Outcome
 from tisim.plotting.style import empty, letters, plain, scale_of, superscripts
 
-_FRONT, _KNOWN, _FEW, _CHOSEN = "#0b5394", "#8f8f8f", "#d3d3d3", "#b45f06"
+_FRONT_COLOUR, _MANY_STARTS_COLOUR, _FEW_STARTS_COLOUR, _CHOSEN_COLOUR = (
+    "#0b5394",
+    "#8f8f8f",
+    "#d3d3d3",
+    "#b45f06",
+)
 Estimates = tuple[FitnessEstimate, ...]
 
 
@@ -43,7 +48,7 @@ def others(outcome: Outcome) -> tuple[list[Estimates], list[Estimates]]:
     """Designs outside the front: from as many starts as the median design of the front, and from fewer."""
     front = {tuple(string) for string in outcome.hall}
     enough = np.median([string.estimates[0].starts for string in outcome.hall] or [1])
-    good = [e for genes, e in outcome.seen.items() if e[0].ok and genes not in front]
+    good = [e for genes, e in outcome.estimates.items() if e[0].ok and genes not in front]
     return [e for e in good if e[0].starts >= enough], [e for e in good if e[0].starts < enough]
 
 
@@ -52,27 +57,27 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
     plain(axis)
     axis.set_xlabel(_heading(objectives[x].label, objectives[x].maximise))
     axis.set_ylabel(_heading(objectives[y].label, objectives[y].maximise))
-    known, few = others(outcome)
+    many, few = others(outcome)
     means, _ = _values(outcome, few)
     if few:
         axis.plot(
-            means[:, x], means[:, y], "o", mfc="none", color=_FEW, ms=2.5, mew=0.6, zorder=1,
+            means[:, x], means[:, y], "o", mfc="none", color=_FEW_STARTS_COLOUR, ms=2.5, mew=0.6, zorder=1,
             label=f"other designs, only {_starts(few)}: the luckiest lie beyond the front",
         )  # fmt: skip
-    if known:
-        _bars(axis, outcome, known, (x, y), _KNOWN, f"other designs, {_starts(known)}")
+    if many:
+        _bars(axis, outcome, many, (x, y), _MANY_STARTS_COLOUR, f"other designs, {_starts(many)}")
     if not outcome.hall:
         return
     front = [string.confirmed or string.estimates for string in outcome.hall]
     fresh = "run again: " if outcome.hall[0].confirmed else ""
-    _bars(axis, outcome, front, (x, y), _FRONT, f"front, {fresh}{_starts(front)}")
+    _bars(axis, outcome, front, (x, y), _FRONT_COLOUR, f"front, {fresh}{_starts(front)}")
     means, _ = _values(outcome, front)
     chosen = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
     axis.plot(
-        *means[chosen, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN, mew=1.5, zorder=5, ls="",
+        *means[chosen, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN_COLOUR, mew=1.5, zorder=5, ls="",
         label="nearest to the best of each",
     )  # fmt: skip
-    everything, _ = _values(outcome, [*known, *few, *front])
+    everything, _ = _values(outcome, [*many, *few, *front])
     axis.set_xscale(scale_of(means[:, x]) if everything[:, x].min() > 0 else "linear")
     axis.set_yscale(scale_of(means[:, y]) if everything[:, y].min() > 0 else "linear")
 
@@ -85,8 +90,8 @@ def _bars(
     unsure = bool(widths.any())
     axis.errorbar(
         means[:, of[0]], means[:, of[1]], xerr=widths[:, of[0]], yerr=widths[:, of[1]], fmt="o",
-        color=colour, ms=4 if colour == _FRONT else 2.5, lw=0.8 if colour == _FRONT else 0.4,
-        zorder=4 if colour == _FRONT else 2,
+        color=colour, ms=4 if colour == _FRONT_COLOUR else 2.5, lw=0.8 if colour == _FRONT_COLOUR else 0.4,
+        zorder=4 if colour == _FRONT_COLOUR else 2,
         label=label + ", 95 % intervals" * unsure,
     )  # fmt: skip
 

@@ -18,22 +18,20 @@ from optimize.outcome import Outcome
 from optimize.report.convergence import convergence_figure
 from optimize.report.front import front_figure
 from optimize.tables import best_columns
+from tisim.console import TERMINAL_WIDTH
 from tisim.files.atomic import replace_file
-
-WIDTH = 80
-"""Of the table of the best designs; every terminal has as many columns."""
 
 
 def best_table(outcome: Outcome) -> RenderableType:
     """The best designs for the terminal: a column per design, genes in their units, fitness with its 95 %
-    interval, derived values. In several tables where they would not fit on WIDTH columns side by side. Of a
-    front as many as the hall of fame has places, spread along it.
+    interval, derived values. In several tables where they would not fit on TERMINAL_WIDTH columns side by
+    side. Of a front as many as the hall of fame has places, spread along it.
     """
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
     shown = _spread(len(outcome.hall), places)
     headings, *rows = ((heading, *(_text(values[k]) for k in shown)) for heading, values in columns.items())
-    designs = max(1, (WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
+    designs = max(1, (TERMINAL_WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
     title = outcome.problem.title or outcome.problem.name
     part = (
         f"; {len(shown)} of the {len(outcome.hall)} designs of its front" if outcome.problem.several else ""
@@ -61,8 +59,8 @@ def notes(outcome: Outcome) -> RenderableType:
         "settled": f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it",
     }
     fresh = {"fresh starts": f"the mean over {ensemble.confirm} starts that the search has not seen"}
-    told = {**problem.meanings, **common, **(fresh if outcome.hall[0].confirmed else {})}
-    return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in told.items()))
+    meanings = {**problem.meanings, **common, **(fresh if outcome.hall[0].confirmed else {})}
+    return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()))
 
 
 def _spread(number: int, places: int) -> list[int]:
@@ -79,7 +77,7 @@ def details_table(details: Mapping[str, float]) -> RenderableType:
 
 
 def details_csv(details: Mapping[str, float]) -> bytes:
-    """The same as CSV, all digits."""
+    """What the run of the best design shows as CSV, all digits."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["quantity", "value"])
@@ -114,13 +112,16 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
         figures["front"] = front_figure(outcome)
     contents = {"best.csv": best_csv(outcome)}
     for name, figure in figures.items():
-        contents |= {f"{name}.png": drawn(figure, "png", dpi=200), f"{name}.pdf": drawn(figure, "pdf")}
+        contents |= {
+            f"{name}.png": figure_bytes(figure, "png", dpi=200),
+            f"{name}.pdf": figure_bytes(figure, "pdf"),
+        }
     for name, content in contents.items():
         replace_file(folder / name, content)
     return {name: folder / name for name in contents}
 
 
-def drawn(figure: Figure, kind: str, **options: Any) -> bytes:
+def figure_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
     """A figure as the bytes of a file of that kind."""
     file = io.BytesIO()
     figure.savefig(file, format=kind, **options)

@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from optimize.storage import hdf5_store, salvage
+from optimize.storage import hdf5_store
 from optimize.storage.hdf5_store import Hdf5Table
 from optimize.storage.journal import Journal, Mark
 from optimize.storage.record import Record
@@ -39,7 +38,7 @@ class Cache:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path, journal, self._lock = _files(path)
+        self.path, journal, self._lock = cache_files(path)
         self._journal = Journal(journal)
         self._records: dict[str, Record] = {}
         self._pending: dict[str, Hdf5Table] = {}
@@ -62,7 +61,7 @@ class Cache:
         return len(self._records)
 
     def records(self) -> list[Record]:
-        """All evaluations, oldest first."""
+        """All evaluations in the file, oldest first."""
         return list(self._records.values())
 
     def get(self, key: str) -> Record | None:
@@ -116,12 +115,12 @@ class Cache:
 
     def attributes(self) -> dict[str, Mapping[str, Any]]:
         """The attributes of all tables by name, stored or waiting for the next fold."""
-        found: dict[str, Mapping[str, Any]] = {}
+        stored: dict[str, Mapping[str, Any]] = {}
         with locked(self._lock, exclusive=False):
             if status(self.path) is not None:
                 with hdf5_store.opened(self.path) as file:
-                    found = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
-        return found | {name: table.attrs for name, table in self._pending.items()}
+                    stored = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
+        return stored | {name: table.attrs for name, table in self._pending.items()}
 
     def tables(self) -> list[str]:
         """Names of all tables, stored or waiting for the next fold."""
@@ -144,28 +143,28 @@ class Cache:
             self._fold(damaged=False)
 
     def close(self) -> None:
-        """Fold."""
+        """Fold what is waiting into the HDF5 file."""
         self.fold()
 
     def _fold(self, *, damaged: bool = True) -> None:
         old = None if status(self.path) is None else self.path
         replace_file(self.path, hdf5_store.image(old, self.records(), self._pending, damaged))
         self._journal.clear()
-        self._pending, self._version, self._end, self._frames = {}, _version(self.path), 0, 0
+        self._pending, self._version, self._end, self._frames = {}, file_version(self.path), 0, 0
 
     def _refresh(self) -> None:
-        version = _version(self.path)
+        version = file_version(self.path)
         if version != self._version or self._journal.size() < self._end:
             self._records, self._end, self._frames, self._version = {}, 0, 0, version
             if version is not None:
                 with hdf5_store.opened(self.path) as file:
                     self._take(*hdf5_store.read_rows(file))
         first = self._end == 0
-        found = self._journal.read(self._end)
-        self._take(*_evaluations(found))
-        self._end, self._frames = found.end, self._frames + len(found.payloads)
+        scanned = self._journal.read(self._end)
+        self._take(*journal_records(scanned))
+        self._end, self._frames = scanned.end, self._frames + len(scanned.payloads)
         mark = Mark.read(self._lock) if first else None
-        if mark is not None and (cut := mark.cut(version, found)):
+        if mark is not None and (cut := mark.cut(version, scanned)):
             warnings.warn(f"{self.path}: {cut}; what is lost will be run again", RuntimeWarning, stacklevel=4)
 
     def _take(self, records: Sequence[Record], damaged: Sequence[str]) -> None:
@@ -176,24 +175,24 @@ class Cache:
             warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
-def _files(path: str | Path) -> tuple[Path, Path, Path]:
+def cache_files(path: str | Path) -> tuple[Path, Path, Path]:
     """The HDF5 file, its journal and its lock."""
     path = Path(path)
     must(bool(path.name), "cache file", "a file", str(path))
     return path, path.with_name(f"{path.name}.journal"), path.with_name(f"{path.name}.lock")
 
 
-def _version(path: Path) -> tuple[int, ...] | None:
+def file_version(path: Path) -> tuple[int, ...] | None:
     """What tells one state of the HDF5 file from another; None where there is none."""
     there = status(path)
     return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
 
 
-def _evaluations(found: Scan) -> tuple[list[Record], list[str]]:
+def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
     """The evaluations in a stretch of journal, and a description of each thing in it that is none."""
     records = []
-    damaged = [f"journal, byte {offset}: not a whole record" for offset in found.damaged]
-    for number, payload in enumerate(found.payloads):
+    damaged = [f"journal, byte {offset}: not a whole record" for offset in scanned.damaged]
+    for number, payload in enumerate(scanned.payloads):
         try:
             records.append(Record.parse(payload))
         except ValueError:
@@ -201,31 +200,9 @@ def _evaluations(found: Scan) -> tuple[list[Record], list[str]]:
     return records, damaged
 
 
-@dataclass(frozen=True)
-class VerifyReport:
-    """What verify found. rows, journal : whole records in the HDF5 file and in the journal.
-
-    damaged : every row, table or stretch of journal that is not what was written, or has been cut off.
-    torn : bytes of an unfinished record at the journal's end (a killed writer; harmless).
-    duplicates : records stored more than once (a kill during a fold; harmless).
-    conflicts : keys stored with different fitnesses: the evaluation is not reproducible.
-    """
-
-    rows: int
-    journal: int
-    damaged: list[str]
-    torn: int
-    duplicates: int
-    conflicts: list[str]
-
-    @property
-    def ok(self) -> bool:
-        """Nothing damaged and nothing in conflict."""
-        return not self.damaged and not self.conflicts
-
-
-def _existing(path: str | Path) -> tuple[Path, Path, Path]:
-    file, journal, lock = _files(path)
+def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
+    """As ``cache_files``, of a cache that is there already. InputError if there is no such file."""
+    file, journal, lock = cache_files(path)
     there = status(file) or status(journal)
     must(there is not None, "cache file", "an existing file", str(path))
     return file, journal, lock
@@ -233,49 +210,4 @@ def _existing(path: str | Path) -> tuple[Path, Path, Path]:
 
 def existing(path: str | Path) -> Cache:
     """The cache of a file that is there already. InputError if there is no such file."""
-    return Cache(_existing(path)[0])
-
-
-def verify(path: str | Path) -> VerifyReport:
-    """Check every row, table and journal frame of an existing cache file; changes nothing.
-
-    InputError if the file does not exist, is cut short or is not a cache's.
-    """
-    path, journal, lock = _existing(path)
-    with locked(lock, exclusive=False):
-        rows: list[Record] = []
-        damaged: list[str] = []
-        version = _version(path)
-        if version is not None:
-            with hdf5_store.opened(path) as file:
-                rows, damaged = hdf5_store.read_rows(file)
-                bad = hdf5_store.damaged_tables(file)
-                damaged += [f"table {name}: its checksum does not fit" for name in bad]
-        found, mark = Journal(journal).read(), Mark.read(lock)
-    frames, none = _evaluations(found)
-    cut = None if mark is None else mark.cut(version, found)
-    damaged += [*none, *([cut] if cut else [])]
-    first: dict[str, Record] = {}
-    for record in (*rows, *frames):
-        first.setdefault(record.key, record)
-    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(first[r.key].values)}
-    return VerifyReport(
-        rows=len(rows),
-        journal=len(frames),
-        damaged=damaged,
-        torn=found.torn,
-        duplicates=len(rows) + len(frames) - len(first),
-        conflicts=sorted(conflicts),
-    )
-
-
-def compact(path: str | Path) -> int:
-    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept.
-
-    A file that is damaged as a whole is kept as FILE.damaged; FILE then has what could be read of it.
-    """
-    file, _, lock = _existing(path)
-    salvage.mend(file, lock)
-    cache = Cache(file)
-    cache.compact()
-    return len(cache)
+    return Cache(existing_files(path)[0])

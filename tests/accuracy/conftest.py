@@ -5,9 +5,9 @@ import os
 import pytest
 
 from tests.scenes import compiled
-from tisim.accuracy.timing import Bench
+from tisim.accuracy.timing import SimulationCache
 
-READY = Bench.ready
+READY = SimulationCache.compiled
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -16,12 +16,14 @@ def shared():
     if os.environ.get("TISIM_TEST_PRECISION", "f64") != "f64":
         pytest.skip("a study starts f64 anew, and all that is compiled in f32 would be lost")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Bench, "ready", lambda self, scene, worlds: compiled(scene, worlds, scene.capacity()))
-        patch.setattr(Bench, "close", lambda self: None)
+        patch.setattr(
+            SimulationCache, "compiled", lambda self, scene, worlds: compiled(scene, worlds, scene.capacity())
+        )
+        patch.setattr(SimulationCache, "close", lambda self: None)
         yield
 
 
 @pytest.fixture
 def own(monkeypatch):
-    """A bench keeps what it has made, as it does outside of tests."""
-    monkeypatch.setattr(Bench, "ready", READY)
+    """A cache keeps the simulations that it has made, as it does outside of tests."""
+    monkeypatch.setattr(SimulationCache, "compiled", READY)

@@ -5,7 +5,7 @@ import pytest
 
 from cases.agglomeration import scene as agglomeration
 from cases.blast import scene as blast
-from cases.case import every, find
+from cases.case import every
 from cases.vibration import scene as vibration
 from tests.scenes import simulate
 from tisim import Box, Particles
@@ -18,23 +18,25 @@ from tisim.sources import ElectricField
 def test_every_size_of_every_case_says_what_is_compared(name):
     case = every()[name]
     for size in case.sizes:
-        found = case.quantities(case.scene(size, 0))
-        assert found
-        assert len({quantity.random for quantity in found}) == 1
-        assert len({quantity.name for quantity in found}) == len(found)
+        quantities = case.quantities(case.scene(size, 0))
+        assert quantities
+        assert len({quantity.random for quantity in quantities}) == 1
+        assert len({quantity.name for quantity in quantities}) == len(quantities)
 
 
 def test_paths_that_are_chaotic_are_not_compared():
-    assert [q.random for q in find("blast").quantities(blast.scene())] == [False]
-    assert [q.random for q in find("blast").quantities(blast.scene(contact=True))] == [True]
-    assert [q.random for q in find("agglomeration").quantities(agglomeration.scene_for("small", 0))] == [True]
+    assert [q.random for q in every()["blast"].quantities(blast.scene())] == [False]
+    assert [q.random for q in every()["blast"].quantities(blast.scene(contact=True))] == [True]
+    assert [q.random for q in every()["agglomeration"].quantities(agglomeration.scene_for("small", 0))] == [
+        True
+    ]
 
 
 @pytest.mark.long
 def test_the_array_follows_its_closed_form():
     """Of a single particle, and of the array's centre whatever the near field."""
     scene = vibration.scene(near_field="none", sites=2, duration=0.004)
-    positions, centre = find("vibration").quantities(scene)
+    positions, centre = every()["vibration"].quantities(scene)
     (result,) = simulate([scene], capacity=8)
     for quantity in (positions, centre):
         truth = closed_form(quantity, result)
@@ -46,11 +48,11 @@ def test_the_array_follows_its_closed_form():
 
 
 def test_a_closed_form_is_claimed_only_where_it_holds():
-    def known(scene):
-        return [q.exact is not None for q in find("vibration").quantities(scene)]
+    def closed_forms(scene):
+        return [q.exact is not None for q in every()["vibration"].quantities(scene)]
 
-    assert known(vibration.scene(near_field="none")) == [True, True]
-    assert known(vibration.scene()) == [False, True]
+    assert closed_forms(vibration.scene(near_field="none")) == [True, True]
+    assert closed_forms(vibration.scene()) == [False, True]
     for change in (
         {"effects.electric_field.constant": [1.0, 0.0, 0.0]},
         {"effects.electric_field.amplitude": [0.1, 0.1, 0.0]},
@@ -59,7 +61,7 @@ def test_a_closed_form_is_claimed_only_where_it_holds():
         {"particles.mean_velocity": [1.0, 0.0, 0.0]},
         {"particles.deviation": [0.0, 1e-3, 0.0]},
     ):
-        assert known(vibration.scene().replace(change)) == [False, False], change
+        assert closed_forms(vibration.scene().replace(change)) == [False, False], change
     rest = vibration.scene(near_field="none", sites=2)
     arrays = rest.particles.arrays(rest.domain, 0)
     for change, holds in (
@@ -71,8 +73,8 @@ def test_a_closed_form_is_claimed_only_where_it_holds():
         values = {**arrays, **change}
         given = {name: values.pop(name) for name in ("position", "velocity", "radius", "mass")}
         start = Particles(**given, quantities=values)
-        assert known(rest.model_copy(update={"particles": start})) == [holds, holds], change
+        assert closed_forms(rest.model_copy(update={"particles": start})) == [holds, holds], change
     around = Box(low=(-1.0,) * 3, high=(1.0,) * 3)
-    assert known(rest.model_copy(update={"domain": around})) == [False, False]
+    assert closed_forms(rest.model_copy(update={"domain": around})) == [False, False]
     bare = vibration.scene().model_copy(update={"effects": (ElectricField(),)})
-    assert known(bare) == [False, False]
+    assert closed_forms(bare) == [False, False]

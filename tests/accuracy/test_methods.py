@@ -55,39 +55,39 @@ class Patchy(Trap):
     accuracy_parameters = (AccuracyParameter(grain=2),)
 
 
-def found(scene, precisions=("f64",)):
+def methods_of(scene, precisions=("f64",)):
     return {m.name: m for m in methods(scene, 0.1, 1.0, LEVELS, precisions, 1)}
 
 
 def test_a_new_stepper_and_its_control_say_themselves_what_to_turn(monkeypatch):
     monkeypatch.setattr(Sharp, "wanted", True)
-    line = found(oscillator())["Sharp, Pace: error"]
+    line = methods_of(oscillator())["Sharp, Pace: error"]
     assert [s.scene.stepper.control.error for s in line.settings] == [1e-4, 1e-5, 1e-6]
     assert [s.scene.stepper.control.dt for s in line.settings] == [0.1] * 3
-    assert [s.words for s in line.settings] == ["error=0.0001", "error=1e-05", "error=1e-06"]
+    assert [s.description for s in line.settings] == ["error=0.0001", "error=1e-05", "error=1e-06"]
     # It is the reference then, being of the highest order, and the scene's own is its check.
-    made = attempts(list(found(oscillator()).values()), 0.0)
-    assert [attempt.name for attempt in made] == ["Sharp, Pace"] * 2 + ["Verlet, FixedStep"] * 2
-    assert [attempt.scene.stepper.control.error for attempt in made[:2]] == [1e-8, 1e-7]
-    assert made[2].scene.stepper.control.dt == pytest.approx(oscillator().stepper.control.dt / 10)
+    references = attempts(list(methods_of(oscillator()).values()), 0.0)
+    assert [attempt.name for attempt in references] == ["Sharp, Pace"] * 2 + ["Verlet, FixedStep"] * 2
+    assert [attempt.scene.stepper.control.error for attempt in references[:2]] == [1e-8, 1e-7]
+    assert references[2].scene.stepper.control.dt == pytest.approx(oscillator().stepper.control.dt / 10)
 
 
 def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
     scene = oscillator().model_copy(update={"effects": (Patchy(stiffness=1.0),)})
-    line = found(scene)["patchy: grain"]
+    line = methods_of(scene)["patchy: grain"]
     assert [s.scene.effects[0].grain for s in line.settings] == [1e-2, 3.16e-3, 1e-3]
     assert not line.converges
     assert finest(scene, -2).effects[0].grain == pytest.approx(1e-4)
     assert finest(scene, -2).stepper == scene.stepper
-    reference, *_ = attempts(list(found(scene).values()), 0.0)
+    reference, *_ = attempts(list(methods_of(scene).values()), 0.0)
     assert reference.scene.effects[0].grain == pytest.approx(1e-4)
     assert reference.scene.stepper == reference.method.at(-2).stepper
 
 
 def test_the_scenes_own_method_is_first_and_in_other_precisions_too():
-    names = list(found(oscillator(), ("f64", "f32")))
+    names = list(methods_of(oscillator(), ("f64", "f32")))
     assert names[:2] == ["Verlet, FixedStep: dt", "Verlet, FixedStep: dt, f32"]
-    single = found(oscillator(), ("f64", "f32"))[names[1]].settings[0]
+    single = methods_of(oscillator(), ("f64", "f32"))[names[1]].settings[0]
     assert options(oscillator(), single.scene, single.precision)[-2:] == ["--precision", "f32"]
 
 
@@ -95,7 +95,7 @@ def test_only_what_suits_a_scene_is_tried():
     """No magnetic field: no Boris. A force of velocity: no Verlet. No force: nothing implicit."""
 
     def tried(scene):
-        return {type(method.base.stepper).__name__ for method in found(scene).values()}
+        return {type(method.base.stepper).__name__ for method in methods_of(scene).values()}
 
     assert {"Verlet", "Trapezoid"} <= tried(oscillator())
     assert "Boris" not in tried(oscillator())
@@ -120,7 +120,7 @@ def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_choo
         temperature=298.0, viscosity=1e-3, control=DriftLimit(longest=1e-3), hydrodynamics="rotne-prager",
         noise="fast",
     )  # fmt: skip
-    names = list(found(oscillator().model_copy(update={"stepper": fluid})))
+    names = list(methods_of(oscillator().model_copy(update={"stepper": fluid})))
     exact, fast = (
         "Brownian(hydrodynamics='rotne-prager')",
         "Brownian(hydrodynamics='rotne-prager', noise='fast')",
@@ -132,29 +132,29 @@ def test_exact_noise_is_tried_against_fast_and_a_method_is_named_by_what_it_choo
 def test_a_cut_off_is_tried_against_the_law_that_has_none():
     law = NearField(alpha1=1.0, alpha2=2.0, beta2=3)
     scene = oscillator().model_copy(update={"effects": (law,)})
-    cuts = [s.scene.effects[0] for s in found(scene)["TruncatedNearField"].settings]
+    cuts = [s.scene.effects[0] for s in methods_of(scene)["TruncatedNearField"].settings]
     assert all(type(cut) is TruncatedNearField for cut in cuts)
     assert [cut.cutoff for cut in cuts] == [0.1, 0.2, 0.5, 1.0]
     assert {(cut.alpha1, cut.alpha2, cut.beta2) for cut in cuts} == {(1.0, 2.0, 3)}
-    words = options(scene, found(scene)["TruncatedNearField"].settings[0].scene)
-    assert words[:2] == ["--without", "near_field"]
+    arguments = options(scene, methods_of(scene)["TruncatedNearField"].settings[0].scene)
+    assert arguments[:2] == ["--without", "near_field"]
     table = "{alpha1 = 1.0, alpha2 = 2.0, beta2 = 3, cutoff = 0.1}"
-    assert words[2:] == ["--set", f"effects.truncated_near_field={table}"]
+    assert arguments[2:] == ["--set", f"effects.truncated_near_field={table}"]
     changed = scene.without("near_field")
     assert changed.replace({"effects.truncated_near_field": cuts[0].model_dump()}).effects == (cuts[0],)
     # One that a scene asks for is its law.
-    assert "TruncatedNearField" not in found(scene.model_copy(update={"effects": (cuts[0],)}))
+    assert "TruncatedNearField" not in methods_of(scene.model_copy(update={"effects": (cuts[0],)}))
 
 
 def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():
     law = MutualInducedMoment(susceptibility=2.0)
     scene = oscillator().model_copy(update={"effects": (MagneticField(), law)})
-    alone, once = found(scene)["InducedMoment"].settings
-    assert [setting.words for setting in (alone, once)] == ["InducedMoment", "sweeps=0"]
+    alone, once = methods_of(scene)["InducedMoment"].settings
+    assert [setting.description for setting in (alone, once)] == ["InducedMoment", "sweeps=0"]
     assert alone.scene.effects[1] == InducedMoment(susceptibility=2.0)
-    words = options(scene, alone.scene)
-    assert words[:2] == ["--without", "mutual_induced_moment"]
-    assert words[2:] == ["--set", "effects.induced_moment={susceptibility = 2.0}"]
+    arguments = options(scene, alone.scene)
+    assert arguments[:2] == ["--without", "mutual_induced_moment"]
+    assert arguments[2:] == ["--set", "effects.induced_moment={susceptibility = 2.0}"]
 
 
 def test_a_part_is_exchanged_in_its_place():
@@ -197,11 +197,11 @@ def test_wrong_settings_are_refused_before_anything_runs(settings, message):
 
 def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatch):
     monkeypatch.setattr(Sharp, "wanted", True)
-    made = attempts(list(found(oscillator()).values()), 0.0)
+    references = attempts(list(methods_of(oscillator()).values()), 0.0)
     number = Quantity("number", lambda result: result)
 
     def own(*values):
-        return compared(number, [[value] for value in values], made[: len(values)]).error
+        return compared(number, [[value] for value in values], references[: len(values)]).error
 
     assert own(1.0, 1.01) == pytest.approx(0.01)
     # The other one is as far off as its own two settings are apart.
@@ -255,9 +255,9 @@ def test_a_law_that_changes_nothing_is_not_chosen():
 
 def pictured(*rows):
     """Labels of the legend, and the limits of the errors, of a study that has found this."""
-    made = Study(oscillator(), (KNOWN,))
-    made.rows = list(rows)
-    figure = picture(made)
+    cost_study = Study(oscillator(), (KNOWN,))
+    cost_study.rows = list(rows)
+    figure = picture(cost_study)
     (legend,) = figure.legends
     return [" ".join(text.get_text().split()) for text in legend.get_texts()], figure.axes[0].get_ylim()
 
@@ -281,17 +281,17 @@ def test_a_picture_of_large_errors_is_not_blank():
 
 
 def test_nothing_found_is_told_in_words():
-    made = Study(oscillator(), (KNOWN,))
-    made.rows = [row("good", 1.0, 1e-3, 1e-4)]
-    with pytest.raises(RunError) as told:
-        made.cheapest(1e-4)
-    assert str(told.value) == (
+    cost_study = Study(oscillator(), (KNOWN,))
+    cost_study.rows = [row("good", 1.0, 1e-3, 1e-4)]
+    with pytest.raises(RunError) as error:
+        cost_study.cheapest(1e-4)
+    assert str(error.value) == (
         "error of known must be at least 1.1e-03, the least that was reached (good, ; finer settings go "
         "further); received 0.0001"
     )
-    made.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
+    cost_study.rows = [Row("never", "", "", "", "f64", 1, failed="a quantity is not finite")]
     with pytest.raises(RunError, match=r"there is none: a quantity is not finite"):
-        made.cheapest(1.0)
+        cost_study.cheapest(1.0)
 
 
 def test_the_table_fits_80_columns_and_cuts_no_number():
@@ -299,10 +299,12 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
     many = {"seconds": (0.05,), "steps": 123456.0, "sums": 1234567.0, "rejections": 12345.0}
     long = Row("Long", "error=1e-04, tolerance=1e-05", "", "", "f64", 1, errors=((1.2e-4, 0.0),) * 2, **many)
     failed = Row("Long", "error=1e-05", "", "", "f64", 1, failed="a quantity is not finite")
-    made = Study(oscillator(), [replace(KNOWN, name=name) for name in ("positions", "centre of gravity")])
-    made.rows = [long, failed]
+    cost_study = Study(
+        oscillator(), [replace(KNOWN, name=name) for name in ("positions", "centre of gravity")]
+    )
+    cost_study.rows = [long, failed]
     console = Console(width=80, file=io.StringIO())
-    console.print(made.table())
+    console.print(cost_study.table())
     lines = console.file.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
     (whole,) = [line for line in lines if "1.2e-04" in line]

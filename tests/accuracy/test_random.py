@@ -26,13 +26,13 @@ def drifts():
 def test_the_interval_covers_the_true_mean_as_often_as_it_says(drifts):
     """95 % of 60: fewer than 51 happens once in 2000 times, all 60 in 5 % of them."""
     groups = [drifts[k : k + STARTS] for k in range(0, len(drifts), STARTS)]
-    found = [estimate(ENERGY, group) for group in groups]
-    covered = sum(abs(one.value[0] - energy()) <= one.uncertainty for one in found)
+    estimates = [estimate(ENERGY, group) for group in groups]
+    covered = sum(abs(one.value[0] - energy()) <= one.uncertainty for one in estimates)
     assert 51 <= covered < ENSEMBLES
     # Student's t for 7 degrees of freedom is 2.365; v^2 = (m + d x)^2 has the variance below.
     variance = 4 * MEAN**2 * DEVIATION**2 / 3 + 4 * DEVIATION**4 / 45
     half = 2.365 * 0.5 * GRAIN * np.sqrt(GRAINS * variance / STARTS)
-    assert np.mean([one.uncertainty for one in found]) == pytest.approx(half, rel=0.1)
+    assert np.mean([one.uncertainty for one in estimates]) == pytest.approx(half, rel=0.1)
 
 
 def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
@@ -45,30 +45,30 @@ def test_the_interval_of_several_components_is_that_of_their_distance(drifts):
 @pytest.mark.slow
 def test_more_starts_buy_a_smaller_error(drifts):
     """The error that is certain falls as the square root of the starts, and bounds the true one."""
-    found = Study(drift(), (ENERGY,), precisions=("f64",), repeats=1, starts=(8, len(drifts)), coarser=0)
-    found.run()
-    few, many = found.line("random starts")
+    cost_study = Study(drift(), (ENERGY,), precisions=("f64",), repeats=1, starts=(8, len(drifts)), coarser=0)
+    cost_study.run()
+    few, many = cost_study.line("random starts")
     assert (few.starts, many.starts) == (8, len(drifts))
     for row in (few, many):
         error, uncertainty = row.errors[0]
         assert error < 2 * uncertainty
     gain = few.errors[0][1] / many.errors[0][1]
     assert gain == pytest.approx(np.sqrt(len(drifts) / 8), rel=0.35)
-    assert found.truths[0].estimate.value[0] == pytest.approx(energy())
-    assert found.cheapest(many.at_most()).starts == len(drifts)
+    assert cost_study.truths[0].estimate.value[0] == pytest.approx(energy())
+    assert cost_study.cheapest(many.at_most()).starts == len(drifts)
     # Other settings are run from the largest number of starts, the same ones.
-    assert [row.errors for row in found.line("Verlet, FixedStep: dt")] == [many.errors]
+    assert [row.errors for row in cost_study.line("Verlet, FixedStep: dt")] == [many.errors]
 
 
 def test_a_random_reference_is_no_better_than_its_starts(drifts):
     """The interval of its own mean counts, though the runs that check it agree to the last digit."""
     unknown = Quantity("kinetic energy", kinetic_energy, random=True)
-    made = attempts(methods(drift(), 0.05, 1.0, (0.0,), ("f64",), 1), 0.0)
-    truth = compared(unknown, [drifts, drifts], made[:2])
+    references = attempts(methods(drift(), 0.05, 1.0, (0.0,), ("f64",), 1), 0.0)
+    truth = compared(unknown, [drifts, drifts], references[:2])
     assert truth.estimate.uncertainty == estimate(unknown, drifts).uncertainty > 0
     # A stepper that errs, the same in every start, is not hidden by that interval.
     half = drifts[: len(drifts) // 2]
-    bias = compared(unknown, [drifts, half], made[:2]).estimate.uncertainty - truth.estimate.uncertainty
+    bias = compared(unknown, [drifts, half], references[:2]).estimate.uncertainty - truth.estimate.uncertainty
     apart = estimate(unknown, half).value - truth.estimate.value
     assert bias == pytest.approx(np.linalg.norm(apart))
     assert bias > 0

@@ -16,7 +16,7 @@ from tests.steppers.charged import charged
 from tisim import InputError, Result, RunError, Status
 from tisim.accuracy import Quantity, Study, storage, study
 from tisim.accuracy.quantity import displacement
-from tisim.accuracy.timing import Bench, Timed
+from tisim.accuracy.timing import SimulationCache, Timed
 from tisim.backend import runtime
 from tisim.cli import scene_arguments
 from tisim.steppers import Boris, Collocation, ErrorControl, FixedStep, IterationControl, Trapezoid, Verlet
@@ -36,9 +36,9 @@ def measured():
     """The oscillator, its place compared with the closed form and with a reference."""
     with pytest.MonkeyPatch.context() as patch:
         only(patch, Verlet, Trapezoid)
-        found = Study(oscillator(), (KNOWN, UNKNOWN), precisions=("f64",), repeats=2)
-        found.run()
-    return found
+        cost_study = Study(oscillator(), (KNOWN, UNKNOWN), precisions=("f64",), repeats=2)
+        cost_study.run()
+    return cost_study
 
 
 def order(rows):
@@ -80,9 +80,9 @@ def test_work_is_that_of_the_steppers(measured):
 def test_rejections_are_counted_as_the_sums_of_the_stepper_are():
     """Steps that independent particles take by themselves are shared out; steps of all are not."""
     for stepper, expected in ((Trapezoid(), 3.0), (Collocation(), 6.0)):
-        made = oscillator().model_copy(update={"stepper": stepper})
+        scene = oscillator().model_copy(update={"stepper": stepper})
         work = {"particle_steps": 20, "force_evaluations": 40, "rejections": 6}
-        pair = Result(made, {}, {"mass": np.ones(2)}, DURATION, work, Status(True, ""), 0.0)
+        pair = Result(scene, {}, {"mass": np.ones(2)}, DURATION, work, Status(True, ""), 0.0)
         assert Timed([pair], 1.0).work == (10.0, expected * 40 / 6, expected)
 
 
@@ -93,10 +93,10 @@ def test_the_reference_is_no_worse_than_it_says(measured):
     assert measured.truths[0].error == 0.0
     assert 0 < off <= measured.truths[1].error
     for row in measured.rows:
-        (true, sure), (found, unsure) = row.errors
+        (true, sure), (error, unsure) = row.errors
         assert sure == 0.0
         assert unsure == pytest.approx(measured.truths[1].error, rel=1e-3)
-        assert abs(true - found) <= unsure
+        assert abs(true - error) <= unsure
         assert row.trusted(1)
     assert measured.truths[1].error < 20 * off
 
@@ -113,18 +113,18 @@ def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypat
         return np.array([[np.sin(w * t), np.cos(w * t) - 1.0, 0.0]]) / w
 
     known = type(KNOWN)("known", displacement, exact)
-    found = Study(circle, (known, UNKNOWN), precisions=("f64",), repeats=1, coarser=1)
-    found.run()
-    off = np.linalg.norm(found.truths[1].estimate.value - found.truths[0].estimate.value)
-    off /= np.linalg.norm(found.truths[0].estimate.value)
-    assert off <= found.truths[1].error < 100 * off
+    cost_study = Study(circle, (known, UNKNOWN), precisions=("f64",), repeats=1, coarser=1)
+    cost_study.run()
+    off = np.linalg.norm(cost_study.truths[1].estimate.value - cost_study.truths[0].estimate.value)
+    off /= np.linalg.norm(cost_study.truths[0].estimate.value)
+    assert off <= cost_study.truths[1].error < 100 * off
     # Those that go far in one line: the paper's control turned one setting at a time.
-    names = {row.method.partition(": ")[2] for row in found.rows}
+    names = {row.method.partition(": ")[2] for row in cost_study.rows}
     assert names == {"longest, tolerance", "longest", "tolerance", "dt"}
     # The tolerance alone does not take the error of the rule away: dt_lim bounds it.
-    bounded = [row.errors[0][0] for row in found.line("Trapezoid, IterationControl: tolerance")]
+    bounded = [row.errors[0][0] for row in cost_study.line("Trapezoid, IterationControl: tolerance")]
     assert bounded[1] > bounded[0] / 2
-    assert order(found.line("Boris, FixedStep: dt")) == pytest.approx(2, abs=0.05)
+    assert order(cost_study.line("Boris, FixedStep: dt")) == pytest.approx(2, abs=0.05)
 
 
 def test_the_cheapest_setting_is_the_cheapest(measured):
@@ -149,9 +149,9 @@ def test_words_and_python_of_a_row_make_its_scene(measured):
     names["IterationControl"] = IterationControl
     for row in measured.rows:
         stepper = eval(row.python, names)
-        words = shlex.split(row.options)
-        assert words[::2] == ["--set"] * (len(words) // 2)
-        assert measured.scene.replace(scene_arguments.assignments(words[1::2])).stepper == stepper
+        arguments = shlex.split(row.options)
+        assert arguments[::2] == ["--set"] * (len(arguments) // 2)
+        assert measured.scene.replace(scene_arguments.assignments(arguments[1::2])).stepper == stepper
         asked = row.setting.split(", ")[0].split("=")
         assert getattr(stepper.control, asked[0]) == pytest.approx(float(asked[1]), rel=5e-3)
 
@@ -191,24 +191,24 @@ def verlet_only(monkeypatch):
 
 
 def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
-    run = Bench.run
+    run = SimulationCache.run
 
     def brittle(self, scenes, *more):
         if scenes[0].stepper.control.dt > 0.02:
             raise RunError("a quantity is not finite")
         return run(self, scenes, *more)
 
-    monkeypatch.setattr(Bench, "run", brittle)
-    found = study(oscillator(), (KNOWN,), precisions=("f64",))
-    assert [row.failed for row in found.rows] == ["a quantity is not finite", "", "", ""]
-    assert [len(row.seconds) for row in found.rows] == [0, 3, 3, 3]
-    assert found.complete
-    assert found.cheapest(1.0) in found.rows[1:]
-    assert "not finite" in printed(found)
+    monkeypatch.setattr(SimulationCache, "run", brittle)
+    cost_study = study(oscillator(), (KNOWN,), precisions=("f64",))
+    assert [row.failed for row in cost_study.rows] == ["a quantity is not finite", "", "", ""]
+    assert [len(row.seconds) for row in cost_study.rows] == [0, 3, 3, 3]
+    assert cost_study.complete
+    assert cost_study.cheapest(1.0) in cost_study.rows[1:]
+    assert "not finite" in printed(cost_study)
 
 
 def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
-    run, runs = Bench.run, []
+    run, runs = SimulationCache.run, []
 
     def stopped(self, scenes, *more):
         runs.append(scenes[0].stepper.control.dt)
@@ -216,24 +216,24 @@ def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
             raise KeyboardInterrupt
         return run(self, scenes, *more)
 
-    monkeypatch.setattr(Bench, "run", stopped)
-    found = Study(oscillator(), (KNOWN,), precisions=("f64",))
+    monkeypatch.setattr(SimulationCache, "run", stopped)
+    cost_study = Study(oscillator(), (KNOWN,), precisions=("f64",))
     with pytest.raises(KeyboardInterrupt):
-        found.run()
-    assert [(row.setting, len(row.seconds)) for row in found.rows] == [("dt=0.0316", 3), ("dt=0.01", 1)]
-    assert not found.complete
+        cost_study.run()
+    assert [(row.setting, len(row.seconds)) for row in cost_study.rows] == [("dt=0.0316", 3), ("dt=0.01", 1)]
+    assert not cost_study.complete
 
 
-def printed(found):
+def printed(cost_study):
     console = Console(width=120, file=io.StringIO())
-    console.print(found.table())
+    console.print(cost_study.table())
     return console.file.getvalue()
 
 
 def test_what_does_not_fit_the_budget_is_left_out(verlet_only):
-    found = study(oscillator(), (KNOWN,), precisions=("f64",), budget=1e-6)
-    assert found.rows == []
-    assert not found.complete
+    cost_study = study(oscillator(), (KNOWN,), precisions=("f64",), budget=1e-6)
+    assert cost_study.rows == []
+    assert not cost_study.complete
     with pytest.raises(RunError, match=r"the reference takes about \S+ s of running, more than the"):
         study(oscillator(), (UNKNOWN,), precisions=("f64",), budget=1e-6)
 
@@ -246,9 +246,9 @@ def test_nothing_to_compare_is_told(verlet_only):
 
 def test_single_precision_is_a_line_of_its_own_and_the_runtime_as_before(verlet_only):
     before = runtime.current()
-    found = study(oscillator(), (KNOWN,), precisions=("f64", "f32"), repeats=1, finer=2)
+    cost_study = study(oscillator(), (KNOWN,), precisions=("f64", "f32"), repeats=1, finer=2)
     assert runtime.current() == before
-    single, double = found.line("Verlet, FixedStep: dt, f32"), found.line("Verlet, FixedStep: dt")
+    single, double = cost_study.line("Verlet, FixedStep: dt, f32"), cost_study.line("Verlet, FixedStep: dt")
     assert [row.precision for row in single] == ["f32"] * 6
     # Rounding of f32 is met on the way to 1e-8, and not by f64.
     assert single[0].errors[0][0] == pytest.approx(double[0].errors[0][0], rel=1e-3)

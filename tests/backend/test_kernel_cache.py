@@ -65,8 +65,8 @@ def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
     assert kernel_cache.lock().name in warned(begin())
     left(age=2 * kernel_cache.STALE)
     assert warned(begin()) == ""
-    kept = [path for path in folder.rglob("*") if path.suffix in (".tic", ".qdc")]
-    assert len(kept) > 5
+    kernels = [path for path in folder.rglob("*") if path.suffix in (".tic", ".qdc")]
+    assert len(kernels) > 5
     # Now there is something to read: who starts while another process writes waits, however long that takes.
     with kernel_cache.alone():
         left(age=0.0)

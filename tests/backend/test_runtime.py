@@ -81,7 +81,7 @@ mine.close()
 assert (run(scene).state["position"] == 1).all()
 print("closed")
 del mine
-memory.WORN, before = 1, runtime.generation()
+memory.MAX_TREES_PER_START, before = 1, runtime.generation()
 for number in (9, 20, 45):
     at = np.zeros((number, 3))
     more = Particles(position=at, velocity=at + 1, radius=1.0, mass=1.0)
@@ -192,14 +192,14 @@ def test_trees_that_are_forgotten_are_destroyed():
 
 def test_too_many_trees_are_refused(monkeypatch):
     """Before Taichi crashes, at 512."""
-    monkeypatch.setattr(memory, "MOST", len(memory.in_use()) + 3)
-    kept = [tree() for _ in range(3)]
+    monkeypatch.setattr(memory, "MAX_TREES", len(memory.in_use()) + 3)
+    trees = [tree() for _ in range(3)]
     with pytest.raises(RunError, match=r"^at most \d+ sets of fields can be in use at once"):
         tree()
-    in_taichi_thread(kept[0][0].fill)(1.0)
-    kept[1][1].destroy()
-    kept.append(tree())
-    in_taichi_thread(kept[-1][0].fill)(2.0)
+    in_taichi_thread(trees[0][0].fill)(1.0)
+    trees[1][1].destroy()
+    trees.append(tree())
+    in_taichi_thread(trees[-1][0].fill)(2.0)
 
 
 @in_taichi_thread
@@ -214,10 +214,10 @@ def test_few_kernels_are_compiled_and_none_again():
     tisim.run(moving(1.0, (Trap(stiffness=2e-6, omega=1.0),)))
     tree()[1].destroy()
     Simulation(moving(1.0)).close()
-    made = kernels()
-    assert made - before < 24
+    compiled = kernels()
+    assert compiled - before < 24
     tisim.run(moving(2.0, (Trap(stiffness=2e-6, omega=1.0),)))
-    assert kernels() == made
+    assert kernels() == compiled
 
 
 def grains(number):
@@ -248,7 +248,7 @@ def test_rounded_sizes():
 def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
     """A simulation of somebody's goes on, however much has been compiled."""
     mine, before = Simulation(moving(1.0)), runtime.generation()
-    monkeypatch.setattr(memory, "WORN", 0)
+    monkeypatch.setattr(memory, "MAX_TREES_PER_START", 0)
     assert tisim.run(grains(9)).status.ok
     assert runtime.generation() == before
     mine.load([moving(1.0)])
@@ -258,7 +258,7 @@ def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
 GROWTH = """
 from tests.benchmarks.changing_structure import soak
 from tisim.backend import memory, runtime
-memory.WORN = 10
+memory.MAX_TREES_PER_START = 10
 sizes = [size for _, _, size in soak(40, 5)]
 print(runtime.generation(), *sizes)
 """

@@ -63,13 +63,15 @@ def main() -> None:
     asked.add_argument("--scenes", type=int, default=1000)
     asked.add_argument("--every", type=int, default=100)
     asked.add_argument("--threads", type=int, default=2)
-    asked.add_argument("--worn", type=int, default=memory.WORN, help="trees after which Taichi starts anew")
+    asked.add_argument(
+        "--worn", type=int, default=memory.MAX_TREES_PER_START, help="trees after which Taichi starts anew"
+    )
     given = asked.parse_args()
-    memory.WORN = given.worn
+    memory.MAX_TREES_PER_START = given.worn
     runtime.init(threads=given.threads)
     print(f"{runtime.backend()}\n{'scenes':>8}{'s each':>9}{'MB':>8}{'trees':>8}{'starts':>8}")
     for done, seconds, size in soak(given.scenes, given.every):
-        made, starts = memory.made(), runtime.generation()
+        made, starts = memory.trees_made(), runtime.generation()
         print(f"{done:8d}{seconds:9.2f}{size:8.0f}{made:8d}{starts:8d}", flush=True)
 
 

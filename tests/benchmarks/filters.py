@@ -44,7 +44,7 @@ CHANGES = {
 def main(starts):
     seeds = [start_seed(FRESH, k) for k in range(starts)]
     for variant, (found, changes) in CHANGES.items():
-        filters = problem(variant)
+        filters = problem(variant=variant)
         designs = [found, *({**found, **change} for change in changes.values())]
         results = run([filters.scene(design, seed) for design in designs for seed in seeds])
         part = np.reshape([captured(result) for result in results], (len(designs), starts))

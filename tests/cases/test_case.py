@@ -1,8 +1,10 @@
 """The contract of a case."""
 
+import inspect
+
 import pytest
 
-from cases.case import every
+from cases.case import Late, every
 from tisim import InputError
 
 INVERSE = [name for name, case in every().items() if case.problem]
@@ -14,5 +16,17 @@ def test_variants_are_those_of_the_inverse_problem(name):
     size = next(key for key, one in case.sizes.items() if one.search is not None)
     with pytest.raises(InputError, match=f"variant must be one of {', '.join(case.variants)}; received ''"):
         case.problem(size, "")
-    made = [case.problem(size, variant) for variant in case.variants]
-    assert len({problem.name for problem in made}) == len(made)
+    problems = [case.problem(size, variant) for variant in case.variants]
+    assert len({problem.name for problem in problems}) == len(problems)
+
+
+ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pictures": (None,),
+             "figures": ("default", None)}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", every())
+def test_what_a_case_imports_late_is_there_and_takes_what_it_is_called_with(name):
+    functions = {field: value for field, value in vars(every()[name]).items() if isinstance(value, Late)}
+    assert functions.keys() <= ARGUMENTS.keys()
+    for field, late in functions.items():
+        inspect.signature(late.function).bind(*ARGUMENTS[field])

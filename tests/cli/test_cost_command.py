@@ -45,7 +45,7 @@ def swing(tmp_path, monkeypatch):
 
 
 def rows(folder):
-    with (folder / storage.CSV).open(newline="") as file:
+    with (folder / storage.COST_CSV).open(newline="") as file:
         return list(csv.DictReader(file))
 
 

@@ -182,15 +182,15 @@ def test_four_normal_numbers_are_those_of_box_and_muller():
     draw = np.random.default_rng(2)
     ends = [[0] * 4, [ONES] * 4, [2, 3, 2**31, 2**30]]
     words = np.vstack([draw.integers(0, 2**32, (100_000, 4)), ends]).astype(np.uint32)
-    found = np.zeros((len(words), 4))
-    _normals(words, found)
+    normals = np.zeros((len(words), 4))
+    _normals(words, normals)
     for k in (0, 2):
         length = np.sqrt(-2 * np.log((words[:, k] + 0.5) / 2**32))
         angle = np.pi / 2 * ((words[:, k + 1] >> 2) + 0.5) / 2**30
         first, second = 1.0 - (words[:, k + 1] & 2), 1.0 - 2.0 * (words[:, k + 1] & 1)
-        np.testing.assert_allclose(found[:, k], length * first * np.cos(angle), rtol=0, atol=5e-11)
-        np.testing.assert_allclose(found[:, k + 1], length * second * np.sin(angle), rtol=0, atol=5e-11)
-    drawn = found[:-3]
+        np.testing.assert_allclose(normals[:, k], length * first * np.cos(angle), rtol=0, atol=5e-11)
+        np.testing.assert_allclose(normals[:, k + 1], length * second * np.sin(angle), rtol=0, atol=5e-11)
+    drawn = normals[:-3]
     for column in drawn.T:
         assert stats.kstest(column, "norm").pvalue > 0.01
     correlation = np.corrcoef(np.hstack([drawn, drawn**2]).T)

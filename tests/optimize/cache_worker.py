@@ -92,12 +92,12 @@ def announce():
     """Have each evaluation named on standard output when it is stored; who reads slowly holds it up."""
     put = Cache.put
 
-    def told(cache, record):
-        kept = put(cache, record)
+    def put_and_say(cache, record):
+        stored = put(cache, record)
         os.write(1, f"stored {record.key}\n".encode())
-        return kept
+        return stored
 
-    Cache.put = told
+    Cache.put = put_and_say
 
 
 class Asleep:
@@ -110,14 +110,14 @@ class Asleep:
 def asleep():
     """Two worker processes that are busy, and a parent that waits for them."""
     from optimize.evaluation.executors.processes import Processes
-    from optimize.evaluation.executors.worker import Wanted
+    from optimize.evaluation.executors.worker import WorkerSettings
 
     pool = Processes(2)
-    given = [pool.submit([Asleep()], Wanted()) for _ in range(2)]
+    futures = [pool.submit([Asleep()], WorkerSettings()) for _ in range(2)]
     while len(pool._crew) < 2:
         time.sleep(0.01)
     print("2 at work", flush=True)
-    given[0].result()
+    futures[0].result()
 
 
 def tisim(*arguments):
@@ -133,5 +133,5 @@ def tisim(*arguments):
 
 
 if __name__ == "__main__":
-    known = (write, stepwise, limited, search, asleep, tisim)
-    {function.__name__: function for function in known}[sys.argv[1]](*sys.argv[2:])
+    functions = (write, stepwise, limited, search, asleep, tisim)
+    {function.__name__: function for function in functions}[sys.argv[1]](*sys.argv[2:])

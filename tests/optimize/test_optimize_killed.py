@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from optimize.storage.cache import Cache, existing, verify
+from optimize.storage.cache import Cache, existing
+from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
 
 QUICK = ("drift",)
@@ -21,19 +22,19 @@ def begin(case, folder):
 
 def kill(search, rng):
     """SIGKILL at a random moment, mostly while evaluations are stored; the keys of those told stored."""
-    told = ""
+    output = ""
     if rng.random() < 0.25:
         time.sleep(rng.uniform(0.0, 2.0))  # while it starts, reads the file, compiles
     else:
         for _ in range(rng.randint(1, 40)):
-            told += search.stdout.readline()
+            output += search.stdout.readline()
         time.sleep(rng.uniform(0.0, 0.02))
     search.kill()
-    told += search.stdout.read()
-    return {line.split()[1] for line in told.splitlines(keepends=True) if line.endswith("\n")}
+    output += search.stdout.read()
+    return {line.split()[1] for line in output.splitlines(keepends=True) if line.endswith("\n")}
 
 
-def found(folder):
+def contents_of(folder):
     """All that a search has found: in its file, and in what it has written of its best designs."""
     cache = Cache(folder / "search.h5")
     tables = {name: cache.table(name).columns for name in cache.tables()}
@@ -48,7 +49,7 @@ def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
     with begin(case, tmp_path / "whole") as search:
         search.communicate()
     assert search.returncode == 0
-    whole = found(tmp_path / "whole")
+    whole = contents_of(tmp_path / "whole")
     folder = tmp_path / "cut"
     file = folder / "search.h5"
     rng = random.Random(kills)
@@ -63,14 +64,14 @@ def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
         report = verify(file)
         assert report.ok, report
         leftovers |= {name for name in ("journal", "torn", "duplicates") if getattr(report, name)}
-        kept = {record.key: record.payload() for record in existing(file).records()}
-        assert stored <= set(kept), number
-        assert {key: kept.get(key) for key in seen} == seen, number
-        seen = kept
+        records = {record.key: record.payload() for record in existing(file).records()}
+        assert stored <= set(records), number
+        assert {key: records.get(key) for key in seen} == seen, number
+        seen = records
     assert "journal" in leftovers, "killed within a generation"
     with begin(case, folder) as search:
         again = search.communicate()[0].count("stored ")
     assert search.returncode == 0
     assert again == len(whole[2]) - len(seen) > 0, "nothing is run twice"
-    assert found(folder) == whole
+    assert contents_of(folder) == whole
     assert verify(file).ok

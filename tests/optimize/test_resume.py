@@ -4,7 +4,8 @@ import pytest
 
 from optimize.search import search
 from optimize.settings import Settings
-from optimize.storage.cache import Cache, verify
+from optimize.storage.cache import Cache
+from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 
@@ -16,7 +17,7 @@ def run(path, evaluator):
         return search(fake_problem(3), evaluator, cache, SETTINGS)
 
 
-def found(outcome):
+def contents_of(outcome):
     return repr(list(outcome.logbook)), [(list(s), repr(s.estimates)) for s in outcome.hall]
 
 
@@ -35,7 +36,7 @@ def test_resume_after_interrupt_equals_never_interrupted(path, uninterrupted, af
     assert Cache(path).table(part.name).attrs["stopped"] == "interrupted"
     second = FakeEvaluator()
     whole = run(path, second)
-    assert found(whole) == found(uninterrupted)
+    assert contents_of(whole) == contents_of(uninterrupted)
     assert (whole.stopped, whole.interrupted) == ("generations", False)
     assert not set(first.ran) & set(second.ran), "nothing is evaluated twice"
     assert len(first.ran) + len(second.ran) == uninterrupted.evaluations
@@ -55,6 +56,6 @@ def test_resume_after_sigkill_equals_never_interrupted(path, uninterrupted):
     assert 0 < stored[-1] < uninterrupted.evaluations
     evaluator = FakeEvaluator()
     outcome = run(path, evaluator)
-    assert found(outcome) == found(uninterrupted)
+    assert contents_of(outcome) == contents_of(uninterrupted)
     assert len(evaluator.ran) == uninterrupted.evaluations - stored[-1]
     assert verify(path).duplicates == 0

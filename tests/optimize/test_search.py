@@ -8,11 +8,12 @@ import pytest
 
 from optimize.evaluation.ensemble import EnsembleSettings
 from optimize.evaluation.runs import start_seed
-from optimize.methods.breeding import GeneticOperator
+from optimize.methods.breeding_settings import GeneticOperator
 from optimize.search import search
 from optimize.search_records import searches
 from optimize.settings import Settings
-from optimize.storage.cache import Cache, verify
+from optimize.storage.cache import Cache
+from optimize.storage.maintenance import verify
 from tests.optimize.fake_runs import FakeEvaluator, bowl, fake_problem
 from tisim import InputError, RunError
 
@@ -41,16 +42,16 @@ def run(path, evaluator=None, genes=4, problem=None, callbacks=None, **settings)
 @pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
 def test_beats_random_search_at_equal_evaluations(tmp_path, settings):
     """In 10 dimensions, three seeds: the median best lies far below that of as many random points."""
-    found, chance = [], []
+    best, chance = [], []
     for seed in range(3):
         outcome = run(tmp_path / f"{seed}.h5", genes=10, seed=seed, **settings)
-        asked = sum(outcome.logbook.select("starts"))
-        assert 300 < asked <= 20 + 25 * 14  # strings that are bred twice are not run twice
-        points = np.random.default_rng(seed).random((asked, 10))
-        found.append(outcome.best.estimates[0].mean - 0.5)
+        requested = sum(outcome.logbook.select("starts"))
+        assert 300 < requested <= 20 + 25 * 14  # strings that are bred twice are not run twice
+        points = np.random.default_rng(seed).random((requested, 10))
+        best.append(outcome.best.estimates[0].mean - 0.5)
         chance.append(np.sum((points - 0.3) ** 2, axis=1).min())
-    assert np.median(found) < np.median(chance) / 5
-    assert max(found) < min(chance)
+    assert np.median(best) < np.median(chance) / 5
+    assert max(best) < min(chance)
 
 
 @pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])

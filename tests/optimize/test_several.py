@@ -20,8 +20,9 @@ from optimize.report.front import others
 from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage import hdf5_store
-from optimize.storage.cache import Cache, compact, existing, verify
+from optimize.storage.cache import Cache, existing
 from optimize.storage.journal import frame
+from optimize.storage.maintenance import compact, verify
 from optimize.storage.record import Record
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
@@ -45,10 +46,10 @@ def zdt1(design, seed, noise=0.0):
 
 
 def run(path, function=zdt1, evaluator=None, genes=3, **settings):
-    wish = Settings(**{"method": "nsga2", "seed": 1, "ensemble": ONE, "generations": 30, **settings})
+    wished = Settings(**{"method": "nsga2", "seed": 1, "ensemble": ONE, "generations": 30, **settings})
     problem = fake_problem(genes, objective=OBJECTIVES)
     with Cache(path) as cache:
-        return search(problem, evaluator or FakeEvaluator(function), cache, wish)
+        return search(problem, evaluator or FakeEvaluator(function), cache, wished)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +73,7 @@ def test_nsga2_finds_the_front_and_spreads_along_it(outcome):
 
 
 def test_front_is_what_nothing_dominates(outcome):
-    costs = [[estimate.mean for estimate in estimates] for estimates in outcome.seen.values()]
+    costs = [[estimate.mean for estimate in estimates] for estimates in outcome.estimates.values()]
     front, seen = values(outcome), np.array([outcome.problem.costs(each) for each in costs])
     better = (seen[:, None, 0] >= front[None, :, 0]) & (seen[:, None, 1] <= front[None, :, 1])
     strictly = (seen[:, None, 0] > front[None, :, 0]) | (seen[:, None, 1] < front[None, :, 1])
@@ -98,9 +99,9 @@ def test_hall_of_one_objective_keeps_the_best_different_ones():
     hall = Hall(2)
 
     def string(genes, cost):
-        made = Individual(genes)
-        made.know((FitnessEstimate(cost, 0.0, 0.0, 4, True, "" if cost < 9 else "failed"),))
-        return made
+        individual = Individual(genes)
+        individual.know((FitnessEstimate(cost, 0.0, 0.0, 4, True, "" if cost < 9 else "failed"),))
+        return individual
 
     assert hall.update([string([0.1], 3.0), string([0.1], 3.0), string([0.2], 2.0), string([0.3], 9.0)])
     assert [list(s) for s in hall.strings] == [[0.2], [0.1]]
@@ -126,7 +127,7 @@ def test_log_and_report(outcome, tmp_path):
     (axis,) = report.front_figure(outcome).axes
     shown = {bars.get_label(): bars.lines[0].get_xydata() for bars in axis.containers}
     np.testing.assert_array_equal(shown["front, 1 start"], values(outcome))
-    assert len(shown["other designs, 1 start"]) == len(outcome.seen) - len(outcome.hall)
+    assert len(shown["other designs, 1 start"]) == len(outcome.estimates) - len(outcome.hall)
     assert axis.get_xlabel() == "gain (1/s), more is better"
     assert imread(paths["front.png"]).std() > 0.01
 
@@ -142,10 +143,10 @@ def test_designs_of_few_starts_are_told_from_those_that_are_known(outcome):
 
     front, known, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
     front.fitness.values = (-0.5, 0.5)
-    made = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
-    made.seen = {tuple(string): string.estimates for string in (front, known, lucky)}
-    assert others(made) == ([known.estimates], [lucky.estimates])
-    (axis,) = report.front_figure(made).axes
+    other = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
+    other.estimates = {tuple(string): string.estimates for string in (front, known, lucky)}
+    assert others(other) == ([known.estimates], [lucky.estimates])
+    (axis,) = report.front_figure(other).axes
     lines = {bars.get_label(): bars for bars in axis.containers}
     assert list(lines) == [
         "other designs, 9 starts, 95 % intervals",

@@ -64,6 +64,8 @@ def test_no_room():
     with pytest.raises(InputError, match="length must be above a diameter"):
         RandomAroundCylinder(**{**CYLINDER, "length": 0.1}, part="side").centres(1, 0.1, Open(), 0)
     with pytest.raises(InputError, match=r"cloud.number must be at most what finds room around the cylinder"):
+        RandomAroundCylinder(**CYLINDER).centres(1500, 0.1, Open(), 0)
+    with pytest.raises(InputError, match=r"finds room around the cylinder, less than 1746; received 2000"):
         RandomAroundCylinder(**CYLINDER).centres(2000, 0.1, Open(), 0)
     with pytest.raises(InputError, match="axis must be a direction"):
         RandomAroundCylinder(**{**CYLINDER, "axis": (0.0, 0.0, 0.0)})

@@ -100,9 +100,9 @@ def test_blast_of_unequal_masses_starts_from_their_centre_of_mass():
 
 def test_charge_is_by_mass_or_for_each(ball):
     np.testing.assert_array_equal(ball["charge"], 10.0 * ball["mass"])
-    made = arrays(Cloud(**VIBRATION, quantities={"charge": 1.0, "spin": (0.0, 0.0, 3.0)}))
-    np.testing.assert_array_equal(made["charge"], np.ones(343))
-    np.testing.assert_array_equal(made["spin"], np.tile([0.0, 0.0, 3.0], (343, 1)))
+    start = arrays(Cloud(**VIBRATION, quantities={"charge": 1.0, "spin": (0.0, 0.0, 3.0)}))
+    np.testing.assert_array_equal(start["charge"], np.ones(343))
+    np.testing.assert_array_equal(start["spin"], np.tile([0.0, 0.0, 3.0], (343, 1)))
 
 
 def test_lattice_of_the_vibration_sample():
@@ -290,13 +290,13 @@ def test_a_start_of_any_size_is_apart_or_refused(number, radius, density, room, 
         }[kind]()
         fixed = {} if kind == "lattice" else {"number": number}
         cloud = Cloud(**fixed, radius=radius, density=density, placement=placement)
-        made = arrays(cloud, Box(low=low, high=high) if kind == "domain" else None)
+        start = arrays(cloud, Box(low=low, high=high) if kind == "domain" else None)
     except InputError as fault:
         check_message(str(fault))
         return
-    assert all(np.isfinite(values).all() for values in made.values())
+    assert all(np.isfinite(values).all() for values in start.values())
     # Counted from the first sphere and in radii, whose squares are numbers.
-    places = (made["position"] - made["position"][0]) / radius
+    places = (start["position"] - start["position"][0]) / radius
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(len(places), 1)]
     assert (apart >= 2 * (1 - 2e-3)).all()
 

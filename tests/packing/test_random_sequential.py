@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tisim import InputError
-from tisim.packing.random_sequential import SATURATION, sequential_addition
+from tisim.packing.random_sequential import SATURATION_FRACTION, place
 from tisim.packing.region import box
 from tisim.packing.saturation import fill
 
@@ -18,7 +18,7 @@ RADIUS = 0.05
 @pytest.mark.parametrize("periodic", [False, True])
 def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
     for seed in range(5):
-        centres = sequential_addition(1200, RADIUS, LOW, HIGH, seed, periodic)
+        centres = place(1200, RADIUS, box(LOW, HIGH, periodic), seed)
         assert ((centres >= LOW) & (centres < HIGH)).all()
         tree = cKDTree(centres - LOW, boxsize=HIGH - LOW if periodic else None)
         assert not tree.query_pairs(2 * RADIUS * (1 - 1e-12))
@@ -28,13 +28,13 @@ def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
 
 
 def test_the_seed_decides():
-    first, again, other = (sequential_addition(200, RADIUS, LOW, HIGH, seed) for seed in (1, 1, 2))
+    first, again, other = (place(200, RADIUS, box(LOW, HIGH), seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.1
 
 
 def test_places_are_uniform():
-    centres = np.concatenate([sequential_addition(50, 1e-3, LOW, HIGH, seed) for seed in range(200)])
+    centres = np.concatenate([place(50, 1e-3, box(LOW, HIGH), seed) for seed in range(200)])
     u = (centres - LOW) / (HIGH - LOW)
     assert np.abs(u.mean(axis=0) - 0.5).max() < 4 / np.sqrt(12 * len(u))
     assert np.abs(u.var(axis=0) - 1 / 12).max() < 4 * np.sqrt(1 / 180 / len(u))
@@ -42,15 +42,15 @@ def test_places_are_uniform():
 
 def test_what_cannot_be_reached_is_refused():
     with pytest.raises(InputError, match=r"volume fraction must be at most 0.384.*; received 0\.8727"):
-        sequential_addition(5000, RADIUS, LOW, HIGH, 0)
+        place(5000, RADIUS, box(LOW, HIGH), 0)
 
 
 def test_what_is_just_beyond_reach_says_what_was_reached():
     with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as refused:
-        sequential_addition(2280, RADIUS, LOW, HIGH, 0, periodic=True)
+        place(2280, RADIUS, box(LOW, HIGH, periodic=True), 0)
     reached = float(str(refused.value).split("at most ")[1][:6])
     # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
-    assert reached == pytest.approx(SATURATION, abs=0.006)
+    assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
 
 
 def saturated(region, radius, seed=0):
@@ -73,10 +73,10 @@ def test_saturated_packing_has_no_room_left(rng, periodic):
 def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
     """0.38413; for 700 spheres a single packing is off by about 0.002."""
     region = box(np.zeros(3), np.ones(3), periodic=True)
-    radius = (3 * SATURATION / (4 * np.pi * 700)) ** (1 / 3)
+    radius = (3 * SATURATION_FRACTION / (4 * np.pi * 700)) ** (1 / 3)
     sphere = 4 / 3 * np.pi * radius**3
     fractions = [len(saturated(region, radius, seed)) * sphere for seed in range(12)]
-    assert np.mean(fractions) == pytest.approx(SATURATION, abs=0.002)
+    assert np.mean(fractions) == pytest.approx(SATURATION_FRACTION, abs=0.002)
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ def test_filling_voids_is_the_same_process_as_trying_everywhere():
 
     tried, filled = [], []
     for seed in range(8):
-        tried.append(neighbours(sequential_addition(number, radius, region.low, region.high, seed, True)))
+        tried.append(neighbours(place(number, radius, region, seed)))
         generator = np.random.Generator(np.random.Philox(100 + seed))
         filled.append(neighbours(fill(np.empty((0, 3)), number, 2 * radius, region, generator)))
     spread = np.hypot(np.std(tried), np.std(filled)) / np.sqrt(7)

@@ -36,22 +36,22 @@ def file(tmp_path_factory):
 
 
 def test_history_is_that_of_two_grains_in_straight_flight(file):
-    with frames(file) as found:
-        seen = history(found)
-    np.testing.assert_allclose(seen.time, np.arange(5) * 1e-3, rtol=1e-12)
-    np.testing.assert_allclose(seen.kinetic_energy, 0.5 * (1 + 4) + 1.5 * (9 + 4), rtol=1e-12)
-    np.testing.assert_allclose(seen.drift, [[2.5, 2.0, 0]] * 5, rtol=1e-12)
-    np.testing.assert_allclose(seen.shift, seen.time[:, None] * [2.5, 2.0, 0], rtol=1e-9, atol=1e-15)
-    assert seen.number.tolist() == [2] * 5
+    with frames(file) as trajectory:
+        series = history(trajectory)
+    np.testing.assert_allclose(series.time, np.arange(5) * 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(series.kinetic_energy, 0.5 * (1 + 4) + 1.5 * (9 + 4), rtol=1e-12)
+    np.testing.assert_allclose(series.drift, [[2.5, 2.0, 0]] * 5, rtol=1e-12)
+    np.testing.assert_allclose(series.shift, series.time[:, None] * [2.5, 2.0, 0], rtol=1e-9, atol=1e-15)
+    assert series.number.tolist() == [2] * 5
 
 
 def test_quantities_draw_the_history(file):
-    with frames(file) as found:
-        figure, seen = quantities(found), history(found)
+    with frames(file) as trajectory:
+        figure, series = quantities(trajectory), history(trajectory)
     energy, centre = figure.axes
-    np.testing.assert_array_equal(energy.lines[0].get_ydata(), seen.kinetic_energy)
+    np.testing.assert_array_equal(energy.lines[0].get_ydata(), series.kinetic_energy)
     for k, line in enumerate(centre.lines):
-        np.testing.assert_array_equal(line.get_ydata(), seen.shift[:, k])
+        np.testing.assert_array_equal(line.get_ydata(), series.shift[:, k])
     assert energy.get_ylim()[0] == 0
     assert [axis.get_title("left") for axis in figure.axes] == ["(a)", "(b)"]
     labels = energy.get_ylabel(), centre.get_ylabel(), centre.get_xlabel()
@@ -78,8 +78,8 @@ def test_a_number_of_particles_that_changes_has_a_panel():
 def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
     box = Box(low=(-0.02,) * 3, high=(0.02,) * 3)
     tisim.run(scene(**MOVING, domain=box), record=Recording(tmp_path / "t.h5", frames=4))
-    with frames(tmp_path / "t.h5") as found:
-        centre = quantities(found).axes[1]
+    with frames(tmp_path / "t.h5") as trajectory:
+        centre = quantities(trajectory).axes[1]
     assert "velocity" in centre.get_ylabel()
     np.testing.assert_allclose(centre.lines[0].get_ydata(), 2.5)
 
@@ -87,15 +87,15 @@ def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
 def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
     """The same frames of a run that was to last twice as long."""
     longer = scene(**{**MOVING, "steps": 8})
-    with frames(file) as found, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
-        assert mark_missing(quantities(found), found).get_supxlabel() == ""
-        for frame in found:
+    with frames(file) as trajectory, Trajectory(Recording(tmp_path / "t.h5", frames=8), [longer]) as begun:
+        assert mark_missing(quantities(trajectory), trajectory).get_supxlabel() == ""
+        for frame in trajectory:
             begun.write(0, frame)
-    with frames(tmp_path / "t.h5") as found:
-        figures = [mark_missing(draw(found), found) for draw in (clouds, quantities)]
+    with frames(tmp_path / "t.h5") as trajectory:
+        figures = [mark_missing(draw(trajectory), trajectory) for draw in (clouds, quantities)]
     for figure in figures:
-        told = "the run has come to t = 0.004 s of 0.008 s; what follows is missing"
-        assert figure.get_supxlabel() == told
+        message = "the run has come to t = 0.004 s of 0.008 s; what follows is missing"
+        assert figure.get_supxlabel() == message
     assert [axis.get_title("left").split(",")[0] for axis in figures[0].axes] == [
         "(a) start",
         "(b) last frame",
@@ -103,8 +103,8 @@ def test_pictures_of_an_interrupted_run_say_what_is_missing(file, tmp_path):
 
 
 def test_clouds_are_of_the_first_and_last_frame(file):
-    with frames(file) as found:
-        start, end = clouds(found).axes
+    with frames(file) as trajectory:
+        start, end = clouds(trajectory).axes
     titles = [axis.get_title("left").split(":")[0] for axis in (start, end)]
     assert titles == ["(a) start, t = 0 s", "(b) end, t = 4 ms"]
 
@@ -124,8 +124,8 @@ def test_start_and_end_are_on_one_scale_with_the_axes_of_space_and_gravity():
 
 def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
     done = []
-    with frames(file) as found:
-        movie(found, tmp_path / "t.gif", 10, done.append)
+    with frames(file) as trajectory:
+        movie(trajectory, tmp_path / "t.gif", 10, done.append)
     assert done[-1] == 1.0
     assert [path.name for path in tmp_path.iterdir()] == ["t.gif"]
     with Image.open(tmp_path / "t.gif") as read:
@@ -149,13 +149,13 @@ def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path,
 
     monkeypatch.setattr(PillowWriter, "grab_frame", grab)
     monkeypatch.setattr(PillowWriter, "finish", lambda writer: None)
-    told = "the run has come to t = 1.83413e-06 s of 1.23457e-05 s; what follows is missing"
-    monkeypatch.setattr(Frames, "missing", told)
-    with frames(file) as found:
-        movie(found, tmp_path / "t.gif")
+    message = "the run has come to t = 1.83413e-06 s of 1.23457e-05 s; what follows is missing"
+    monkeypatch.setattr(Frames, "missing", message)
+    with frames(file) as trajectory:
+        movie(trajectory, tmp_path / "t.gif")
     assert len(seen) == 5
     for parts in seen:
-        ((note, place),) = [pair for pair in parts if getattr(pair[0], "get_text", str)() == told]
+        ((note, place),) = [pair for pair in parts if getattr(pair[0], "get_text", str)() == message]
         whole = note.figure.bbox
         assert whole.x0 < place.x0 < place.x1 < whole.x1
         others = [other for part, other in parts if part is not note]
@@ -165,12 +165,12 @@ def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path,
 
 def test_movies_that_cannot_be_made_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with frames(file) as found:
+    with frames(file) as trajectory:
         for name, rate, message in (
             ("t.mp4", 20, r"movie must be a .gif where ffmpeg is not installed; received 't.mp4'"),
             ("t.avi", 20, r"movie must be a .gif or .mp4 file; received 't.avi'"),
             ("t.gif", 0, "frames a second must be 1 to 100; received 0"),
         ):
             with pytest.raises(InputError, match=message):
-                movie(found, tmp_path / name, rate)
+                movie(trajectory, tmp_path / name, rate)
     assert list(tmp_path.iterdir()) == []

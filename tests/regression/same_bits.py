@@ -39,10 +39,10 @@ RUNS = (
 def fingerprint(name: str, size: str, part: float) -> str:
     """SHA-256, hexadecimal, of what one case gives from its start number 1."""
     import tisim
-    from cases.case import find
+    from cases.case import every
     from tisim.io.reader import frames
 
-    scene = find(name).scene(size, 1)
+    scene = every()[name].scene(size, 1)
     scene = scene.model_copy(update={"duration": part * scene.duration})
     digest = hashlib.sha256()
     with tempfile.TemporaryDirectory() as folder:
@@ -66,9 +66,9 @@ def _add(digest: Any, arrays: dict[str, np.ndarray]) -> None:
 
 def checked(name: str) -> dict[str, str]:
     """All numbers that the checks of a case find, by what they are of, bit by bit."""
-    from cases.case import find
+    from cases.case import every
 
-    return {item.name: repr(item) for item in find(name).check()}
+    return {item.name: repr(item) for item in every()[name].check()}
 
 
 def measure(check: bool) -> dict[str, Any]:

@@ -10,18 +10,19 @@ import numpy as np
 import pytest
 
 import tisim
-from cases.capture.problem import GENES, HEIGHT, NUMBER, SPEED, WIDTH, problem
+from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, FILTER_PARTICLES, FLOW_SPEED
+from cases.capture.problem import GENES, problem
 from tisim.backend import runtime
 
 CAUGHT = {
     "throughput": {
-        (0.8, 90.0, 2.0, 10.0, 3.0, SPEED, 125.0): (44, 55),
-        (0.8, 0.0, 2.0, 10.0, 3.0, SPEED, 125.0): (29, 31),
-        (0.8, 90.0, 20.0, 1.0, 3.0, SPEED, 125.0): (29, 39),
-        (0.1, 90.0, 2.0, 10.0, 3.0, SPEED, 125.0): (24, 29),
-        (0.8, 90.0, 2.0, 10.0, 1.2, SPEED, 125.0): (25, 28),
-        (0.8, 90.0, 2.0, 5.0, 3.0, SPEED, 125.0): (13, 31),
-        (0.5, 60.0, 3.0, 6.0, 2.5, SPEED, 125.0): (21, 35),
+        (0.8, 90.0, 2.0, 10.0, 3.0, FLOW_SPEED, 125.0): (44, 55),
+        (0.8, 0.0, 2.0, 10.0, 3.0, FLOW_SPEED, 125.0): (29, 31),
+        (0.8, 90.0, 20.0, 1.0, 3.0, FLOW_SPEED, 125.0): (29, 39),
+        (0.1, 90.0, 2.0, 10.0, 3.0, FLOW_SPEED, 125.0): (24, 29),
+        (0.8, 90.0, 2.0, 10.0, 1.2, FLOW_SPEED, 125.0): (25, 28),
+        (0.8, 90.0, 2.0, 5.0, 3.0, FLOW_SPEED, 125.0): (13, 31),
+        (0.5, 60.0, 3.0, 6.0, 2.5, FLOW_SPEED, 125.0): (21, 35),
     },
     "fraction": {
         (0.8, 90.0, 2.0, 10.0, 3.0): (44, 55),
@@ -53,13 +54,13 @@ def caught(**changed):
     """Particles caught by variant, shape (designs, starts), and the throughput (m^3/s) of the first."""
     scenes = []
     for variant, designs in CAUGHT.items():
-        filters = problem(variant)
+        filters = problem(variant=variant)
         for values in designs:
             design = {**dict(zip(names(variant), values, strict=True)), **changed}
             scenes += [filters.scene(design, seed) for seed in (0, 1)]
     results = tisim.run(scenes)
-    fraction, flow = problem("throughput").objectives
-    counts = np.reshape([NUMBER * fraction.of(result) for result in results], (-1, 2))
+    fraction, flow = problem(variant="throughput").objectives
+    counts = np.reshape([FILTER_PARTICLES * fraction.of(result) for result in results], (-1, 2))
     ends = np.cumsum([len(designs) for designs in CAUGHT.values()])
     return dict(zip(CAUGHT, np.split(counts, ends[:-1]), strict=True)), flow.of(results[0])
 
@@ -70,7 +71,7 @@ def test_fitness_of_capture_is_that_of_the_record():
     turned = 1 if runtime.current().precision == "f64" else 2
     for variant, designs in CAUGHT.items():
         np.testing.assert_allclose(found[variant], list(designs.values()), atol=turned + 0.1)
-    assert flow == pytest.approx(SPEED * WIDTH * HEIGHT)
+    assert flow == pytest.approx(FLOW_SPEED * CHANNEL_WIDTH * CHANNEL_HEIGHT)
     # Particles of 100 nm have half the moment: fewer are caught, in every variant, than rounding may turn.
     smaller, _ = caught(radius=100.0)
     for variant in CAUGHT:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cases.vibration.closed_forms import driven, static_field, tethered
 from tests.scenes import simulate
 from tests.steppers.charged import PUSH, W, accurate, boris, charged, equal_steps, final, order
+from tests.steppers.closed_forms import driven, static_field, tethered
 
 DURATION = 4.0
 GRID = [(b, k) for b in (0.5, 2.0) for k in (0.7, 8.0)]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cases.vibration.closed_forms import quadratic_drag, stokes_drag
 from tests.scenes import scene, simulate
 from tests.steppers.charged import boris, equal_steps, order
+from tests.steppers.closed_forms import quadratic_drag, stokes_drag
 from tisim.effects import ConstantDrag, StokesDrag
 
 DURATION, RHO = 2.0, 900.0

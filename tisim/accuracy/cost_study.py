@@ -67,7 +67,7 @@ class Study:
         self.truths: tuple[Truth, ...] = ()
         self.complete = False
 
-    def asked(self) -> dict[str, Any]:
+    def sweep_settings(self) -> dict[str, Any]:
         """Which settings are measured."""
         return {"levels": self.levels, "precisions": self.precisions}
 
@@ -106,11 +106,11 @@ class Study:
         if best := tied(self.rows, error, k):
             return best[0]
         name = f"error of {self.quantities[k].name}"
-        done = [row for row in self.rows if row.errors]
-        if not done:
+        measured = [row for row in self.rows if row.errors]
+        if not measured:
             failed = next((f": {row.failed}" for row in self.rows if row.failed), "")
             raise RunError(f"{name} must be of a setting that was measured; there is none{failed}")
-        least = min(done, key=lambda row: row.at_most(k))
+        least = min(measured, key=lambda row: row.at_most(k))
         finer = "more starts go further" if self.random else "finer settings go further"
         raise RunError(
             f"{name} must be at least {least.at_most(k):.1e}, the least that was reached ({least.method}, "
@@ -153,6 +153,6 @@ class Study:
 
 def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) -> Study:
     """What accuracy costs in time for a scene: a ``Study`` with its settings, run to its end."""
-    made = Study(scene, quantities, **settings)
-    made.run()
-    return made
+    cost_study = Study(scene, quantities, **settings)
+    cost_study.run()
+    return cost_study

@@ -1,4 +1,4 @@
-"""Settings in words: as Python, and as options of ``tisim run``."""
+"""Settings as text: as Python, and as options of ``tisim run``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tisim.components.component import Component
 from tisim.scene.scene import Scene
 
 
-def given(part: Component) -> dict[str, Any]:
+def non_default_settings(part: Component) -> dict[str, Any]:
     """The settings of a part that are not at their defaults, by name."""
     return {
         name: getattr(part, name)
@@ -24,26 +24,26 @@ def expression(part: Component) -> str:
     """A part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
     arguments = (
         f"{name}={expression(value) if isinstance(value, Component) else repr(value)}"
-        for name, value in given(part).items()
+        for name, value in non_default_settings(part).items()
     )
     return f"{type(part).__name__}({', '.join(arguments)})"
 
 
 def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
-    """Words that make ``tisim run`` run ``changed`` where it would have run ``scene``."""
+    """Command-line arguments that make ``tisim run`` run ``changed`` where it would have run ``scene``."""
     old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
-    words = [word for name in old if name not in new for word in ("--without", name)]
+    arguments = [argument for name in old if name not in new for argument in ("--without", name)]
     settings = list(_differences(scene.stepper, changed.stepper, "stepper"))
     for name, effect in new.items():
         settings += _differences(old.get(name), effect, f"effects.{name}")
     for key, value in settings:
-        words += ["--set", f"{key}={value}"]
-    return words + (["--precision", precision] if precision != "f64" else [])
+        arguments += ["--set", f"{key}={value}"]
+    return arguments + (["--precision", precision] if precision != "f64" else [])
 
 
-def pasted(words: list[str]) -> str:
-    """Words as a shell takes them."""
-    return shlex.join(words)
+def shell_line(arguments: list[str]) -> str:
+    """Command-line arguments as one line that a shell takes."""
+    return shlex.join(arguments)
 
 
 def _differences(old: Component | None, new: Component, path: str) -> Iterator[tuple[str, str]]:
@@ -60,5 +60,7 @@ def _differences(old: Component | None, new: Component, path: str) -> Iterator[t
 
 
 def _table(part: Component, named: bool = True) -> dict[str, Any]:
-    table = {name: _table(v) if isinstance(v, Component) else v for name, v in given(part).items()}
+    table = {
+        name: _table(v) if isinstance(v, Component) else v for name, v in non_default_settings(part).items()
+    }
     return {"kind": part.kind(), **table} if named else table

@@ -16,11 +16,11 @@ from tisim.accuracy.row import Row, decades
 from tisim.files.atomic import replace_file
 from tisim.plotting.style import empty, letters, plain
 
-COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
-"""P. Tol's bright set, and one of his light one."""
+METHOD_COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
+"""The methods are drawn in P. Tol's bright set of colours, and one of his light one."""
 MARKERS = "osD^vP<>X"
-WIDTH = 80
-"""Characters of a line in the legend, which a panel has room for."""
+LEGEND_WIDTH = 80
+"""A line of the legend has so many characters at most, which a panel has room for."""
 
 
 def save(study: Study, path: Path) -> Path:
@@ -61,17 +61,17 @@ def picture(study: Study) -> Figure:
 def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     for at, method in enumerate(lines):
         rows = [row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same]
-        colour, marker = COLOURS[at % len(COLOURS)], MARKERS[at % len(MARKERS)]
+        colour, marker = METHOD_COLOURS[at % len(METHOD_COLOURS)], MARKERS[at % len(MARKERS)]
         style = "-" if all(row.precision == "f64" for row in rows) else "--"
         times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
         axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
-        label = fill(_label(study, method), WIDTH)
+        label = fill(_label(study, method), LEGEND_WIDTH)
         axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=label)
         for row in rows:
             _mark(axis, row, k, colour, marker)
-    found = list(decades(study.rows, k).values())
-    best = {row.key: row for row, *_ in found}
-    others = {row.key: row for _, *rows in found for row in rows if row.key not in best}
+    cheapest = list(decades(study.rows, k).values())
+    best = {row.key: row for row, *_ in cheapest}
+    others = {row.key: row for _, *rows in cheapest for row in rows if row.key not in best}
     _ring(axis, list(best.values()), k, "-", "cheapest for a power of ten of the error")
     _ring(axis, list(others.values()), k, ":", "as cheap, as far as timings tell, with more work")
     axis.set_xscale("log")

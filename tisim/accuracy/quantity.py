@@ -58,7 +58,7 @@ class QuantityEstimate:
 
 
 def estimate(quantity: Quantity, results: Sequence[Result]) -> QuantityEstimate:
-    """Of one result, or the mean over those of random starts."""
+    """The estimate from one result, or from the mean over those of random starts."""
     values = np.array([np.ravel(np.asarray(quantity.value(result))) for result in results])
     if not quantity.random:
         return QuantityEstimate(values[0])
@@ -71,23 +71,23 @@ def mean(values: np.ndarray) -> QuantityEstimate:
 
 
 def displacement(result: Result) -> np.ndarray:
-    """Of every particle, in the order of their ids, m, shape (n, 3)."""
+    """The displacement of every particle since the start, in the order of their ids, m, shape (n, 3)."""
     order = np.argsort(result.state["id"])
     return result.state["position"][order] - result.start["position"]
 
 
 def velocity(result: Result) -> np.ndarray:
-    """Of every particle, in the order of their ids, m/s, shape (n, 3)."""
+    """The velocity of every particle at the end, in the order of their ids, m/s, shape (n, 3)."""
     return result.state["velocity"][np.argsort(result.state["id"])]
 
 
 def kinetic_energy(result: Result) -> float:
-    """J."""
+    """The kinetic energy of all particles at the end, without rotation, J."""
     return 0.5 * float((result.state["mass"] * (result.state["velocity"] ** 2).sum(axis=1)).sum())
 
 
 def mean_square(result: Result) -> float:
-    """Mean square displacement, m^2."""
+    """The mean square displacement of the particles since the start, m^2."""
     return float((displacement(result) ** 2).sum(axis=1).mean())
 
 

@@ -49,12 +49,12 @@ class ReferenceRun:
 
     @property
     def scene(self) -> Scene:
-        """What is run."""
+        """The scene that is run."""
         return finest(self.method.at(self.decades), -TIGHTER)
 
     @property
     def name(self) -> str:
-        """For people."""
+        """The stepper and its step control, for people."""
         stepper = self.method.base.stepper
         return f"{type(stepper).__name__}, {type(stepper.control).__name__}"
 
@@ -83,7 +83,10 @@ def closed_form(quantity: Quantity, result: Result, largest: float = 0.0) -> Tru
 
 
 def compared(
-    quantity: Quantity, runs: Sequence[Sequence[Result]], made: Sequence[ReferenceRun], largest: float = 0.0
+    quantity: Quantity,
+    runs: Sequence[Sequence[Result]],
+    references: Sequence[ReferenceRun],
+    largest: float = 0.0,
 ) -> Truth:
     """The truth from the runs of a reference and its checks. largest : |value| on the way."""
     best, short, *other = (estimate(quantity, results) for results in runs)
@@ -91,20 +94,20 @@ def compared(
     if other:
         apart = _distance(best, other[0])
         off = off if apart <= off + _distance(*other) else apart
-    source = f"{made[0].name} at {made[0].decades:+g} decades of error, checked by itself"
-    source += "".join(f" and by {attempt.name}" for attempt in made[2:3])
+    source = f"{references[0].name} at {references[0].decades:+g} decades of error, checked by itself"
+    source += "".join(f" and by {attempt.name}" for attempt in references[2:3])
     # What the stepper does to every start, and what so few starts leave open.
     return _truth(quantity, QuantityEstimate(best.value, off + best.uncertainty), source, largest)
 
 
-def _truth(quantity: Quantity, found: QuantityEstimate, source: str, largest: float) -> Truth:
+def _truth(quantity: Quantity, estimated: QuantityEstimate, source: str, largest: float) -> Truth:
     """InputError where there is nothing that an error could be relative to."""
-    size = float(np.linalg.norm(found.value))
+    size = float(np.linalg.norm(estimated.value))
     if quantity.returns:
         size = max(size, largest)
     when = "at some time" if quantity.returns else "at the end"
     must(size > 0, quantity.name, f"other than zero {when}", size)
-    return Truth(found, source, size)
+    return Truth(estimated, source, size)
 
 
 def _distance(one: QuantityEstimate, other: QuantityEstimate) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 TRUSTED = 3.0
 """An error is known when it is at least so many times what it may be off by."""
-ONCE, ALWAYS, CLOCK = 0.15, 0.05, 1e-3
+ONCE, ALWAYS, CLOCK_RESOLUTION = 0.15, 0.05, 1e-3
 """Seconds are never known better than to these parts of themselves, if taken once and if more often; nor than
 to so many s."""
 ALIKE = 1e-11
@@ -25,7 +25,7 @@ ALIKE = 1e-11
 class Row:
     """What a setting costs, and how accurate it is.
 
-    method : the line that it is on. setting : in words. python : stepper, and laws that were exchanged, as
+    method : the line that it is on. setting : as text. python : stepper, and laws that were exchanged, as
     Python. options : of ``tisim run``, as a shell takes them. starts : random starts in all that follows.
     seconds : wall seconds of each repeat. steps, sums, rejections : steps, sums of forces and rejected steps
     of a particle, the mean over particles and starts.
@@ -55,19 +55,19 @@ class Row:
 
     @property
     def median(self) -> float:
-        """Of the wall seconds."""
+        """The median of the wall seconds of all repeats, s; NaN before there is one."""
         return float(np.median(self.seconds)) if self.seconds else math.nan
 
     @property
     def spread(self) -> float:
-        """Longest less shortest of the wall seconds."""
+        """The longest less the shortest of the wall seconds of all repeats, s."""
         return max(self.seconds) - min(self.seconds) if self.seconds else math.nan
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Least and most wall seconds that it may take: those measured, or as well as a clock tells."""
-        known = max(CLOCK, (ALWAYS if len(self.seconds) > 1 else ONCE) * self.median)
-        return min(*self.seconds, self.median - known), max(*self.seconds, self.median + known)
+        """The least and the most wall time that it may take, s: as measured, or as well as a clock tells."""
+        uncertainty = max(CLOCK_RESOLUTION, (ALWAYS if len(self.seconds) > 1 else ONCE) * self.median)
+        return min(*self.seconds, self.median - uncertainty), max(*self.seconds, self.median + uncertainty)
 
     def same_errors(self, other: Row) -> bool:
         """Whether another row has the same errors, but for rounding."""
@@ -103,8 +103,8 @@ def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
     if not reached:
         return {}
     highest, lowest = math.ceil(math.log10(max(reached))), math.ceil(math.log10(min(reached)))
-    found = {}
+    by_error = {}
     for power in range(min(highest, 0), lowest - 1, -1):
         if best := tied(rows, 10.0**power, quantity):
-            found[10.0**power] = best
-    return found
+            by_error[10.0**power] = best
+    return by_error

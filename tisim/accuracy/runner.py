@@ -1,4 +1,4 @@
-"""The driver of a study.
+"""The runs of a study, in their order, timed.
 
 Every method of the scene is run from its coarsest setting to its finest, all methods at one level before the
 next and repeats in turns, so that a machine that drifts, a budget that ends and Ctrl-C treat all alike.
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tisim.accuracy import reference
-from tisim.accuracy.formatting import expression, options, pasted
+from tisim.accuracy.formatting import expression, options, shell_line
 from tisim.accuracy.quantity import estimate
 from tisim.accuracy.row import Row
 from tisim.accuracy.sweep import Setting, SettingSweep, ensembles, in_steps_of_at_most, methods
-from tisim.accuracy.timing import LOOKS, Bench, Limit, Look, OutOfTime, Timed
+from tisim.accuracy.timing import OBSERVATIONS, Limit, OutOfTime, ResultCallback, SimulationCache, Timed
 from tisim.backend import runtime
 from tisim.components.accuracy_parameter import three_digits
 from tisim.engine.result import Result
@@ -30,10 +30,11 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 """Called with the fraction of the study that is done, 0..1, and what is being run."""
-OTHERS = 1_000_000
-"""Between the seeds of a random quantity's reference and those of its rows: they share no start."""
-REFERENCES = 4
-"""Starts of the reference for each of the largest number that is tried: half as wide an interval."""
+REFERENCE_SEED_OFFSET = 1_000_000
+"""The seeds of a random quantity's reference lie so far beyond those of its rows: they share no start."""
+REFERENCE_STARTS = 4
+"""A random reference has so many times the largest number of starts that is tried: its interval is half as
+wide."""
 
 
 class Run:
@@ -41,7 +42,7 @@ class Run:
 
     def __init__(self, study: Study, progress: Progress, finished: Callable[[], object]) -> None:
         self.study, self.progress, self.finished = study, progress, finished
-        self.bench, self.spent = Bench(), 0.0
+        self.simulations, self.spent = SimulationCache(), 0.0
         self.done, self.planned, self.what = 0.0, 1.0, "the scene as it is"
 
     def all(self) -> None:
@@ -49,40 +50,46 @@ class Run:
         where = runtime.current()
         runtime.init(where.device, "f64", where.threads)
         base = self._run([study.scene], 0.0)
-        found = self._methods(base)
+        sweeps = self._methods(base)
         self.base = base.seconds
-        must(bool(found), "scene", "one that has something to turn", study.scene.stepper.kind())
-        rounds = max(len(method.settings) for method in found)
-        known = {row.key for row in study.rows}
+        must(bool(sweeps), "scene", "one that has something to turn", study.scene.stepper.kind())
+        rounds = max(len(method.settings) for method in sweeps)
+        measured = {row.key for row in study.rows}
         plan = [
-            [(m, k) for m in found if k < len(m.settings) and (m.name, m.settings[k].words) not in known]
+            [
+                (m, k)
+                for m in sweeps
+                if k < len(m.settings) and (m.name, m.settings[k].description) not in measured
+            ]
             for k in range(rounds)
         ]
         rest = sum(self._cost(m, k) for items in plan for m, k in items)
-        self._truths(base, found, rest)
+        self._truths(base, sweeps, rest)
         for precision in study.precisions:
             if runtime.current().precision != precision:
-                self.bench.close()
+                self.simulations.close()
                 runtime.init(where.device, precision, where.threads)
             for items in plan:
                 self._round([(m, k) for m, k in items if m.settings[k].precision == precision])
-        self._compare_laws(found)
-        known = {row.key for row in study.rows}
-        study.complete = all((m.name, setting.words) in known for m in found for setting in m.settings)
-        self.bench.close()
+        self._compare_laws(sweeps)
+        measured = {row.key for row in study.rows}
+        study.complete = all(
+            (m.name, setting.description) in measured for m in sweeps for setting in m.settings
+        )
+        self.simulations.close()
 
     def _methods(self, base: Timed) -> list[SettingSweep]:
         study, result = self.study, base.results[0]
         ends = (result.start["position"], result.state["position"])
         extent = max(float(np.linalg.norm(r.max(axis=0) - r.min(axis=0))) for r in ends)
         dt = three_digits(study.scene.duration / max(base.work[0], 1.0))
-        found = methods(study.scene, dt, extent, study.levels, study.precisions, study.starts[-1])
-        return [ensembles(study.scene, study.starts), *found] if study.random else found
+        sweeps = methods(study.scene, dt, extent, study.levels, study.precisions, study.starts[-1])
+        return [ensembles(study.scene, study.starts), *sweeps] if study.random else sweeps
 
     def _cost(self, method: SettingSweep, k: int) -> float:
         """Guess of the seconds that a setting takes, all repeats, from another of its method if known."""
         weights, repeats = method.weights, self.study.repeats
-        guesses = dict(zip((setting.words for setting in method.settings), weights, strict=True))
+        guesses = dict(zip((setting.description for setting in method.settings), weights, strict=True))
         for row in self.study.line(method.name):
             if row.seconds and row.setting in guesses:
                 return repeats * row.median * weights[k] / guesses[row.setting]
@@ -94,45 +101,47 @@ class Run:
         )
 
     def _largest(self) -> list[float]:
-        """How large each quantity has been on the way, in steps that no look has to wait for; 0 where nobody
-        asks."""
+        """How large each quantity has been on the way, in steps that no observation has to wait for; 0 where
+        nobody asks."""
         largest = [0.0 for _ in self.study.quantities]
 
-        def look(result: Result) -> None:
+        def update_largest(result: Result) -> None:
             for k, q in enumerate(self.study.quantities):
                 largest[k] = max(largest[k], q.size(result))
 
         if any(q.returns for q in self.study.quantities):
             self.what = "the size of the motion"
-            often = in_steps_of_at_most(self.study.scene, self.study.scene.duration / LOOKS)
-            self._run([often], self.base, look=look)
+            often = in_steps_of_at_most(self.study.scene, self.study.scene.duration / OBSERVATIONS)
+            self._run([often], self.base, on_result=update_largest)
         return largest
 
-    def _truths(self, base: Timed, found: Sequence[SettingSweep], rest: float) -> None:
+    def _truths(self, base: Timed, sweeps: Sequence[SettingSweep], rest: float) -> None:
         """The true values, where they are not known yet. rest : seconds planned for all that follows."""
         study, self.planned = self.study, rest
         if study.truths:
             return
-        runs, made = [], []
+        runs, references = [], []
         if any(quantity.exact is None for quantity in study.quantities):
-            made = reference.attempts(found, study.levels[-1])
-            n = REFERENCES * study.starts[-1] if study.random else 1
-            costs = [n * self.base * 10.0 ** (-a.decades / a.method.base.stepper.order) for a in made]
+            references = reference.attempts(sweeps, study.levels[-1])
+            n = REFERENCE_STARTS * study.starts[-1] if study.random else 1
+            costs = [n * self.base * 10.0 ** (-a.decades / a.method.base.stepper.order) for a in references]
             self.planned += sum(costs)
             if sum(costs) > self._left():
                 reason = (
                     f"the reference takes about {sum(costs):.2g} s of running, more than the budget has left"
                 )
                 raise RunError(f"{reason}, {max(self._left(), 0.0):.2g} s")
-            for attempt, cost in zip(made, costs, strict=True):
-                self.what = f"{'reference' if attempt is made[0] else 'its check'}: {attempt.name}"
+            for attempt, cost in zip(references, costs, strict=True):
+                self.what = f"{'reference' if attempt is references[0] else 'its check'}: {attempt.name}"
                 try:
-                    runs.append(self._run(self._starts(attempt.scene, n, OTHERS), cost).results)
+                    runs.append(
+                        self._run(self._starts(attempt.scene, n, REFERENCE_SEED_OFFSET), cost).results
+                    )
                 except RunError as error:
                     raise RunError(f"the {self.what}: {error}") from None
         largest = self._largest()
         study.truths = tuple(
-            reference.compared(q, runs, made, most)
+            reference.compared(q, runs, references, most)
             if q.exact is None
             else reference.closed_form(q, base.results[0], most)
             for q, most in zip(study.quantities, largest, strict=True)
@@ -154,7 +163,7 @@ class Run:
             for repeat in range(self.study.repeats):
                 for at, (method, k) in enumerate(items):
                     cost, setting = costs[at] / self.study.repeats, method.settings[k]
-                    self.what = f"{method.name}, {setting.words}"
+                    self.what = f"{method.name}, {setting.description}"
                     if at in failed or (repeat == 0 and self._left() < costs[at]):
                         self.done += cost
                         continue
@@ -171,10 +180,10 @@ class Run:
                 if runs[at] or at in failed:
                     self._row(method, k, runs[at], failed.get(at, ""))
 
-    def _compare_laws(self, found: Sequence[SettingSweep]) -> None:
+    def _compare_laws(self, sweeps: Sequence[SettingSweep]) -> None:
         """Cheaper laws that make the same errors as the law they stand for are no laws of their own."""
         rows = {row.key: row for row in self.study.rows}
-        stands_for = {(m.name, s.words): m.exact for m in found for s in m.settings if m.exact}
+        stands_for = {(m.name, s.description): m.exact for m in sweeps for s in m.settings if m.exact}
         self.study.rows[:] = [
             replace(row, same=row.same_errors(rows.get(stands_for.get(row.key, row.key), row)))
             for row in self.study.rows
@@ -186,30 +195,34 @@ class Run:
         return self.study.budget - self.spent
 
     def _run(
-        self, scenes: Sequence[Scene], cost: float, limit: float = math.inf, look: Look | None = None
+        self,
+        scenes: Sequence[Scene],
+        cost: float,
+        limit: float = math.inf,
+        on_result: ResultCallback | None = None,
     ) -> Timed:
         """Run and time; ``cost`` is what was planned for it, s; OutOfTime after ``limit`` (s)."""
-        begun = self.done
+        done_before = self.done
         if limit <= 0.0:
             raise OutOfTime
 
-        def watch(fraction: float) -> None:
-            self.progress(min((begun + cost * fraction) / self.planned, 1.0), self.what)
+        def report_progress(fraction: float) -> None:
+            self.progress(min((done_before + cost * fraction) / self.planned, 1.0), self.what)
 
-        watch(0.0)
-        clock = Limit(limit, watch)
+        report_progress(0.0)
+        clock = Limit(limit, report_progress)
         try:
-            timed = self.bench.run(scenes, clock, look)
+            timed = self.simulations.run(scenes, clock, on_result)
         finally:
             self.spent += clock.spent
-        self.done = begun + cost
+        self.done = done_before + cost
         return timed
 
     def _row(self, method: SettingSweep, k: int, runs: Sequence[Timed], failed: str) -> None:
         study, setting = self.study, method.settings[k]
         row = Row(
-            method.name, setting.words, self._python(setting),
-            pasted(options(study.scene, setting.scene, setting.precision)),
+            method.name, setting.description, self._python(setting),
+            shell_line(options(study.scene, setting.scene, setting.precision)),
             setting.precision, setting.starts, failed=failed,
         )  # fmt: skip
         if not failed:

@@ -32,8 +32,8 @@ from tisim.files.ownership import writable
 from tisim.io.run_folder import versions
 
 FORMAT = "tisim cost 2"
-CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-NAMES = (CSV, HDF5, PICTURE, lock.LOCK)
+COST_CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
+NAMES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
@@ -41,9 +41,9 @@ _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "reje
 def write(study: Study, folder: Path) -> list[Path]:
     """Write cost.csv and cost.h5, in place of any before; returns their paths. RunError on a full disk."""
     writable(folder)
-    replace_file(folder / CSV, table(study).encode())
+    replace_file(folder / COST_CSV, table(study).encode())
     _write_rows(study, folder / HDF5)
-    return [folder / CSV, folder / HDF5]
+    return [folder / COST_CSV, folder / HDF5]
 
 
 def table(study: Study) -> str:
@@ -55,9 +55,9 @@ def table(study: Study) -> str:
     writer.writerow([*_TEXTS, *_NUMBERS, "seconds", "least seconds", "most seconds", "repeats", *errors])
     for row in study.rows:
         times = [row.median, min(row.seconds), max(row.seconds)] if row.seconds else [math.nan] * 3
-        found = [x for pair in row.errors for x in pair] or [math.nan] * len(errors)
+        uncertain_errors = [x for pair in row.errors for x in pair] or [math.nan] * len(errors)
         values = [getattr(row, name) for name in (*_TEXTS, *_NUMBERS)]
-        writer.writerow([*values, *times, len(row.seconds), *found])
+        writer.writerow([*values, *times, len(row.seconds), *uncertain_errors])
     return text.getvalue()
 
 
@@ -66,7 +66,7 @@ def _write_rows(study: Study, path: Path) -> None:
         file.attrs.update({
             "format": FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
             "settings": json.dumps(_settings(study)), "versions": json.dumps(versions()),
-            "complete": json.dumps(study.asked() if study.complete else None),
+            "complete": json.dumps(study.sweep_settings() if study.complete else None),
         })  # fmt: skip
         rows = file.create_group("rows")
         for name in _TEXTS:
@@ -114,7 +114,7 @@ def resume(study: Study, folder: Path) -> None:
         rule = "without the study of another scene, version, machine or depth (or give --overwrite)"
         must(same, "output folder", rule, str(folder))
         study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
-        study.complete = file.attrs["complete"] == json.dumps(study.asked())
+        study.complete = file.attrs["complete"] == json.dumps(study.sweep_settings())
 
 
 def rows(path: Path) -> list[Row]:

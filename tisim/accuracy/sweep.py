@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tisim import steppers
-from tisim.accuracy.formatting import given
+from tisim.accuracy.formatting import non_default_settings
 from tisim.components import serialization
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, unit_of
@@ -19,10 +19,10 @@ from tisim.steppers.base import Stepper
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to run a scene: the scene with it, in words, precision, and number of random starts."""
+    """One way to run a scene: the scene with it, its description, precision, and number of random starts."""
 
     scene: Scene
-    words: str
+    description: str
     precision: str = "f64"
     starts: int = 1
 
@@ -47,8 +47,8 @@ class SettingSweep:
     @property
     def converges(self) -> bool:
         """Whether the error of the stepper vanishes along this line."""
-        known = self.accuracy_parameter
-        return known is not None and known.converges and self.path.startswith("stepper")
+        parameter = self.accuracy_parameter
+        return parameter is not None and parameter.converges and self.path.startswith("stepper")
 
     def at(self, decades: float) -> Scene:
         """The scene with the accuracy parameter turned to an error so many decades larger than at its
@@ -78,8 +78,8 @@ def exchanged(scene: Scene, path: str, part: Component) -> Scene:
     if first == "effects":
         own = next(effect for effect in scene.effects if effect.label == rest[0])
         new = _put(own, rest[1:], part)
-        listed = tuple(new if effect is own else effect for effect in scene.effects)
-        return scene.model_copy(update={"effects": listed})
+        effects = tuple(new if effect is own else effect for effect in scene.effects)
+        return scene.model_copy(update={"effects": effects})
     return scene.model_copy(update={first: _put(getattr(scene, first), rest, part)})
 
 
@@ -120,34 +120,36 @@ def methods(
     levels : decades of error, relative to what the scene asks for, that accuracy parameters are turned to.
     The first method is the scene's own stepper. starts : random starts of each run.
     """
-    found = []
+    sweeps = []
     own = sorted(parts(scene), key=lambda item: not item[0].startswith("stepper"))
     for path, part in own:
-        found += [
+        sweeps += [
             _turning(scene, path, accuracy_parameter, levels, "f64", starts)
             for accuracy_parameter in part.accuracy_parameters
         ]
-    if found:
-        first = found[0]
+    if sweeps:
+        first = sweeps[0]
         for precision in precisions:
             if precision != "f64" and first.accuracy_parameter:
-                found.append(_turning(scene, first.path, first.accuracy_parameter, levels, precision, starts))
+                sweeps.append(
+                    _turning(scene, first.path, first.accuracy_parameter, levels, precision, starts)
+                )
     for effect in scene.effects:
         laws = effect.approximations(extent)
         if laws:
             # As accurate otherwise as anything here, so that what is seen is the error of the law.
-            accurate = found[0].settings[-1] if found else Setting(scene, "")
-            exact = (found[0].name, accurate.words) if found else None
-            found.append(_laws(accurate.scene, effect, laws, starts, exact))
+            accurate = sweeps[0].settings[-1] if sweeps else Setting(scene, "")
+            exact = (sweeps[0].name, accurate.description) if sweeps else None
+            sweeps.append(_laws(accurate.scene, effect, laws, starts, exact))
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in _within("stepper", stepper):
-            found += [
+            sweeps += [
                 _turning(other, path, k, levels, "f64", starts)
                 for k in part.accuracy_parameters
                 if k.converges
             ]
-    return [method for method in found if method.settings]
+    return [method for method in sweeps if method.settings]
 
 
 def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
@@ -159,20 +161,20 @@ def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
 def _steppers(scene: Scene, dt: float) -> list[Stepper]:
     """Steppers that suit the scene, other than its own."""
     serialization.load(steppers)
-    asked = {_kind(scene.stepper)}
-    found = []
+    kinds = {_kind(scene.stepper)}
+    suitable = []
     rivals = scene.stepper.rivals(scene.effects, dt)
     if rivals is None:
         # By name, whatever has been imported first.
-        kinds = [kind for _, kind in sorted(Stepper.known().items())]
-        rivals = tuple(stepper for kind in kinds for stepper in kind.alternatives(scene.effects, dt))
+        known = [kind for _, kind in sorted(Stepper.known().items())]
+        rivals = tuple(stepper for kind in known for stepper in kind.alternatives(scene.effects, dt))
     for stepper in rivals:
         if type(stepper.control) is type(scene.stepper.control):
             stepper = stepper.model_copy(update={"control": scene.stepper.control})
-        if _kind(stepper) not in asked:
-            asked.add(_kind(stepper))
-            found.append(stepper)
-    return found
+        if _kind(stepper) not in kinds:
+            kinds.add(_kind(stepper))
+            suitable.append(stepper)
+    return suitable
 
 
 def _kind(stepper: Stepper) -> tuple[Any, ...]:
@@ -195,8 +197,8 @@ def _turning(
         except InputError:
             continue  # The part cannot be set so: a shortest step above the longest, for one.
         part = dict(parts(changed))[path]
-        words = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
-        settings.append(Setting(changed, words, precision, starts))
+        description = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
+        settings.append(Setting(changed, description, precision, starts))
         weights.append(10.0 ** (-decades / scene.stepper.order) if path.startswith("stepper") else 1.0)
     name = f"{_title(scene, path)}: {', '.join(accuracy_parameter.orders)}"
     name += "" if precision == "f64" else f", {precision}"
@@ -213,9 +215,9 @@ def _laws(
             for name in type(law).model_fields
             if getattr(own, name, None) != getattr(law, name)
         ]
-        words = ", ".join(differ) or type(law).__name__
+        description = ", ".join(differ) or type(law).__name__
         named = law.model_copy(update={"name": own.name})
-        settings.append(Setting(exchanged(scene, f"effects.{own.label}", named), words, starts=starts))
+        settings.append(Setting(exchanged(scene, f"effects.{own.label}", named), description, starts=starts))
     name = type(laws[0]).__name__
     return SettingSweep(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
 
@@ -223,8 +225,12 @@ def _laws(
 def _title(scene: Scene, path: str) -> str:
     if not path.startswith("stepper"):
         return path.removeprefix("effects.")
-    # What any such stepper must be told, such as what fluid it is in, is no matter of method.
-    stepper, told = scene.stepper, type(scene.stepper).model_fields
-    chosen = [f"{k}={v!r}" for k, v in given(stepper).items() if k != "control" and not told[k].is_required()]
+    # What any such stepper must be given, such as what fluid it is in, is no matter of method.
+    stepper, fields = scene.stepper, type(scene.stepper).model_fields
+    chosen = [
+        f"{k}={v!r}"
+        for k, v in non_default_settings(stepper).items()
+        if k != "control" and not fields[k].is_required()
+    ]
     name = type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else "")
     return f"{name}, {type(stepper.control).__name__}"

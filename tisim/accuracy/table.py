@@ -8,11 +8,10 @@ from rich.text import Text
 
 from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row
+from tisim.console import TERMINAL_WIDTH
 
-WIDTH = 80
-"""Characters of a line; every terminal has as many."""
 NARROW = 16
-"""The least of them for the settings of a method."""
+"""The column with the settings of a method has at least so many characters."""
 
 
 def table(study: Study) -> RenderableType:
@@ -26,7 +25,7 @@ def table(study: Study) -> RenderableType:
     cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows if not row.failed}
     columns = zip(heads, *cells.values(), strict=True)
     first, *widths = (max(len(line) for cell in column for line in cell.split("\n")) for column in columns)
-    widths = [max(NARROW, min(first, WIDTH - sum(widths) - len(widths))), *widths]
+    widths = [max(NARROW, min(first, TERMINAL_WIDTH - sum(widths) - len(widths))), *widths]
     relative = ", ".join(f"{q.name}: relative to {q.relative_to}" for q in study.quantities)
     blocks: list[RenderableType] = [Text(f"errors of {relative}"), _grid([heads], widths, "bold")]
     for method in dict.fromkeys(row.method for row in study.rows):

@@ -19,12 +19,12 @@ from tisim.engine.simulation import Simulation
 from tisim.errors import RunError
 from tisim.scene.scene import Scene
 
-Look = Callable[[Result], None]
-LOOKS = 127
-"""Looks at a run on its way. A prime number: of a motion of any whole number of periods, but for multiples of
-it, no two looks are at the same part of the period."""
+ResultCallback = Callable[[Result], None]
+OBSERVATIONS = 127
+"""A run is observed so many times on its way. A prime number: of a motion of any whole number of periods, but
+for multiples of it, no two observations are at the same part of the period."""
 ROOM = 40
-"""Trees of fields that must be free before a simulation is made, which takes two to some ten."""
+"""So many trees of fields must be free before a simulation is made, which takes two to some ten."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ class Timed:
         return steps / starts, sums / starts, rejections / starts
 
 
-class Looks(Observer):
-    """Lets the first world wait ``LOOKS`` times on its way, and looks at its state there."""
+class ResultObserver(Observer):
+    """Lets the first world pause ``OBSERVATIONS`` times on its way, and hands on its result there."""
 
-    def __init__(self, duration: float, look: Look) -> None:
-        """duration : of the run, s."""
-        self.times = np.append(duration / LOOKS * np.arange(LOOKS + 1), np.inf)
-        self.look, self.due = look, 0.0
+    def __init__(self, duration: float, on_result: ResultCallback) -> None:
+        """duration : simulated time of the run, s."""
+        self.times = np.append(duration / OBSERVATIONS * np.arange(OBSERVATIONS + 1), np.inf)
+        self.on_result, self.due = on_result, 0.0
 
     def pause(self, simulation: Simulation) -> np.ndarray:
         return np.array([self.due, *[np.inf] * (len(simulation.scenes) - 1)])
@@ -63,48 +63,52 @@ class Looks(Observer):
     def observe(self, simulation: Simulation) -> None:
         (result,) = simulation.results([0])
         if result.time >= self.due:
-            self.look(result)
+            self.on_result(result)
             self.due = float(self.times[np.searchsorted(self.times, result.time, side="right")])
 
 
-class Bench:
+class SimulationCache:
     """Compiled simulations, one for each structure and number of worlds: idle worlds would be timed too.
 
     They are kept for as long as there is room for another. Those that were not used for longest go first.
     """
 
     def __init__(self) -> None:
-        self.made: dict[Any, Simulation] = {}
+        self.cached: dict[Any, Simulation] = {}
         self.warm: weakref.WeakSet[Simulation] = weakref.WeakSet()
 
-    def ready(self, scene: Scene, worlds: int) -> Simulation:
-        """Compiled for a scene of this structure and size."""
+    def compiled(self, scene: Scene, worlds: int) -> Simulation:
+        """The simulation that is compiled for a scene of this structure and size."""
         key = scene.structure(), worlds, scene.capacity()
-        found = self.made.pop(key, None)
-        if found is None:
-            while self.made and len(memory.in_use()) > memory.MOST - ROOM:
-                self.made.pop(next(iter(self.made))).close()
-            found = Simulation(scene, worlds)
-        self.made[key] = found
-        return found
+        simulation = self.cached.pop(key, None)
+        if simulation is None:
+            while self.cached and len(memory.in_use()) > memory.MAX_TREES - ROOM:
+                self.cached.pop(next(iter(self.cached))).close()
+            simulation = Simulation(scene, worlds)
+        self.cached[key] = simulation
+        return simulation
 
     def run(
-        self, scenes: Sequence[Scene], progress: Progress | None = None, look: Look | None = None
+        self,
+        scenes: Sequence[Scene],
+        progress: Progress | None = None,
+        on_result: ResultCallback | None = None,
     ) -> Timed:
         """RunError, with the reason, when one of them fails.
 
-        progress : called about four times a second, first when all is compiled and the run begins. look :
-        given the first scene's state about ``LOOKS`` times, evenly in its simulated time.
+        progress : called about four times a second, first when all is compiled and the run begins.
+        on_result : called with the first scene's result about ``OBSERVATIONS`` times, evenly in its simulated
+        time.
         """
-        simulation = self.ready(scenes[0], len(scenes))
+        simulation = self.compiled(scenes[0], len(scenes))
         simulation.load(scenes)
         if simulation not in self.warm:
-            # What is only compiled when it is first used: steps, and all that looks at them.
+            # What is only compiled when it is first used: steps, and all that reads their results.
             simulation.run(steps=1)
             simulation.results()
             simulation.load(scenes)
             self.warm.add(simulation)
-        observers: list[Observing] = [Looks(scenes[0].duration, look)] if look else []
+        observers: list[Observing] = [ResultObserver(scenes[0].duration, on_result)] if on_result else []
         if progress:
             observers.append(lambda simulation: progress(simulation.fraction()))
         simulation.run(observers=observers)
@@ -115,10 +119,10 @@ class Bench:
         return Timed(results, simulation.wall_s)
 
     def close(self) -> None:
-        """Give the memory back."""
-        for simulation in self.made.values():
+        """Give the device memory of all simulations back."""
+        for simulation in self.cached.values():
             simulation.close()
-        self.made.clear()
+        self.cached.clear()
         self.warm.clear()
 
 

@@ -20,8 +20,10 @@ from tisim.backend.taichi import BACKEND, ti
 from tisim.backend.thread import in_taichi_thread
 
 DEPENDENCIES = ("tisim", "taichi", "quadrants", "numpy", "h5py", "deap", "pydantic", "matplotlib")
-PARTICLES = 2000
-SECONDS = 0.5
+BENCHMARK_PARTICLES = 2000
+"""The measured rate is of the forces between so many particles."""
+BENCHMARK_SECONDS = 0.5
+"""The rate is measured for so long, wall seconds."""
 
 # The first LLVM that knows an x86 processor newer than 2021, by (vendor, family, lowest and highest model).
 # LLVM, llvm/lib/TargetParser/Host.cpp and release notes of 12 to 19.
@@ -69,15 +71,15 @@ def _pairs(
 def pair_rate() -> float:
     """Pairs per second of a 1/r^2 force between all pairs: f64, one core, the running backend."""
     runtime.init("cpu", "f64", 1)
-    x, y, z = np.random.Generator(np.random.Philox(1)).random((3, PARTICLES))
-    f = np.zeros(PARTICLES)
-    _pairs(x, y, z, f, PARTICLES)
-    end, fastest = time.perf_counter() + SECONDS, float("inf")
+    x, y, z = np.random.Generator(np.random.Philox(1)).random((3, BENCHMARK_PARTICLES))
+    f = np.zeros(BENCHMARK_PARTICLES)
+    _pairs(x, y, z, f, BENCHMARK_PARTICLES)
+    end, fastest = time.perf_counter() + BENCHMARK_SECONDS, float("inf")
     while (began := time.perf_counter()) < end:
-        _pairs(x, y, z, f, PARTICLES)
+        _pairs(x, y, z, f, BENCHMARK_PARTICLES)
         # The fastest, as the rest of the machine can only slow it down.
         fastest = min(fastest, time.perf_counter() - began)
-    return PARTICLES**2 / fastest
+    return BENCHMARK_PARTICLES**2 / fastest
 
 
 def rate_of(backend: str) -> float | None:
@@ -85,14 +87,18 @@ def rate_of(backend: str) -> float | None:
     if importlib.util.find_spec(backend) is None:
         return None
     command = [sys.executable, "-c", "from tisim.backend.diagnostics import pair_rate; print(pair_rate())"]
-    found = subprocess.run(
+    benchmark = subprocess.run(
         command, env={**os.environ, "TISIM_BACKEND": backend}, capture_output=True, text=True, check=False
     )
-    return float(found.stdout.split()[-1]) if found.returncode == 0 and found.stdout.strip() else None
+    return (
+        float(benchmark.stdout.split()[-1])
+        if benchmark.returncode == 0 and benchmark.stdout.strip()
+        else None
+    )
 
 
 def llvm_version() -> str:
-    """Of the LLVM inside the backend, or "unknown"."""
+    """The version of the LLVM inside the backend, or "unknown"."""
     version = getattr(ti._lib.core, "get_llvm_target_support", None)
     return str(version()) if version else "unknown"
 
@@ -107,7 +113,7 @@ def processor() -> dict[str, str]:
     return {key.strip(): value.strip() for key, value in pairs}
 
 
-def known(cpu: dict[str, str], llvm: str) -> str:
+def processor_support(cpu: dict[str, str], llvm: str) -> str:
     """Whether an LLVM knows a processor, as a sentence."""
     try:
         vendor, family, model = cpu["vendor_id"], int(cpu["cpu family"]), int(cpu["model"])
@@ -127,7 +133,7 @@ def findings() -> list[Finding]:
     cpu, llvm = processor(), llvm_version()
     report = [
         Finding("backend", runtime.backend(), f"LLVM {llvm}"),
-        Finding("processor", cpu.get("model name", "unknown"), known(cpu, llvm)),
+        Finding("processor", cpu.get("model name", "unknown"), processor_support(cpu, llvm)),
         Finding("cores", str(runtime.cores()), f"{os.cpu_count()} in the machine"),
         Finding("memory", _memory()),
         Finding("cuda", "present" if _cuda() else "absent", "" if _cuda() else "--device cpu only"),
@@ -157,7 +163,7 @@ def _advice(rates: dict[str, float | None]) -> Finding:
 
 
 def _cuda() -> bool:
-    """Whether a driver is there that a kernel could run on."""
+    """Whether a CUDA driver is there that a kernel could run on."""
     return any(Path(device).exists() for device in ("/dev/nvidia0", "/dev/dxg")) and ti._lib.core.with_cuda()
 
 

@@ -14,12 +14,13 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.errors import RunError
 
-MOST = 480
-"""Trees of fields that may be in use at once; with more than 512, Taichi 1.7.4 and Quadrants 1.3.3 crash."""
+MAX_TREES = 480
+"""So many trees of fields may be in use at once; with more than 512, Taichi 1.7.4 and Quadrants 1.3.3
+crash."""
 
-WORN = 300
-"""Trees that may be made before Taichi is started anew: it never gives back the memory of compiled kernels,
-some hundred kB to each tree, and takes longer to compile the more there are."""
+MAX_TREES_PER_START = 300
+"""Taichi is started anew after so many trees: it never gives back the memory of compiled kernels, some
+hundred kB to each tree, and takes longer to compile the more there are."""
 
 _made: Counter[int] = Counter()
 """Trees that have been made, by the start of Taichi."""
@@ -48,9 +49,11 @@ class Tree:
             trees.append(self)
         _made[self.generation] += 1
         _release_lost()
-        if len(in_use()) > MOST:
+        if len(in_use()) > MAX_TREES:
             self.destroy()
-            raise RunError(f"at most {MOST} sets of fields can be in use at once; close a Simulation first")
+            raise RunError(
+                f"at most {MAX_TREES} sets of fields can be in use at once; close a Simulation first"
+            )
 
     @property
     def alive(self) -> bool:
@@ -84,14 +87,14 @@ def collected() -> Iterator[list[Tree]]:
         _collecting.pop()
 
 
-def made() -> int:
+def trees_made() -> int:
     """Trees that have been made in this process."""
     return _made.total()
 
 
 def worn() -> bool:
     """Whether so many trees have been made that Taichi should be started anew."""
-    return _made[runtime.generation()] >= WORN
+    return _made[runtime.generation()] >= MAX_TREES_PER_START
 
 
 @in_taichi_thread

@@ -38,11 +38,11 @@ def in_taichi_thread(function: Callable[P, R]) -> Callable[P, R]:
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         if getattr(_here, "is_it", False):
             return function(*args, **kwargs)
-        asked = _thread.submit(function, *args, **kwargs)
+        future = _thread.submit(function, *args, **kwargs)
         try:
-            return asked.result()
+            return future.result()
         finally:
             # Where the wait was broken off: what has not begun does not begin.
-            asked.cancel()
+            future.cancel()
 
     return call

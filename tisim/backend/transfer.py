@@ -4,6 +4,7 @@ Taichi's own copies are a kernel for each field and direction, and a kernel take
 simulation of two particles spent ten times as long on them as on the kernels of its steps.
 """
 
+import math
 from collections.abc import Mapping
 from itertools import groupby
 from typing import Any
@@ -13,13 +14,13 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 
-MOST = 32
-"""Entries of a loop that Taichi unrolls without a warning."""
+UNROLL_LIMIT = 32
+"""A loop may have so many entries for Taichi to unroll it without a warning."""
 TYPES = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32, ti.i64: np.int64}
 
 
 def _divided(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
-    return tuple(entries[k : k + MOST] for k in range(0, len(entries), MOST))
+    return tuple(entries[k : k + UNROLL_LIMIT] for k in range(0, len(entries), UNROLL_LIMIT))
 
 
 @ti.data_oriented
@@ -27,18 +28,17 @@ class Exchange:
     """The copies of some fields, scalar or of vectors, by their names."""
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
-        self.kinds = list(TYPES)
-        sizes, placed = dict.fromkeys(TYPES, 0), []
-        self.places: dict[str, tuple[Any, int, tuple[int, ...]]] = {}
+        kinds, sizes, placed = list(TYPES), dict.fromkeys(TYPES, 0), []
+        self.places: dict[str, tuple[int, slice, tuple[int, ...]]] = {}
         for name, column in columns.items():
             parts = getattr(column, "n", 1)
             shape = (*column.shape, parts) if parts > 1 else tuple(column.shape)
-            begin = sizes[column.dtype]
+            begin, kind = sizes[column.dtype], kinds.index(column.dtype)
             for k in range(parts):
                 part = column.get_scalar_field(k) if parts > 1 else column
-                placed.append((tuple(column.shape), self.kinds.index(column.dtype), part, begin + k, parts))
-            self.places[name] = column.dtype, begin, shape
-            sizes[column.dtype] += int(np.prod(shape))
+                placed.append((tuple(column.shape), kind, part, begin + k, parts))
+            sizes[column.dtype] += math.prod(shape)
+            self.places[name] = kind, slice(begin, sizes[column.dtype]), shape
         self.sizes = sizes
         placed.sort(key=lambda entry: entry[0])
         groups = [(shape, tuple(entry[1:] for entry in of)) for shape, of in groupby(placed, lambda e: e[0])]
@@ -50,14 +50,13 @@ class Exchange:
 
     def _views(self, buffers: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
         return {
-            name: buffers[self.kinds.index(dtype)][begin : begin + int(np.prod(shape))].reshape(shape)
-            for name, (dtype, begin, shape) in self.places.items()
+            name: buffers[kind][where].reshape(shape) for name, (kind, where, shape) in self.places.items()
         }
 
     def read(self) -> dict[str, np.ndarray]:
         """Every field as an array of its full shape."""
         buffers = self._buffers()
-        self._launch_read(buffers)
+        self._launch(True, buffers)
         return self._views(buffers)
 
     def write(self, values: Mapping[str, Any]) -> None:
@@ -65,16 +64,11 @@ class Exchange:
         buffers = self._buffers()
         for name, view in self._views(buffers).items():
             view[...] = values[name]
-        self._launch_write(buffers)
+        self._launch(False, buffers)
 
     @in_taichi_thread
-    def _launch_read(self, buffers: tuple[np.ndarray, ...]) -> None:
-        self._read(*buffers)
-        ti.sync()
-
-    @in_taichi_thread
-    def _launch_write(self, buffers: tuple[np.ndarray, ...]) -> None:
-        self._write(*buffers)
+    def _launch(self, reads: bool, buffers: tuple[np.ndarray, ...]) -> None:
+        self._copy(reads, *buffers)
         ti.sync()
 
     @ti.func
@@ -86,33 +80,22 @@ class Exchange:
         return at
 
     @ti.kernel
-    def _read(
+    def _copy(
         self,
+        reads: ti.template(),  # type: ignore[valid-type]
         f32: ti.types.ndarray(),  # type: ignore[valid-type]
         f64: ti.types.ndarray(),  # type: ignore[valid-type]
         i32: ti.types.ndarray(),  # type: ignore[valid-type]
         i64: ti.types.ndarray(),  # type: ignore[valid-type]
     ):
+        """From the fields to the arrays where it reads, else from the arrays to the fields."""
         for group in ti.static(self.groups):
             for where in ti.grouped(group[1][0][0][1]):
                 at = self._at(group[0], where)
                 for entries in ti.static(group[1]):
                     for entry in ti.static(entries):
                         buffer = ti.static((f32, f64, i32, i64)[entry[0]])
-                        buffer[entry[2] + at * entry[3]] = entry[1][where]
-
-    @ti.kernel
-    def _write(
-        self,
-        f32: ti.types.ndarray(),  # type: ignore[valid-type]
-        f64: ti.types.ndarray(),  # type: ignore[valid-type]
-        i32: ti.types.ndarray(),  # type: ignore[valid-type]
-        i64: ti.types.ndarray(),  # type: ignore[valid-type]
-    ):
-        for group in ti.static(self.groups):
-            for where in ti.grouped(group[1][0][0][1]):
-                at = self._at(group[0], where)
-                for entries in ti.static(group[1]):
-                    for entry in ti.static(entries):
-                        buffer = ti.static((f32, f64, i32, i64)[entry[0]])
-                        entry[1][where] = buffer[entry[2] + at * entry[3]]
+                        if ti.static(reads):
+                            buffer[entry[2] + at * entry[3]] = entry[1][where]
+                        else:
+                            entry[1][where] = buffer[entry[2] + at * entry[3]]

@@ -64,7 +64,7 @@ def optimize(
 
     All goes to search.h5; running again goes on from there.
     """
-    from optimize.evaluation.executors import made
+    from optimize.evaluation.executors import evaluator_named
     from optimize.search_folder import FILE, clear
     from optimize.session import session
     from optimize.settings import Settings, fit, followed, proposed
@@ -84,7 +84,7 @@ def optimize(
     settings = Settings(**scene_arguments.nested(followed(proposed(problem, usual, method), given), given))
     fit(problem, settings)
     place = folder or Path("out") / problem.name
-    with closing(made(executor, device, precision, threads)) as evaluator:
+    with closing(evaluator_named(executor, device, precision, threads)) as evaluator:
         if fresh:
             clear(place, overwrite)
         outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
@@ -120,7 +120,7 @@ def compare(
 
     Given again, it goes on.
     """
-    from optimize.evaluation.executors import made
+    from optimize.evaluation.executors import evaluator_named
     from optimize.report import comparison
     from optimize.settings import followed
     from optimize.storage.cache import Cache
@@ -133,7 +133,7 @@ def compare(
     ownership.take(place, comparison.NAMES, overwrite)
     found = []
     with (
-        closing(made(executor, device, precision, threads)) as evaluator,
+        closing(evaluator_named(executor, device, precision, threads)) as evaluator,
         Cache(place / comparison.FILE) as store,
         Interrupt(stopping) as ctrl_c,
     ):
@@ -163,8 +163,8 @@ def cache(
     compact: Annotated[bool, typer.Option("--compact", help="Drop what is damaged or double.")] = False,
 ) -> None:
     """List the evaluations in a search's file; verify or compact it."""
-    from optimize.report.cache_summary import listing
-    from optimize.storage import cache as store
+    from optimize.report.cache_summary import summary
+    from optimize.storage import maintenance as store
 
     if compact:
         print(f"{store.compact(file)} evaluations kept")
@@ -179,4 +179,4 @@ def cache(
         if not found.ok:
             raise typer.Exit(1)
     if not (compact or verify):
-        out().print(listing(file))
+        out().print(summary(file))

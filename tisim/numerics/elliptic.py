@@ -15,7 +15,7 @@ LIMITS = {ti.f64: (1e-8, 1e-17), ti.f32: (1e-4, 1e-9)}
 """Relative difference at which the two means have met, as the next would be its square; and the least kc and
 |gamma|, below the rounding of what they are made of."""
 ITERATIONS = 16
-"""More than the least kc takes."""
+"""The mean of the least kc has met its limit in fewer iterations than these."""
 
 
 def limits() -> tuple[float, float]:

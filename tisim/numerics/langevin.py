@@ -3,7 +3,7 @@
 from tisim.backend.taichi import ti
 
 TERMS = 9
-"""Of the continued fraction; up to x = 1 the next one is below rounding in f64."""
+"""So many terms of the continued fraction are taken; up to x = 1 the next one is below rounding in f64."""
 
 
 @ti.func

@@ -9,7 +9,8 @@ from math import factorial, log, pi, sqrt
 
 from tisim.backend.taichi import ti
 
-ROUNDS = 10
+PHILOX_ROUNDS = 10
+"""Philox4x32-10 mixes the counter and the key so many times."""
 Words = ti.types.vector(4, ti.u32)
 
 
@@ -23,7 +24,7 @@ def philox(counter, key_low, key_high):
     """Four random 32-bit words of a counter of four 32-bit words and a key of two."""
     c = counter
     k0, k1 = ti.cast(key_low, ti.u32), ti.cast(key_high, ti.u32)
-    for _ in ti.static(range(ROUNDS)):
+    for _ in ti.static(range(PHILOX_ROUNDS)):
         p0 = ti.cast(c[0], ti.u64) * ti.u64(0xD2511F53)
         p1 = ti.cast(c[2], ti.u64) * ti.u64(0xCD9E8D57)
         c = Words([_high(p1) ^ c[1] ^ k0, ti.cast(p1, ti.u32), _high(p0) ^ c[3] ^ k1, ti.cast(p0, ti.u32)])
@@ -72,11 +73,11 @@ def normal(words):
 
 LOG_2, QUARTER, ROOT = log(2), pi / 2, sqrt(0.5)
 ROOT_BITS = 0x3FE6A09E667F3BCD
-"""Of ROOT as f64."""
+"""The bits of ROOT as an f64 number."""
 ARTANH = tuple(1 / k for k in range(1, 14, 2))
 COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(7))
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(6))
-"""Of the series of artanh(x)/x, cos x and sin(x)/x, in x^2."""
+"""ARTANH, COSINE and SINE are the coefficients of the series of artanh(x)/x, cos x and sin(x)/x in x^2."""
 
 
 @ti.func

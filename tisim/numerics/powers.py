@@ -3,7 +3,8 @@
 from tisim.backend.taichi import ti
 
 Exponent = int | float
-"""Of an effect: an option, not a parameter per world. It is compiled in, and the same for a whole batch."""
+"""The type of an exponent of an effect: an option, not a parameter per world. It is compiled in, and the same
+for a whole batch."""
 
 
 @ti.func

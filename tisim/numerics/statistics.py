@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
 CONFIDENCE = 0.95
+"""The probability with which an interval holds the true mean, where none other is asked for."""
 
 
 def half_width(values: ArrayLike, confidence: float = CONFIDENCE) -> Any:
@@ -14,8 +15,8 @@ def half_width(values: ArrayLike, confidence: float = CONFIDENCE) -> Any:
 
     Spread over further axes is that of each component by itself.
     """
-    found = np.asarray(values, float)
-    n = len(found)
+    samples = np.asarray(values, float)
+    n = len(samples)
     if n < 2:
-        return np.full(found.shape[1:], np.inf)[()]
-    return student.ppf(0.5 + confidence / 2, n - 1) * found.std(axis=0, ddof=1) / np.sqrt(n)
+        return np.full(samples.shape[1:], np.inf)[()]
+    return student.ppf(0.5 + confidence / 2, n - 1) * samples.std(axis=0, ddof=1) / np.sqrt(n)

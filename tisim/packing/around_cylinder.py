@@ -14,8 +14,8 @@ from tisim.components.ranges import check_direction, check_resolved
 from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
 
-ROUNDS = 200
-"""Of as many tries as there are spheres, before the region counts as full."""
+MAX_ROUNDS = 200
+"""The region counts as full after so many rounds, each of as many tries as there are spheres."""
 
 
 class RandomAroundCylinder(Placement):
@@ -43,7 +43,7 @@ class RandomAroundCylinder(Placement):
         return axis
 
     def volume(self) -> float:
-        """Of the part, m^3."""
+        """The volume of the part, m^3."""
         outer = np.pi * (self.radius + self.thickness) ** 2
         side = (outer - np.pi * self.radius**2) * self.length
         return float((self.part != "top") * side + (self.part != "side") * 2 * outer * self.thickness)
@@ -58,17 +58,19 @@ class RandomAroundCylinder(Placement):
         rule = f"at most what finds room around the cylinder, less than {most:.4g}"
         must(number <= most, "cloud.number", rule, number)
         generator = np.random.default_rng([seed, 0x6C61796572])
-        found = np.empty((0, 3))
-        for _ in range(ROUNDS):
-            found = _apart(np.vstack([found, self._tries(number, radius, generator)]), 2 * radius)[:number]
-            if len(found) == number:
+        centres = np.empty((0, 3))
+        for _ in range(MAX_ROUNDS):
+            centres = _apart(np.vstack([centres, self._tries(number, radius, generator)]), 2 * radius)[
+                :number
+            ]
+            if len(centres) == number:
                 break
         else:
             raise InputError(
-                f"cloud.number must be at most what finds room around the cylinder, {len(found)} here; "
+                f"cloud.number must be at most what finds room around the cylinder, {len(centres)} here; "
                 f"received {number}"
             )
-        return self._turned(found) + np.asarray(self.centre)
+        return self._turned(centres) + np.asarray(self.centre)
 
     def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
         """Points of the part, evenly, in a frame whose z axis is that of the cylinder. m."""
@@ -94,8 +96,8 @@ class RandomAroundCylinder(Placement):
 
 
 def _apart(points: np.ndarray, distance: float) -> np.ndarray:
-    """Without those nearer than a distance (m) to one that comes before."""
-    kept = np.ones(len(points), bool)
+    """The points (m) without those nearer than a distance (m) to one that comes before."""
+    free = np.ones(len(points), bool)
     for i, j in sorted(cKDTree(points).query_pairs(distance)):
-        kept[j] &= not kept[i]
-    return points[kept]
+        free[j] &= not free[i]
+    return points[free]

@@ -13,16 +13,16 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.components.ranges import check_resolved
 from tisim.errors import InputError, must
 from tisim.numerics import philox
-from tisim.packing.region import Region, box
+from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
+from tisim.packing.region import Region
 from tisim.packing.saturation import fill
 
-STREAM = 0x52534100
-SATURATION = 0.3841
-"""Volume fraction at which no further sphere fits, in the bulk."""
-PATIENCE = 5_000
-"""Failures in a row after which places are no longer tried everywhere, only where there is room."""
-CELLS = 64
-"""Cells along an axis, at most."""
+SATURATION_FRACTION = 0.3841
+"""The volume fraction at which no further sphere fits, in the bulk."""
+MAX_CONSECUTIVE_FAILURES = 5_000
+"""After so many failures in a row places are no longer tried everywhere, only where there is room."""
+MAX_CELLS = 64
+"""The list of neighbours has so many cells along an axis at most."""
 
 
 @in_taichi_thread
@@ -34,7 +34,7 @@ def _add(
     spheres: ti.i32,
     radius: ti.f64,
     seed: ti.u64,
-    patience: ti.i32,
+    max_failures: ti.i32,
     x_low: ti.f64,
     y_low: ti.f64,
     z_low: ti.f64,
@@ -62,9 +62,9 @@ def _add(
         for i in range(spheres):
             free = False
             tries = 0
-            while not free and tries < patience and not stuck:
-                a = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 0))
-                b = philox.uniform(philox.bits(seed, STREAM, 0, attempt, 1))
+            while not free and tries < max_failures and not stuck:
+                a = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 0))
+                b = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 1))
                 u = ti.Vector([a[0], a[1], b[0]])
                 attempt += ti.cast(1, ti.u64)
                 if ball == 0 or (u - 0.5).norm_sqr() <= 0.25:
@@ -103,17 +103,6 @@ def _add(
     return placed
 
 
-def sequential_addition(
-    count: int, radius: float, low: np.ndarray, high: np.ndarray, seed: int, periodic: bool = False
-) -> np.ndarray:
-    """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) that do not overlap.
-
-    Centres lie anywhere in the box ``low``..``high`` (m); spheres may reach over its faces, and where the box
-    is ``periodic`` they do not overlap across them either. Further as ``place``.
-    """
-    return place(count, radius, box(low, high, periodic), seed)
-
-
 def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) in a region, none overlapping.
 
@@ -124,18 +113,18 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     check_resolved("places of the packing", np.stack([region.low, region.high]), radius)
     sphere = 4 / 3 * np.pi * radius**3
     # Refused at once where no choice of places would do: a few spheres can exceed the limit of many.
-    most = (SATURATION + count**-0.5) * region.covered(radius) / region.volume
-    wanted = count * sphere / region.volume
-    rule = f"at most {SATURATION:.3f}, where random sequential addition of many spheres ends"
-    must(wanted <= most, "volume fraction", rule, float(f"{wanted:.4g}"))
+    most = (SATURATION_FRACTION + count**-0.5) * region.covered(radius) / region.volume
+    fraction = count * sphere / region.volume
+    rule = f"at most {SATURATION_FRACTION:.3f}, where random sequential addition of many spheres ends"
+    must(fraction <= most, "volume fraction", rule, float(f"{fraction:.4g}"))
     centres = _everywhere(count, radius, region, seed)
     if len(centres) < count:
-        generator = np.random.Generator(np.random.Philox(key=[seed, STREAM]))
+        generator = np.random.Generator(np.random.Philox(key=[seed, SEQUENTIAL_ADDITION]))
         centres = fill(centres, count, 2 * radius, region, generator)
     if len(centres) < count:
         raise InputError(
             f"volume fraction must be at most {len(centres) * sphere / region.volume:.4f}, where no further "
-            f"sphere fits ({len(centres)} of {count} were placed); received {wanted:.4f}"
+            f"sphere fits ({len(centres)} of {count} were placed); received {fraction:.4f}"
         )
     return centres
 
@@ -143,7 +132,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
 def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     """The first centres, found by trying places in all of the region."""
     # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
-    dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, CELLS).astype(int)
+    dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, MAX_CELLS).astype(int)
     heads = np.full(int(np.prod(dims)), -1, dtype=np.int32)
     centres, follow = np.zeros((count, 3)), np.full(count, -1, dtype=np.int32)
     placed = _add(
@@ -153,7 +142,7 @@ def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndar
         count,
         radius,
         seed,
-        PATIENCE,
+        MAX_CONSECUTIVE_FAILURES,
         *region.low.tolist(),
         *region.side.tolist(),
         *dims.tolist(),

@@ -25,17 +25,17 @@ class Region:
 
     @property
     def side(self) -> np.ndarray:
-        """m, shape (3,)."""
+        """The lengths of the box along the axes, m, shape (3,)."""
         return self.high - self.low
 
     @property
     def centre(self) -> np.ndarray:
-        """m, shape (3,)."""
+        """The centre of the box, m, shape (3,)."""
         return (self.low + self.high) / 2
 
     @property
     def reach(self) -> float:
-        """Of the ball, m."""
+        """The radius of the ball, m."""
         return float(self.side[0]) / 2
 
     def covered(self, radius: float) -> float:
@@ -46,7 +46,7 @@ class Region:
 
 
 def box(low: np.ndarray, high: np.ndarray, periodic: bool = False) -> Region:
-    """Centres anywhere in a box; spheres may reach over its faces."""
+    """Centres anywhere in a box low..high (m); spheres may reach over its faces."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     wide = bool((high > low).all())
     must(wide, "box", "wider than nothing in each direction", (high - low).tolist())

@@ -15,15 +15,15 @@ from scipy.spatial import cKDTree
 
 from tisim.packing.region import Region
 
-COARSE = 0.5
-"""Side of the first voxels, in diameters."""
-BLOCK = 200_000
-"""Voxels worked on at once."""
-NEAREST = 4
-"""Centres that may cover a voxel, of those nearest to the voxel that it was cut from; what is missed for the
-moment is found in a finer cut."""
-FINEST = 40
-"""Times that voxels are cut; their side is then below the rounding of a diameter."""
+FIRST_VOXEL_SIDE = 0.5
+"""The side of the first voxels is so long at most, in diameters of a sphere."""
+VOXELS_PER_BLOCK = 200_000
+"""So many voxels are worked on at once, which bounds the memory that it takes."""
+NEAREST_CENTRES = 4
+"""Whether a voxel is covered is asked of so many centres, those nearest to the voxel that it was cut from;
+what is missed for the moment is found in a finer cut."""
+MAX_CUTS = 40
+"""Voxels are cut so many times at most; their side is then below the rounding of a diameter."""
 
 
 def fill(
@@ -44,7 +44,7 @@ class _Voids:
         self.box = region.side if region.periodic else None
         self.places = centres - region.low
         self.tree = self._tree(self.places)
-        dims = np.maximum(np.ceil(region.side / (COARSE * diameter)), 1).astype(int)
+        dims = np.maximum(np.ceil(region.side / (FIRST_VOXEL_SIDE * diameter)), 1).astype(int)
         self.step = region.side / dims
         self.index = np.concatenate([
             self._outside(self._in_ball(np.stack(np.unravel_index(block, dims), axis=1)), self.tree)
@@ -56,7 +56,7 @@ class _Voids:
         return cKDTree(places % self.box if self.box is not None else places, boxsize=self.box)
 
     def fill(self, count: int, generator: np.random.Generator) -> np.ndarray:
-        for _ in range(FINEST):
+        for _ in range(MAX_CUTS):
             while len(self.index) and len(self.places) < count:
                 tries = len(self.index)
                 new = self._try(tries, generator)[: count - len(self.places)]
@@ -81,13 +81,13 @@ class _Voids:
 
     def _first_come(self, places: np.ndarray) -> np.ndarray:
         """Which places are taken when each, in turn, is taken if no earlier one is within a diameter."""
-        taken = np.ones(len(places), dtype=bool)
+        accepted = np.ones(len(places), dtype=bool)
         if len(places):
             pairs = self._tree(places).query_pairs(self.diameter, output_type="ndarray")
             for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
-                if taken[i]:
-                    taken[j] = False
-        return taken
+                if accepted[i]:
+                    accepted[j] = False
+        return accepted
 
     def _add(self, new: np.ndarray) -> None:
         self.places = np.concatenate([self.places, new])
@@ -101,17 +101,17 @@ class _Voids:
         self.step = coarse / 2
         eighths = np.indices((2, 2, 2)).reshape(3, -1).T
         reach = self.diameter + float(np.linalg.norm(coarse)) / 2
-        kept = []
+        children = []
         for block in _blocks(parents):
-            _, near = self.tree.query((block + 0.5) * coarse, k=NEAREST, distance_upper_bound=reach)
+            _, near = self.tree.query((block + 0.5) * coarse, k=NEAREST_CENTRES, distance_upper_bound=reach)
             index = 2 * block[:, None, :] + eighths
             middle = (index + 0.5) * self.step
-            left = np.ones(index.shape[:2], dtype=bool)
-            for k in range(NEAREST):
+            uncovered = np.ones(index.shape[:2], dtype=bool)
+            for k in range(NEAREST_CENTRES):
                 there = near[:, k] < len(self.places)
-                left[there] &= ~self._covered(middle[there], self.places[near[there, k], None, :])
-            kept.append(self._in_ball(index[left]))
-        self.index = np.concatenate(kept)
+                uncovered[there] &= ~self._covered(middle[there], self.places[near[there, k], None, :])
+            children.append(self._in_ball(index[uncovered]))
+        self.index = np.concatenate(children)
 
     def _outside(self, index: np.ndarray, tree: cKDTree) -> np.ndarray:
         """The voxels that the nearest centre of a tree does not cover."""
@@ -137,5 +137,5 @@ class _Voids:
 
 
 def _blocks(items: np.ndarray) -> Iterator[np.ndarray]:
-    for begin in range(0, max(len(items), 1), BLOCK):
-        yield items[begin : begin + BLOCK]
+    for begin in range(0, max(len(items), 1), VOXELS_PER_BLOCK):
+        yield items[begin : begin + VOXELS_PER_BLOCK]

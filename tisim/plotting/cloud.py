@@ -24,9 +24,11 @@ PIXELS = 1400
 SMALLEST = 4.0
 """Least radius of a grain in those pixels: a smaller one would not be seen."""
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
-PLAIN = (0.36, 0.55, 0.73)
-FALL = "#b3413e"
-"""Colour of gravity."""
+"""The viewer stands in this direction: its angle to x in the xy plane and above it, rad."""
+GRAIN_COLOUR = (0.36, 0.55, 0.73)
+"""The colour of grains without a temperature: red, green and blue, 0..1."""
+GRAVITY_COLOUR = "#b3413e"
+"""The colour of the arrow of gravity."""
 # Without its black end, against which neither shade nor edge of a cold grain would show.
 HEAT = ListedColormap(colormaps["inferno"](np.linspace(0.17, 0.97, 256)))
 
@@ -35,7 +37,7 @@ _TOWARDS = np.array([
 ])  # fmt: skip
 _RIGHT = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
 _UP = np.cross(_TOWARDS, _RIGHT)
-SEEN = np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
+PROJECTION = np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
 """A point times this is right, up and towards the viewer."""
 _LIGHT = np.array([-0.45, 0.6, 0.66])
 
@@ -57,10 +59,10 @@ def start_and_end(
     figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
     norm = temperatures(states)
-    seen = corners(*scene.domain.bounds())
-    square = common(states, seen)
+    box = corners(*scene.domain.bounds())
+    square = common(states, box)
     for axis, state, heading, time in zip(axes, states, ("start", last), times, strict=True):
-        panel(axis, state, square, seen, norm)
+        panel(axis, state, square, box, norm)
         directions(axis, square, gravity(scene))
         axis.set_title(f"{heading}, {caption(state, time)}")
     letters(axes)
@@ -99,7 +101,7 @@ def temperatures(states: Sequence[Arrays]) -> Normalize | None:
 
 def _project(points: np.ndarray) -> np.ndarray:
     """Right, up and towards the viewer, for points of shape (n, 3). m."""
-    return np.asarray(points) @ SEEN
+    return np.asarray(points) @ PROJECTION
 
 
 def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
@@ -117,9 +119,9 @@ def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, flo
 
 def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
     """Left, bottom and side of a square that holds all grains and the box. m."""
-    seen, radius = _project(state["position"]), state["radius"][:, None]
-    low = np.vstack([seen - radius, box]).min(axis=0)[:2]
-    high = np.vstack([seen + radius, box]).max(axis=0)[:2]
+    projected, radius = _project(state["position"]), state["radius"][:, None]
+    low = np.vstack([projected - radius, box]).min(axis=0)[:2]
+    high = np.vstack([projected + radius, box]).max(axis=0)[:2]
     side = 1.06 * float((high - low).max())
     left, bottom = (low + high) / 2 - side / 2
     return float(left), float(bottom), side
@@ -130,7 +132,7 @@ def panel(
 ) -> None:
     """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``."""
     left, bottom, side = square
-    colour = np.tile(PLAIN, (len(state["radius"]), 1))
+    colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
     if norm is not None:
         colour = HEAT(norm(state["temperature"]))[:, :3]
     image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
@@ -145,8 +147,8 @@ def panel(
 
 def gravity(scene: Scene) -> np.ndarray:
     """Acceleration of all gravity in a scene, m/s^2; 0 where there is none."""
-    found = [effect.acceleration for effect in scene.effects if isinstance(effect, Gravity)]
-    return np.sum([(0.0, 0.0, 0.0), *found], axis=0)
+    accelerations = [effect.acceleration for effect in scene.effects if isinstance(effect, Gravity)]
+    return np.sum([(0.0, 0.0, 0.0), *accelerations], axis=0)
 
 
 def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray, share: float = 0.07) -> None:
@@ -159,21 +161,23 @@ def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray,
     origin = np.array([left + side - 1.7 * length, bottom + (1.6 if fall.any() else 0.5) * length])
     ends = [(name, end, "0.35") for name, end in zip("xyz", np.eye(3), strict=True)]
     if fall.any():
-        ends.append(("g", fall / np.linalg.norm(fall), FALL))
+        ends.append(("g", fall / np.linalg.norm(fall), GRAVITY_COLOUR))
     for name, end, colour in ends:
-        x, y = origin + length * (end @ SEEN)[:2]
+        x, y = origin + length * (end @ PROJECTION)[:2]
         arrow = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
         axis.annotate("", (x, y), (origin[0], origin[1]), arrowprops=arrow, zorder=4)
-        x, y = origin + 1.3 * length * (end @ SEEN)[:2]
+        x, y = origin + 1.3 * length * (end @ PROJECTION)[:2]
         axis.text(x, y, name, color=colour, fontsize=9, ha="center", va="center", zorder=4)
 
 
-def _draw(seen: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:
+def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:
     """Shaded spheres, hidden where another is in front. RGBA, shape (pixels, pixels, 4) / 2."""
     scale = PIXELS / side
     depth = np.full((PIXELS, PIXELS), -np.inf)
     image = np.zeros((PIXELS, PIXELS, 4))
-    for (x, y, z), r, rgb in zip(seen * scale, np.maximum(radius * scale, SMALLEST), colour, strict=True):
+    for (x, y, z), r, rgb in zip(
+        projected * scale, np.maximum(radius * scale, SMALLEST), colour, strict=True
+    ):
         i0, i1 = max(int(y - r), 0), min(int(y + r) + 2, PIXELS)
         j0, j1 = max(int(x - r), 0), min(int(x + r) + 2, PIXELS)
         v, u = np.mgrid[i0:i1, j0:j1] + 0.5

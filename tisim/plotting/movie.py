@@ -18,40 +18,41 @@ from tisim.plotting import cloud
 from tisim.scene.initial_state import Arrays
 
 SIDE = 5.0
-"""Of the picture, inches; of DPI pixels each."""
+"""The side of the picture, inches."""
 DPI = 110
+"""Pixels per inch of the picture."""
 
 
 def movie(
-    found: Frames, path: Path, rate: int = 20, progress: Callable[[float], None] = lambda fraction: None
+    frames: Frames, path: Path, rate: int = 20, progress: Callable[[float], None] = lambda fraction: None
 ) -> None:
     """Write a moving picture of all frames, ``rate`` of them a second, in place of any before.
 
     path : ends in .gif, or in .mp4 where ffmpeg is installed; InputError otherwise. progress : called with
     the finished fraction, 0..1.
     """
-    writer = check(found, path, rate)
-    coloured, ranges = _scales(found)
+    writer = check(frames, path, rate)
+    coloured, ranges = _scales(frames)
     figure = Figure(figsize=(SIDE + 0.9 * (coloured is not None), SIDE), facecolor="white")
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
-    seen = cloud.corners(*found.scene.domain.bounds())
-    square = cloud.view(ranges, seen)
+    box = cloud.corners(*frames.scene.domain.bounds())
+    square = cloud.view(ranges, box)
     if coloured is not None:
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         cloud.scale(figure, None, coloured, side)
     # Between the caption and what is drawn, where it covers neither grains nor their scale.
-    figure.text(0.5, 0.935, found.missing, ha="center", fontsize=7)
+    figure.text(0.5, 0.935, frames.missing, ha="center", fontsize=7)
     unfinished = path.with_name(while_drawn(path))
     try:
         with replacing(path, unfinished), writer.saving(figure, str(unfinished), DPI):
-            for k, frame in enumerate(found):
+            for k, frame in enumerate(frames):
                 axis.clear()
-                cloud.panel(axis, frame.arrays, square, seen, coloured)
-                cloud.directions(axis, square, cloud.gravity(found.scene))
+                cloud.panel(axis, frame.arrays, square, box, coloured)
+                cloud.directions(axis, square, cloud.gravity(frames.scene))
                 figure.suptitle(cloud.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
                 writer.grab_frame()
-                progress((k + 1) / len(found))
+                progress((k + 1) / len(frames))
     except CalledProcessError as error:
         raise RunError(f"{path} could not be written: {error}") from error
 
@@ -61,10 +62,10 @@ def while_drawn(path: Path) -> str:
     return f"{path.stem}.new{path.suffix}"
 
 
-def check(found: Frames, path: Path, rate: int) -> AbstractMovieWriter:
+def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
     """What writes such a file; InputError when there is no movie to make, or nothing to make it with."""
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
-    must(len(found) > 1, "file", "one with 2 frames or more", f"{len(found)} frames")
+    must(len(frames) > 1, "file", "one with 2 frames or more", f"{len(frames)} frames")
     if path.suffix == ".mp4":
         if not FFMpegWriter.isAvailable():
             raise InputError(f"movie must be a .gif where ffmpeg is not installed; received {path.name!r}")
@@ -73,13 +74,13 @@ def check(found: Frames, path: Path, rate: int) -> AbstractMovieWriter:
     return PillowWriter(fps=rate)
 
 
-def _scales(found: Frames) -> tuple[cloud.Normalize | None, Arrays]:
+def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:
     """Scale of temperature, and the farthest reaches of the cloud, over all frames."""
     position, radius, heat = [], [], []
-    for frame in found:
+    for frame in frames:
         arrays = frame.arrays
         for extreme in (np.argmin, np.argmax):
-            for k in {int(i) for i in extreme(arrays["position"] @ cloud.SEEN, axis=0)}:
+            for k in {int(i) for i in extreme(arrays["position"] @ cloud.PROJECTION, axis=0)}:
                 position.append(arrays["position"][k])
                 radius.append(arrays["radius"].max())
         if "temperature" in arrays:

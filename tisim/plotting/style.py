@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter
 TIME = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
 """Colours of time: even to the eye, and without the end that is lost on white."""
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-"""Of units, by power of ten."""
+"""The prefix of a unit by power of ten."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = 30.0
 """Largest over smallest value from which on an axis is logarithmic."""
@@ -81,7 +81,7 @@ def superscripts(text: str) -> str:
 
 
 def scale_of(values: np.ndarray) -> str:
-    """Of an axis for these values: "log" where they span decades and are positive, else "linear"."""
+    """The scale of an axis for values: "log" where they span decades and are positive, else "linear"."""
     wide = values.size and values.min() > 0 and values.max() > WIDE * values.min()
     return "log" if wide else "linear"
 

@@ -8,9 +8,10 @@ from tisim.backend import runtime
 from tisim.errors import must
 
 RULE = "batch, processes:N or dask://HOST:PORT"
+"""What the name of an executor must be, as error messages say it."""
 
 
-def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Evaluator:
+def evaluator_named(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Evaluator:
     """The evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
 
     "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
@@ -26,16 +27,16 @@ def made(name: str, device: str = "cpu", precision: str = "f64", threads: int = 
         return BatchEvaluator()
     # Imported late: nobody needs the one for the other, and Dask may not be there at all.
     from optimize.evaluation.executors.remote import Remote
-    from optimize.evaluation.executors.worker import Wanted
+    from optimize.evaluation.executors.worker import WorkerSettings
 
-    wanted = Wanted(device, precision, threads)
+    worker_settings = WorkerSettings(device, precision, threads)
     if kind == "processes":
         from optimize.evaluation.executors.processes import Processes
 
         able = rest.isdecimal() and len(rest) < 5 and int(rest) >= 1
         must(able, "executor", "processes:N with N >= 1 and of at most 4 digits", name)
-        return Remote(Processes(int(rest)), wanted)
+        return Remote(Processes(int(rest)), worker_settings)
     from optimize.evaluation.executors.dask_cluster import DaskCluster
 
     must(rest.startswith("//") and len(rest) > 2, "executor", RULE, name)
-    return Remote(DaskCluster(rest[2:]), wanted)
+    return Remote(DaskCluster(rest[2:]), worker_settings)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from optimize.evaluation.executors import handshake, worker
-from optimize.evaluation.executors.worker import Answer, Wanted
+from optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import InputError, RunError, Scene
 from tisim.errors import must
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from distributed import Client
 
 CONNECT_S = 10.0
-"""Time that a scheduler has to answer, seconds."""
+"""A scheduler has so long to answer, s."""
 SILENCE_S = 60.0
-"""Time without any worker after which the search gives up, seconds: a cluster may start others."""
+"""A search gives up after so long without any worker, s: a cluster may start others."""
 ENCRYPTED = ("tls", "wss")
 SCHEMES = ("tcp", "ws", *ENCRYPTED)
-"""In which a scheduler may be spoken to."""
-LOOK_S = 1.0
-"""Time between looks at whether there are workers, seconds."""
+"""The schemes of addresses in which a scheduler may be spoken to."""
+WORKER_CHECK_S = 1.0
+"""It is checked at most once in so long whether there are workers, s."""
 
 
 class DaskCluster:
@@ -40,7 +40,7 @@ class DaskCluster:
 
     def __init__(self, address: str) -> None:
         self._client = _client(address)
-        # A scheduler that is lost is told below; Dask would tell it too, with all of its stacks.
+        # A scheduler that is lost is reported below; Dask would report it too, with all of its stacks.
         for logger in ("distributed", "distributed.client"):
             logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
@@ -55,8 +55,8 @@ class DaskCluster:
             self._client.close()
             raise
         self._executor = self._client.get_executor(pure=False)
-        self._looked = self._answered = time.monotonic()
-        self._told = False
+        self._checked = self._answered = time.monotonic()
+        self._warned = False
 
     @property
     def workers(self) -> int:
@@ -66,10 +66,10 @@ class DaskCluster:
         except (OSError, TimeoutError):
             return 0
 
-    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
+    def submit(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> cf.Future[Answer]:
         self._check()
         self._answered = time.monotonic()
-        return self._executor.submit(_run, worker.packed(scenes), wanted)
+        return self._executor.submit(_run, worker.packed(scenes), worker_settings)
 
     def outcome(self, future: cf.Future[Answer]) -> Answer:
         from distributed import KilledWorker
@@ -85,21 +85,21 @@ class DaskCluster:
         # It could not read what it was sent, or is of a version that does not know of answers.
         raise handshake.stranger(answer, "worker of the Dask cluster")
 
-    def look(self) -> None:
+    def check_workers(self) -> None:
         """Say so when there is no worker; RunError without one for SILENCE_S, or without a scheduler."""
         self._check()
         now = time.monotonic()
-        if now - self._looked < LOOK_S:
+        if now - self._checked < WORKER_CHECK_S:
             return
-        self._looked = now
+        self._checked = now
         if self.workers:
-            self._answered, self._told = now, False
+            self._answered, self._warned = now, False
         elif now - self._answered > SILENCE_S:
             raise RunError(
                 f"no worker of the Dask cluster has answered for {SILENCE_S:g} s; what had finished is kept"
             )
-        elif not self._told:
-            self._told = True
+        elif not self._warned:
+            self._warned = True
             waiting = f"no worker of the Dask cluster answers; waiting for {SILENCE_S:g} s"
             warnings.warn(waiting, RuntimeWarning, stacklevel=2)
 
@@ -114,7 +114,8 @@ class DaskCluster:
 
 
 def _client(address: str) -> Client:
-    """Of the scheduler at the address; nothing is begun that Dask could not end where the address is none."""
+    """The client of the scheduler at the address. Where the address is none, nothing is begun that Dask could
+    not end."""
     try:
         from distributed import Client, Security
         from distributed.comm import parse_host_port
@@ -142,7 +143,7 @@ def _scheduler_lost() -> RunError:
     return RunError("Dask scheduler was lost; what had finished is kept")
 
 
-def _run(scenes: bytes, wanted: Wanted) -> Answer:
+def _run(scenes: bytes, worker_settings: WorkerSettings) -> Answer:
     from distributed import get_worker
 
-    return worker.run(scenes, wanted, get_worker().state.nthreads)
+    return worker.run(scenes, worker_settings, get_worker().state.nthreads)

@@ -12,12 +12,12 @@ from multiprocessing import resource_tracker
 
 from optimize.evaluation.executors import worker
 from optimize.evaluation.executors.remote import Lost
-from optimize.evaluation.executors.worker import Answer, Wanted
+from optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import RunError, Scene
 from tisim.backend import runtime
 
 LEAVE_S = 10.0
-"""Time that a worker without work has to end by itself, seconds."""
+"""A worker without work has so long to end by itself, s."""
 
 
 class Processes:
@@ -36,13 +36,13 @@ class Processes:
         self._changing = threading.Lock()
         self._stopped = False
 
-    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
-        return self._threads.submit(self._ask, scenes, wanted)
+    def submit(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> cf.Future[Answer]:
+        return self._threads.submit(self._ask, scenes, worker_settings)
 
     def outcome(self, future: cf.Future[Answer]) -> Answer:
         return future.result()
 
-    def look(self) -> None:
+    def check_workers(self) -> None:
         """A worker that has ended is noticed by the thread that waits for it."""
 
     def stop(self) -> None:
@@ -59,20 +59,20 @@ class Processes:
             one.process.kill()
             one.process.join()
 
-    def _ask(self, scenes: Sequence[Scene], wanted: Wanted) -> Answer:
+    def _ask(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> Answer:
         question = worker.packed(scenes)
         with self._changing:
             if self._stopped:
                 raise Lost("workers have been stopped")
-            asked = self._idle.pop() if self._idle else _Worker(max(1, runtime.cores() // self.workers))
-            self._crew.add(asked)
+            member = self._idle.pop() if self._idle else _Worker(max(1, runtime.cores() // self.workers))
+            self._crew.add(member)
         try:
-            answer = asked.answer(question, wanted)
+            answer = member.answer(question, worker_settings)
         except (EOFError, OSError):
-            asked.process.join()
-            self._crew.remove(asked)
-            raise Lost(f"a worker process has ended with exit code {asked.process.exitcode}") from None
-        self._idle.append(asked)
+            member.process.join()
+            self._crew.remove(member)
+            raise Lost(f"a worker process has ended with exit code {member.process.exitcode}") from None
+        self._idle.append(member)
         return answer
 
 
@@ -90,9 +90,9 @@ class _Worker:
                 raise RunError(f"worker process could not be started: {failure}") from failure
         end.close()  # or it would not be closed when the process ends
 
-    def answer(self, scenes: bytes, wanted: Wanted) -> Answer:
+    def answer(self, scenes: bytes, worker_settings: WorkerSettings) -> Answer:
         """EOFError or OSError when the process ends before it has answered."""
-        self.connection.send((scenes, wanted))
+        self.connection.send((scenes, worker_settings))
         answer: Answer = self.connection.recv()
         return answer
 

@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
 from optimize.evaluation.executors import handshake
-from optimize.evaluation.executors.worker import Answer, Wanted
+from optimize.evaluation.executors.worker import Answer, WorkerSettings
 from tisim import Result, RunError, Scene
 
 UNITS = 2
-"""Units of work per worker and call. More even out runs of different length; fewer are larger, and a batch
-of worlds is the faster per world the larger it is."""
-LOOK_S = 0.1
-"""Time between looks at progress while nothing comes, seconds."""
-TRIES = 3
-"""Workers that a unit of work may cost before the search gives up."""
+"""Each worker gets so many units of work in a call. More even out runs of different length; fewer are larger,
+and a batch of worlds is the faster per world the larger it is."""
+POLL_S = 0.1
+"""Progress is reported and workers are checked after so long while nothing comes, s."""
+MAX_LOST_WORKERS = 3
+"""The search gives up once a unit of work has cost so many workers."""
 
 
 class Lost(Exception):
@@ -29,7 +29,7 @@ class Pool(Protocol):
     @property
     def workers(self) -> int: ...
 
-    def submit(self, scenes: Sequence[Scene], wanted: Wanted) -> cf.Future[Answer]:
+    def submit(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> cf.Future[Answer]:
         """Have a worker run optimize.evaluation.executors.worker.run on them."""
         ...
 
@@ -39,8 +39,8 @@ class Pool(Protocol):
         """
         ...
 
-    def look(self) -> None:
-        """Called every LOOK_S while an answer is waited for; RunError when none is to be hoped for."""
+    def check_workers(self) -> None:
+        """Called every POLL_S while an answer is waited for; RunError when none is to be hoped for."""
         ...
 
     def stop(self) -> None:
@@ -56,9 +56,9 @@ class Remote:
     cache is written by this process only, so nothing can be counted twice.
     """
 
-    def __init__(self, pool: Pool, wanted: Wanted) -> None:
-        self.pool, self.wanted = pool, wanted
-        self.settings: dict[str, Any] = dict(wanted.settings)
+    def __init__(self, pool: Pool, worker_settings: WorkerSettings) -> None:
+        self.pool, self.worker_settings = pool, worker_settings
+        self.settings: dict[str, Any] = dict(worker_settings.settings)
 
     def evaluate(
         self, scenes: Sequence[Scene], progress: Callable[[float], None] | None = None
@@ -70,34 +70,34 @@ class Remote:
         waiting: dict[cf.Future[Answer], tuple[list[int], int]] = {}
 
         def send(unit: list[int], lost: int) -> None:
-            waiting[self.pool.submit([scenes[k] for k in unit], self.wanted)] = unit, lost
+            waiting[self.pool.submit([scenes[k] for k in unit], self.worker_settings)] = unit, lost
 
         for unit in units(scenes, self.pool.workers):
             send(unit, 0)
         done = 0
         while waiting:
-            finished, _ = cf.wait(waiting, LOOK_S, cf.FIRST_COMPLETED)
+            finished, _ = cf.wait(waiting, POLL_S, cf.FIRST_COMPLETED)
             for future in finished:
                 unit, lost = waiting.pop(future)
                 try:
                     results = self._results(self.pool.outcome(future))
                 except Lost as gone:
-                    if lost + 1 == TRIES:
+                    if lost + 1 == MAX_LOST_WORKERS:
                         raise RunError(
-                            f"{gone}; it was the worker number {TRIES} to be lost with the same work. "
-                            "What had finished is kept"
+                            f"{gone}; it was the worker number {MAX_LOST_WORKERS} to be lost with the same "
+                            "work. What had finished is kept"
                         ) from gone
                     send(unit, lost + 1)
                     continue
                 done += len(unit)
                 yield from zip(unit, results, strict=True)
-            self.pool.look()
+            self.pool.check_workers()
             if progress is not None:
                 progress(done / len(scenes))
 
     def _results(self, answer: Answer) -> list[Result]:
         """What a worker has found. Its error if it failed, InputError if it is of another program."""
-        ours = handshake.program() if answer.error else self.wanted.made_by
+        ours = handshake.program() if answer.error else self.worker_settings.made_by
         handshake.agree(ours, answer.made_by, answer.worker)
         if answer.error:
             raise answer.error

@@ -20,7 +20,7 @@ from tisim.files.python_file import PythonFile
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WorkerSettings:
     """How a worker is to run: see tisim.backend.runtime; threads 0 for its share of the cores.
 
     files : Python files of the user's that define what scenes are made of; those loaded here by default.
@@ -76,13 +76,13 @@ def packed(scenes: Sequence[Scene]) -> bytes:
         ) from None
 
 
-def run(scenes: bytes, wanted: Wanted, share: int) -> Answer:
+def run(scenes: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
     """The answer of a worker whose share of the cores that is."""
-    return _answered(_work.submit(_run, scenes, wanted, share))
+    return _answered(_work.submit(_run, scenes, worker_settings, share))
 
 
 def serve(connection: Connection, share: int) -> None:
-    """Answer pickled (packed scenes, wanted) until the other end is closed: the whole life of the process.
+    """Answer pickled (packed scenes, settings) until the other end is closed: the whole life of the process.
 
     This thread does nothing but listen. When the searching process is gone, however it went, the system
     closes its end, and what is being run for it ends here and now.
@@ -93,22 +93,22 @@ def serve(connection: Connection, share: int) -> None:
             question = connection.recv_bytes()
         except (EOFError, OSError):
             break
-        made = _work.submit(_run_pickled, question, share)
-        sent = _work.submit(_send, connection, made)
+        future = _work.submit(_run_pickled, question, share)
+        sent = _work.submit(_send, connection, future)
         sent.add_done_callback(_end_unless_sent)
     if sent is not None and not sent.done():
         os._exit(1)
 
 
 def _run_pickled(question: bytes, share: int) -> Answer:
-    scenes, wanted = pickle.loads(question)
-    return _run(scenes, wanted, share)
+    scenes, worker_settings = pickle.loads(question)
+    return _run(scenes, worker_settings, share)
 
 
-def _run(sent: bytes, wanted: Wanted, share: int) -> Answer:
-    scenes = _unpacked(sent, wanted)
+def _run(sent: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
+    scenes = _unpacked(sent, worker_settings)
     before = runtime.generation()
-    runtime.init(wanted.device, wanted.precision, wanted.threads or share)
+    runtime.init(worker_settings.device, worker_settings.precision, worker_settings.threads or share)
     if not _evaluator or runtime.generation() != before:
         _evaluator[:] = [BatchEvaluator()]
     results = dict(_evaluator[0].evaluate(scenes))
@@ -116,10 +116,10 @@ def _run(sent: bytes, wanted: Wanted, share: int) -> Answer:
     return Answer(made_by, [results[index] for index in range(len(scenes))])
 
 
-def _unpacked(sent: bytes, wanted: Wanted) -> Sequence[Scene]:
+def _unpacked(sent: bytes, worker_settings: WorkerSettings) -> Sequence[Scene]:
     """InputError, in a line, when what they are made of cannot be imported here."""
     try:
-        for file in wanted.files:
+        for file in worker_settings.files:
             python_file.install(file)
         scenes: Sequence[Scene] = pickle.loads(sent)
     except InputError as error:
@@ -130,13 +130,13 @@ def _unpacked(sent: bytes, wanted: Wanted) -> Sequence[Scene]:
     return scenes
 
 
-def _answered(made: cf.Future[Answer]) -> Answer:
-    error = made.exception()
-    return Answer(handshake.program(), [], _portable(error)) if error else made.result()
+def _answered(future: cf.Future[Answer]) -> Answer:
+    error = future.exception()
+    return Answer(handshake.program(), [], _portable(error)) if error else future.result()
 
 
-def _send(connection: Connection, made: cf.Future[Answer]) -> None:
-    connection.send(_answered(made))
+def _send(connection: Connection, future: cf.Future[Answer]) -> None:
+    connection.send(_answered(future))
 
 
 def _end_unless_sent(sent: cf.Future[None]) -> None:
@@ -149,10 +149,10 @@ def _portable(error: BaseException) -> BaseException:
     """The error as it can be sent; one that is not for people with where in the worker it was raised."""
     if isinstance(error, (InputError, RunError)):
         return error
-    told = "".join(traceback.format_exception(error))
+    trace = "".join(traceback.format_exception(error))
     try:
         error = pickle.loads(pickle.dumps(error))
     except (pickle.PickleError, TypeError, AttributeError):
         error = RuntimeError(repr(error))
-    error.add_note(f"in a worker:\n{told}")
+    error.add_note(f"in a worker:\n{trace}")
     return error

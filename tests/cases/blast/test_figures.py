@@ -3,27 +3,27 @@
 import numpy as np
 import pytest
 
-from cases.blast.figures import SHOWN, BlastHistory, beside, pictures, table
+from cases.blast.figures import SEQUENCE_FRAMES, BlastHistory, beside, pictures, table
 from cases.blast.scene import scene
 from tisim import Recording, run
 from tisim.io.reader import frames
-from tisim.plotting.cloud import SEEN
+from tisim.plotting.cloud import PROJECTION
 
 
 @pytest.mark.slow
 def test_pictures_of_a_run(tmp_path):
     path = tmp_path / "trajectory.h5"
-    made = scene(number=60, duration=0.06)
-    run(made, record=Recording(path, frames=3))
-    with frames(path) as found:
-        assert pictures(found) == {}
-    run(made, record=Recording(path, frames=24))
-    with frames(path) as found:
-        figures, history = pictures(found), BlastHistory.of(found)
-        last = found[-1]
-    assert len(figures["sequence.png"].axes) == SHOWN
+    blast = scene(number=60, duration=0.06)
+    run(blast, record=Recording(path, frames=3))
+    with frames(path) as trajectory:
+        assert pictures(trajectory) == {}
+    run(blast, record=Recording(path, frames=24))
+    with frames(path) as trajectory:
+        figures, history = pictures(trajectory), BlastHistory.of(trajectory)
+        last = trajectory[-1]
+    assert len(figures["sequence.png"].axes) == SEQUENCE_FRAMES
     arrows = figures["velocities.png"].axes[-1].collections[0]
-    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ SEEN)[:, 0])
+    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ PROJECTION)[:, 0])
     left, right, *_ = figures["envelope.png"].axes
     np.testing.assert_array_equal(left.lines[0].get_ydata(), history.axes[:, 0])
     assert history.axes[-1, 0] > 1.1 * history.axes[0, 0]

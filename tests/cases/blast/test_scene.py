@@ -12,8 +12,8 @@ SMALL = 200
 
 
 def test_start_has_the_speed_and_the_energy_of_the_paper():
-    made = scene(number=SMALL)
-    start = made.particles.arrays(made.domain, 0)
+    blast = scene(number=SMALL)
+    start = blast.particles.arrays(blast.domain, 0)
     speed = np.linalg.norm(start["velocity"], axis=1)
     np.testing.assert_allclose(speed, SPEED, rtol=1e-12)
     assert (start["mass"] * speed**2).sum() / 2 == pytest.approx(ENERGY * SMALL / NUMBER)
@@ -40,8 +40,8 @@ def test_the_field_makes_an_ellipsoid_of_the_sphere():
 @pytest.mark.slow
 def test_contact_conserves_momentum_and_takes_energy():
     """Without air and field: touching spheres exchange momentum, and dissipate."""
-    made = scene(0.0, contact=True, number=60, duration=0.02)
-    (result,) = simulate([made.without("chow_drag")], worlds=1, capacity=60)
+    blast = scene(0.0, contact=True, number=60, duration=0.02)
+    (result,) = simulate([blast.without("chow_drag")], worlds=1, capacity=60)
     assert result.status.ok, result.status.reason
     start, end = result.start, result.state
     impulse = (start["mass"][:, None] * (end["velocity"] - start["velocity"])).sum(axis=0)
@@ -53,10 +53,10 @@ def test_contact_conserves_momentum_and_takes_energy():
 @pytest.mark.slow
 def test_neighbours_agglomerate_where_contact_alone_does_not():
     """Z16 Fig. 9: clumps, while the cloud goes on growing along the field."""
-    made = scene(number=100, duration=0.1, contact=True, near=True, cutoff=NEIGHBOURS)
+    blast = scene(number=100, duration=0.1, contact=True, near=True, cutoff=NEIGHBOURS)
     law = "effects.truncated_near_field"
-    without = made.replace({f"{law}.alpha1": 0.0, f"{law}.alpha2": 0.0})
-    alone, clumped = simulate([without, made], worlds=2, capacity=100)
+    without = blast.replace({f"{law}.alpha1": 0.0, f"{law}.alpha2": 0.0})
+    alone, clumped = simulate([without, blast], worlds=2, capacity=100)
     assert clumped.status.ok, clumped.status.reason
     assert contacts(clumped.state) > 5 * contacts(alone.state)
     assert contacts(clumped.state) > 40

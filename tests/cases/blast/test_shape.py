@@ -5,7 +5,7 @@ import pytest
 
 from cases.blast import CASE
 from cases.blast import scene as blast
-from cases.blast.problem import DURATION, FLUX, details, field, misfit, problem, start
+from cases.blast.problem import DURATION, TARGET_FLUX, details, field, misfit, problem, start
 from cases.blast.shape import ball, contacts, ellipsoid, extents, moments, principal_half_axes
 from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.search import search
@@ -33,13 +33,13 @@ def flown(r, n, flux, t):
 @pytest.mark.parametrize("t", [0.1, 0.3, 0.7])
 def test_ellipsoid_is_that_of_particles_that_circle(rng, t):
     r, n = shell(rng)
-    state = {"position": flown(r, n, FLUX, t), "mass": np.ones(len(r))}
-    exact = ellipsoid(FLUX, t, 1.0)
+    state = {"position": flown(r, n, TARGET_FLUX, t), "mass": np.ones(len(r))}
+    exact = ellipsoid(TARGET_FLUX, t, 1.0)
     assert misfit(moments(state), exact) < 5e-3
     axes, directions = principal_half_axes(exact), np.linalg.eigh(exact)[1]
     assert axes[0] > 1.005 * axes[1]
-    assert abs(directions[:, -1] @ FLUX) / np.linalg.norm(FLUX) == pytest.approx(1.0, abs=1e-12)
-    along, across = extents(blast.SPECIFIC_CHARGE * np.linalg.norm(FLUX), t, 1.0)
+    assert abs(directions[:, -1] @ TARGET_FLUX) / np.linalg.norm(TARGET_FLUX) == pytest.approx(1.0, abs=1e-12)
+    along, across = extents(blast.SPECIFIC_CHARGE * np.linalg.norm(TARGET_FLUX), t, 1.0)
     np.testing.assert_allclose(axes, np.sqrt(5 * np.array([along, across, across])), rtol=1e-12)
 
 
@@ -47,10 +47,10 @@ def test_ellipsoid_is_that_of_particles_that_circle(rng, t):
 def test_wanted_ellipsoid_begins_as_the_starts_of_its_number_do(size):
     """Starts that it has not been measured on: their mean, which varies by 1 part in 1000 with 500."""
     number = CASE.size(size).scene.get("number", blast.NUMBER)
-    made = [blast.scene(number=number, seed=100 + k) for k in range(8)]
-    found = [ball(moments(one.particles.arrays(one.domain, one.seed))) for one in made]
-    assert np.mean(found) == pytest.approx(start(number), rel=4e-3)
-    target = ellipsoid(FLUX, DURATION, start(number))
+    scenes = [blast.scene(number=number, seed=100 + k) for k in range(8)]
+    sizes = [ball(moments(one.particles.arrays(one.domain, one.seed))) for one in scenes]
+    assert np.mean(sizes) == pytest.approx(start(number), rel=4e-3)
+    target = ellipsoid(TARGET_FLUX, DURATION, start(number))
     shown = ", ".join(f"{a:.3f}" for a in principal_half_axes(target))
     assert f"half axes of {shown} m" in problem(size).title
 
@@ -67,11 +67,11 @@ def test_moments_weigh_by_mass_and_contacts_count_pairs():
 
 def test_details_say_what_was_wanted_and_reached(rng):
     r, n = shell(rng, 2000)
-    state = {"position": flown(r, n, FLUX, DURATION), "mass": np.ones(2000)}
+    state = {"position": flown(r, n, TARGET_FLUX, DURATION), "mass": np.ones(2000)}
     result = Result(None, state, state, DURATION, {}, Status(True, ""), 0.0)
     for sign in (1.0, -1.0):
-        turned = dict(zip(("flux_x", "flux_y", "flux_z"), sign * FLUX, strict=True))
-        shown = details(turned, result, ellipsoid(FLUX, DURATION, 1.0))
+        turned = dict(zip(("flux_x", "flux_y", "flux_z"), sign * TARGET_FLUX, strict=True))
+        shown = details(turned, result, ellipsoid(TARGET_FLUX, DURATION, 1.0))
         assert shown["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
     assert shown["strength of the field, T"] == pytest.approx(0.7)
     for k in (1, 2, 3):
@@ -90,12 +90,14 @@ def test_search_recovers_the_field_up_to_sign(tmp_path):
     """500 particles, 10 generations: within 5 % of 0.7 T, and 4 degrees."""
     evaluator = BatchEvaluator()
     with Cache(tmp_path / "search.h5") as cache:
-        outcome = search(problem("small"), evaluator, cache, Settings(**{**blast.SEARCH, "generations": 10}))
+        outcome = search(
+            problem("small"), evaluator, cache, Settings(**{**blast.SEARCH_SETTINGS, "generations": 10})
+        )
     evaluator.close()
     best = outcome.logbook.select("best")
     assert best[-1] < best[0] / 2
-    found = field(outcome.problem.genome.decode(outcome.best))
-    strength = np.linalg.norm(found)
-    assert strength == pytest.approx(np.linalg.norm(FLUX), rel=0.05)
-    cosine = abs(found @ FLUX) / strength / np.linalg.norm(FLUX)
+    flux = field(outcome.problem.genome.decode(outcome.best))
+    strength = np.linalg.norm(flux)
+    assert strength == pytest.approx(np.linalg.norm(TARGET_FLUX), rel=0.05)
+    cosine = abs(flux @ TARGET_FLUX) / strength / np.linalg.norm(TARGET_FLUX)
     assert np.degrees(np.arccos(cosine)) < 4.0

@@ -37,13 +37,13 @@ def test_captured_fraction_in_time_and_at_the_end():
         ]  # fmt: skip
 
     angles = rows(swept((75, 212), (20.0,), ("top", "side")))
-    sizes, aspects = rows(swept(capture.MOMENT, (20.0,))), rows(swept(curves.SOME, ASPECTS))
+    sizes, aspects = rows(swept(capture.SATURATION_MOMENTS, (20.0,))), rows(swept(curves.SOME, ASPECTS))
     axes = curves.captured(angles, sizes, aspects).axes
     for axis, n in zip(axes[:4], (75, 75, 212, 212), strict=True):
         assert len(axis.lines) == len(ANGLES)
         np.testing.assert_allclose(axis.lines[-1].get_ydata(), mean_of(n))
     by_size = {line.get_label(): line.get_ydata() for line in axes[4].lines}
-    assert list(by_size) == [f"{n} nm" for n in capture.MOMENT]
+    assert list(by_size) == [f"{n} nm" for n in capture.SATURATION_MOMENTS]
     np.testing.assert_allclose(by_size["50 nm"], mean_of(50))
     assert [line.get_label() for line in axes[5].lines] == [f"L/D = {r:.3g}" for r in ASPECTS]
     np.testing.assert_allclose(axes[5].lines[0].get_ydata(), mean_of(125))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cases.capture import problem as filters
-from cases.capture.problem import HEIGHT, WIDTH, WIRE, Filter
-from cases.capture.scene import DIAMETER, SATURATION, SEARCH
+from cases.capture.filter import CHANNEL_HEIGHT, CHANNEL_WIDTH, WIRE, Filter
+from cases.capture.scene import DIAMETER, SATURATION_MAGNETISATION, SEARCH_SETTINGS
 from cases.statistics import Claim, Mean
 from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.evaluation.runs import start_seed
@@ -21,14 +21,14 @@ FIBRES = {"flux": 0.8, "field_angle": 90.0, "aspect": 2.5, "number": 8.2, "spaci
 
 @pytest.mark.parametrize("number", [1, 5, 12])
 def test_fibres_of_a_filter_lie_in_the_channel_and_apart(number):
-    made = Filter(aspect=5 / 3, number=float(number), spacing=1.2)
-    places = np.array(made.places())
+    fibres = Filter(aspect=5 / 3, number=float(number), spacing=1.2)
+    places = np.array(fibres.places())
     assert len(places) == number
-    assert np.abs(places[:, 0]).max() <= (WIDTH - DIAMETER) / 2 + 1e-12
-    assert np.abs(places[:, 2]).max() <= (HEIGHT - made.length) / 2 + 1e-12
+    assert np.abs(places[:, 0]).max() <= (CHANNEL_WIDTH - DIAMETER) / 2 + 1e-12
+    assert np.abs(places[:, 2]).max() <= (CHANNEL_HEIGHT - fibres.length) / 2 + 1e-12
     assert places[:, 1].min() == 0.0
     for k in range(number):
-        gap = np.abs(places - places[k]) - [DIAMETER, DIAMETER, made.length]
+        gap = np.abs(places - places[k]) - [DIAMETER, DIAMETER, fibres.length]
         assert all((gap[j] > -1e-12).any() for j in range(number) if j != k)
 
 
@@ -40,7 +40,7 @@ def test_wire_is_limited():
 
 def test_every_string_of_the_search_has_a_fibre():
     """Also those on the bounds, to which methods clip."""
-    genome = filters.problem("fraction").genome
+    genome = filters.problem(variant="fraction").genome
     for end in (0.0, 1.0):
         number = genome.decode([end] * len(genome))["number"]
         assert 1 <= len(Filter(number=number).places()) <= 12
@@ -55,14 +55,16 @@ def effect(scene, kind):
 @pytest.mark.parametrize("angle", [0.0, 30.0, 90.0])
 def test_hard_magnets_are_saturated_where_their_gene_says_whatever_the_field(angle):
     """Angles to the axis, z, in the plane of x and z; what soft ones do is the field's."""
-    hard, soft = filters.problem("hard"), filters.problem("fraction")
+    hard, soft = filters.problem(variant="hard"), filters.problem(variant="fraction")
     assert {*hard.genome.names} - {*soft.genome.names} == {"magnetisation_angle"}
     way = np.array([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
     fields = [{"flux": flux, "field_angle": to} for flux in (0.05, 1.0) for to in (20.0, 70.0)]
     for field in fields:
         scene = hard.scene({**FIBRES, **field, "magnetisation_angle": angle}, 0)
         for body in effect(scene, MagneticCylinders).cylinders:
-            np.testing.assert_allclose(body.magnetisation, SATURATION * way, atol=1e-9 * SATURATION)
+            np.testing.assert_allclose(
+                body.magnetisation, SATURATION_MAGNETISATION * way, atol=1e-9 * SATURATION_MAGNETISATION
+            )
         x, _, z = effect(scene, MagneticField).constant
         assert np.hypot(x, z) == pytest.approx(field["flux"])
         assert np.degrees(np.arctan2(x, z)) == pytest.approx(field["field_angle"])
@@ -76,14 +78,14 @@ def outcome_of(scene, caught_by):
     """A result in which particles lie where they began, but for those that a fibre has caught."""
     start = scene.particles.arrays(scene.domain, scene.seed)
     places = np.array([body.centre for body in effect(scene, MagneticCylinders).cylinders])
-    held = caught_by >= 0
-    position = np.where(held[:, None], places[caught_by] + [0, -DIAMETER / 2, 0], start["position"])
+    stopped = caught_by >= 0
+    position = np.where(stopped[:, None], places[caught_by] + [0, -DIAMETER / 2, 0], start["position"])
     state = {"position": position, "captured_by": caught_by}
     return Result(scene, state, start, scene.duration, {}, Status(True, ""), 0.0)
 
 
 def test_objectives_are_the_fraction_caught_and_the_water_that_flows_through():
-    problem = filters.problem("throughput")
+    problem = filters.problem(variant="throughput")
     caught, flow = problem.objectives
     caught_by = np.full(120, -1)
     caught_by[:30] = np.arange(30) % 8
@@ -96,17 +98,17 @@ def test_objectives_are_the_fraction_caught_and_the_water_that_flows_through():
     assert (flow.unit, caught.unit) == ("m^3/s", "")
     # Costs are minimised: more of either is better.
     assert problem.costs([0.25, 1e-7]) == (-0.25, -1e-7)
-    assert filters.problem("hard").costs([0.25]) == (-0.25,)
+    assert filters.problem(variant="hard").costs([0.25]) == (-0.25,)
 
 
 def test_details_of_the_best_filter():
     strong = {**FIBRES, "flux": 1.0}
-    found = filters.details(strong, None)
-    assert found["fibres"] == 8
-    assert found["length of a fibre, mm"] == pytest.approx(1.5)
-    assert found["wire used, of what there is"] == pytest.approx(1.0)
-    assert found["magnetisation to the axis, degrees"] == pytest.approx(90.0)
-    assert found["magnetisation over saturation"] == pytest.approx(1.0)
+    details = filters.details(strong, None)
+    assert details["fibres"] == 8
+    assert details["length of a fibre, mm"] == pytest.approx(1.5)
+    assert details["wire used, of what there is"] == pytest.approx(1.0)
+    assert details["magnetisation to the axis, degrees"] == pytest.approx(90.0)
+    assert details["magnetisation over saturation"] == pytest.approx(1.0)
     # A weak field magnetises in proportion, and nearer to the axis than it is itself.
     weak, weaker = ({**FIBRES, "flux": flux, "field_angle": 45.0} for flux in (0.1, 0.05))
     shares = [filters.details(one, None)["magnetisation over saturation"] for one in (weak, weaker)]
@@ -124,7 +126,7 @@ def test_picture_shows_the_fibres_and_what_they_caught():
     caught_by[:30] = np.arange(30) % 8
     result = outcome_of(scene, caught_by)
     side, front = filters.caught(result).axes
-    held = caught_by >= 0
+    stopped = caught_by >= 0
     assert "25% caught" in side.get_title(loc="left")
     bodies = effect(scene, MagneticCylinders).cylinders
     for axis, k in ((side, 1), (front, 0)):
@@ -134,7 +136,7 @@ def test_picture_shows_the_fibres_and_what_they_caught():
         np.testing.assert_allclose([box.size for box in boxes], [(1.5, 0.6)] * 8)
         for line, (places, which) in zip(
             axis.lines,
-            [(result.start, ~held), (result.start, held), (result.state, held)],
+            [(result.start, ~stopped), (result.start, stopped), (result.state, stopped)],
             strict=True,
         ):
             shown = 1e3 * places["position"][which][:, [2, k]]
@@ -144,7 +146,7 @@ def test_picture_shows_the_fibres_and_what_they_caught():
 
 def captured(variant, designs, starts):
     """Fractions from starts that no search has used, the same of all designs. Shape (designs, starts)."""
-    problem = filters.problem(variant)
+    problem = filters.problem(variant=variant)
     seeds = [start_seed(FRESH, k) for k in range(starts)]
     results = run([problem.scene(design, seed) for design in designs for seed in seeds])
     return np.reshape([filters.captured(result) for result in results], (len(designs), starts))
@@ -166,9 +168,9 @@ def test_what_is_in_the_way_is_all_that_is_caught_of_a_fast_flow():
     half = {**FIBRES, "number": 4.0, "speed": 1e-2, "radius": 208.0}
     whole = {**half, "number": 8.0}
     for design in (half, whole):
-        covered = round(design["number"]) * design["aspect"] * DIAMETER**2 / (WIDTH * HEIGHT)
-        found = captured("throughput", (design,), 40)[0]
-        assert Claim("fast", Mean.of(found), least=covered - 0.02, most=covered + 0.03).ok
+        covered = round(design["number"]) * design["aspect"] * DIAMETER**2 / (CHANNEL_WIDTH * CHANNEL_HEIGHT)
+        fraction = captured("throughput", (design,), 40)[0]
+        assert Claim("fast", Mean.of(fraction), least=covered - 0.02, most=covered + 0.03).ok
     assert covered == pytest.approx(1 / 6)
     slow = captured("throughput", ({**whole, "speed": 1e-3},), 8)[0]
     assert Claim("slow", Mean.of(slow), least=covered + 0.05).ok
@@ -180,15 +182,15 @@ def test_search_finds_transverse_and_short(tmp_path, seed):
     """B16's conclusions, by a search that knows nothing of them; and what it found is worse without them."""
     evaluator = BatchEvaluator()
     with Cache(tmp_path / "search.h5") as cache:
-        problem = filters.problem("fraction")
-        outcome = search(problem, evaluator, cache, Settings(**SEARCH, seed=seed))
+        problem = filters.problem(variant="fraction")
+        outcome = search(problem, evaluator, cache, Settings(**SEARCH_SETTINGS, seed=seed))
     evaluator.close()
-    found = problem.genome.decode(outcome.best)
-    assert found["field_angle"] > 60.0
-    assert found["aspect"] < 6.0
-    across, along = ({**found, "field_angle": angle} for angle in (90.0, 0.0))
-    one_long = {**found, "aspect": 20.0, "number": 1.0}
-    best, turned, *worse = captured("fraction", (found, across, along, one_long), 60)
+    design = problem.genome.decode(outcome.best)
+    assert design["field_angle"] > 60.0
+    assert design["aspect"] < 6.0
+    across, along = ({**design, "field_angle": angle} for angle in (90.0, 0.0))
+    one_long = {**design, "aspect": 20.0, "number": 1.0}
+    best, turned, *worse = captured("fraction", (design, across, along, one_long), 60)
     assert Claim("right across the field is as good", Mean.of(turned - best), least=-0.03).ok
     for name, other in zip(("along the field", "all wire in one fibre"), worse, strict=True):
         assert Claim(name, Mean.of(best - other), least=0.03).ok

@@ -16,12 +16,14 @@ from tisim.io.reader import frames
 def test_cylinder_lies_at_its_angle_and_is_saturated_along_the_field():
     body = capture.fibre(capture.axis(30.0), 20.0)
     assert np.degrees(np.arccos(body.axis[0])) == pytest.approx(30.0)
-    assert np.linalg.norm(body.magnetisation) == pytest.approx(capture.SATURATION)
+    assert np.linalg.norm(body.magnetisation) == pytest.approx(capture.SATURATION_MAGNETISATION)
     # Between the axis of a long cylinder and the field.
-    turned = np.degrees(np.arccos(np.dot(body.axis, body.magnetisation) / capture.SATURATION))
+    turned = np.degrees(np.arccos(np.dot(body.axis, body.magnetisation) / capture.SATURATION_MAGNETISATION))
     assert 0.0 < turned < 30.0
     across = capture.fibre(capture.axis(90.0), 5 / 3).magnetisation
-    np.testing.assert_allclose(across, (capture.SATURATION, 0, 0), atol=1e-6 * capture.SATURATION)
+    np.testing.assert_allclose(
+        across, (capture.SATURATION_MAGNETISATION, 0, 0), atol=1e-6 * capture.SATURATION_MAGNETISATION
+    )
 
 
 @pytest.mark.long
@@ -40,12 +42,12 @@ def test_transverse_captures_more_and_pictures_show_it(tmp_path):
     assert text[1].startswith("125,90.0,1.666")
     path = tmp_path / "trajectory.h5"
     run(capture.scene(number=40, duration=2.0), record=Recording(path, frames=8))
-    with frames(path) as found:
-        drawn = figures.pictures(found)["trajectories.png"]
-        last = found[-1].arrays
-    curve = drawn.axes[1].lines[0].get_ydata()
+    with frames(path) as trajectory:
+        figure = figures.pictures(trajectory)["trajectories.png"]
+        last = trajectory[-1].arrays
+    curve = figure.axes[1].lines[0].get_ydata()
     assert curve[-1] == pytest.approx((last["captured_at"] >= 0).mean())
-    assert len(drawn.axes[0].collections[0].get_segments()) == 40 * (len(found.times) - 1)
+    assert len(figure.axes[0].collections[0].get_segments()) == 40 * (len(trajectory.times) - 1)
 
 
 def test_a_scene_of_its_own_placement_is_read_where_nothing_else_is_imported(tmp_path):

@@ -44,7 +44,7 @@ def test_cascades_that_are_done_wait_for_none(stages):
 
 
 def test_a_cascade_that_captures_too_little_is_given_up(stages, monkeypatch):
-    monkeypatch.setattr(capture_times, "MOST", 2)
+    monkeypatch.setattr(capture_times, "MAX_STAGES", 2)
     (times,) = captured_at([Cascade(number=10)], 1)
     assert np.isfinite(times).sum() == 6
     assert time_to(0.9, times) == np.inf

@@ -13,10 +13,10 @@ def test_curves_of_concentrated_samples():
         (angle, c): (when, c * np.arange(4.0), c * np.arange(4.0) + angle)
         for angle in (0.0, 90.0) for c in figures.CONCENTRATIONS
     }  # fmt: skip
-    right = figures.drawn(curves).axes[1]
-    held, touched = right.lines[2:4]
-    assert held.get_label() == "500 mg/mL, captured or in a chain that is"
-    np.testing.assert_allclose(held.get_ydata(), 0.5 * np.arange(4.0) + 90.0)
+    right = figures.captured_figure(curves).axes[1]
+    hanging, touched = right.lines[2:4]
+    assert hanging.get_label() == "500 mg/mL, captured or in a chain that is"
+    np.testing.assert_allclose(hanging.get_ydata(), 0.5 * np.arange(4.0) + 90.0)
     np.testing.assert_allclose(touched.get_ydata(), 0.5 * np.arange(4.0))
     assert figures.table(curves).splitlines()[2] == f"0.0,0.005,{when[1]},0.005,0.005"
 
@@ -24,7 +24,7 @@ def test_curves_of_concentrated_samples():
 def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
     """Two pairs along the field and one particle by itself, which all were single at the start."""
 
-    class Seen(list):
+    class FewFrames(list):
         times = np.array([0.0, 1e-3])
 
     def frame(position):
@@ -33,8 +33,8 @@ def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
         return SimpleNamespace(arrays=arrays)
 
     pairs = 1.5e-7 * np.array([[0, 0, 0], [1, 0, 0], [0, 0, 9], [1, 0, 9], [0, 9, 0.0]])
-    found = Seen([frame(10 * pairs), frame(pairs)])
-    left, right = figures.pictures(found)["chains.png"].axes
+    trajectory = FewFrames([frame(10 * pairs), frame(pairs)])
+    left, right = figures.pictures(trajectory)["chains.png"].axes
     np.testing.assert_allclose(right.lines[0].get_xdata(), [0.0, 1.0])
     np.testing.assert_allclose(right.lines[0].get_ydata(), [1.0, 5 / 3])
     discs = left.collections[0]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cases.capture.scene import MOMENT
+from cases.capture.scene import SATURATION_MOMENTS
 from cases.concentration import CASE
 from cases.concentration.scene import DENSITY, DISTANCE, SIZES, coupling, longest, scene, scene_for, side
 from cases.concentration.statistics import (
@@ -16,7 +16,7 @@ from cases.concentration.statistics import (
     first,
     firsts,
     grown,
-    held,
+    held_fraction,
     results,
 )
 from cases.statistics import Claim, Mean
@@ -27,9 +27,9 @@ from tisim.analysis import head_to_tail, labels, mean_size, near
 @pytest.mark.parametrize("angle", [0.0, 90.0])
 @pytest.mark.parametrize("concentration", [0.005, 2.0])
 def test_samples_have_the_concentration_and_lie_above_the_rim(angle, concentration):
-    made = scene(angle=angle, concentration=concentration, number=500)
-    state = made.particles.arrays(made.domain, 0)
-    body = made.effects[1].cylinders[0]
+    sample = scene(angle=angle, concentration=concentration, number=500)
+    state = sample.particles.arrays(sample.domain, 0)
+    body = sample.effects[1].cylinders[0]
     along = state["position"] @ np.asarray(body.direction)
     d = side(500, 75e-9, concentration)
     assert state["mass"].sum() / d**3 == pytest.approx(1e3 * concentration)
@@ -99,8 +99,8 @@ def test_chains_and_singles():
 def test_held_is_what_hangs_on_a_captured_one():
     position = np.array([[0, 0, 0], [2.1, 0, 0], [4.2, 0, 0], [9, 0, 0], [11, 0, 0]], float)
     state = {"position": position, "radius": np.ones(5), "fixed": np.array([1, 0, 0, 0, 0])}
-    assert held(state) == 3 / 5
-    assert held({**state, "fixed": np.zeros(5, int)}) == 0
+    assert held_fraction(state) == 3 / 5
+    assert held_fraction({**state, "fixed": np.zeros(5, int)}) == 0
 
 
 def test_first_capture_is_not_the_end_of_the_run():
@@ -116,19 +116,19 @@ def test_first_capture_is_not_the_end_of_the_run():
 def test_every_size_runs():
     """A few steps of each kind; the longest of them take days."""
     for size in SIZES:
-        made = scene_for(size, 0).replace({"duration": 2e-6})
-        assert run(made).status.ok, size
+        sample = scene_for(size, 0).replace({"duration": 2e-6})
+        assert run(sample).status.ok, size
 
 
 def spread(coarse):
     """Standard deviation of the distance of a bound pair, in diameters, after it has come to equilibrium."""
-    made = scene(nanometres=75, number=2, coarse=coarse)
-    place = np.asarray(made.particles.placement.low) + np.array([[0.0, 0, 0], [1.5e-7, 0, 0]])
+    two = scene(nanometres=75, number=2, coarse=coarse)
+    place = np.asarray(two.particles.placement.low) + np.array([[0.0, 0, 0], [1.5e-7, 0, 0]])
     pair = Particles(
         position=place, velocity=0 * place, radius=75e-9, density=DENSITY,
-        quantities={"saturation_moment": MOMENT[75]},
+        quantities={"saturation_moment": SATURATION_MOMENTS[75]},
     )  # fmt: skip
-    scenes = [made.model_copy(update={"particles": pair, "seed": seed}) for seed in range(16)]
+    scenes = [two.model_copy(update={"particles": pair, "seed": seed}) for seed in range(16)]
     simulation = Simulation(scenes[0], worlds=16)
     simulation.load(scenes)
     distance = []

@@ -14,7 +14,7 @@ from cases.vibration.problem import (
     problem,
     scene,
 )
-from cases.vibration.scene import CHARGE, MASS, SEARCH
+from cases.vibration.scene import CHARGE, MASS, SEARCH_SETTINGS
 from optimize.evaluation.evaluator import BatchEvaluator
 from optimize.search import search
 from optimize.settings import Settings
@@ -32,19 +32,19 @@ DESIGNS = {
 @pytest.fixture(scope="module")
 def evaluator():
     """One, so that both searches share what it compiles."""
-    made = BatchEvaluator()
-    yield made
-    made.close()
+    batch = BatchEvaluator()
+    yield batch
+    batch.close()
 
 
 @pytest.mark.long
 def test_fitness_is_the_closed_form():
     results = tisim.run([scene(design, duration=0.2) for design in DESIGNS.values()])
-    found = [problem().objective(result) for result in results]
+    peaks = [problem().objective(result) for result in results]
     exact = [-1e3 * closed_form(design) for design in DESIGNS.values()]
-    np.testing.assert_allclose(found, exact, rtol=2e-3)
+    np.testing.assert_allclose(peaks, exact, rtol=2e-3)
     opposite = [problem(variant="avoid").objective(result) for result in results]
-    np.testing.assert_array_equal(opposite, -np.array(found))
+    np.testing.assert_array_equal(opposite, -np.array(peaks))
     shown = details(DESIGNS["far"], results[0])
     assert shown["nearest resonance over drive"] == pytest.approx(1.0 / 0.8, rel=2e-3)
     assert shown["largest displacement, m"] == displacement(results[0])
@@ -59,8 +59,8 @@ def test_resonance_nearest_to_the_drive():
 
 
 def test_nothing_is_random_and_other_variants_are_refused():
-    made = problem()
-    assert made.scene(DESIGNS["far"], 1).digest() == made.scene(DESIGNS["far"], 2).digest()
+    inverse = problem()
+    assert inverse.scene(DESIGNS["far"], 1).digest() == inverse.scene(DESIGNS["far"], 2).digest()
     with pytest.raises(InputError, match="variant must be one of resonate, avoid; received 'sing'"):
         problem(variant="sing")
 
@@ -68,7 +68,7 @@ def test_nothing_is_random_and_other_variants_are_refused():
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_search_improves_and_lands_on_the_resonance_or_far_from_it(variant, evaluator, tmp_path):
-    wished = {**SEARCH, "generations": 6}
+    wished = {**SEARCH_SETTINGS, "generations": 6}
     with Cache(tmp_path / "search.h5") as cache:
         outcome = search(problem(variant=variant), evaluator, cache, Settings(**wished))
     best = outcome.logbook.select("best")

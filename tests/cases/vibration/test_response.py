@@ -6,7 +6,7 @@ import pytest
 from cases.vibration import scene as vibration
 from cases.vibration.accuracy import constants
 from cases.vibration.closed_forms import response
-from cases.vibration.figures import FLOOR, drawn, table
+from cases.vibration.figures import FLOOR, resonance_figure, table
 from cases.vibration.response import (
     FAST,
     SLOW,
@@ -33,9 +33,9 @@ def history(ratio, duration, number):
 
 
 def test_beat_period_and_spectrum_of_the_closed_form():
-    seen = history(0.9, 0.4, 1200)
-    assert seen.beat_period() == pytest.approx(2 * np.pi / (0.1 * FAST), rel=3e-4)
-    omega, lines = seen.spectrum()
+    beating = history(0.9, 0.4, 1200)
+    assert beating.beat_period() == pytest.approx(2 * np.pi / (0.1 * FAST), rel=3e-4)
+    omega, lines = beating.spectrum()
     # Free motion turns clockwise; the drive is a line on both sides.
     for expected in (-FAST, 0.9 * FAST):
         near = np.abs(omega - expected) < 40
@@ -56,21 +56,21 @@ def test_vertex_of_a_parabola_and_peak_of_a_long_time():
 
 
 def test_constants_are_those_of_the_scene_or_none():
-    made = vibration.scene(0.3, "none", sites=2, flux=0.7, stiffness=30.0)
-    found = constants(made)
-    assert found["w"] == pytest.approx(0.7 * vibration.CYCLOTRON)
-    assert found["k_m"] == pytest.approx(30.0 / vibration.MASS)
-    assert found["push"] == pytest.approx(CONSTANTS["push"])
-    assert found["omega"] == pytest.approx(0.3 * vibration.CYCLOTRON)
-    assert constants(made.replace({"effects.magnetic_field.constant": [0.1, 0.0, 1.0]})) is None
-    assert constants(made.without("tether")) is None
+    array = vibration.scene(0.3, "none", sites=2, flux=0.7, stiffness=30.0)
+    parameters = constants(array)
+    assert parameters["w"] == pytest.approx(0.7 * vibration.CYCLOTRON)
+    assert parameters["k_m"] == pytest.approx(30.0 / vibration.MASS)
+    assert parameters["push"] == pytest.approx(CONSTANTS["push"])
+    assert parameters["omega"] == pytest.approx(0.3 * vibration.CYCLOTRON)
+    assert constants(array.replace({"effects.magnetic_field.constant": [0.1, 0.0, 1.0]})) is None
+    assert constants(array.without("tether")) is None
     # Also what a picture could overlook.
-    assert constants(made.replace({"effects.electric_field.phase": [1.0, 0.0, 0.0]})) is None
-    assert constants(made.replace({"effects.electric_field.constant": [0.1, 0.0, 0.0]})) is None
-    assert constants(made.replace({"effects.magnetic_field.amplitude": [0.0, 0.0, 0.1]})) is None
-    falling = made.model_copy(update={"effects": (*made.effects, Gravity())})
+    assert constants(array.replace({"effects.electric_field.phase": [1.0, 0.0, 0.0]})) is None
+    assert constants(array.replace({"effects.electric_field.constant": [0.1, 0.0, 0.0]})) is None
+    assert constants(array.replace({"effects.magnetic_field.amplitude": [0.0, 0.0, 0.1]})) is None
+    falling = array.model_copy(update={"effects": (*array.effects, Gravity())})
     assert constants(falling) is None
-    assert constants(made.replace({"particles.mean_velocity": [1.0, 0.0, 0.0]})) is None
+    assert constants(array.replace({"particles.mean_velocity": [1.0, 0.0, 0.0]})) is None
 
 
 @pytest.mark.slow
@@ -82,10 +82,10 @@ def test_resonance_curve_of_runs_is_that_of_the_closed_form():
     assert slow.deviation < 1e-5
     assert fast.top() == pytest.approx(FAST, rel=1e-2)
     assert slow.top() == pytest.approx(SLOW, rel=3e-2)
-    figure = drawn(slow, fast, fast, "none", history(0.9, 0.4, 1200))
+    figure = resonance_figure(slow, fast, fast, "none", history(0.9, 0.4, 1200))
     left, right, beats, lines = figure.axes
-    np.testing.assert_array_equal(left.lines[1].get_ydata(), slow.found)
-    np.testing.assert_array_equal(right.lines[1].get_ydata(), fast.found)
+    np.testing.assert_array_equal(left.lines[1].get_ydata(), slow.peaks)
+    np.testing.assert_array_equal(right.lines[1].get_ydata(), fast.peaks)
     assert "65.7" in beats.get_title(loc="left")
     assert lines.get_xlabel().startswith("angular frequency")
     rows = table(("one", slow), ("two", fast)).splitlines()

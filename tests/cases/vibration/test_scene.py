@@ -38,12 +38,12 @@ def test_centre_of_gravity_follows_the_closed_form(near_field):
 
 def test_error_falls_and_work_rises_with_the_accuracy_asked_for():
     """The printed near field, before chaos: the paths of a reference two orders tighter."""
-    asked = (1e-4, 1e-5, 1e-6, 1e-8)
+    tolerances = (1e-4, 1e-5, 1e-6, 1e-8)
     results = simulate(
-        [scene(0.8, "printed", duration=0.001, sites=3, error=e) for e in asked], worlds=8, capacity=27
+        [scene(0.8, "printed", duration=0.001, sites=3, error=e) for e in tolerances], worlds=8, capacity=27
     )
-    *found, reference = (result.state["position"] for result in results)
-    errors = np.array([np.abs(position - reference).max() for position in found])
+    *places, reference = (result.state["position"] for result in results)
+    errors = np.array([np.abs(position - reference).max() for position in places])
     work = np.array([result.work["force_evaluations"] for result in results])
     assert (np.diff(errors) < 0).all()
     assert (np.diff(work) > 0).all()

@@ -9,12 +9,12 @@ def serve(connection, share):
     """Echo what is asked, end, or end in the middle of an answer."""
     while True:
         try:
-            asked = pickle.loads(connection.recv()[0])
+            scenes = pickle.loads(connection.recv()[0])
         except EOFError:
             return
-        if asked == "end":
+        if scenes == "end":
             os._exit(3)
-        if asked == "answer in part":
+        if scenes == "answer in part":
             os.write(connection.fileno(), struct.pack("!i", 1000) + b"too short")
             os._exit(4)
-        connection.send(os.getpid() if asked == "pid" else asked)
+        connection.send(os.getpid() if scenes == "pid" else scenes)

@@ -131,12 +131,12 @@ def test_nothing_is_evaluated_twice(tmp_path):
     run = ensemble(tmp_path, evaluator)
     first = run.estimate([*DESIGNS, DESIGNS[0]])
     assert first[3] == first[0]
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == run.asked
+    assert len(evaluator.ran) == len(set(evaluator.ran)) == run.requested
     assert run.runs.hits == 0
     other = FakeEvaluator()
     again = ensemble(tmp_path, other)
     assert again.estimate([*DESIGNS, DESIGNS[0]]) == first
-    assert (other.ran, again.runs.evaluations, again.runs.hits) == ([], 0, run.asked)
+    assert (other.ran, again.runs.evaluations, again.runs.hits) == ([], 0, run.requested)
 
 
 @pytest.mark.parametrize("change", ["precision", "problem", "version"])

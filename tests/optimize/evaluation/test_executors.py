@@ -24,10 +24,11 @@ from optimize.evaluation.executors import dask_cluster, handshake
 from optimize.evaluation.executors import worker as working
 from optimize.evaluation.executors.processes import Processes
 from optimize.evaluation.executors.remote import Lost, Remote, units
-from optimize.evaluation.executors.worker import Answer, Wanted
+from optimize.evaluation.executors.worker import Answer, WorkerSettings
 from optimize.search import search
 from optimize.settings import Settings
-from optimize.storage.cache import Cache, verify
+from optimize.storage.cache import Cache
+from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import worker
 from tests.optimize.drift_case import problem, scene
 from tests.optimize.evaluation import light_worker
@@ -49,8 +50,10 @@ CROWDED = SCENES[0].model_copy(update={"particles": Cloud(number=4, radius=0.2, 
 def cluster():
     """A real Dask cluster of two processes."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=":0") as made:
-        yield made
+    with distributed.LocalCluster(
+        2, threads_per_worker=1, processes=True, dashboard_address=":0"
+    ) as local_cluster:
+        yield local_cluster
 
 
 @pytest.fixture(scope="module", params=["processes", "dask"])
@@ -58,10 +61,10 @@ def away(request):
     """An evaluator in other processes, and how to know their ids."""
     if request.param == "dask":
         cluster = request.getfixturevalue("cluster")
-        evaluator = executors.made(f"dask://{cluster.scheduler_address.removeprefix('tcp://')}")
+        evaluator = executors.evaluator_named(f"dask://{cluster.scheduler_address.removeprefix('tcp://')}")
         pids = lambda: list(evaluator.pool._client.run(os.getpid).values())  # noqa: E731
     else:
-        evaluator = executors.made("processes:2")
+        evaluator = executors.evaluator_named("processes:2")
         crew = evaluator.pool._crew
         pids = lambda: [one.process.pid for one in crew if one.process.is_alive()]  # noqa: E731
     with closing(evaluator):
@@ -91,10 +94,10 @@ def same(results, others):
 def test_results_are_those_of_one_process_to_the_bit_and_so_are_failures(away, here):
     evaluator, pids = away
     seen = []
-    found = list(evaluator.evaluate([*SCENES, CROWDED], seen.append))
-    assert len(found) == 10, "each once"
-    same(dict(found), here[0])
-    assert not dict(found)[9].status.ok
+    results = list(evaluator.evaluate([*SCENES, CROWDED], seen.append))
+    assert len(results) == 10, "each once"
+    same(dict(results), here[0])
+    assert not dict(results)[9].status.ok
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
     assert len(pids()) == 2
@@ -110,18 +113,20 @@ def test_effects_of_the_users_own_act_in_workers(away, own_file):
         law = python_file.load(own_file("own_law.py", LAW.replace("-self", f"-{factor}self")))
         scenes = [s.model_copy(update={"effects": (law.Pull(strength=1e-9),)}) for s in SCENES[:2]]
         with closing(BatchEvaluator()) as local:
-            same(dict(Remote(evaluator.pool, Wanted()).evaluate(scenes)), dict(local.evaluate(scenes)))
+            same(
+                dict(Remote(evaluator.pool, WorkerSettings()).evaluate(scenes)), dict(local.evaluate(scenes))
+            )
 
 
 def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
     law = python_file.load(own_file("own_law.py", LAW))
     sent = working.packed([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
-    here = Wanted()
+    here = WorkerSettings()
     python_file.forget("own_law")
     with pytest.raises(
         InputError, match=r"^worker \(process .* must be able to import .* --plugin\); received No"
     ):
-        working._unpacked(sent, Wanted())
+        working._unpacked(sent, WorkerSettings())
     (file,) = here.files
     broken = replace(here, files=(replace(file, text=b"import no_such_module"),))
     with pytest.raises(
@@ -144,7 +149,7 @@ def test_scenes_that_cannot_be_sent_are_told_in_a_line():
 def test_killed_worker_loses_nothing(away, here):
     evaluator, pids = away
     dict(evaluator.evaluate(SCENES))  # all have started and compiled
-    killed, found = [], []
+    killed, results = [], []
 
     def progress(fraction):
         if not killed:
@@ -152,11 +157,11 @@ def test_killed_worker_loses_nothing(away, here):
             os.kill(killed[0], signal.SIGKILL)
 
     for pair in evaluator.evaluate(LONG, progress):
-        found.append(pair)
+        results.append(pair)
     assert killed
     assert killed[0] not in pids()
-    assert sorted(index for index, _ in found) == list(range(9)), "each once"
-    same(dict(found), here[1])
+    assert sorted(index for index, _ in results) == list(range(9)), "each once"
+    same(dict(results), here[1])
 
 
 @pytest.mark.slow
@@ -165,21 +170,21 @@ def test_search_is_the_same_though_a_worker_is_killed(away, tmp_path):
     evaluator, pids = away
     settings = Settings(seed=2, generations=2, options={"population": 8, "parents": 2})
 
-    def found(path, runner, on_progress=None):
+    def records_of(path, runner, on_progress=None):
         with Cache(path) as cache:
             outcome = search(problem("default", ""), runner, cache, settings, on_progress=on_progress)
-        kept = {record.key: (record.fitness, record.seed) for record in Cache(path).records()}
-        return outcome, kept
+        records = {record.key: (record.fitness, record.seed) for record in Cache(path).records()}
+        return outcome, records
 
     def kill(where):
         if where.evaluations == 20:
             os.kill(pids()[-1], signal.SIGKILL)
 
-    there, kept = found(tmp_path / "there.h5", evaluator, kill)
+    there, records = records_of(tmp_path / "there.h5", evaluator, kill)
     with closing(BatchEvaluator()) as local:
-        here, expected = found(tmp_path / "here.h5", local)
-    assert kept == expected
-    assert there.evaluations == here.evaluations == len(kept)
+        here, expected = records_of(tmp_path / "here.h5", local)
+    assert records == expected
+    assert there.evaluations == here.evaluations == len(records)
     assert repr(list(there.logbook)) == repr(list(here.logbook))
     assert [list(s) for s in there.hall] == [list(s) for s in here.hall]
     report = verify(tmp_path / "there.h5")
@@ -200,7 +205,7 @@ def test_worker_killed_while_it_has_nothing_to_do(away, here):
 
 @pytest.mark.long
 def test_stopped_it_leaves_no_process():
-    evaluator = executors.made("processes:2")
+    evaluator = executors.evaluator_named("processes:2")
     with closing(evaluator):
         dict(evaluator.evaluate(SCENES))
         children = [one.process for one in evaluator.pool._crew]
@@ -219,7 +224,7 @@ def test_stopped_it_leaves_no_process():
 def light(monkeypatch):
     """Processes that do what they are told and compile nothing; see light_worker.py."""
     monkeypatch.setattr("optimize.evaluation.executors.worker.serve", light_worker.serve)
-    with closing(Remote(Processes(2), Wanted())) as evaluator:
+    with closing(Remote(Processes(2), WorkerSettings())) as evaluator:
         yield evaluator.pool
 
 
@@ -267,7 +272,7 @@ def test_error_of_the_program_in_a_worker_is_raised_here(away):
     dict(evaluator.evaluate(SCENES))
     before = pids()
     with pytest.raises(ValueError, match="invalid literal for int") as raised:
-        evaluator._results(evaluator.pool.outcome(evaluator.pool.submit([Unreadable()], Wanted())))
+        evaluator._results(evaluator.pool.outcome(evaluator.pool.submit([Unreadable()], WorkerSettings())))
     assert "in _run_pickled" in raised.value.__notes__[0]
     dict(evaluator.evaluate(SCENES))
     assert pids() == before
@@ -298,7 +303,7 @@ class Doomed:
     def __init__(self):
         self.sent = []
 
-    def submit(self, scenes, wanted):
+    def submit(self, scenes, worker_settings):
         self.sent.append(tuple(scene.seed for scene in scenes))
         future = cf.Future()
         future.set_result([])
@@ -307,14 +312,14 @@ class Doomed:
     def outcome(self, future):
         raise Lost("killed")
 
-    def look(self):
+    def check_workers(self):
         pass
 
 
 def test_workers_that_die_of_everything_end_the_search():
     doomed = Doomed()
     with pytest.raises(RunError, match=r"killed; it was the worker number 3 to be lost with the same work"):
-        list(Remote(doomed, Wanted()).evaluate(SCENES))
+        list(Remote(doomed, WorkerSettings()).evaluate(SCENES))
     assert max(doomed.sent.count(unit) for unit in doomed.sent) == 3
 
 
@@ -346,16 +351,16 @@ def test_units_of_work():
 )
 def test_unknown_executors_are_refused(name, message):
     with pytest.raises(InputError, match=message):
-        executors.made(name)
+        executors.evaluator_named(name)
     with pytest.raises(InputError, match="precision must be"):
-        executors.made("processes:2", precision="f16")
+        executors.evaluator_named("processes:2", precision="f16")
 
 
 def test_nobody_at_the_address(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("optimize.evaluation.executors.dask_cluster.CONNECT_S", 0.3)
     with pytest.raises(InputError, match="must be the address of a running Dask scheduler; received '127"):
-        executors.made("dask://127.0.0.1:9")
+        executors.evaluator_named("dask://127.0.0.1:9")
 
 
 @pytest.mark.parametrize(
@@ -375,7 +380,7 @@ def test_addresses_that_are_none(monkeypatch, address, message):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(distributed, "Client", lambda *a, **k: pytest.fail("nobody is to be asked"))
     with pytest.raises(InputError, match=message):
-        executors.made(f"dask://{address}")
+        executors.evaluator_named(f"dask://{address}")
 
 
 @pytest.fixture
@@ -391,8 +396,8 @@ def encrypted():
     }
     with distributed.LocalCluster(
         1, threads_per_worker=1, processes=False, dashboard_address=":0", protocol="tls", security=lets_in
-    ) as made:
-        yield made.scheduler_address, settings
+    ) as local_cluster:
+        yield local_cluster.scheduler_address, settings
 
 
 def test_dask_cluster_with_tls(encrypted):
@@ -401,17 +406,17 @@ def test_dask_cluster_with_tls(encrypted):
 
     address, settings = encrypted
     assert address.startswith("tls://")
-    with dask.config.set(settings), closing(executors.made(f"dask://{address}")) as evaluator:
+    with dask.config.set(settings), closing(executors.evaluator_named(f"dask://{address}")) as evaluator:
         assert evaluator.pool.workers == 1
     strangers = {**settings, "distributed.comm.tls.ca-file": "/nowhere/ca.pem"}
     with dask.config.set(strangers), pytest.raises(InputError, match=r"\(\[Errno 2\] No such file"):
-        executors.made(f"dask://{address}")
+        executors.evaluator_named(f"dask://{address}")
 
 
 def test_dask_is_optional(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"one that is installed \(pip install 'tisim\[dask\]'\)"):
-        executors.made("dask://127.0.0.1:9")
+        executors.evaluator_named("dask://127.0.0.1:9")
 
 
 class Other:
@@ -422,7 +427,7 @@ class Other:
     def __init__(self, answer):
         self.answer = answer
 
-    def submit(self, scenes, wanted):
+    def submit(self, scenes, worker_settings):
         future = cf.Future()
         future.set_result(self.answer)
         return future
@@ -430,7 +435,7 @@ class Other:
     def outcome(self, future):
         return future.result()
 
-    def look(self):
+    def check_workers(self):
         pass
 
 
@@ -450,11 +455,13 @@ class Other:
 )
 def test_worker_of_another_program_is_refused(name, value):
     """Its last bits may be others, and the cache would take them for the same."""
-    wanted = Wanted()
-    made_by = {**wanted.made_by, name: value}
-    message = f"of {name} {re.escape(wanted.made_by[name])}, as the search is; received '{name} {value}'"
+    worker_settings = WorkerSettings()
+    made_by = {**worker_settings.made_by, name: value}
+    message = (
+        f"of {name} {re.escape(worker_settings.made_by[name])}, as the search is; received '{name} {value}'"
+    )
     with pytest.raises(InputError, match=message):
-        list(Remote(Other(Answer(made_by, [])), wanted).evaluate(SCENES[:1]))
+        list(Remote(Other(Answer(made_by, [])), worker_settings).evaluate(SCENES[:1]))
 
 
 def test_one_edited_source_file_makes_another_program(tmp_path, monkeypatch):
@@ -511,7 +518,7 @@ def without(folder, *gone):
 
 
 def connected(cluster):
-    return executors.made(f"dask://{cluster.scheduler_address.removeprefix('tcp://')}")
+    return executors.evaluator_named(f"dask://{cluster.scheduler_address.removeprefix('tcp://')}")
 
 
 @pytest.mark.long
@@ -550,7 +557,7 @@ def test_dask_futures_that_hold_no_answer_are_messages():
     distributed = pytest.importorskip("distributed")
     for sent, error, message in (
         ([], InputError, r"one that knows what the search is made of \(tisim .*\); received \[\]"),
-        (AttributeError("Wanted"), InputError, r"received AttributeError\('Wanted'\)"),
+        (AttributeError("WorkerSettings"), InputError, r"received AttributeError\('WorkerSettings'\)"),
         (
             distributed.KilledWorker("run", SimpleNamespace(address="tcp://a"), 4),
             RunError,
@@ -572,7 +579,7 @@ def test_dask_futures_that_hold_no_answer_are_messages():
 def test_dask_without_workers_says_so_and_gives_up(cluster, monkeypatch):
     """Simulated here; the next test kills real ones."""
     monkeypatch.setattr(dask_cluster, "SILENCE_S", 0.5)
-    monkeypatch.setattr(dask_cluster, "LOOK_S", 0.0)
+    monkeypatch.setattr(dask_cluster, "WORKER_CHECK_S", 0.0)
     with closing(connected(cluster)) as evaluator:
         dict(evaluator.evaluate(SCENES))
         monkeypatch.setattr(dask_cluster.DaskCluster, "workers", 0)
@@ -585,13 +592,13 @@ def test_dask_without_workers_says_so_and_gives_up(cluster, monkeypatch):
 
 def alive(group):
     """Command lines of the processes of a group that have not ended."""
-    found = []
+    processes = []
     for status in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             state, _, of = status.read_text().rpartition(")")[2].split()[:3]
             if int(of) == group and state != "Z":
-                found.append(status.with_name("cmdline").read_text())
-    return found
+                processes.append(status.with_name("cmdline").read_text())
+    return processes
 
 
 def await_end(group):

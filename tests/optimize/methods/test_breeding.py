@@ -3,7 +3,8 @@ import random
 import numpy as np
 import pytest
 
-from optimize.methods.breeding import Breeder, Breeding, GeneticOperator
+from optimize.methods.breeding import Breeder
+from optimize.methods.breeding_settings import Breeding, GeneticOperator
 from optimize.methods.individual import Individual
 from tests.optimize.fake_runs import bowl
 from tisim import InputError

@@ -19,8 +19,8 @@ METHODS = sorted(every())
 
 
 def run(cache, function, evaluator=None, genes=5, **settings):
-    wish = Settings(**{"seed": 1, "generations": 1000, "ensemble": ONE, **settings})
-    return search(fake_problem(genes), evaluator or FakeEvaluator(function), cache, wish)
+    settings = Settings(**{"seed": 1, "generations": 1000, "ensemble": ONE, **settings})
+    return search(fake_problem(genes), evaluator or FakeEvaluator(function), cache, settings)
 
 
 def quiet(design, seed):
@@ -33,7 +33,7 @@ def rosenbrock(design, seed):
     return float(np.sum(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2))
 
 
-def made(name, genes=5, seed=3, **options):
+def method_named(name, genes=5, seed=3, **options):
     kind = find(name)
     return kind(genes, 1, kind.Options(**options), seed)
 
@@ -53,12 +53,12 @@ def test_methods_are_found_by_looking():
 
 @pytest.mark.parametrize("name", METHODS)
 def test_asks_within_the_unit_cube_and_by_its_seed_alone(name):
-    twins = [made(name), made(name), made(name, seed=4)]
+    twins = [method_named(name), method_named(name), method_named(name, seed=4)]
     for _ in range(12):
-        asked = [method.ask() for method in twins]
-        assert [list(s) for s in asked[0]] == [list(s) for s in asked[1]]
-        assert [list(s) for s in asked[0]] != [list(s) for s in asked[2]]
-        for strings, method in zip(asked, twins, strict=True):
+        populations = [method.ask() for method in twins]
+        assert [list(s) for s in populations[0]] == [list(s) for s in populations[1]]
+        assert [list(s) for s in populations[0]] != [list(s) for s in populations[2]]
+        for strings, method in zip(populations, twins, strict=True):
             assert all(isinstance(string, Individual) for string in strings)
             assert np.all((np.array(strings) >= 0) & (np.array(strings) <= 1))
             assert 0 < method.width <= 1
@@ -68,10 +68,10 @@ def test_asks_within_the_unit_cube_and_by_its_seed_alone(name):
 
 def driven(name, function, evaluations, genes, seed=3):
     """The least cost that a method finds by itself, without a cache and all that."""
-    method, hall, asked = made(name, genes=genes, seed=seed), [], 0
-    while asked < evaluations:
+    method, hall, evaluated = method_named(name, genes=genes, seed=seed), [], 0
+    while evaluated < evaluations:
         strings = method.ask()
-        asked += sum(not string.fitness.valid for string in strings)
+        evaluated += sum(not string.fitness.valid for string in strings)
         hall = sorted([*worth(strings, function), *hall], key=lambda s: s.fitness.values)[:6]
         method.tell(strings, hall)
     return hall[0].fitness.values[0]
@@ -79,12 +79,12 @@ def driven(name, function, evaluations, genes, seed=3):
 
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "random"])
 def test_beats_chance_at_equal_evaluations(name):
-    found, chance = [], []
+    costs, chance = [], []
     for seed in range(5):
-        found.append(driven(name, quiet, 300, genes=8, seed=seed) - 0.5)
+        costs.append(driven(name, quiet, 300, genes=8, seed=seed) - 0.5)
         chance.append(np.sum((np.random.default_rng(seed).random((340, 8)) - 0.3) ** 2, axis=1).min())
-    assert np.median(found) < np.median(chance) / 2
-    assert max(found) < min(chance)
+    assert np.median(costs) < np.median(chance) / 2
+    assert max(costs) < min(chance)
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -106,7 +106,7 @@ def test_resumed_after_interrupt_it_is_the_same(path, name, after):
     }  # fmt: skip
     settings["options"] = {"population": 8, **({"parents": 2} if name in ("genetic", "restart") else {})}
 
-    def found(outcome):
+    def course_of(outcome):
         return repr(list(outcome.logbook)), [(list(s), repr(s.estimates)) for s in outcome.hall]
 
     whole = run(FakeCache(), bowl, **settings)
@@ -115,7 +115,7 @@ def test_resumed_after_interrupt_it_is_the_same(path, name, after):
     assert (part.stopped, part.evaluations) == ("interrupted", after)
     with Cache(path) as cache:
         again = run(cache, bowl, **settings)
-    assert found(again) == found(whole)
+    assert course_of(again) == course_of(whole)
     assert again.evaluations == whole.evaluations - after
     assert whole.evaluations > 200
 
@@ -142,7 +142,7 @@ def test_cma_es_follows_a_valley_that_the_genetic_algorithm_does_not():
 
 def test_cma_es_finds_a_corner():
     """Reflection at the bounds lets it come as near to them as to anything else."""
-    method = made("cma-es", genes=4)
+    method = method_named("cma-es", genes=4)
     for _ in range(40):
         strings = method.ask()
         hall = worth(strings, lambda design, seed: float(sum(design.values())))
@@ -156,7 +156,7 @@ def test_reflection():
 
 
 def test_cma_es_begins_again_with_twice_the_strings_when_it_has_converged():
-    method = made("cma-es", genes=2, smallest=1e-2)
+    method = method_named("cma-es", genes=2, smallest=1e-2)
     sizes, moved = [], []
     for _ in range(60):
         strings = method.ask()
@@ -171,7 +171,7 @@ def test_cma_es_begins_again_with_twice_the_strings_when_it_has_converged():
 
 
 def test_restart_draws_anew_around_the_best_when_it_has_stalled():
-    method = made("restart", genes=3, stalled=2, smallest=0.2)
+    method = method_named("restart", genes=3, stalled=2, smallest=0.2)
     widths, best = [], None
     for generation in range(14):
         strings = method.ask()

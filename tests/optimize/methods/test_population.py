@@ -5,7 +5,7 @@ import pytest
 
 from cases import case as catalogue
 from optimize.methods.base import every, find
-from optimize.methods.breeding import Breeding
+from optimize.methods.breeding_settings import Breeding
 from optimize.settings import Settings, followed, proposed
 from tests.optimize.fake_runs import fake_problem
 from tisim import InputError
@@ -44,8 +44,8 @@ def settings_of(usual, method, given):
 
 
 def test_the_table_is_of_the_cases_there_are():
-    known = [case.sizes["default"].search for case in catalogue.every().values() if case.problem]
-    options = [search["options"] for search in known if "options" in search]
+    searches = [case.sizes["default"].search for case in catalogue.every().values() if case.problem]
+    options = [search["options"] for search in searches if "options" in search]
     assert all(any(usual.get("options") == own for usual in USUAL.values()) for own in options)
 
 
@@ -72,9 +72,9 @@ def test_every_population_is_taken_or_refused_for_a_real_reason(case, method):
 def test_proportions_are_the_published_ones():
     assert (Breeding().population, Breeding().parents, Breeding().bred) == (20, 6, 6)
     for population in POPULATIONS:
-        made = Breeding(population=population)
-        assert made.bred in (made.parents, made.parents - 1)
-        assert abs(made.parents - 0.3 * population) <= 1.0 or population < 4
+        breeding = Breeding(population=population)
+        assert breeding.bred in (breeding.parents, breeding.parents - 1)
+        assert abs(breeding.parents - 0.3 * population) <= 1.0 or population < 4
     for usual in USUAL.values():
         options = usual.get("options", {})
         if "parents" in options:
@@ -99,8 +99,8 @@ def test_proportions_are_the_published_ones():
     ],
 )
 def test_what_is_given_stays_and_the_rest_follows(given, population, parents, bred):
-    made = Breeding(**given)
-    assert (made.population, made.parents, made.bred) == (population, parents, bred)
+    breeding = Breeding(**given)
+    assert (breeding.population, breeding.parents, breeding.bred) == (population, parents, bred)
 
 
 def test_parents_alone_leave_the_population_of_the_case():

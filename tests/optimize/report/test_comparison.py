@@ -28,7 +28,7 @@ def noisy(design, seed):
     return bowl(design, seed + int(1e9 * design["x0"]), noise=0.1)
 
 
-def found(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache=None, problem=None):
+def compared(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache=None, problem=None):
     arguments = (BASE, methods, evaluations, repeats, fresh)
     cache = FakeCache() if cache is None else cache
     return list(compare(problem or fake_problem(6), *arguments, evaluator or FakeEvaluator(noisy), cache))
@@ -36,41 +36,41 @@ def found(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache=No
 
 def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
     evaluator, cache = FakeEvaluator(noisy), FakeCache()
-    made = found(["random", "genetic", "cma-es"], evaluator=evaluator, cache=cache)
-    assert [(f.method, f.repeat) for f in made] == [
+    results = compared(["random", "genetic", "cma-es"], evaluator=evaluator, cache=cache)
+    assert [(f.method, f.repeat) for f in results] == [
         (method, repeat) for repeat in range(3) for method in ("random", "genetic", "cma-es")
     ]
-    assert {f.evaluations for f in made} <= {119, 120}
+    assert {f.evaluations for f in results} <= {119, 120}
     fresh = [start_seed(FRESH, k) for k in range(8)]
     searched = {start_seed(seed, k) for seed in range(3) for k in range(13)}
     assert not searched & set(fresh)
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == sum(f.evaluations for f in made) + 9 * 8
+    assert len(evaluator.ran) == len(set(evaluator.ran)) == sum(f.evaluations for f in results) + 9 * 8
     seen = {}
     for record in cache.known.values():
         if record.seed in fresh:
             seen.setdefault(tuple(record.design.values()), []).append(record.fitness)
     assert sorted(np.mean(values) for values in seen.values()) == pytest.approx(
-        sorted(f.fresh.mean for f in made), rel=1e-12
+        sorted(f.fresh.mean for f in results), rel=1e-12
     )
     again = FakeEvaluator(noisy)
-    assert found(["random", "genetic", "cma-es"], evaluator=again, cache=cache) == made
+    assert compared(["random", "genetic", "cma-es"], evaluator=again, cache=cache) == results
     assert again.ran == []
 
 
-def rows(problem, made):
+def rows(problem, results):
     console = Console(width=120, record=True, file=io.StringIO())
-    console.print(comparison.table(problem, made))
+    console.print(comparison.table(problem, results))
     return [line.split() for line in console.export_text().splitlines()]
 
 
 def test_table_ranks_by_the_median_from_fresh_starts():
-    made = found(["random", "genetic"], repeats=5)
-    printed = rows(fake_problem(6), made)
+    results = compared(["random", "genetic"], repeats=5)
+    printed = rows(fake_problem(6), results)
     heading = next(line for line in printed if line[0] == "method")
     lines = [line for line in printed if line[0] in ("random", "genetic")]
     medians = {}
     for name, searches, _, *numbers in lines:
-        mine = [f for f in made if f.method == name]
+        mine = [f for f in results if f.method == name]
         assert int(searches) == len(mine) == 5
         values = [f.fresh.mean for f in mine]
         claimed = np.median([f.claimed.mean for f in mine])
@@ -82,16 +82,21 @@ def test_table_ranks_by_the_median_from_fresh_starts():
     assert "median" in heading
     assert printed[0] == ["fitness"], "the objective, above"
     large = fake_problem(6, objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
-    turned = found(["random", "genetic"], repeats=5, problem=large)
+    turned = compared(["random", "genetic"], repeats=5, problem=large)
     assert [line[0] for line in rows(large, turned) if line[0] in medians] == ["genetic", "random"]
     numbers = list(csv.reader(comparison.as_csv(large, turned).decode().splitlines()))
-    assert [float(row[3]) for row in numbers[1:]] == [-f.fresh.mean for f in made]
+    assert [float(row[3]) for row in numbers[1:]] == [-f.fresh.mean for f in results]
 
 
 def test_stopping_rules_and_options_of_the_case():
-    wish = settings_of(fake_problem(), BASE, "genetic", 50, 3)
-    assert (wish.target, wish.patience, wish.max_evaluations, wish.seed) == (None, None, 50, 3)
-    assert (wish.options.population, wish.ensemble.confirm, wish.ensemble.block) == (10, 0, 2)
+    settings = settings_of(fake_problem(), BASE, "genetic", 50, 3)
+    assert (settings.target, settings.patience, settings.max_evaluations, settings.seed) == (
+        None,
+        None,
+        50,
+        3,
+    )
+    assert (settings.options.population, settings.ensemble.confirm, settings.ensemble.block) == (10, 0, 2)
     assert settings_of(fake_problem(), BASE, "restart", 50, 3).options.parents == 4
     assert settings_of(fake_problem(), BASE, "cma-es", 50, 3).options.population is None
 
@@ -108,7 +113,7 @@ def test_what_cannot_be_compared_is_refused():
     ):
         evaluator = FakeEvaluator(noisy)
         with pytest.raises(InputError, match=message):
-            found(**arguments, evaluator=evaluator)
+            compared(**arguments, evaluator=evaluator)
         assert evaluator.ran == []
 
 

@@ -101,20 +101,20 @@ def test_terminal_table_shows_the_best_designs(outcome):
 
 def agglomerations(number):
     """Designs of Z04's ten genes; values such as 1.234e15 among them."""
-    made = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
+    outcome = Outcome(agglomeration("paper"), Settings(), {"problem": "agglomeration"})
     for k in range(number):
         string = Individual([0.851234 + k / 200] * 10)
         string.estimates = (FitnessEstimate(0.712345 + k / 1e3, 0.1, 0.0123456, 48, k % 2 == 0),)
         string.confirmed = string.estimates
-        made.hall.append(string)
-    return made
+        outcome.hall.append(string)
+    return outcome
 
 
 @pytest.mark.parametrize("number", [1, 6, 20])
 def test_no_row_wraps_on_80_columns(number):
-    made = agglomerations(number)
-    headings = list(best_columns(made.problem, made.hall))
-    rows = [line for line in printed(made) if line]
+    outcome = agglomerations(number)
+    headings = list(best_columns(outcome.problem, outcome.hall))
+    rows = [line for line in printed(outcome) if line]
     blocks = -(-number // 6)
     assert len(rows) == blocks * len(headings)
     for k, row in enumerate(rows):
@@ -125,13 +125,13 @@ def test_no_row_wraps_on_80_columns(number):
 
 
 def test_symbols_of_the_table_are_explained_under_it(outcome):
-    def told(made):
+    def headings(outcome):
         console = Console(width=80, record=True, file=io.StringIO())
-        console.print(report.notes(made))
+        console.print(report.notes(outcome))
         return [line.split(": ")[0] for line in console.export_text().splitlines() if ": " in line]
 
-    assert told(outcome) == ["95 % +-", "starts", "settled"]
-    assert told(agglomerations(2)) == [
+    assert headings(outcome) == ["95 % +-", "starts", "settled"]
+    assert headings(agglomerations(2)) == [
         "Pi",
         "b_f / b_0",
         "n_f",
@@ -140,7 +140,7 @@ def test_symbols_of_the_table_are_explained_under_it(outcome):
         "settled",
         "fresh starts",
     ]
-    assert told(agglomerations(0)) == []
+    assert headings(agglomerations(0)) == []
     headings = best_columns(agglomerations(2).problem, agglomerations(2).hall)
     assert set(agglomeration("paper").meanings) <= set(headings)
 

@@ -4,8 +4,9 @@ import re
 import h5py
 import pytest
 
-from optimize.storage.cache import Cache, compact, existing, verify
+from optimize.storage.cache import Cache, existing
 from optimize.storage.journal import Journal, frame, scan
+from optimize.storage.maintenance import compact, verify
 from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
@@ -16,8 +17,8 @@ def test_torn_tail_at_every_byte(path):
     whole = b"".join(frame(fake_record(n).payload()) for n in range(2))
     last = frame(fake_record(2, pad="longer than what is appended after it" * 3).payload())
     for cut in range(len(last)):
-        found = scan(whole + last[:cut])
-        assert (len(found.payloads), found.end, found.torn, found.damaged) == (2, len(whole), cut, [])
+        scanned = scan(whole + last[:cut])
+        assert (len(scanned.payloads), scanned.end, scanned.torn, scanned.damaged) == (2, len(whole), cut, [])
     for cut in range(0, len(last), 7):
         journal_of(path).write_bytes(whole + last[:cut])
         lock_of(path).unlink(missing_ok=True)
@@ -34,9 +35,9 @@ def test_damage_inside_the_journal_loses_only_the_damaged(path):
     for at in range(len(frames[1])):
         hurt = bytearray(frames[1])
         hurt[at] ^= 0x41
-        found = scan(frames[0] + bytes(hurt) + frames[2] + frames[3])
-        assert len(found.payloads) == 3
-        assert found.damaged == [len(frames[0])]
+        scanned = scan(frames[0] + bytes(hurt) + frames[2] + frames[3])
+        assert len(scanned.payloads) == 3
+        assert scanned.damaged == [len(frames[0])]
     journal_of(path).write_bytes(frames[0] + bytes(hurt) + frames[2] + frames[3])
     assert verify(path).damaged == [f"journal, byte {len(frames[0])}: not a whole record"]
     with pytest.warns(RuntimeWarning, match=r"1 damaged evaluation\(s\) are ignored"):
@@ -111,12 +112,12 @@ def test_no_flipped_bit_anywhere_goes_unnoticed(path):
     for at in range(0, len(good), 5):
         path.write_bytes(good[:at] + bytes([good[at] ^ (1 << at % 8)]) + good[at + 1 :])
         try:
-            found = verify(path).damaged
+            damaged = verify(path).damaged
         except InputError:
             outcomes.add("refused")
             continue
-        outcomes.add("reported" if found else "harmless")
-        if not found:
+        outcomes.add("reported" if damaged else "harmless")
+        if not damaged:
             assert payloads(existing(path).records()) == payloads([fake_record(1), fake_record(2)])
             assert Cache(path).table("a/log") == table
     assert {"refused", "reported"} <= outcomes

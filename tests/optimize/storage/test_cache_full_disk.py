@@ -5,8 +5,9 @@ import threading
 import h5py
 import pytest
 
-from optimize.storage.cache import Cache, verify
+from optimize.storage.cache import Cache
 from optimize.storage.hdf5_store import image
+from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import RunError

@@ -3,7 +3,8 @@ import time
 
 import pytest
 
-from optimize.storage.cache import Cache, verify
+from optimize.storage.cache import Cache
+from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import worker
 from tests.optimize.fake_runs import fake_record
 
@@ -46,8 +47,8 @@ def test_sigkill_at_every_system_call_leaves_a_whole_cache(tmp_path):
         report = verify(folder / "cache.h5")
         assert report.ok, folder.name
         assert report.rows >= 1
-        kept = {record.seed for record in Cache(folder / "cache.h5").records()}
-        assert {0} | numbers <= kept <= {0, 1, 2}
+        seeds = {record.seed for record in Cache(folder / "cache.h5").records()}
+        assert {0} | numbers <= seeds <= {0, 1, 2}
         with Cache(folder / "cache.h5") as cache:
             for number in (1, 2, 3):
                 cache.put(fake_record(number))

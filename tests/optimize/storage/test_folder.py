@@ -8,7 +8,7 @@ import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from optimize.search_folder import NAMES, clear
+from optimize.search_folder import SEARCH_FILES, clear
 from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
@@ -70,12 +70,12 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
 
 def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp_path, monkeypatch):
     assert optimize("--generations", 0)[0] == 0
-    asked = []
+    interrupted = []
 
     class Joined(FakeEvaluator):
         def evaluate(self, scenes, progress=None):
-            if not asked:
-                asked.append(scenes)
+            if not interrupted:
+                interrupted.append(scenes)
                 assert optimize()[0] == 0
                 with pytest.raises(InputError, match="without a command that is still at work there"):
                     clear(tmp_path / "s", overwrite=True)
@@ -83,7 +83,7 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
 
     monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", Joined)
     assert optimize("--generations", 3)[0] == 0
-    assert asked
+    assert interrupted
     assert optimize("--generations", 3, "--fresh", "--overwrite")[0] == 0
 
 
@@ -116,7 +116,7 @@ def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
     assert optimize()[0] == 0
 
 
-@pytest.mark.parametrize("name", ["best.csv", "best.csv.new", *NAMES[:3]])
+@pytest.mark.parametrize("name", ["best.csv", "best.csv.new", *SEARCH_FILES[:3]])
 @pytest.mark.parametrize("way", [(), ("--fresh",), ("--fresh", "--overwrite")])
 def test_planted_links_are_refused_and_not_followed(optimize, tmp_path, name, way):
     victim, folder = tmp_path / "victim", tmp_path / "s"

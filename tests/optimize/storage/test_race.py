@@ -21,21 +21,23 @@ def noisy(design, seed, noise=0.1):
 
 
 def ensemble(function=noisy, problem=None, budget=None, **settings):
-    wish = EnsembleSettings(**{"min_starts": 4, "block": 4, "max_starts": 60, "tolerance": 0.9, **settings})
-    return Ensemble(problem or fake_problem(1), FakeEvaluator(function), FakeCache(), wish, 2, budget)
+    settings = EnsembleSettings(
+        **{"min_starts": 4, "block": 4, "max_starts": 60, "tolerance": 0.9, **settings}
+    )
+    return Ensemble(problem or fake_problem(1), FakeEvaluator(function), FakeCache(), settings, 2, budget)
 
 
 def twin(first, second):
     """The paired t test of SciPy: whether first is surely lower, two-sided 95 %."""
-    found = stats.ttest_rel(second, first)
-    return found.statistic > 0 and found.pvalue < 0.05
+    test = stats.ttest_rel(second, first)
+    return test.statistic > 0 and test.pvalue < 0.05
 
 
 def test_starts_go_to_those_that_compete():
     run = ensemble(race=60)
     assert [e.starts for (e,) in run.estimate(DESIGNS)] == [4] * 4
     raced = [e for (e,) in run.race(DESIGNS)]
-    assert run.asked <= 16 + 60
+    assert run.requested <= 16 + 60
     assert raced[0].starts == raced[1].starts > 16
     assert raced[3].starts == 4, "beaten before the first round"
     for design, estimate in zip(DESIGNS, raced, strict=True):
@@ -51,8 +53,8 @@ def test_who_is_out_is_who_loses_the_paired_test():
     run.estimate(DESIGNS)
     racing, used = list(costs), dict.fromkeys(costs, 4)
     while True:
-        known = {x: costs[x][: used[x]] for x in racing}
-        racing = [x for x in known if not any(twin(known[y], known[x]) for y in known if y != x)]
+        samples = {x: costs[x][: used[x]] for x in racing}
+        racing = [x for x in samples if not any(twin(samples[y], samples[x]) for y in samples if y != x)]
         if len(racing) < 2 or used[racing[0]] == 60:
             break
         for x in racing:
@@ -65,11 +67,11 @@ def test_race_ends_with_its_purse_with_the_budget_and_with_max_starts():
     run = ensemble(race=20)
     run.estimate(DESIGNS[:2])
     run.race(DESIGNS[:2])
-    assert run.asked == 8 + 16, "a third round of 8 would cost more than 20"
+    assert run.requested == 8 + 16, "a third round of 8 would cost more than 20"
     run = ensemble(race=1000, budget=30)
     run.estimate(DESIGNS[:2])
     run.race(DESIGNS[:2])
-    assert run.asked == 24
+    assert run.requested == 24
     run = ensemble(race=1000, max_starts=10)
     run.estimate(DESIGNS[:2])
     assert [e.starts for (e,) in run.race(DESIGNS[:2])] == [10, 10]
@@ -112,8 +114,8 @@ def test_search_with_races_finds_better_designs_at_equal_evaluations():
         starts = EnsembleSettings(min_starts=2, block=2, max_starts=40, tolerance=0.9, race=race)
         best = []
         for seed in range(12):
-            wish = Settings(seed=seed, generations=99, max_evaluations=400, ensemble=starts)
-            outcome = search(fake_problem(3), FakeEvaluator(noisy_bowl), FakeCache(), wish)
+            settings = Settings(seed=seed, generations=99, max_evaluations=400, ensemble=starts)
+            outcome = search(fake_problem(3), FakeEvaluator(noisy_bowl), FakeCache(), settings)
             assert 398 <= outcome.evaluations <= 400
             best.append(outcome.best)
         true[race] = np.sum((np.array(best) - 0.3) ** 2, axis=1)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cases.vibration.closed_forms import driven
 from tests.interactions.test_short_ranged import grains, shells
 from tests.scenes import compiled, scene, simulate
 from tests.steppers.charged import PUSH, W, charged, final, order
 from tests.steppers.charged import equal_steps as trapezoidal_steps
+from tests.steppers.closed_forms import driven
 from tests.steppers.implicit.test_trapezoid import with_stepper
 from tests.throwaway import SoftShell
 from tisim import Box

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cases.vibration.closed_forms import driven
 from tests.interactions.test_short_ranged import grains, shells
 from tests.scenes import scene, simulate
 from tests.steppers.charged import PUSH, W, charged, equal_steps, final
+from tests.steppers.closed_forms import driven
 from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import InputError, Simulation
 from tisim.backend.taichi import ti

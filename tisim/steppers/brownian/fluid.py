@@ -4,11 +4,10 @@ import scipy.constants
 
 from tisim.backend.taichi import ti
 from tisim.numerics import philox
+from tisim.numerics.random_streams import BROWNIAN_MOTION
 from tisim.sources.base import sources
 from tisim.steppers.context import StepContext
 
-STREAM = 1
-"""The number of the random stream (philox.py)."""
 PER_KELVIN = scipy.constants.k
 """Boltzmann's constant, J/K."""
 
@@ -75,5 +74,5 @@ class Fluid:
     def normals(self, w, i, step):
         """Three independent standard normal numbers, those of a particle in a step."""
         s = self.s
-        g = philox.normals(philox.bits(s.seed[w], STREAM, s.id[w, i], step))
+        g = philox.normals(philox.bits(s.seed[w], BROWNIAN_MOTION, s.id[w, i], step))
         return ti.cast(ti.Vector([g[0], g[1], g[2]]), s.real)

@@ -1,4 +1,4 @@
-"""How a study looks at its runs, and how many simulations it keeps."""
+"""How a study observes its runs, and how many simulations it keeps."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from tests.accuracy.scenes import oscillator
 from tisim import Result, Status, steppers
 from tisim.accuracy import timing
 from tisim.accuracy.sweep import in_steps_of_at_most
-from tisim.accuracy.timing import LOOKS, ROOM, Bench, Looks
+from tisim.accuracy.timing import OBSERVATIONS, ROOM, ResultObserver, SimulationCache
 from tisim.backend import memory
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
@@ -20,7 +20,7 @@ CONTROLS = {k: c for k, c in StepControl.known().items() if c.__module__.startsw
 
 
 class Waiting:
-    """A world that is where it waits to be looked at, or at its end."""
+    """A world that is where it waits to be observed, or at its end."""
 
     def __init__(self, duration):
         self.time = 0.0
@@ -30,34 +30,34 @@ class Waiting:
         return [Result(self.scenes[0], {}, {}, self.time, {}, Status(True, ""), 0.0)]
 
 
-def test_a_world_is_looked_at_each_time_once_and_waits_for_what_is_to_come():
+def test_a_world_is_observed_each_time_once_and_waits_for_what_is_to_come():
     """In one case of 20, n times a part of the duration is rounded to less than n such parts."""
     for duration in np.random.default_rng(0).uniform(0.0, 10.0, 200):
         seen, world = [], Waiting(duration)
-        looks = Looks(duration, lambda result, seen=seen: seen.append(result.time))
-        looks.observe(world)
+        observer = ResultObserver(duration, lambda result, seen=seen: seen.append(result.time))
+        observer.observe(world)
         while world.time < duration:
-            assert looks.pause(world)[0] > world.time
-            world.time = min(looks.pause(world)[0], duration)
-            looks.observe(world)
-        assert len(seen) == LOOKS + 1
-        np.testing.assert_allclose(np.diff(seen), duration / LOOKS, rtol=1e-12)
+            assert observer.pause(world)[0] > world.time
+            world.time = min(observer.pause(world)[0], duration)
+            observer.observe(world)
+        assert len(seen) == OBSERVATIONS + 1
+        np.testing.assert_allclose(np.diff(seen), duration / OBSERVATIONS, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", CONTROLS)
 def test_steps_of_every_control_can_be_kept_short(kind):
     """Whatever a control calls its lengths, and whatever the shortest is."""
     control = CONTROLS[kind]
-    told = {name: 1e-3 for name, info in control.model_fields.items() if info.is_required()}
+    required = {name: 1e-3 for name, info in control.model_fields.items() if info.is_required()}
     duration = 1e-5
-    stepper = Stepper.known()["verlet"].model_construct(control=control(**told))
+    stepper = Stepper.known()["verlet"].model_construct(control=control(**required))
     scene = oscillator().model_copy(update={"stepper": stepper, "duration": duration})
-    assert scene.stepper.control.fewest(duration) < LOOKS
-    short = in_steps_of_at_most(scene, duration / LOOKS).stepper.control
-    assert short.fewest(duration) >= LOOKS * (1 - 1e-12)
+    assert scene.stepper.control.fewest(duration) < OBSERVATIONS
+    short = in_steps_of_at_most(scene, duration / OBSERVATIONS).stepper.control
+    assert short.fewest(duration) >= OBSERVATIONS * (1 - 1e-12)
     # Its parts still agree with each other, and what is compiled is the same.
     assert control(**short.model_dump()) == short
-    assert short.structure() == control(**told).structure()
+    assert short.structure() == control(**required).structure()
 
 
 class Memory:
@@ -79,16 +79,16 @@ class Memory:
 
 def test_a_study_of_many_structures_gives_back_what_it_has_not_used_for_longest(own, monkeypatch):
     monkeypatch.setattr(timing, "Simulation", Memory)
-    monkeypatch.setattr(memory, "MOST", len(memory.in_use()) + ROOM + 8)
-    made, scene = Bench(), oscillator()
-    first = made.ready(scene, 1)
+    monkeypatch.setattr(memory, "MAX_TREES", len(memory.in_use()) + ROOM + 8)
+    cache, scene = SimulationCache(), oscillator()
+    first = cache.compiled(scene, 1)
     for worlds in range(2, ROOM):
-        latest = made.ready(scene, worlds)
-        assert made.ready(scene, 1) is first
-        assert made.ready(scene, worlds) is latest
+        latest = cache.compiled(scene, worlds)
+        assert cache.compiled(scene, 1) is first
+        assert cache.compiled(scene, worlds) is latest
     assert all(tree.alive for tree in first.trees + latest.trees)
     # Two fit beside the room for another, and that one.
-    assert len(made.made) == 3
-    assert sum(tree.alive for kept in made.made.values() for tree in kept.trees) == 12
-    for kept in made.made.values():
-        kept.close()
+    assert len(cache.cached) == 3
+    assert sum(tree.alive for simulation in cache.cached.values() for tree in simulation.trees) == 12
+    for simulation in cache.cached.values():
+        simulation.close()

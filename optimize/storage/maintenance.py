@@ -1,0 +1,80 @@
+"""Whether a cache file is whole, and what can be kept of it: a search's file checked, or made small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from optimize.storage import hdf5_store, salvage
+from optimize.storage.cache import Cache, existing_files, file_version, journal_records
+from optimize.storage.journal import Journal, Mark
+from optimize.storage.record import Record
+from tisim.files.atomic import locked
+
+
+@dataclass(frozen=True)
+class VerifyReport:
+    """What verify found. rows, journal : whole records in the HDF5 file and in the journal.
+
+    damaged : every row, table or stretch of journal that is not what was written, or has been cut off.
+    torn : bytes of an unfinished record at the journal's end (a killed writer; harmless).
+    duplicates : records stored more than once (a kill during a fold; harmless).
+    conflicts : keys stored with different fitnesses: the evaluation is not reproducible.
+    """
+
+    rows: int
+    journal: int
+    damaged: list[str]
+    torn: int
+    duplicates: int
+    conflicts: list[str]
+
+    @property
+    def ok(self) -> bool:
+        """Nothing damaged and nothing in conflict."""
+        return not self.damaged and not self.conflicts
+
+
+def verify(path: str | Path) -> VerifyReport:
+    """Check every row, table and journal frame of an existing cache file; changes nothing.
+
+    InputError if the file does not exist, is cut short or is not a cache's.
+    """
+    path, journal, lock = existing_files(path)
+    with locked(lock, exclusive=False):
+        rows: list[Record] = []
+        damaged: list[str] = []
+        version = file_version(path)
+        if version is not None:
+            with hdf5_store.opened(path) as file:
+                rows, damaged = hdf5_store.read_rows(file)
+                bad = hdf5_store.damaged_tables(file)
+                damaged += [f"table {name}: its checksum does not fit" for name in bad]
+        scanned, mark = Journal(journal).read(), Mark.read(lock)
+    frames, none = journal_records(scanned)
+    cut = None if mark is None else mark.cut(version, scanned)
+    damaged += [*none, *([cut] if cut else [])]
+    first: dict[str, Record] = {}
+    for record in (*rows, *frames):
+        first.setdefault(record.key, record)
+    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(first[r.key].values)}
+    return VerifyReport(
+        rows=len(rows),
+        journal=len(frames),
+        damaged=damaged,
+        torn=scanned.torn,
+        duplicates=len(rows) + len(frames) - len(first),
+        conflicts=sorted(conflicts),
+    )
+
+
+def compact(path: str | Path) -> int:
+    """Fold an existing cache file's journal, drop what is damaged or double; return how many are kept.
+
+    A file that is damaged as a whole is kept as FILE.damaged; FILE then has what could be read of it.
+    """
+    file, _, lock = existing_files(path)
+    salvage.mend(file, lock)
+    cache = Cache(file)
+    cache.compact()
+    return len(cache)

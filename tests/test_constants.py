@@ -1,0 +1,68 @@
+"""A constant's name stands for one value, wherever it is read."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+from tests import rooms
+
+SHARED = {
+    "BEFORE", "CUTS", "FARTHEST", "FILE", "FORMAT", "NAMES", "OWN", "PATIENCE", "ROUNDING", "ROWS", "SHOWN",
+    "SMALL",
+}  # fmt: skip
+"""The names that still stand for several values; none is to be added."""
+
+
+def constants(tree):
+    """The public upper-case names that a module defines, and what they are set to, as it is written."""
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        if isinstance(node, ast.AnnAssign) and node.value:
+            targets = [node.target]
+        for target in targets:
+            names, values = [target], [node.value]
+            if isinstance(target, ast.Tuple):
+                names = target.elts
+                whole = isinstance(node.value, ast.Tuple) and len(node.value.elts) == len(names)
+                values = node.value.elts if whole else [ast.Subscript(node.value, ast.Constant(k))
+                                                        for k in range(len(names))]  # fmt: skip
+            for name, value in zip(names, values, strict=True):
+                if isinstance(name, ast.Name) and name.id.isupper() and not name.id.startswith("_"):
+                    yield name.id, ast.unparse(value)
+
+
+FILES = rooms.modules(Path(__file__).parents[1])
+
+
+def owner(module):
+    """The case that a module is of; "" for what all of them read."""
+    package = ".".join(module.split(".")[:2])
+    return package if f"{package}.scene" in FILES and package.startswith("cases.") else ""
+
+
+def ambiguous(files):
+    """The names with several values in the packages, or in one case and the packages together.
+
+    A case is a scenario of its own: two of them may each have a DENSITY of their particles.
+    """
+    values = defaultdict(lambda: defaultdict(set))
+    for module, text in files.items():
+        for name, value in constants(ast.parse(text)):
+            values[name][owner(module)].add(value)
+    return {
+        name
+        for name, of_owner in values.items()
+        if any(len(own | of_owner.get("", set())) > 1 for own in of_owner.values())
+    }
+
+
+def test_a_name_stands_for_one_value():
+    texts = {module: file.read_text(encoding="utf-8") for module, file in FILES.items()}
+    assert ambiguous(texts) == SHARED
+
+
+def test_a_second_value_is_found():
+    assert ambiguous({"tisim.a": "MOST, LEAST = 3, 1", "optimize.b": "MOST: int = 4"}) == {"MOST"}
+    assert ambiguous({"cases.blast.a": "FEW = 3", "cases.blast.b": "FEW = 4"}) == {"FEW"}
+    assert ambiguous({"cases.blast.a": "FEW = 3", "tisim.b": "FEW = 4"}) == {"FEW"}
+    assert ambiguous({"cases.blast.a": "FEW = 3", "cases.capture.a": "FEW = 4"}) == set()

@@ -1,0 +1,9 @@
+"""The streams of random numbers: every use of ``philox.bits`` has one of its own.
+
+Two uses of one seed that shared a stream would draw the same numbers. A stream is a number below 2^32.
+"""
+
+BROWNIAN_MOTION = 1
+"""The thermal noise of Brownian steppers draws from this stream."""
+SEQUENTIAL_ADDITION = 0x52534100
+"""Random sequential addition draws the places that it tries from this stream."""
