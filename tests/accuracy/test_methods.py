@@ -16,7 +16,7 @@ from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import decades, tied
-from tisim.accuracy.sweep import exchanged, finest, methods, parts
+from tisim.accuracy.sweep import exchanged, finest, methods, parts, rivals
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects import InducedMoment, MutualInducedMoment, NearField, Tether, TruncatedNearField
@@ -108,7 +108,7 @@ def test_settings_of_what_is_tried_are_rounded():
     """They are pasted: 1e3 times 0.0556 is 55.599999999999994."""
     for dt in (0.0556, 7.3e-11, 4.29e-13, 123.0):
         for effects in (oscillator().effects, charged(accurate(1e-3), 1.0).effects):
-            for stepper in Verlet(control=FixedStep(dt=dt)).rivals(effects, dt):
+            for stepper in rivals(Verlet(control=FixedStep(dt=dt)), effects, dt):
                 values = stepper.control.model_dump().values()
                 rounded = [float(f"{v:.3g}") if isinstance(v, float) else v for v in values]
                 assert list(values) == rounded, expression(stepper)

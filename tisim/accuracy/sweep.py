@@ -158,17 +158,22 @@ def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
     return SettingSweep("random starts", settings, tuple(n / sizes[0] for n in sizes), scene)
 
 
+def rivals(stepper: Stepper, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
+    """Return what is tried beside a stepper in a scene of these effects, with steps of some dt (s)."""
+    own = stepper.rivals(effects, dt)
+    if own is not None:
+        return own
+    # By name, whatever has been imported first.
+    kinds = [kind for _, kind in sorted(Stepper.known().items())]
+    return tuple(other for kind in kinds for other in kind.alternatives(effects, dt))
+
+
 def _steppers(scene: Scene, dt: float) -> list[Stepper]:
     """Steppers that suit the scene, other than its own."""
     serialization.load(steppers)
     kinds = {_kind(scene.stepper)}
     suitable = []
-    rivals = scene.stepper.rivals(scene.effects, dt)
-    if rivals is None:
-        # By name, whatever has been imported first.
-        known = [kind for _, kind in sorted(Stepper.known().items())]
-        rivals = tuple(stepper for kind in known for stepper in kind.alternatives(scene.effects, dt))
-    for stepper in rivals:
+    for stepper in rivals(scene.stepper, scene.effects, dt):
         if type(stepper.control) is type(scene.stepper.control):
             stepper = stepper.model_copy(update={"control": scene.stepper.control})
         if _kind(stepper) not in kinds:
