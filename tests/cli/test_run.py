@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tisim import Scene
+from tisim import InputError, Scene, read
 from tisim.backend import runtime
 
 
@@ -83,6 +83,26 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
         assert dict(whole["work"].attrs) == dict(cut["work"].attrs)
         for name, values in whole["end"].items():
             np.testing.assert_array_equal(cut["end"][name], values)
+
+
+@pytest.mark.parametrize("stopped", [True, False], ids=["interrupted", "finished"])
+def test_nothing_of_a_run_is_left_beside_another_that_was_killed(
+    tisim, toml, tmp_path, monkeypatch, press_ctrl_c, stopped
+):
+    """The second, with --overwrite, ends before its first checkpoint; then the first is not gone on with, nor
+    taken for what the folder holds."""
+    command, folder = ("run", toml, "--frames", 4), tmp_path / "out" / "flow"
+    with monkeypatch.context() as patch:
+        if stopped:
+            press_ctrl_c(patch, after=2)
+        assert tisim(*command)[0] == (130 if stopped else 0)
+    press_ctrl_c(monkeypatch, after=1, times=2)
+    assert tisim(*command, "--seed", 2, "--overwrite")[0] == 130
+    assert {path.name for path in folder.iterdir()} == {".tisim", ".tisim.lock", "trajectory.h5"}
+    assert read(folder / "trajectory.h5").scene.seed == 2
+    with pytest.raises(InputError, match="one with a whole run or study"):
+        read(folder)
+    assert tisim(*command, "--resume")[0] == 2
 
 
 def test_second_ctrl_c_stops_at_once(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):

@@ -10,8 +10,9 @@ import pytest
 from tests.scenes import scene, simulate
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
-from tisim.files.ownership import writable
-from tisim.io.run_folder import Folder, write
+from tisim.files import lock
+from tisim.files.ownership import MARKER, writable
+from tisim.io.run_folder import DATA, Folder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
@@ -75,6 +76,16 @@ def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
             with pytest.raises(InputError, match="must be without a command that is still at work there"):
                 call()
     folder.check(resume=True)
+
+
+def test_to_overwrite_is_to_remove_what_is_there_before_anything_is_written(tmp_path):
+    folder = Folder(tmp_path)
+    for name in (*DATA, "notes.txt"):
+        (tmp_path / name).touch()
+    with folder.taken(resume=True):
+        assert folder.checkpoint.exists()
+    with folder.taken(overwrite=True):
+        assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, lock.LOCK}
 
 
 def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):

@@ -118,8 +118,6 @@ def run(
     with place.taken(overwrite, resume):
         if resume:
             checkpoint.restore(simulation, place.checkpoint)
-        if recording is None:
-            place.trajectory.unlink(missing_ok=True)
         observed = recording.observer(simulation, resume) if recording else nullcontext()
         saving = checkpoint.PeriodicCheckpoint(place.checkpoint, scene_arguments.checkpoint_seconds())
         try:

@@ -33,10 +33,11 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.state import SHARED, resolve_fields
 
-NAMES = (
-    "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,
-)  # fmt: skip
-"""Of all files that a run writes."""
+DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
+"""Names of the files that are about one run, in the order in which a new run removes them: without the result
+the folder is that of an interrupted run, and a checkpoint is of use only with the frames before it."""
+NAMES = (*DATA, lock.LOCK)
+"""Names of all files that a run writes."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,15 @@ class Folder:
     def taken(self, overwrite: bool = False, resume: bool = False) -> Iterator[None]:
         """Make the folder, mark it as one of tisim's, and be alone at work there while this lasts.
 
-        InputError as of check, and where that cannot be.
+        overwrite : remove what an earlier run has left, so that nothing of it is taken for the new one's,
+        even if that is killed. InputError as of check, and where that cannot be.
         """
         ownership.take(self.path, NAMES, overwrite or resume)
         with lock.held(self.path):
             self._check(overwrite, resume)  # another run may have come and gone since that was looked at
+            if overwrite and not resume:
+                for name in DATA:
+                    (self.path / name).unlink(missing_ok=True)
             yield
 
 

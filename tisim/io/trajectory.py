@@ -29,11 +29,11 @@ from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.atomic import replace_file
+from tisim.files.atomic import replace_file, unfinished
 from tisim.files.growing_hdf5 import Growing
 from tisim.interrupt import held
 from tisim.io import h5md
-from tisim.io.reader import Frame, frames
+from tisim.io.reader import Frame, frames, worlds
 from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
 from tisim.worlds.state import Field, resolve_fields
@@ -134,20 +134,24 @@ class Trajectory:
 
     @classmethod
     def going_on(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
-        """The file that a stopped run has left, less its frames after ``time`` (s); a new one if none is."""
+        """The file that a stopped run has left, less its frames after ``time`` (s); a new one if none is.
+
+        InputError when the file is damaged, or of another scene; it is then as it was.
+        """
         path = Path(recording.path)
         if not regular_file.exists(path):
             return cls(recording, [scene], real)
-        unfinished = path.with_name(path.name + ".new")
-        with ExitStack() as given_up:
-            given_up.callback(unfinished.unlink, missing_ok=True)
-            made = cls(replace(recording, path=unfinished), [scene], real)
+        new = path.with_name(unfinished(path.name))
+        with frames(path) as before, ExitStack() as given_up:
+            same = worlds(path) == 1 and before.scene.digest() == scene.digest()
+            must(same, "trajectory to go on with", "of the same scene", f"{path}, of another one")
+            given_up.callback(new.unlink, missing_ok=True)
+            made = cls(replace(recording, path=new), [scene], real)
             given_up.push(made)
-            with frames(path) as before:
-                for frame in before:
-                    if frame.time <= time:
-                        made.write(0, frame)
-            unfinished.replace(path)
+            for frame in before:
+                if frame.time <= time:
+                    made.write(0, frame)
+            new.replace(path)
             given_up.pop_all()
         made.path = path
         return made
