@@ -127,7 +127,7 @@ def export(
     """Write the frames of a run for other programs; h5md is a copy."""
     from tisim.io.export import check, names
     from tisim.io.export import export as write
-    from tisim.io.reader import frames
+    from tisim.io.reader import frames, worlds
 
     file = _file(file)
     check(file, kind)
@@ -135,8 +135,9 @@ def export(
     ownership.take(place, names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
-    with frames(file) as found:
-        _tell(found.missing)
+    for world in range(number := worlds(file)):
+        with frames(file, world) as found:
+            _tell(f"world {world}: {found.missing}" if found.missing and number > 1 else found.missing)
     print(made)
 
 
