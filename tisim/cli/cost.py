@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +19,7 @@ from tisim.files import lock, ownership
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
-    from tisim.accuracy import Quantity, Study
+    from tisim.accuracy import Quantity, Row, Study
     from tisim.scene.scene import Scene
 
 Absent = Annotated[
@@ -102,8 +104,44 @@ def cost(
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)
-        words = f"{target} --size {size}" if size else target
-        print(f"cheapest with an error of at most {error:g}:\n{table.recipe(row, words, which)}")
+        found = answer(row, which, scene, target, size, seed, changes, device, threads, plugins)
+        print(f"cheapest with an error of at most {error:g}:\n{found}")
+
+
+def answer(
+    row: Row, quantity: int, scene: Scene, target: str, size: str | None, seed: int | None,
+    changes: Sequence[str] | None, device: str, threads: int, plugins: Sequence[str] | None,
+) -> str:  # fmt: skip
+    """How to run a row of the study of a scene, which this command has made of these words."""
+    from tisim.accuracy import table
+    from tisim.accuracy.formatting import options
+
+    words = shlex.split(row.options)
+    pairs = list(zip(words[::2], words[1::2], strict=True))
+    absent, own = ([value for key, value in pairs if key == name] for name in ("--without", "--set"))
+    measured = scene.without(*absent).replace(scene_arguments.assignments(own))
+    # Stepper and effects as they have become, whoever has changed them; all else as it was given.
+    _, base = scene_arguments.scene(target, size, seed)
+    given = [target, *_given(size, seed, changes, device, threads, plugins)]
+    return table.recipe(row, given + options(base, measured, row.precision), quantity)
+
+
+def _given(
+    size: str | None, seed: int | None, changes: Sequence[str] | None,
+    device: str, threads: int, plugins: Sequence[str] | None,
+) -> Iterator[str]:  # fmt: skip
+    """The options given to this command that ``tisim run`` needs too, but those of stepper and effects."""
+    for name, value, usual in (
+        ("--size", size, None), ("--seed", seed, None),
+        ("--device", device, "cpu"), ("--threads", threads, 0),
+    ):  # fmt: skip
+        if value != usual:
+            yield from (name, str(value))
+    for change in changes or ():
+        if change.partition("=")[0].strip().partition(".")[0] not in ("stepper", "effects"):
+            yield from ("--set", change)
+    for plugin in plugins or ():
+        yield from ("--plugin", plugin)
 
 
 def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:
