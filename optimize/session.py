@@ -18,7 +18,7 @@ from optimize.problem.problem import Problem
 from optimize.report import report
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import FILE, HOW, NAMES, check
+from optimize.search_folder import FILE, NAMES, check
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from tisim.backend import runtime
@@ -79,10 +79,11 @@ def session(
     InputError when the folder is another search's, has such files, or cannot be written. Other processes may
     join the search, but not begin anew.
     """
-    take(folder, NAMES, overwrite, HOW)
+    take(folder, NAMES, overwrite)
     with lock.held(folder, exclusive=False):
         with Cache(folder / FILE) as cache:
-            check(folder, cache, identity(problem, settings, evaluator.settings))
+            if check(folder, cache, identity(problem, settings, evaluator.settings)):
+                bar.print(f"going on with {folder / FILE}, which has {len(cache)} runs", highlight=False)
             outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
         paths = [folder / FILE]
         if outcome.best is not None:

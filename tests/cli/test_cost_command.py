@@ -10,7 +10,7 @@ from typer.main import get_command
 
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
-from tisim.accuracy import Row, storage
+from tisim.accuracy import Row, Study, storage
 from tisim.accuracy.formatting import options, pasted
 from tisim.accuracy.sweep import methods
 from tisim.cli import cost, scene_arguments
@@ -148,6 +148,22 @@ def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch
     assert "dt=0.01 " in out
     cut = rows(tmp_path / "cut")
     assert [row["setting"] for row in cut] == ["dt=0.0316", "dt=0.01"]
-    assert tisim(*command)[0] == 0
+    code, _, err = tisim(*command, "--fresh")
+    assert (code, err) == (
+        2, "output folder must be without measured costs (or give --overwrite); received 'cut'\n"
+    )  # fmt: skip
+    code, _, err = tisim(*command)
+    assert code == 0
+    assert "going on with cut/cost.h5, which has 2 settings" in " ".join(err.split())
     assert rows(tmp_path / "cut")[:2] == cut
     assert len(rows(tmp_path / "cut")) == 4
+    with monkeypatch.context() as patch:
+        patch.setattr(Study, "run", stopped)
+        code, _, err = tisim(*command, "--set", "duration=1.0", "--overwrite")
+    assert code == 130
+    assert "give the same command again, without --overwrite." in " ".join(err.split())
+    assert {path.name for path in (tmp_path / "cut").iterdir()} == {".tisim", ".tisim.lock"}
+
+
+def stopped(*arguments):
+    raise KeyboardInterrupt

@@ -12,19 +12,28 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import scene_arguments, targets
-from tisim.cli.options import Changes, Device, Out, Overwrite, Plugins, Seed, Size, Target, Threads
+from tisim.cli.options import (
+    Absent,
+    Changes,
+    Device,
+    Fresh,
+    Out,
+    Overwrite,
+    Plugins,
+    Seed,
+    Size,
+    Target,
+    Threads,
+)
 from tisim.console import err, out, progress_bar, stopping
 from tisim.errors import must
 from tisim.files import lock, ownership
+from tisim.files.resuming import how_to_go_on
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
     from tisim.accuracy import Quantity, Row, Study
     from tisim.scene.scene import Scene
-
-Absent = Annotated[
-    list[str] | None, typer.Option("--without", metavar="EFFECT", help="Leave an effect out. Repeatable.")
-]
 
 
 def cost(
@@ -63,12 +72,13 @@ def cost(
     single: Annotated[bool, typer.Option("--f32/--no-f32", help="Also run in single precision.")] = True,
     device: Device = "cpu",
     threads: Threads = 0,
+    fresh: Fresh = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
     """Measure error against time for every setting of a scene; write cost.csv, cost.h5 and cost.png.
 
-    Giving the same command again goes on with what an earlier one has left, and answers --error from it.
+    The same command, given again, goes on where it was stopped, and answers --error from what is measured.
     """
     from tisim.accuracy import Study, storage, table
     from tisim.accuracy.plot import save
@@ -88,19 +98,21 @@ def cost(
     )
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
+    storage.resumes(place, fresh, overwrite)
     ownership.take(place, storage.NAMES, overwrite)
     with lock.held(place):
-        if not overwrite:
+        if storage.resumes(place, fresh, overwrite):
             storage.resume(study, place)
+            err().print(f"going on with {place / storage.HDF5}, which has {len(study.rows)} settings")
+        else:
+            storage.clear(place)
         done = _measure(study, place)
         if study.truths and study.rows:
             out().print(table.table(study))
             written = [*storage.write(study, place), save(study, place / storage.PICTURE)]
             out().print("\n".join([*table.sources(study), *map(str, written)]))
     if not done:
-        err().print(
-            f"stopped; {place / storage.HDF5} has what is done. To go on, give the same command again."
-        )
+        err().print(f"stopped; {place / storage.HDF5} has what is done. {how_to_go_on(fresh, overwrite)}")
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)

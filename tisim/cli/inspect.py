@@ -17,6 +17,7 @@ from tisim.cli.options import CaseName, Device, Out, Overwrite, Plugins, Precisi
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
 from tisim.files import lock, ownership, regular_file
+from tisim.files.resuming import resumes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,7 +67,10 @@ def figures(
     device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:  # fmt: skip
-    """Make the figures of a case that take many runs, and the numbers in them."""
+    """Make the figures of a case that take many runs, and the numbers in them.
+
+    Stopped, it keeps nothing, and begins anew.
+    """
     from tisim.files.atomic import replace_file
 
     found = targets.case(case)
@@ -77,6 +81,7 @@ def figures(
     runtime.init(device, precision, threads)
     place = folder or Path("out") / f"{found.name}-figures"
     ownership.check_all(place, overwrite)
+    resumes(place, "figures", False, "finished figures" * ownership.results(place), None, overwrite)
     ownership.take(place, (lock.LOCK,), overwrite)
     with lock.held(place):
         with _bar("running") as progress:

@@ -48,7 +48,8 @@ def export(
 def check(file: Path, kind: str) -> None:
     """InputError unless the file can be written in this format."""
     must(kind in FORMATS, "format", f"one of {', '.join(FORMATS)}", kind)
-    sound = kind != "h5md" or "id" in _first(file).arrays
+    first = _first(file)
+    sound = kind != "h5md" or "id" in first.arrays
     must(sound, "file", "a trajectory.h5 for format h5md", str(file))
 
 

@@ -217,8 +217,8 @@ class Trajectory:
 def asked(path: Path, frames: int | None, every: float | None, resume: bool) -> Recording | None:
     """What the options of a command ask for; None when that is nothing."""
     if frames is None and every is None:
-        begun = resume and regular_file.exists(path)
-        must(not begun, "--frames or --every", "given as before, to go on with trajectory.h5", "neither")
+        begun, rule = resume and regular_file.exists(path), "to go on with trajectory.h5 (or give --fresh)"
+        must(not begun, "--frames or --every", f"given as before, {rule}", "neither")
         return None
     return Recording(path, frames, every)
 
