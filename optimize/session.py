@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +46,18 @@ def run(
     (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
 
     Device and precision are those of ``tisim.init``. Ctrl-C ends the search, which says so in
-    ``Outcome.stopped``. InputError for settings that cannot be, before anything runs.
+    ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
+    until a search in this process is over. InputError for settings that cannot be, before anything runs.
     """
     wished = Settings(**proposed(problem, settings, settings.get("method")))
     fit(problem, wished)
-    running = runtime.current()
-    threads = running.threads if executor == "batch" else 0
-    with closing(made(executor, running.device, running.precision, threads)) as evaluator:
+    here = executor == "batch"
+    with ExitStack() as stack:
+        if here:
+            stack.enter_context(runtime.turn)
+        running = runtime.current()
+        threads = running.threads if here else 0
+        evaluator = stack.enter_context(closing(made(executor, running.device, running.precision, threads)))
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
             return session(problem, wished, evaluator, Path(out), say, bar, stopping)
