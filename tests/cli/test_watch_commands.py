@@ -69,6 +69,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
     tisim, tmp_path, first, monkeypatch
 ):
+    """A folder as version 0.1.0 left it, with pictures that have other names by now."""
     monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
     sizes = {"default": Size("", {})}
     parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
