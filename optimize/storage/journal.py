@@ -15,8 +15,6 @@ from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
 from tisim.files.regular_file import content, opened, status
 
-__all__ = ["Journal", "Mark", "Scan", "frame", "scan"]
-
 
 @dataclass(frozen=True)
 class Mark:

@@ -22,7 +22,7 @@ from tisim.scene.scene import Scene
 CAN = "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
 """What ``read`` reads."""
 SEARCH = "tisim evaluations 1"
-"""The format of a search.h5."""
+"""The format of a search.h5, which is that of a room above; a test holds them together."""
 
 
 def read(path: str | Path) -> Any:

@@ -5,11 +5,11 @@ import h5py
 import pytest
 
 from optimize.storage.cache import Cache, compact, existing, verify
-from optimize.storage.journal import Journal, frame, scan
+from optimize.storage.journal import Journal
 from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
-from tisim.files.framing import MAGIC
+from tisim.files.framing import MAGIC, frame, scan
 
 
 def test_torn_tail_at_every_byte(path):
