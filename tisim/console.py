@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 WIDTH = 110
-"""Of tables that do not go to a terminal, where rich would assume 80 columns."""
+"""Columns of text that does not go to a terminal, where rich would assume 80."""
 
 
 def out() -> Console:

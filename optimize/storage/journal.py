@@ -50,7 +50,7 @@ class Mark:
 
 
 class Journal:
-    """The journal file at path. Callers hold the lock (durable.locked)."""
+    """The journal file at path. Callers hold the lock (tisim.files.atomic.locked)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -92,7 +92,7 @@ def rate_of(backend: str) -> float | None:
 
 
 def llvm_version() -> str:
-    """Of the LLVM inside the backend, or "unknown"."""
+    """The version of the LLVM inside the backend, or "unknown"."""
     version = getattr(ti._lib.core, "get_llvm_target_support", None)
     return str(version()) if version else "unknown"
 

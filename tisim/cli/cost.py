@@ -59,7 +59,9 @@ def cost(
     finer: Annotated[
         int | None, typer.Option(min=-16, max=16, help="Decades of error to go below it; 0 by default.")
     ] = None,
-    repeats: Annotated[int | None, typer.Option(max=1000, help="Of every timing; 3 by default.")] = None,
+    repeats: Annotated[
+        int | None, typer.Option(max=1000, help="How often to time each setting; 3 by default.")
+    ] = None,
     starts: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Numbers of random starts to try: 8,32,128.")
     ] = None,

@@ -62,7 +62,7 @@ Out = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", callback=nameable, help="Folder to write to; out/NAME by default."),
 ]
-Seed = Annotated[int | None, typer.Option(help="Of all that is random.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of all that is random.")]
 Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
 Device = Annotated[str, typer.Option(help="cpu or cuda.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]

@@ -1,4 +1,4 @@
-"""Who may write to a folder: what tisim has written there it may replace, anything else only when told to.
+"""Who may write to a folder: what tisim has written there it may replace, anything else only if it is to.
 
 The marker ``.tisim`` in a folder names the files that tisim has written to it, one a line; a file that it
 does not name is of another origin. A folder without a marker may be of version 0.1.0, which made none: it is

@@ -49,10 +49,10 @@ def read(path: str | Path) -> Any:
     if not head.startswith(SIGNATURE):
         return _text(place)
     # A trajectory has its own checksums, and may be large.
-    return recorded_trajectory.RecordedTrajectory(place) if sound(head) else _sealed(place)
+    return recorded_trajectory.RecordedTrajectory(place) if sound(head) else _written_whole(place)
 
 
-def _sealed(path: Path) -> Any:
+def _written_whole(path: Path) -> Any:
     """What is in an HDF5 file that is written whole."""
     from tisim.accuracy import storage
 

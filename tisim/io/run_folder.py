@@ -161,7 +161,7 @@ def read_result(path: Path) -> Result:
 
 
 def units(scene: Scene) -> dict[str, str]:
-    """Of all quantities that particles of a scene have, by name."""
+    """The unit of each quantity that particles of a scene have, by name."""
     fields = resolve_fields((*SHARED, *needed_fields(scene.effects, scene.stepper)))
     return {field.name: field.unit for field in fields}
 

@@ -281,8 +281,10 @@ def test_paths_that_name_no_file(path):
 
 
 SPOILT = {
-    "a flipped bit in the seal": lambda content: content[:-20] + bytes([content[-20] ^ 1]) + content[-19:],
-    "without the seal": lambda content: content[: content.rfind(MAGIC)],
+    "a flipped bit in the checksum": lambda content: (
+        content[:-20] + bytes([content[-20] ^ 1]) + content[-19:]
+    ),
+    "without the checksum": lambda content: content[: content.rfind(MAGIC)],
     "garbage after it": lambda content: content + MAGIC + b"garbage",
 }
 
@@ -318,7 +320,7 @@ def test_reading_what_is_damaged_ends_in_any_case(path, monkeypatch):
     """As when HDF5 never returns; and the file is then as it was."""
     with Cache(path) as cache:
         cache.put(fake_record(1))
-    before = SPOILT["without the seal"](path.read_bytes())
+    before = SPOILT["without the checksum"](path.read_bytes())
     path.write_bytes(before)
     with monkeypatch.context() as patch:
         patch.setattr("optimize.storage.salvage.LIMIT", 1e-3)
