@@ -83,7 +83,8 @@ def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
     assert folder.check()
 
 
-def test_to_overwrite_is_to_remove_what_is_there_before_anything_is_written(tmp_path):
+@pytest.mark.parametrize("options", [{"fresh": True}, {"overwrite": True}])
+def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp_path, options):
     folder = Folder(tmp_path)
     for name in (*DATA, "notes.txt"):
         (tmp_path / name).touch()
@@ -91,7 +92,8 @@ def test_to_overwrite_is_to_remove_what_is_there_before_anything_is_written(tmp_
     folder.result.unlink()
     with folder.taken() as goes_on:
         assert (goes_on, folder.checkpoint.exists()) == (True, True)
-    with folder.taken(overwrite=True):
+    with folder.taken(**options) as goes_on:
+        assert not goes_on
         assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, lock.LOCK}
 
 
