@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from optimize.search_records import searches
 from optimize.settings import IDENTITY_FORMAT, search_name
@@ -26,6 +26,7 @@ from tisim.errors import must
 from tisim.files import lock, ownership
 from tisim.files.atomic import locked
 from tisim.files.regular_file import status
+from tisim.files.resuming import resumes
 
 FILE = "search.h5"
 BESIDE = (
@@ -38,45 +39,56 @@ BESIDE = (
     "best_cloud.png",
     "best_run.csv",
 )
-MAIN = (FILE, f"{FILE}.journal")
-"""The files that a search goes on from."""
-SEARCH_FILES = (*MAIN, f"{FILE}.lock", *BESIDE, lock.LOCK)
-HOW = "--fresh --overwrite"
-"""The options that let a search replace what is there."""
+SEARCH_FILES = (FILE, f"{FILE}.journal", f"{FILE}.lock", *BESIDE, lock.LOCK)
+"""The files that a search writes into its folder."""
 
 
-def clear(folder: Path, overwrite: bool) -> None:
-    """Make way for a new search; InputError when there is one already that goes on, or is to be kept."""
-    ownership.check(folder, SEARCH_FILES, overwrite, HOW)
-    begun = any(status(folder / name) is not None for name in MAIN)
-    must(overwrite or not begun, "--fresh", "given with --overwrite where there is a search", str(folder))
-    # The lock file stays: without it two processes could lock two different files.
-    if begun:
-        with lock.held(folder), locked(folder / f"{FILE}.lock", exclusive=True) as handle:
-            for name in (*MAIN, *BESIDE):
+def going_on(
+    folder: Path, fresh: bool | None, overwrite: bool,
+    what: str = "search", file: str = FILE, beside: Sequence[str] = BESIDE,
+) -> bool:  # fmt: skip
+    """Whether a search goes on with what is in the folder (``resuming.resumes``); if not, that is removed.
+
+    what, file, beside : of another command that keeps evaluations what it is, its cache file, and its other
+    files. InputError where it may do neither; also when one is at work there that would be removed.
+    """
+    journal, guard = f"{file}.journal", f"{file}.lock"
+    begun = any(status(folder / name) is not None for name in (file, journal))
+    goes_on = resumes(folder, what, begun, f"what a {what} has found" * begun, fresh, overwrite)
+    ownership.check(folder, (file, journal, guard, *beside, lock.LOCK), overwrite)
+    if begun and not goes_on:
+        # The lock file stays: without it two processes could lock two different files.
+        with lock.held(folder), locked(folder / guard, exclusive=True) as handle:
+            for name in (file, journal, *beside):
                 (folder / name).unlink(missing_ok=True)
             os.ftruncate(handle, 0)
+    return goes_on
 
 
-def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> None:
-    """InputError when the file in the folder is of another search than the one wished, by their identity."""
-    stored = searches(cache)
-    if stored and search_name(wished) not in stored:
-        old = json.loads(next(iter(stored.values()))["identity"])
-        must(
-            old.get("format") == IDENTITY_FORMAT,
-            "output folder",
-            "of a search of this version of the program (or give --out, or --fresh --overwrite)",
-            str(folder),
-        )
-        there = _leaves(old)
-        here = _leaves(json.loads(canonical(wished)))
-        names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-        differ = ", ".join(f"{name} = {there.get(name)} and not {here.get(name)}" for name in names)
-        raise InputError(
-            "output folder must be without another search (or give --out, or --fresh --overwrite); "
-            f"received {str(folder)!r}, where one has {differ}"
-        )
+def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> bool:
+    """Whether the file in the folder has the search wished; InputError when it is of another, by identity."""
+    known = searches(cache)
+    if known and search_name(wished) not in known:
+        refuse(folder, "search", json.loads(next(iter(known.values()))["identity"]), wished)
+    return bool(known)
+
+
+def refuse(folder: Path, what: str, old: Mapping[str, Any], wished: Mapping[str, Any]) -> NoReturn:
+    """InputError that says in what the search (or ``what`` else) in the folder differs from that wished."""
+    must(
+        old.get("format") == IDENTITY_FORMAT,
+        "output folder",
+        f"of a {what} of this version of the program (or give --out or --overwrite)",
+        str(folder),
+    )
+    there = _leaves(old)
+    here = _leaves(json.loads(canonical(wished)))
+    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    differ = ", ".join(f"{name} = {there.get(name)} and not {here.get(name)}" for name in names)
+    raise InputError(
+        f"output folder must be without another {what} (or give --out or --overwrite); "
+        f"received {str(folder)!r}, where one has {differ}"
+    )
 
 
 def _leaves(settings: Mapping[str, Any], above: str = "") -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from optimize.problem.problem import Problem
 from optimize.report import report
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import FILE, HOW, SEARCH_FILES, check
+from optimize.search_folder import FILE, SEARCH_FILES, check
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from tisim.backend import runtime
@@ -46,13 +46,20 @@ def run(
     (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
 
     Device and precision are those of ``tisim.init``. Ctrl-C ends the search, which says so in
-    ``Outcome.stopped``. InputError for settings that cannot be, before anything runs.
+    ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
+    until a search in this process is over. InputError for settings that cannot be, before anything runs.
     """
     wished = Settings(**proposed(problem, settings, settings.get("method")))
     fit(problem, wished)
-    running = runtime.current()
-    threads = running.threads if executor == "batch" else 0
-    with closing(evaluator_named(executor, running.device, running.precision, threads)) as evaluator:
+    here = executor == "batch"
+    with ExitStack() as stack:
+        if here:
+            stack.enter_context(runtime.turn)
+        running = runtime.current()
+        threads = running.threads if here else 0
+        evaluator = stack.enter_context(
+            closing(evaluator_named(executor, running.device, running.precision, threads))
+        )
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
             return session(problem, wished, evaluator, Path(out), say, bar, stopping)
@@ -79,10 +86,11 @@ def session(
     InputError when the folder is another search's, has such files, or cannot be written. Other processes may
     join the search, but not begin anew.
     """
-    take(folder, SEARCH_FILES, overwrite, HOW)
+    take(folder, SEARCH_FILES, overwrite)
     with lock.held(folder, exclusive=False):
         with Cache(folder / FILE) as cache:
-            check(folder, cache, identity(problem, settings, evaluator.settings))
+            if check(folder, cache, identity(problem, settings, evaluator.settings)):
+                bar.print(f"going on with {folder / FILE}, which has {len(cache)} runs", highlight=False)
             outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
         paths = [folder / FILE]
         if outcome.best is not None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,12 @@ import pytest
 
 from tisim.backend import runtime
 from tisim.files import python_file
+
+
+def pytest_configure(config):
+    """A shell starts jobs in the background with Ctrl-C ignored, and what is ignored stays so in tisim."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -24,7 +24,7 @@ def exit_code() -> int:
 
 
 class Interrupt:
-    """Within ``with Interrupt(say) as ctrl_c``, the first Ctrl-C is noted, told by ``say``, and raised
+    """Within ``with Interrupt(say) as ctrl_c``, the first Ctrl-C is noted, reported by ``say``, and raised
     (KeyboardInterrupt) by the next ``ctrl_c.check()``; a second one is raised at once, and ``forced`` set.
 
     SIGTERM and SIGHUP count as a first one: whoever ends a session may send them several times.
@@ -83,7 +83,7 @@ def handled(handle: Callable[[int], None]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def held() -> Iterator[None]:
+def deferred() -> Iterator[None]:
     """Within it signals that ask to stop wait, and are raised again at its end: for a library that calls back
     into Python and does not bear an exception from there.
     """

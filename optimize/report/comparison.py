@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,14 +19,18 @@ from optimize.evaluation.runs import Evaluator
 from optimize.outcome import Outcome, Progress
 from optimize.problem.problem import Problem
 from optimize.search import search
-from optimize.settings import Settings, fit, proposed
+from optimize.search_folder import refuse
+from optimize.search_records import searches
+from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
+from optimize.storage.record import canonical
 from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must
+from tisim.files import lock
 
 FILE, CSV = "compare.h5", "compare.csv"
-NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV)
+NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV, lock.LOCK)
 FRESH = 10**6
 """The seed of the starts from which the best designs are run again: no search has it."""
 NOTE = (
@@ -42,6 +48,16 @@ class MethodResult:
     evaluations: int
     claimed: FitnessEstimate
     fresh: FitnessEstimate
+
+
+def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, Any]) -> None:
+    """InputError when the file in the folder is of a comparison on another problem; methods, their settings
+    and numbers of runs may be others. evaluator : the settings of the evaluator."""
+    for attributes in searches(cache).values():
+        old = json.loads(attributes["identity"])
+        wished = {**identity(problem, Settings(), evaluator), "search": old["search"]}
+        if canonical(old) != canonical(wished):
+            refuse(folder, "comparison", old, wished)
 
 
 def settings_of(
@@ -82,12 +98,10 @@ def compare(
     must(evaluations >= 1, "evaluations", "at least 1", evaluations)
     must(1 <= repeats <= FRESH, "repeats", f"within 1..{FRESH}", repeats)
     must(fresh >= 2, "fresh starts", "at least 2", fresh)
-    searches = [
-        (m, k, settings_of(problem, base, m, evaluations, k)) for k in range(repeats) for m in methods
-    ]
+    planned = [(m, k, settings_of(problem, base, m, evaluations, k)) for k in range(repeats) for m in methods]
     again = EnsembleSettings(min_starts=fresh, max_starts=fresh, block=fresh)
     anew = Ensemble(problem, evaluator, cache, again, FRESH)
-    for method, repeat, settings in searches:
+    for method, repeat, settings in planned:
         outcome = search(problem, evaluator, cache, settings, on_progress=on_progress)
         if outcome.interrupted:
             raise KeyboardInterrupt

@@ -24,7 +24,7 @@ from optimize.storage.record import Record, canonical
 from tisim import InputError
 from tisim.errors import must
 from tisim.files import regular_file
-from tisim.files.checksum import sealed, unsealed
+from tisim.files.checksum import verified, with_checksum
 
 FORMAT = "tisim evaluations 1"
 ROWS = "evaluations"
@@ -56,14 +56,14 @@ class Hdf5Table:
 def opened(path: Path) -> Iterator[h5py.File]:
     """The file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache.
 
-    HDF5 gets what is in its seal and nothing else: given a damaged structure, or another program's, it may
-    never return.
+    HDF5 gets what its checksum says is whole, and nothing else: given a damaged structure, or another
+    program's, it may never return.
     """
     rule = f"{path} must be a whole HDF5 file written by a cache; received"
     content = regular_file.content(path)
     if content is None:
         raise InputError(f"{rule} nothing")
-    inside = unsealed(content)
+    inside = verified(content)
     if inside is None:
         raise InputError(
             f"{rule} {len(content)} bytes that are damaged, cut short or another program's "
@@ -101,7 +101,7 @@ def image(
         new.flush()
         data: list[tuple[int, int]] = []
         new.visititems(lambda _, item: data.append(_place(item)) if isinstance(item, h5py.Dataset) else None)
-        return sealed(bytes(new.id.get_file_image()), data)
+        return with_checksum(bytes(new.id.get_file_image()), data)
 
 
 def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:

@@ -15,8 +15,6 @@ from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
 from tisim.files.regular_file import content, opened, status
 
-__all__ = ["Journal", "Mark", "Scan", "frame", "scan"]
-
 
 @dataclass(frozen=True)
 class Mark:
@@ -52,7 +50,7 @@ class Mark:
 
 
 class Journal:
-    """The journal file at path. Callers hold the lock (durable.locked)."""
+    """The journal file at path. Callers hold the lock (tisim.files.atomic.locked)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

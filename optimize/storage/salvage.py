@@ -16,7 +16,7 @@ import h5py
 from optimize.storage import hdf5_store
 from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
-from tisim.files.checksum import unsealed
+from tisim.files.checksum import verified
 from tisim.files.regular_file import content, status
 
 LIMIT = 300.0
@@ -29,7 +29,7 @@ def mend(path: Path, lock: Path) -> None:
     Nothing happens when the file is whole, or nothing can be read. InputError when FILE.damaged is there.
     """
     old = content(path)
-    if old is None or unsealed(old) is not None:
+    if old is None or verified(old) is not None:
         return
     made = _salvaged(old)
     if made is None:
@@ -48,7 +48,7 @@ def _salvaged(old: bytes) -> bytes | None:
         done = subprocess.run(command, input=old, capture_output=True, timeout=LIMIT, check=False)
     except subprocess.TimeoutExpired:
         return None
-    return done.stdout if done.returncode == 0 and unsealed(done.stdout) is not None else None
+    return done.stdout if done.returncode == 0 and verified(done.stdout) is not None else None
 
 
 def _read(old: bytes) -> bytes:

@@ -1,6 +1,7 @@
 """The runtime: unknown settings are refused, what an earlier start has made says so when used, any thread may
 call, and the caller's arithmetic stays what it was."""
 
+import os
 import subprocess
 import sys
 import tomllib
@@ -13,7 +14,7 @@ import tisim
 from tests.scenes import scene
 from tests.throwaway import Trap
 from tisim import InputError, RunError, Scene, Simulation
-from tisim.backend import memory, runtime
+from tisim.backend import diagnostics, memory, runtime
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -39,6 +40,14 @@ def test_starting_again_with_the_same_settings_changes_nothing():
     now, before = runtime.current(), runtime.generation()
     assert runtime.init(now.device, now.precision, now.threads) is now or runtime.current() == now
     assert runtime.generation() == before
+
+
+def test_a_system_that_does_not_say_how_much_memory_it_has_refuses_nothing(monkeypatch):
+    there = runtime.memory()
+    assert diagnostics._memory() == f"{there / 2**30:.1f} GiB"
+    monkeypatch.delattr(os, "sysconf")
+    assert runtime.memory() == sys.maxsize
+    assert diagnostics._memory() == "unknown"
 
 
 STALE = """

@@ -49,7 +49,6 @@ def impacts(tmp_path, toml):
 @pytest.fixture
 def press_ctrl_c():
     """Press Ctrl-C, or send another signal, when progress is looked at for the ``after``-th time."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored in the background
 
     def press(monkeypatch, after, times=1, number=signal.SIGINT):
         looked = []
@@ -63,5 +62,4 @@ def press_ctrl_c():
 
         monkeypatch.setattr(Interrupt, "check", check)
 
-    yield press
-    signal.signal(signal.SIGINT, before)
+    return press

@@ -56,17 +56,14 @@ def content(folder):
 def test_a_run_is_alone_in_its_folder_until_it_is_gone(tisim, toml, tmp_path, under_way):
     before = content(tmp_path / "out")
     assert set(before) == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
-    for more in ((), ("--overwrite",), ("--resume", "--frames", "3")):
+    for more in ((), ("--overwrite",), ("--fresh",), ("--resume", "--frames", "3")):
         assert tisim("run", toml, "--out", "out", *more) == (2, "", REFUSED.format("out"))
     assert content(tmp_path / "out") == before
     code, out, _ = tisim("export", "out", "--format", "xyz", "--out", "x")
     assert (code, out) == (0, "x/trajectory.xyz\n"), "whoever only reads is not kept out"
     under_way.kill()
     under_way.wait()
-    code, _, err = tisim("run", toml, "--out", "out")
-    assert code == 2
-    assert "without an interrupted run (or give --resume or --overwrite)" in err
-    assert tisim("run", toml, "--out", "out", "--frames", "3", "--resume")[0] == 0
+    assert tisim("run", toml, "--out", "out", "--frames", "3")[0] == 0
     assert "result.h5" in content(tmp_path / "out")
 
 

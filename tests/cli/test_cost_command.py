@@ -2,12 +2,19 @@
 
 import csv
 import os
+import shlex
 import signal
 
 import pytest
+from typer.main import get_command
 
 from tests.accuracy.scenes import only, oscillator
-from tisim.accuracy import storage
+from tests.own_files import LAW
+from tisim.accuracy import Row, Study, storage
+from tisim.accuracy.formatting import options, shell_line
+from tisim.accuracy.sweep import methods
+from tisim.cli import cost, scene_arguments
+from tisim.cli.main import app
 
 CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
 WRONG = [
@@ -79,6 +86,49 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
     assert "output folder must be without the study of another scene" in " ".join(err.split())
 
 
+GIVEN = [
+    (),
+    ("--seed", "7", "--set", "duration=0.5", "--set", "stepper.control.dt=2e-3"),
+    ("--set", "effects.tether.stiffness=[1.0, 2.0, 3.0]", "--set", 'name="two words"', "--threads", "1"),
+    ("--set", 'stepper={kind="boris", control={kind="fixed_step", dt=0.02}}', "--seed", "0"),
+    ("--without", "tether", "--set", "effects.near_field={alpha1=1.0, alpha2=2.0, beta2=3}"),
+    ("--set", "effects.near_field={alpha1=1.0, alpha2=2.0}", "--set", "effects.near_field.beta2=3"),
+    ("--set", "effects.own={kind='pull', strength=2.0}", "--plugin", "own_laws.py"),
+]
+
+
+@pytest.mark.parametrize("given", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
+def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, given):
+    """Whatever was given to tisim cost, and whatever the setting is: stepper, tolerance, law or precision."""
+    monkeypatch.chdir(tmp_path)
+    own_file("own_laws.py", LAW)
+    target = "my swing's.toml"
+    (tmp_path / target).write_text(oscillator().model_copy(update={"seed": 3}).to_toml())
+    measured, _, asked = parsed("cost", target, *given)
+    found = methods(measured, 0.1, 1.0, (1.0, 0.0), ("f64", "f32"), 1)
+    settings = [setting for method in found for setting in method.settings]
+    assert len(settings) > 8
+    for setting in settings:
+        changed = shell_line(options(measured, setting.scene, setting.precision))
+        row = Row("", "", "", changed, setting.precision, 1, seconds=(1.0,), errors=((0.0, 0.0),))
+        printed = cost.answer(row, 0, measured, **asked).splitlines()[-1]
+        made, precision, again = parsed(*shlex.split(printed)[1:])
+        assert (made.digest(), precision) == (setting.scene.digest(), setting.precision)
+        assert {name: again[name] for name in ("device", "threads", "plugins")} == {
+            name: asked[name] for name in ("device", "threads", "plugins")
+        }
+
+
+def parsed(command, *words):
+    """Of the words of a command the scene, the precision, and what the parser makes of those of a scene."""
+    found = get_command(app).commands[command].make_context(command, list(words)).params
+    _, scene = scene_arguments.scene(
+        found["target"], found["size"], found["seed"], found["absent"] or (), found["changes"] or ()
+    )
+    asked = ("target", "size", "seed", "changes", "device", "threads", "plugins")
+    return scene, found.get("precision"), {name: found[name] for name in asked}
+
+
 @pytest.mark.long
 def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--repeats", "1", "--out", "cut")
@@ -98,6 +148,22 @@ def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch
     assert "dt=0.01 " in out
     cut = rows(tmp_path / "cut")
     assert [row["setting"] for row in cut] == ["dt=0.0316", "dt=0.01"]
-    assert tisim(*command)[0] == 0
+    code, _, err = tisim(*command, "--fresh")
+    assert (code, err) == (
+        2, "output folder must be without measured costs (or give --overwrite); received 'cut'\n"
+    )  # fmt: skip
+    code, _, err = tisim(*command)
+    assert code == 0
+    assert "going on with cut/cost.h5, which has 2 settings" in " ".join(err.split())
     assert rows(tmp_path / "cut")[:2] == cut
     assert len(rows(tmp_path / "cut")) == 4
+    with monkeypatch.context() as patch:
+        patch.setattr(Study, "run", stopped)
+        code, _, err = tisim(*command, "--set", "duration=1.0", "--overwrite")
+    assert code == 130
+    assert "give the same command again, without --overwrite." in " ".join(err.split())
+    assert {path.name for path in (tmp_path / "cut").iterdir()} == {".tisim", ".tisim.lock"}
+
+
+def stopped(*arguments):
+    raise KeyboardInterrupt

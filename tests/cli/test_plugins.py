@@ -28,10 +28,11 @@ def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, mo
         press_ctrl_c(patch, after=1)
         assert tisim(*command)[0] == 130
     own_file("own_laws.py", LAW + "\n")
-    code, _, err = tisim(*command, "--resume")
-    assert (code, err) == (2, "checkpoint must be of the same scenes; received 'one of others'\n")
+    code, _, err = tisim(*command)
+    how = "(to begin anew, give --out or --fresh)"
+    assert (code, err) == (2, f"checkpoint must be of the same scenes; received 'one of others' {how}\n")
     own_file("own_laws.py", LAW)
-    code, _, err = tisim(*command, "--resume")
+    code, _, err = tisim(*command)
     assert code == 0, err
     assert (
         len(json.loads(own_file("o/x", "").with_name("versions.json").read_text())["plugin own_laws"]) == 12

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tisim import Scene
+from tisim import InputError, Scene, read
 from tisim.backend import runtime
 
 
@@ -70,19 +70,38 @@ def test_ctrl_c_and_resume_end_as_if_never_stopped(tisim, toml, tmp_path, monkey
         press_ctrl_c(patch, after=2)
         code, _, err = tisim("run", toml, "--out", "cut")
     assert code == 130
-    assert "same command with --resume" in " ".join(err.split())
+    assert "To go on, give the same command again." in " ".join(err.split())
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [
         ".tisim", ".tisim.lock", "checkpoint.h5",
     ]  # fmt: skip
     code, _, err = tisim("run", toml, "--out", "cut")
-    assert code == 2
-    assert "--resume" in err
-    assert tisim("run", toml, "--out", "cut", "--resume")[0] == 0
+    assert code == 0
+    assert "going on with cut/checkpoint.h5, from " in " ".join(err.split())
     assert not (tmp_path / "cut" / "checkpoint.h5").exists()
     with h5py.File(tmp_path / "whole/result.h5") as whole, h5py.File(tmp_path / "cut/result.h5") as cut:
         assert dict(whole["work"].attrs) == dict(cut["work"].attrs)
         for name, values in whole["end"].items():
             np.testing.assert_array_equal(cut["end"][name], values)
+
+
+@pytest.mark.parametrize("stopped", [True, False], ids=["interrupted", "finished"])
+def test_nothing_of_a_run_is_left_beside_another_that_was_killed(
+    tisim, toml, tmp_path, monkeypatch, press_ctrl_c, stopped
+):
+    """The second, with --overwrite, ends before its first checkpoint; then the first is not gone on with, nor
+    taken for what the folder holds."""
+    command, folder = ("run", toml, "--frames", 4), tmp_path / "out" / "flow"
+    with monkeypatch.context() as patch:
+        if stopped:
+            press_ctrl_c(patch, after=2)
+        assert tisim(*command)[0] == (130 if stopped else 0)
+    press_ctrl_c(monkeypatch, after=1, times=2)
+    assert tisim(*command, "--seed", 2, "--overwrite")[0] == 130
+    assert {path.name for path in folder.iterdir()} == {".tisim", ".tisim.lock", "trajectory.h5"}
+    assert read(folder / "trajectory.h5").scene.seed == 2
+    with pytest.raises(InputError, match="one with a whole run or study"):
+        read(folder)
+    assert tisim(*command, "--resume")[0] == 2
 
 
 def test_second_ctrl_c_stops_at_once(tisim, toml, tmp_path, monkeypatch, press_ctrl_c):

@@ -68,7 +68,7 @@ def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c
     press_ctrl_c(monkeypatch, after=2, times=3, number=number)
     ended, _, err = tisim("run", toml, "--out", "cut")
     assert ended == code
-    assert "same command with --resume" in " ".join(err.split())
+    assert "To go on, give the same command again." in " ".join(err.split())
     left = {path.name for path in (tmp_path / "cut").iterdir()}
     assert left == {".tisim", ".tisim.lock", "checkpoint.h5"}
 

@@ -69,6 +69,7 @@ def test_run_plot_movie_and_export(tisim, toml, tmp_path):
 def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first(
     tisim, tmp_path, first, monkeypatch
 ):
+    """A folder as version 0.1.0 left it, with pictures that have other names by now."""
     monkeypatch.setattr("tisim.plotting.movie.movie", lambda *arguments: None)  # drawing is slow
     sizes = {"default": Size("", {})}
     parts = ("toy", "A toy", "none", sizes, lambda size, seed: None, lambda: iter(()))
@@ -112,9 +113,7 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
     code, _, err = tisim("run", toml, "--out", "cut", "--resume")
     assert code == 2
     assert "--frames or --every must be given as before, to go on with trajectory.h5" in err
-    code, _, err = tisim("run", toml, "--out", "cut")
-    assert code == 2
-    assert tisim("run", toml, "--every", "5e-5", "--out", "cut", "--resume")[0] == 0
+    assert tisim("run", toml, "--every", "5e-5", "--out", "cut")[0] == 0
     whole, found = every_frame(tmp_path / "whole" / "trajectory.h5"), every_frame(cut)
     assert 0 < len(begun) < len(whole) == 21
     for frame, other in zip(found, whole, strict=True):
@@ -138,7 +137,7 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
         code, out, err = tisim("run", toml, "--every", "5e-5")
     assert (code, out) == (1, "")
     assert "trajectory.h5 could not be written: File too large; frames before are intact" in err
-    assert "checkpoint.h5 is written. To go on, make room and give the same command with --resume" in err
+    assert "checkpoint.h5 is written. To go on, make room and give the same command again" in err
     left = {path.name for path in folder.iterdir()}
     assert left == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
     begun = every_frame(folder / "trajectory.h5")
@@ -232,6 +231,10 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     code, _, err = tisim("figures", "toy")
     assert code == 2
     assert "(or give --overwrite); received 'out/toy-figures' with notes.txt" in err
+    (tmp_path / "out/toy-figures/notes.txt").unlink()
+    code, _, err = tisim("figures", "toy")
+    rule = "output folder must be without finished figures (or give --overwrite)"
+    assert (code, err) == (2, f"{rule}; received 'out/toy-figures'\n")
     assert tisim("figures", "toy", "--overwrite")[0] == 0
     assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\ndefault\n"
     code, _, err = tisim("figures", "toy", "--size", "huge")

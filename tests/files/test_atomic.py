@@ -111,7 +111,7 @@ def test_a_device_is_refused():
 
 def test_a_lock_that_is_never_given_back_is_told(tmp_path, monkeypatch):
     path = tmp_path / "lock"
-    monkeypatch.setattr(atomic, "PATIENCE", 0.05)
+    monkeypatch.setattr(atomic, "LOCK_TIMEOUT", 0.05)
     with locked(path, exclusive=False):
         lock_to_read(path)
         with pytest.raises(RunError, match=r"lock has been locked by another process for 0\.05 s"):

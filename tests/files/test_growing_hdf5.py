@@ -279,7 +279,7 @@ def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypa
 
 
 def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):
-    monkeypatch.setattr(atomic, "PATIENCE", 0.01)
+    monkeypatch.setattr(atomic, "LOCK_TIMEOUT", 0.01)
     with (
         atomic.locked(tmp_path / "t.h5.new", exclusive=True),
         pytest.raises(RunError, match=r"t\.h5\.new has been locked by another process for 0\.01 s$"),

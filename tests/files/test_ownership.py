@@ -32,8 +32,8 @@ def test_what_was_taken_may_be_replaced_and_nothing_else(tmp_path):
     written(folder, "c")
     take(folder, ["a", "b"])
     for names, found in ((["a", "c"], "c"), (["c", "d"], "c")):
-        with pytest.raises(InputError, match=rf"\(or give --more\); received '.*/below' with {found}$"):
-            take(folder, names, how="--more")
+        with pytest.raises(InputError, match=rf"\(or give --overwrite\); received '.*/below' with {found}$"):
+            take(folder, names)
     take(folder, ["c"], overwrite=True)
     take(folder, ["c"])
     assert (folder / MARKER).read_text() == "a\nb\nc\n"

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 
 import tisim
+from tests.files.test_growing_hdf5 import STILL
+from tests.files.test_growing_hdf5 import frame as grown
 from tests.scenes import flow, scene
 from tisim import InputError, Recording
-from tisim.io.export import export
+from tisim.io.export import export, names
 from tisim.io.reader import frames
 from tisim.io.run_folder import Folder, write
+from tisim.io.trajectory import Trajectory
 from tisim.plotting.movie import movie
 
 
@@ -120,6 +123,37 @@ def test_each_world_has_its_own_files(tmp_path):
     assert done == [0.25, 0.5, 0.75, 1.0]
     for k in range(2):
         assert meshio.read(tmp_path / f"t_{k}_00001.vtu").points.tolist() == [[k, 0, 0]]
+
+
+@pytest.fixture
+def growing(tmp_path):
+    """A trajectory of three worlds in single precision, of which only the second has come to a frame."""
+    with Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL] * 3, "f32") as made:
+        made.write(1, grown(4))
+    return tmp_path / "t.h5"
+
+
+def test_a_world_without_a_frame_yet_is_copied_as_one(growing, tmp_path):
+    copy = export(growing, "h5md", tmp_path)
+    assert [len(every_frame(copy, world)) for world in range(3)] == [0, 1, 0]
+    (frame,), (other,) = every_frame(growing, 1), every_frame(copy, 1)
+    assert (frame.time, frame.step) == (other.time, other.step)
+    for name, values in frame.arrays.items():
+        assert values.dtype == other.arrays[name].dtype
+        np.testing.assert_array_equal(values, other.arrays[name])
+    with h5py.File(copy) as plain:
+        assert {group["position/value"].dtype for group in plain["particles"].values()} == {np.dtype("f4")}
+
+
+def test_worlds_with_and_without_frames_are_exported(growing, tmp_path):
+    for kind, written in (("xyz", "t_1.xyz"), ("vtk", "t_1_00000.vtu")):
+        export(growing, kind, tmp_path)
+        assert set(names(growing, kind)) <= {path.name for path in tmp_path.iterdir()}
+        assert written in names(growing, kind)
+    (alone,) = ase.io.read(tmp_path / "t_1.xyz", index=":", format="extxyz")
+    assert alone.info["Step"] == grown(4).step
+    with frames(growing) as found, pytest.raises(InputError, match="file must be one with"):
+        movie(found, tmp_path / "t.gif")
 
 
 def test_a_result_has_its_start_and_end(tmp_path):

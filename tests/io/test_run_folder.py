@@ -10,8 +10,9 @@ import pytest
 from tests.scenes import scene, simulate
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
-from tisim.files.ownership import writable
-from tisim.io.run_folder import Folder, write
+from tisim.files import lock, ownership
+from tisim.files.ownership import MARKER, writable
+from tisim.io.run_folder import DATA, NAMES, Folder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
@@ -49,22 +50,27 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     folder.check()
     assert not folder.path.exists()
     with pytest.raises(InputError, match="one that an interrupted run has left"):
-        folder.check(resume=True)
-    writable(folder.path)
+        folder.check(fresh=False)
+    ownership.take(folder.path, NAMES)
     folder.checkpoint.touch()
-    with pytest.raises(InputError, match="without an interrupted run"):
-        folder.check()
-    folder.check(resume=True)
-    folder.check(overwrite=True)
+    assert folder.check()
+    assert folder.check(fresh=False)
+    assert not folder.check(fresh=True)
+    assert not folder.check(overwrite=True)
     folder.checkpoint.unlink()
     folder.trajectory.touch()
-    with pytest.raises(InputError, match=r"\(or give --overwrite; there is no checkpoint to go on from\)"):
+    with pytest.raises(InputError, match=r"\(or give --fresh; there is no checkpoint to go on from\)"):
         folder.check()
+    assert not folder.check(fresh=True)
     folder.trajectory.unlink()
     folder.result.touch()
-    with pytest.raises(InputError, match="without a finished run"):
-        folder.check()
-    folder.check(overwrite=True)
+    folder.checkpoint.touch()  # of a run that was killed at its very end
+    for fresh in (None, True):
+        with pytest.raises(InputError, match="without a finished run"):
+            folder.check(fresh)
+    with pytest.raises(InputError, match="one that an interrupted run has left"):
+        folder.check(fresh=False)
+    assert not folder.check(overwrite=True)
 
 
 def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
@@ -74,7 +80,21 @@ def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
         for call in (folder.check, lambda: folder.taken(overwrite=True).__enter__()):
             with pytest.raises(InputError, match="must be without a command that is still at work there"):
                 call()
-    folder.check(resume=True)
+    assert folder.check()
+
+
+@pytest.mark.parametrize("options", [{"fresh": True}, {"overwrite": True}])
+def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp_path, options):
+    folder = Folder(tmp_path)
+    for name in (*DATA, "notes.txt"):
+        (tmp_path / name).touch()
+    ownership.take(tmp_path, NAMES, overwrite=True)
+    folder.result.unlink()
+    with folder.taken() as goes_on:
+        assert (goes_on, folder.checkpoint.exists()) == (True, True)
+    with folder.taken(**options) as goes_on:
+        assert not goes_on
+        assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, lock.LOCK}
 
 
 def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
@@ -90,7 +110,7 @@ def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
     with pytest.raises(InputError, match="without a finished run"), folder.taken():
         pass
     folder.result.unlink()
-    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.taken(resume=True):
+    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.taken(fresh=False):
         pass
 
 

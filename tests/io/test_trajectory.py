@@ -239,6 +239,19 @@ def test_it_goes_on_from_a_checkpoint(tmp_path):
     assert [path.name for path in tmp_path.glob("t.h5*")] == ["t.h5"]
 
 
+@pytest.mark.parametrize("worlds", [1, 2])
+def test_it_does_not_go_on_with_the_frames_of_another_scene(tmp_path, worlds):
+    """Here of as many particles and other velocities, or of several worlds."""
+    path, mine, other = tmp_path / "t.h5", *(scene([(0, 0, 0)], [(v, 0, 0)]) for v in (1.0, 2.0))
+    recording = Recording(path, frames=9)
+    Trajectory(recording, [mine, other][-worlds:]).close()
+    content = path.read_bytes()
+    rule = r"trajectory to go on with must be of the same scene; received '.*t\.h5, of another one'"
+    with pytest.raises(InputError, match=rule):
+        Trajectory.going_on(recording, mine, 1.0)
+    assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("t.h5", content)]
+
+
 KILLED = """
 import sys, time
 import numpy as np

@@ -11,7 +11,9 @@ import pytest
 
 import optimize
 from tests.optimize.drift_case import distance, problem
+from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
+from tisim.backend import runtime
 
 SMALL = {"generations": 1, "options": {"population": 6, "parents": 2}, "ensemble": {"max_starts": 4}}
 
@@ -76,6 +78,28 @@ def test_a_search_may_run_in_a_thread_of_its_own(drift):
     with ThreadPoolExecutor(1) as pool:
         again = pool.submit(optimize.run, problem("default", ""), seed=4, **SMALL).result()
     assert again.designs == drift.designs
+
+
+def test_other_threads_wait_until_a_search_is_over(monkeypatch):
+    """Between its evaluations too: they would start Taichi with settings that are not its own."""
+
+    def free():
+        got = runtime.turn.acquire(blocking=False)
+        if got:
+            runtime.turn.release()
+        return got
+
+    def look(*arguments):
+        seen.append(other.submit(free).result())
+        return made.scene(*arguments)
+
+    seen, made = [], fake_problem()
+    with ThreadPoolExecutor(1) as other:
+        monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
+        optimize.run(replace(made, scene=look), **SMALL)
+        assert seen
+        assert not any(seen)
+        assert other.submit(free).result()
 
 
 @pytest.mark.long

@@ -9,6 +9,8 @@ import pytest
 from optimize.storage.cache import Cache, existing
 from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import PIPE, worker
+from tisim import InputError
+from tisim.files import lock
 
 QUICK = ("drift",)
 REAL = ("agglomeration", "--size", "small")
@@ -20,18 +22,31 @@ def begin(case, folder):
     return worker("tisim", "optimize", *case, *settings, stderr=subprocess.DEVNULL, pipesize=PIPE)
 
 
-def kill(search, rng):
-    """SIGKILL at a random moment, mostly while evaluations are stored; the keys of those told stored."""
-    output = ""
-    if rng.random() < 0.25:
-        time.sleep(rng.uniform(0.0, 2.0))  # while it starts, reads the file, compiles
-    else:
+def kill(search, folder, rng):
+    """SIGKILL at a random moment, mostly while evaluations are stored; the keys of those reported stored."""
+    reported = ""
+    moment = rng.choice(["starts", "reads and compiles", "stores", "stores", "stores", "stores"])
+    if moment == "reads and compiles":
+        while search.poll() is None and not at_work(folder):
+            time.sleep(0.01)
+    elif moment == "stores":
         for _ in range(rng.randint(1, 40)):
-            output += search.stdout.readline()
-        time.sleep(rng.uniform(0.0, 0.02))
+            reported += search.stdout.readline()
+    time.sleep(rng.uniform(0.0, 0.02))
     search.kill()
-    output += search.stdout.read()
-    return {line.split()[1] for line in output.splitlines(keepends=True) if line.endswith("\n")}
+    reported += search.stdout.read()
+    return {line.split()[1] for line in reported.splitlines(keepends=True) if line.endswith("\n")}
+
+
+def at_work(folder):
+    """Whether a search holds the lock of its folder, which it makes itself."""
+    if not (folder / lock.LOCK).exists():
+        return False
+    try:
+        with lock.held(folder, timeout=0.0):
+            return False
+    except InputError:
+        return True
 
 
 def contents_of(folder):
@@ -58,7 +73,7 @@ def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
         if 2 * len(seen) > len(whole[2]):
             break  # What is left is for the run that is not killed, however fast the machine is.
         with begin(case, folder) as search:
-            stored = kill(search, rng)
+            stored = kill(search, folder, rng)
         if not (file.exists() or stored):
             continue  # killed before there was anything
         report = verify(file)

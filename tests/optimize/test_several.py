@@ -21,11 +21,11 @@ from optimize.search import search
 from optimize.settings import Settings
 from optimize.storage import hdf5_store
 from optimize.storage.cache import Cache, existing
-from optimize.storage.journal import frame
 from optimize.storage.maintenance import compact, verify
 from optimize.storage.record import Record
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
+from tisim.files.framing import frame
 
 ONE = EnsembleSettings(min_starts=1, max_starts=1, block=1)
 OBJECTIVES = (

@@ -26,7 +26,7 @@ from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row
 from tisim.backend import runtime
 from tisim.errors import must
-from tisim.files import checksum, lock, regular_file
+from tisim.files import checksum, lock, regular_file, resuming
 from tisim.files.atomic import replace_file
 from tisim.files.ownership import writable
 from tisim.io.run_folder import versions
@@ -101,6 +101,18 @@ def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
     return values
 
 
+def resumes(folder: Path, fresh: bool | None, overwrite: bool) -> bool:
+    """Whether a study goes on with what is in the folder; see ``resuming.resumes``."""
+    begun = regular_file.exists(folder / HDF5)
+    return resuming.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
+
+
+def clear(folder: Path) -> None:
+    """Remove what an earlier study has left, so that nothing of it is taken for a new one's."""
+    for name in (HDF5, COST_CSV, PICTURE):
+        (folder / name).unlink(missing_ok=True)
+
+
 def resume(study: Study, folder: Path) -> None:
     """Give a study the rows and truths that an earlier one of the same scene has left in a folder.
 
@@ -111,7 +123,7 @@ def resume(study: Study, folder: Path) -> None:
         return
     with checksum.opened(path, f"output folder's {HDF5}", FORMAT) as file:
         same = json.loads(file.attrs["identity"]) == study.identity()
-        rule = "without the study of another scene, version, machine or depth (or give --overwrite)"
+        rule = "without the study of another scene, version, machine or depth (or give --out or --overwrite)"
         must(same, "output folder", rule, str(folder))
         study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
         study.complete = file.attrs["complete"] == json.dumps(study.sweep_settings())

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from tisim.accuracy.cost_study import Study
+from tisim.accuracy.formatting import shell_line
 from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
 
@@ -72,11 +75,11 @@ def sources(study: Study) -> list[str]:
     return lines
 
 
-def recipe(row: Row, target: str, quantity: int = 0) -> str:
-    """How to run a setting: as Python in a scene, and as words of ``tisim run`` for a case or file."""
+def recipe(row: Row, words: Sequence[str], quantity: int = 0) -> str:
+    """How to run a setting: as Python in a scene, and as a command. words : of ``tisim run``, all of them."""
     starts = f", over {row.starts} random starts" if row.starts > 1 else ""
     return (
         f"{row.method}: {row.setting}{starts}: {row.median:.3g} s, error {row.at_most(quantity):.1e}\n"
         f"  stepper={row.python}\n"
-        f"  tisim run {target} {row.options}".rstrip()
+        f"  {shell_line(['tisim', 'run', *words])}"
     )

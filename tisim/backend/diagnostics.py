@@ -168,8 +168,5 @@ def _cuda() -> bool:
 
 
 def _memory() -> str:
-    try:
-        page = os.sysconf("SC_PAGE_SIZE")
-        return f"{page * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"
-    except (ValueError, OSError, AttributeError):
-        return "unknown"
+    there = runtime.memory()
+    return f"{there / 2**30:.1f} GiB" if there < sys.maxsize else "unknown"

@@ -6,6 +6,7 @@ import atexit
 import contextlib
 import io
 import os
+import sys
 import threading
 from dataclasses import dataclass
 from typing import Any
@@ -61,8 +62,9 @@ class Runtime:
 
 
 turn = threading.RLock()
-"""Held while scenes are run by ``tisim.run``, and while settings change: calls of several threads take turns,
-and one that is made from within another, such as from its progress, goes ahead."""
+"""Held by ``tisim.run``, studies of accuracy and searches in this process, each from its start to its end,
+and while settings change: calls of several threads take turns, and one that is made from within another, such
+as from its progress, goes ahead."""
 
 _current: Runtime | None = None
 _generation = 0
@@ -74,16 +76,20 @@ def cores() -> int:
 
 
 def memory() -> int:
-    """Memory of this machine, bytes."""
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    """Memory of this machine, bytes; where the system does not say, as much as a number of bytes can be."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return sys.maxsize
 
 
 def init(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
     """Start Taichi with these settings, or keep it as it is when they have not changed.
 
     threads : CPU threads; 0 for all cores.
-    Raises InputError when a setting is unknown or the device is absent. A change of settings
-    invalidates every Simulation made before; those say so when used.
+    Raises InputError when a setting is unknown or the device is absent. A change of settings waits until what
+    ``tisim.run``, ``tisim.accuracy.study`` or ``optimize.run`` do in other threads is over. It invalidates
+    every Simulation made before; those say so when used.
     """
     wanted = Runtime(device, precision, threads or cores())
     if wanted == _current:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,19 +12,28 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import scene_arguments, targets
-from tisim.cli.options import Changes, Device, Out, Overwrite, Plugins, Seed, Size, Target, Threads
+from tisim.cli.options import (
+    Absent,
+    Changes,
+    Device,
+    Fresh,
+    Out,
+    Overwrite,
+    Plugins,
+    Seed,
+    Size,
+    Target,
+    Threads,
+)
 from tisim.console import err, out, progress_bar, stopping
 from tisim.errors import must
 from tisim.files import lock, ownership
+from tisim.files.resuming import how_to_go_on
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
-    from tisim.accuracy import Quantity, Study
+    from tisim.accuracy import Quantity, Row, Study
     from tisim.scene.scene import Scene
-
-Absent = Annotated[
-    list[str] | None, typer.Option("--without", metavar="EFFECT", help="Leave an effect out. Repeatable.")
-]
 
 
 def cost(
@@ -48,7 +59,9 @@ def cost(
     finer: Annotated[
         int | None, typer.Option(min=-16, max=16, help="Decades of error to go below it; 0 by default.")
     ] = None,
-    repeats: Annotated[int | None, typer.Option(max=1000, help="Of every timing; 3 by default.")] = None,
+    repeats: Annotated[
+        int | None, typer.Option(max=1000, help="How often to time each setting; 3 by default.")
+    ] = None,
     starts: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Numbers of random starts to try: 8,32,128.")
     ] = None,
@@ -61,12 +74,13 @@ def cost(
     single: Annotated[bool, typer.Option("--f32/--no-f32", help="Also run in single precision.")] = True,
     device: Device = "cpu",
     threads: Threads = 0,
+    fresh: Fresh = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
     """Measure error against time for every setting of a scene; write cost.csv, cost.h5 and cost.png.
 
-    Giving the same command again goes on with what an earlier one has left, and answers --error from it.
+    The same command, given again, goes on where it was stopped, and answers --error from what is measured.
     """
     from tisim.accuracy import Study, storage, table
     from tisim.accuracy.plot import save
@@ -86,24 +100,62 @@ def cost(
     )
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
+    storage.resumes(place, fresh, overwrite)
     ownership.take(place, storage.NAMES, overwrite)
     with lock.held(place):
-        if not overwrite:
+        if storage.resumes(place, fresh, overwrite):
             storage.resume(study, place)
+            err().print(f"going on with {place / storage.HDF5}, which has {len(study.rows)} settings")
+        else:
+            storage.clear(place)
         done = _measure(study, place)
         if study.truths and study.rows:
             out().print(table.table(study))
             written = [*storage.write(study, place), save(study, place / storage.PICTURE)]
             out().print("\n".join([*table.sources(study), *map(str, written)]))
     if not done:
-        err().print(
-            f"stopped; {place / storage.HDF5} has what is done. To go on, give the same command again."
-        )
+        err().print(f"stopped; {place / storage.HDF5} has what is done. {how_to_go_on(fresh, overwrite)}")
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)
-        words = f"{target} --size {size}" if size else target
-        print(f"cheapest with an error of at most {error:g}:\n{table.recipe(row, words, which)}")
+        found = answer(row, which, scene, target, size, seed, changes, device, threads, plugins)
+        print(f"cheapest with an error of at most {error:g}:\n{found}")
+
+
+def answer(
+    row: Row, quantity: int, scene: Scene, target: str, size: str | None, seed: int | None,
+    changes: Sequence[str] | None, device: str, threads: int, plugins: Sequence[str] | None,
+) -> str:  # fmt: skip
+    """How to run a row of the study of a scene, which this command has made of these words."""
+    from tisim.accuracy import table
+    from tisim.accuracy.formatting import options
+
+    words = shlex.split(row.options)
+    pairs = list(zip(words[::2], words[1::2], strict=True))
+    absent, own = ([value for key, value in pairs if key == name] for name in ("--without", "--set"))
+    measured = scene.without(*absent).replace(scene_arguments.assignments(own))
+    # Stepper and effects as they have become, whoever has changed them; all else as it was given.
+    _, base = scene_arguments.scene(target, size, seed)
+    given = [target, *_given(size, seed, changes, device, threads, plugins)]
+    return table.recipe(row, given + options(base, measured, row.precision), quantity)
+
+
+def _given(
+    size: str | None, seed: int | None, changes: Sequence[str] | None,
+    device: str, threads: int, plugins: Sequence[str] | None,
+) -> Iterator[str]:  # fmt: skip
+    """The options given to this command that ``tisim run`` needs too, but those of stepper and effects."""
+    for name, value, usual in (
+        ("--size", size, None), ("--seed", seed, None),
+        ("--device", device, "cpu"), ("--threads", threads, 0),
+    ):  # fmt: skip
+        if value != usual:
+            yield from (name, str(value))
+    for change in changes or ():
+        if change.partition("=")[0].strip().partition(".")[0] not in ("stepper", "effects"):
+            yield from ("--set", change)
+    for plugin in plugins or ():
+        yield from ("--plugin", plugin)
 
 
 def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:

@@ -17,6 +17,7 @@ from tisim.cli.options import CaseName, Device, Out, Overwrite, Plugins, Precisi
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
 from tisim.files import lock, ownership, regular_file
+from tisim.files.resuming import resumes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,7 +67,10 @@ def figures(
     device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:  # fmt: skip
-    """Make the figures of a case that take many runs, and the numbers in them."""
+    """Make the figures of a case that take many runs, and the numbers in them.
+
+    Stopped, it keeps nothing, and begins anew.
+    """
     from tisim.files.atomic import replace_file
 
     found = targets.case(case)
@@ -77,6 +81,7 @@ def figures(
     runtime.init(device, precision, threads)
     place = folder or Path("out") / f"{found.name}-figures"
     ownership.check_all(place, overwrite)
+    resumes(place, "figures", False, "finished figures" * ownership.results(place), None, overwrite)
     ownership.take(place, (lock.LOCK,), overwrite)
     with lock.held(place):
         with _bar("running") as progress:
@@ -127,7 +132,7 @@ def export(
     """Write the frames of a run for other programs; h5md is a copy."""
     from tisim.io.export import check, names
     from tisim.io.export import export as write
-    from tisim.io.reader import frames
+    from tisim.io.reader import frames, worlds
 
     file = _file(file)
     check(file, kind)
@@ -135,8 +140,9 @@ def export(
     ownership.take(place, names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
-    with frames(file) as found:
-        _tell(found.missing)
+    for world in range(number := worlds(file)):
+        with frames(file, world) as found:
+            _tell(f"world {world}: {found.missing}" if found.missing and number > 1 else found.missing)
     print(made)
 
 

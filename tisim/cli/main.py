@@ -16,16 +16,17 @@ from tisim.backend import runtime
 from tisim.backend.taichi import check_backend
 from tisim.cli import cost, effects, inspect, new, scene_arguments, search, targets
 from tisim.cli.options import (
+    Absent,
     CaseName,
     Changes,
     Device,
     Every,
     Frames,
+    Fresh,
     Out,
     Overwrite,
     Plugins,
     Precision,
-    Resume,
     Seed,
     Size,
     Target,
@@ -35,18 +36,14 @@ from tisim.console import err, out, plain_table, progress_bar, stopping
 from tisim.engine.observer import Observer
 from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
-from tisim.errors import InputError, RunError
+from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
+from tisim.files.resuming import how_to_go_on
 from tisim.interrupt import Interrupt, exit_code, handled, stop
 from tisim.version import __version__
 
 UsageError: Any = typer.BadParameter.__base__
 """What typer raises for words that no command knows."""
-
-Absent = Annotated[
-    list[str] | None,
-    typer.Option("--without", metavar="EFFECT", help="Leave an effect out: cooling. Repeatable."),
-]
 
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
@@ -99,7 +96,7 @@ def _options(
 def run(
     target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
-    threads: Threads = 0, overwrite: Overwrite = False, resume: Resume = False,
+    threads: Threads = 0, fresh: Fresh = None, overwrite: Overwrite = False,
     frames: Frames = None, every: Every = None, plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
@@ -110,29 +107,31 @@ def run(
     runtime.init(device, precision, threads)
     name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
     place = run_folder.Folder(folder or Path("out") / name)
-    place.check(overwrite, resume)
+    resume = place.check(fresh, overwrite)
     recording = asked(place.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)
         simulation.load([scene])
-    with place.taken(overwrite, resume):
+    with place.taken(fresh, overwrite) as still:
+        must(still == resume, "output folder", "as it was when the command began", str(place.path))
         if resume:
-            checkpoint.restore(simulation, place.checkpoint)
-        if recording is None:
-            place.trajectory.unlink(missing_ok=True)
+            _restore(simulation, place.checkpoint)
         observed = recording.observer(simulation, resume) if recording else nullcontext()
         saving = checkpoint.PeriodicCheckpoint(place.checkpoint, scene_arguments.checkpoint_seconds())
         try:
             with observed as recorder:
+                if resume:
+                    err().print(f"going on with {place.checkpoint}, from {simulation.fraction():.1%}")
                 done = _advance(simulation, name, [recorder, saving] if recorder else [saving])
             paths = run_folder.write(simulation.results()[0], place) if done else []
         except RunError as error:
-            raise RunError(f"{error}. {_rescued(simulation, place.checkpoint)}") from error
+            how = how_to_go_on(fresh, overwrite, "make room and ")
+            raise RunError(f"{error}. {_rescued(simulation, place.checkpoint, how)}") from error
         if not done:
             checkpoint.save(simulation, place.checkpoint)
             err().print(
                 f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
-                "To go on, give the same command with --resume."
+                f"{how_to_go_on(fresh, overwrite)}"
             )
             raise typer.Exit(130)
     result = simulation.results()[0]
@@ -161,8 +160,21 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
     return True
 
 
-def _rescued(simulation: Simulation, path: Path) -> str:
-    """What there is to go on from, once something could not be written: a checkpoint, where it finds room."""
+def _restore(simulation: Simulation, path: Path) -> None:
+    """Bring a simulation to where the run was stopped."""
+    from tisim.io import checkpoint
+
+    try:
+        checkpoint.restore(simulation, path)
+    except InputError as error:
+        raise InputError(f"{error} (to begin anew, give --out or --fresh)") from None
+
+
+def _rescued(simulation: Simulation, path: Path, how: str) -> str:
+    """What there is to go on from, once something could not be written: a checkpoint, where it finds room.
+
+    how : which command goes on, as a sentence.
+    """
     from tisim.io import checkpoint
 
     try:
@@ -171,7 +183,7 @@ def _rescued(simulation: Simulation, path: Path) -> str:
         return "No checkpoint could be written either" + "; that of before is intact." * regular_file.exists(
             path
         )
-    return f"{path} is written. To go on, make room and give the same command with --resume."
+    return f"{path} is written. {how}"
 
 
 def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:

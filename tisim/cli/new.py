@@ -22,7 +22,7 @@ KINDS = {
 """What there is, and how it is used."""
 
 Kind = Annotated[str, typer.Argument(metavar="KIND", help=f"{', '.join(KINDS)}.")]
-Name = Annotated[str, typer.Argument(metavar="NAME", help="Of the file NAME.py, such as soft_shell.")]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the file NAME.py, such as soft_shell.")]
 
 
 def new(kind: Kind, name: Name) -> None:

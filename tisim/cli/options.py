@@ -62,15 +62,27 @@ Out = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", callback=nameable, help="Folder to write to; out/NAME by default."),
 ]
-Seed = Annotated[int | None, typer.Option(help="Of all that is random.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of all that is random.")]
 Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
 Device = Annotated[str, typer.Option(help="cpu or cuda.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace what an earlier run has left, and files of other origin.")
+    bool,
+    typer.Option("--overwrite", help="Begin anew, and replace earlier results and files of other origin."),
 ]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on from where Ctrl-C stopped the same run.")]
+Fresh = Annotated[
+    bool | None,
+    typer.Option(
+        "--fresh/--resume", show_default=False,
+        help="Begin anew; or be refused where there is nothing to go on with. Without either, the same "
+        "command goes on where it was stopped.",
+    ),
+]  # fmt: skip
+Absent = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="EFFECT", help="Leave an effect out: cooling. Repeatable."),
+]
 Frames = Annotated[
     int | None,
     typer.Option("--frames", help="Also write trajectory.h5, with so many frames after the start."),

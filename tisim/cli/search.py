@@ -10,11 +10,23 @@ from typing import Annotated
 import typer
 
 from tisim.cli import scene_arguments, targets
-from tisim.cli.options import Device, Out, Overwrite, Plugins, Precision, Seed, Size, Threads, nameable
+from tisim.cli.options import (
+    Device,
+    Fresh,
+    Out,
+    Overwrite,
+    Plugins,
+    Precision,
+    Seed,
+    Size,
+    Threads,
+    nameable,
+)
 from tisim.console import err, out, stopping
-from tisim.errors import RunError, must
-from tisim.files import ownership
+from tisim.errors import RunError
+from tisim.files import lock, ownership
 from tisim.files.atomic import replace_file
+from tisim.files.resuming import how_to_go_on
 from tisim.interrupt import Interrupt
 
 Executor = Annotated[
@@ -50,9 +62,7 @@ def optimize(
     budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
     budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
     changes: SearchChanges = None,
-    fresh: Annotated[
-        bool, typer.Option("--fresh/--resume", help="Begin anew; otherwise go on with the folder's search.")
-    ] = False,
+    fresh: Fresh = None,
     overwrite: Overwrite = False,
     device: Device = "cpu",
     precision: Precision = "f64",
@@ -62,14 +72,13 @@ def optimize(
 ) -> None:
     """Search for the best design of a case, or of your own problem in a Python file.
 
-    All goes to search.h5; running again goes on from there.
+    All goes to search.h5. The same command, given again, goes on where it was stopped.
     """
     from optimize.evaluation.executors import evaluator_named
-    from optimize.search_folder import FILE, clear
+    from optimize.search_folder import FILE, going_on
     from optimize.session import session
     from optimize.settings import Settings, fit, followed, proposed
 
-    must(fresh or not overwrite, "--overwrite", "given with --fresh", "--overwrite")
     problem, usual = targets.inverse(case, size, variant)
     wishes = {
         "seed": seed,
@@ -85,14 +94,14 @@ def optimize(
     fit(problem, settings)
     place = folder or Path("out") / problem.name
     with closing(evaluator_named(executor, device, precision, threads)) as evaluator:
-        if fresh:
-            clear(place, overwrite)
+        going_on(place, fresh, overwrite)
         outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
     if outcome.interrupted:
-        err().print(f"stopped; {place / FILE} has all that is done. To go on, give the same command again.")
+        err().print(f"stopped; {place / FILE} has all that is done. {how_to_go_on(fresh, overwrite)}")
         raise typer.Exit(130)
     if not outcome.logbook:
-        raise RunError("the time was over before the first generation; to go on, give the same command again")
+        how = how_to_go_on(fresh, overwrite)
+        raise RunError(f"the time was over before the first generation. {how}")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {place / FILE}' says why")
 
@@ -109,6 +118,7 @@ def compare(
     folder: Out = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
     changes: SearchChanges = None,
+    fresh: Fresh = None,
     overwrite: Overwrite = False,
     device: Device = "cpu",
     precision: Precision = "f64",
@@ -118,10 +128,11 @@ def compare(
 ) -> None:
     """Compare search methods on a case, or on your own problem, at equal numbers of runs.
 
-    Given again, it goes on.
+    The same command, given again, goes on where it was stopped; other methods and numbers take in its runs.
     """
     from optimize.evaluation.executors import evaluator_named
     from optimize.report import comparison
+    from optimize.search_folder import going_on
     from optimize.settings import followed
     from optimize.storage.cache import Cache
 
@@ -130,13 +141,18 @@ def compare(
     base = scene_arguments.nested(followed(usual, given), given)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
+    goes_on = going_on(place, fresh, overwrite, "comparison", comparison.FILE, (comparison.CSV,))
     ownership.take(place, comparison.NAMES, overwrite)
     found = []
     with (
         closing(evaluator_named(executor, device, precision, threads)) as evaluator,
+        lock.held(place, exclusive=False),
         Cache(place / comparison.FILE) as store,
         Interrupt(stopping) as ctrl_c,
     ):
+        comparison.check(place, store, problem, evaluator.settings)
+        if goes_on:
+            err().print(f"going on with {place / comparison.FILE}, which has {len(store)} runs")
         searches = comparison.compare(
             problem, base, names, evaluations, repeats, fresh_starts, evaluator, store,
             lambda _: ctrl_c.check(),
@@ -147,8 +163,8 @@ def compare(
                 line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
-            done = f"stopped; {place / 'compare.h5'} has all that is done."
-            err().print(f"{done} To go on, give the same command again.")
+            done = f"stopped; {place / comparison.FILE} has all that is done."
+            err().print(f"{done} {how_to_go_on(fresh, overwrite)}")
             raise
     out().print(comparison.table(problem, found))
     replace_file(place / comparison.CSV, comparison.as_csv(problem, found))

@@ -16,15 +16,15 @@ try:
 except ImportError:
     fcntl = None  # type: ignore[assignment]
 
-PATIENCE = 60.0
+LOCK_TIMEOUT = 60.0
 """s, longer than any process at work holds a lock; one that is stopped holds it for good."""
 
 
 @contextlib.contextmanager
-def locked(path: Path, *, exclusive: bool, patience: float | None = None) -> Iterator[int]:
+def locked(path: Path, *, exclusive: bool, timeout: float | None = None) -> Iterator[int]:
     """Hold the advisory lock of a lock file, among processes and threads; a killed holder lets go of it.
 
-    patience : s, to wait for another holder; PATIENCE unless given.
+    timeout : s, to wait for another holder; LOCK_TIMEOUT unless given.
     Gives a handle of the file; of its folder, to one that only reads where no lock file is and none can be
     made. A lock file stays behind on purpose: removing it would let two processes lock two different files.
     InputError where it cannot be had, RunError when another process holds it for longer.
@@ -34,7 +34,7 @@ def locked(path: Path, *, exclusive: bool, patience: float | None = None) -> Ite
     handle = opened(path, os.O_RDWR | os.O_CREAT) if exclusive else _for_reading(path)
     try:
         kind = fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH
-        _wait(handle, path, kind, PATIENCE if patience is None else patience)
+        _wait(handle, path, kind, LOCK_TIMEOUT if timeout is None else timeout)
         yield handle
     finally:
         os.close(handle)
@@ -55,14 +55,14 @@ def _for_reading(path: Path) -> int:
             raise refused from None
 
 
-def _wait(handle: int, path: Path, kind: int, patience: float) -> None:
-    until = time.monotonic() + patience
+def _wait(handle: int, path: Path, kind: int, timeout: float) -> None:
+    until = time.monotonic() + timeout
     while True:
         try:
             return fcntl.flock(handle, kind | fcntl.LOCK_NB)
         except BlockingIOError:
             if time.monotonic() > until:
-                raise RunError(f"{path} has been locked by another process for {patience:g} s") from None
+                raise RunError(f"{path} has been locked by another process for {timeout:g} s") from None
             time.sleep(0.002)
         except OSError as error:
             raise InputError(f"{path} must be where files can be locked; received {error.strerror}") from None

@@ -1,7 +1,7 @@
 """Checksums of HDF5 files that are written whole: behind their end, where HDF5 does not look.
 
 The HDF5 library, given a damaged structure, may read wrong data or never return: it must not be given one.
-The seal covers the file, or all of it but data that has checksums of its own.
+The checksum is of the file, or of all of it but data that has checksums of its own.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ OLDER = "an older version has written it, whose files h5py still reads"
 
 @contextlib.contextmanager
 def created(path: Path) -> Iterator[h5py.File]:
-    """A new HDF5 file in memory; at the end of the ``with`` it is sealed and put in the place of path.
+    """A new HDF5 file in memory; at the end of the ``with`` it gets its checksum and is put in the
+    place of path.
 
     RunError when it cannot be written; path is then what it was.
     """
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
         yield file
-    replace_file(path, sealed(image.getvalue()))
+    replace_file(path, with_checksum(image.getvalue()))
 
 
 @contextlib.contextmanager
@@ -50,12 +51,14 @@ def opened(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> I
 
 
 def image(path: Path, what: str, rule: str) -> bytes:
-    """The HDF5 file that ``sealed`` has sealed. InputError unless it is there and whole; what, rule : as of
-    opened."""
+    """The HDF5 file that was given to ``with_checksum``; InputError unless it is there and whole.
+
+    what, rule : as of opened.
+    """
     content = regular_file.content(Path(os.path.realpath(path)))
     if content is None:
         raise InputError(f"{what} must be an existing file; received {str(path)!r}")
-    found = unsealed(content)
+    found = verified(content)
     if found is None:
         bare = MAGIC not in content and content.startswith(SIGNATURE) and b"tisim" in content
         why = f", without one: it was cut short or damaged, or {OLDER}" if bare else ""
@@ -63,22 +66,22 @@ def image(path: Path, what: str, rule: str) -> bytes:
     return found
 
 
-def sealed(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
-    """The file image with its seal; data : (offset, size) in bytes of data that the seal leaves out."""
+def with_checksum(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
+    """The file image with its checksum; data : (offset, size) in bytes of data that this leaves out."""
     spans = sorted(data)
-    seal = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
-    return image + frame(json.dumps(seal).encode())
+    about = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
+    return image + frame(json.dumps(about).encode())
 
 
-def unsealed(content: bytes) -> bytes | None:
-    """The HDF5 file without its seal; None without a whole seal, or when the file is not what was sealed."""
+def verified(content: bytes) -> bytes | None:
+    """The HDF5 file without its checksum; None where that is missing or damaged, or does not fit."""
     start = max(content.rfind(MAGIC), 0)
     payloads = scan(content[start:]).payloads
     if not content.startswith(SIGNATURE) or not payloads:
         return None
     try:
-        seal = json.loads(payloads[0])
-        size, spans, crc = seal["size"], seal["data"], seal["crc"]
+        about = json.loads(payloads[0])
+        size, spans, crc = about["size"], about["data"], about["crc"]
     except (ValueError, KeyError, TypeError):
         # A frame, but of something else.
         return None

@@ -1,7 +1,7 @@
 """One command at a time makes files in a folder: it holds a lock for as long as it is at work.
 
-The lock is of a file of its own, which stays (see durable.locked); a killed process lets go of it. Commands
-that draw or copy what is in a folder do without, so that a run can be looked at while it goes on.
+The lock is of a file of its own, which stays (see tisim.files.atomic.locked); a killed process lets go of it.
+Commands that draw or copy what is in a folder do without, so that a run can be looked at while it goes on.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from tisim.files import regular_file
 from tisim.files.atomic import locked
 
 LOCK = ".tisim.lock"
-PATIENCE = 1.0
+AT_WORK_TIMEOUT = 1.0
 """s, far longer than it takes to look whether a folder is in use, for which the lock is held as well."""
 
 
-def check(folder: Path, patience: float = PATIENCE) -> None:
+def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
     """InputError where another process is at work in the folder; touches nothing."""
     if regular_file.status(folder / LOCK) is not None:
-        with held(folder, exclusive=False, patience=patience):
+        with held(folder, exclusive=False, timeout=timeout):
             pass
 
 
 @contextmanager
-def held(folder: Path, *, exclusive: bool = True, patience: float = PATIENCE) -> Iterator[None]:
+def held(folder: Path, *, exclusive: bool = True, timeout: float = AT_WORK_TIMEOUT) -> Iterator[None]:
     """Be alone at work in a folder, which exists; InputError where another process still is.
 
-    exclusive : False to share it with those who only look. patience : to wait for the other one, s.
+    exclusive : False to share it with those who only look. timeout : to wait for the other one, s.
     """
     with ExitStack() as stack:
         try:
-            stack.enter_context(locked(folder / LOCK, exclusive=exclusive, patience=patience))
+            stack.enter_context(locked(folder / LOCK, exclusive=exclusive, timeout=timeout))
         except RunError:
             raise InputError(
                 "output folder must be without a command that is still at work there; "

@@ -1,4 +1,4 @@
-"""Who may write to a folder: what tisim has written there it may replace, anything else only when told to.
+"""Who may write to a folder: what tisim has written there it may replace, anything else only if it is to.
 
 The marker ``.tisim`` in a folder names the files that tisim has written to it, one a line; a file that it
 does not name is of another origin. A folder without a marker may be of version 0.1.0, which made none: it is
@@ -55,16 +55,10 @@ BEFORE = (
 """Whatever is written to a folder first, it is all in the marker that is then made."""
 
 
-def check(
-    folder: Path,
-    names: Iterable[str],
-    overwrite: bool = False,
-    how: str = "--overwrite",
-) -> None:
+def check(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
     """InputError when writing files of these names would replace what tisim has not written; touches nothing.
 
-    overwrite : replace it all the same. how : the option that a message speaks of. A link, folder, fifo or
-    device of such a name is refused always.
+    overwrite : replace it all the same. A link, folder, fifo or device of such a name is refused always.
     """
     mine, others = _ours(folder), []
     for name in names:
@@ -72,7 +66,7 @@ def check(
             if regular_file.status(folder / file) is not None and name not in mine:
                 others.append(file)
     if others and not overwrite:
-        raise _refusal(folder, others, f"would replace (or give {how})")
+        raise _refusal(folder, others, "would replace (or give --overwrite)")
 
 
 def check_all(folder: Path, overwrite: bool = False) -> None:
@@ -91,27 +85,27 @@ def check_all(folder: Path, overwrite: bool = False) -> None:
         raise _refusal(folder, others, "might replace (or give --overwrite)")
 
 
-def take(
-    folder: Path,
-    names: Iterable[str],
-    overwrite: bool = False,
-    how: str = "--overwrite",
-) -> None:
+def take(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
     """Make the folder, and mark it: from now on files of these names are of tisim's writing.
 
     InputError as of check, and when the folder cannot be written to.
     """
     wanted = list(names)
-    check(folder, wanted, overwrite, how)
+    check(folder, wanted, overwrite)
     writable(folder)
     if set(wanted) <= _marked(folder):
         return
     with locked(folder / MARKER, exclusive=True):
-        check(folder, wanted, overwrite, how)  # another process may have come first
+        check(folder, wanted, overwrite)  # another process may have come first
         text = regular_file.content(folder / MARKER) or b""
         whole = b"\n" if text and not text.endswith(b"\n") else b""  # a killed writer's last name is not
         new = sorted({*wanted, *_ours(folder)} - _marked(folder))
         append_at(folder / MARKER, len(text), whole + "".join(f"{name}\n" for name in new).encode())
+
+
+def results(folder: Path) -> bool:
+    """Whether there is a file that tisim has written, by the marker."""
+    return any(regular_file.exists(folder / name) for name in _marked(folder) - {LOCK})
 
 
 def writable(folder: Path) -> None:

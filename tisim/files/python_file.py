@@ -98,7 +98,7 @@ def superseded(kind: type) -> bool:
 def checksums(*things: Any) -> dict[str, str]:
     """Checksum of each module outside of this package that defines these functions, classes or their bases.
 
-    Of a file that was loaded here, also those of other loaded files that it takes something from.
+    For a file that was loaded here, also those of other loaded files that it takes something from.
     """
     found: dict[str, str] = {}
     for thing in things:
@@ -125,7 +125,7 @@ def _add(module: str, thing: Any, found: dict[str, str]) -> None:
 
 
 def _checksum(module: str, thing: Any) -> str:
-    """Of the file of a module that Python has imported by itself; of a notebook, of what was defined."""
+    """SHA-256 of the file of a module that Python has imported by itself, or of what a notebook defines."""
     path = getattr(sys.modules.get(module), "__file__", None)
     try:
         text = Path(path).read_bytes() if path else inspect.getsource(thing).encode()
@@ -184,7 +184,7 @@ def _run(file: PythonFile) -> ModuleType:
         sys.modules.pop(file.name)
         if there is not None:
             sys.modules[file.name] = there
-        raise InputError(_told(file, error)) from error
+        raise InputError(_reported(file, error)) from error
     return module
 
 
@@ -194,7 +194,7 @@ def _of_python(module: ModuleType, file: PythonFile) -> bool:
     return file.name not in _current and path is not None and Path(path).read_bytes() == file.text
 
 
-def _told(file: PythonFile, error: BaseException) -> str:
+def _reported(file: PythonFile, error: BaseException) -> str:
     """That a file cannot be imported: where, and why; in one line."""
     if isinstance(error, SyntaxError) and error.filename == file.path:
         line, why = error.lineno, error.msg

@@ -1,7 +1,7 @@
 """An HDF5 file that another process may be writing (see growing_hdf5.py), to be read as a file object.
 
 A reader that has found the end of the file meets, a moment later, data behind that end. HDF5 refuses them, so
-it is told that the file ends where no file does; what is not there is then missing from a block that has a
+it hears that the file ends where no file does; what is not there is then missing from a block that has a
 checksum.
 """
 

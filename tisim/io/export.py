@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tisim.errors import must
+from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, unfinished
 from tisim.io.reader import Frame, Frames, frames, worlds
 from tisim.io.run_folder import units
@@ -40,7 +40,7 @@ def export(
     for world in range(number):
         name = _name(file, world, number)
         with frames(file, world) as found:
-            steps = _told(found, progress, world, number)
+            steps = _reported(found, progress, world, number)
             made.append(_vtk(steps, folder, name) if kind == "vtk" else _xyz(found, steps, folder, name))
     return made[0]
 
@@ -48,10 +48,18 @@ def export(
 def check(file: Path, kind: str) -> None:
     """InputError unless the file can be written in this format."""
     must(kind in FORMATS, "format", f"one of {', '.join(FORMATS)}", kind)
-    with frames(file) as found:
-        must(len(found) > 0, "file", "one with a frame", f"{file}, with none yet")
-        sound = kind != "h5md" or "id" in found[0].arrays
-        must(sound, "file", "a trajectory.h5 for format h5md", str(file))
+    first = _first(file)
+    sound = kind != "h5md" or "id" in first.arrays
+    must(sound, "file", "a trajectory.h5 for format h5md", str(file))
+
+
+def _first(file: Path) -> Frame:
+    """The first frame of the first world that has one; InputError where none has."""
+    for world in range(worlds(file)):
+        with frames(file, world) as found:
+            if len(found):
+                return found[0]
+    raise InputError(f"file must be one with a frame; received {str(file)!r}, with none yet")
 
 
 def names(file: Path, kind: str) -> list[str]:
@@ -67,7 +75,8 @@ def names(file: Path, kind: str) -> list[str]:
     return made
 
 
-def _told(found: Frames, progress: Callable[[float], None], world: int, number: int) -> Iterator[Frame]:
+def _reported(found: Frames, progress: Callable[[float], None], world: int, number: int) -> Iterator[Frame]:
+    """The frames of a world; ``progress`` is called after each, with the finished fraction of all worlds."""
     for k, frame in enumerate(found):
         yield frame
         progress((world + (k + 1) / len(found)) / number)
@@ -179,11 +188,12 @@ def _order(arrays: Arrays) -> list[str]:
 
 
 def _h5md(file: Path, out: Path) -> Path:
+    """A copy; of a world that has no frame yet, its scene."""
     scenes = []
     for world in range(worlds(file)):
         with frames(file, world) as found:
             scenes.append(found.scene)
-            single = found[0].arrays["position"].dtype == np.float32
+    single = _first(file).arrays["position"].dtype == np.float32
     new, real = out.with_name(unfinished(out.name)), "f32" if single else "f64"
     with replacing(out, new), Trajectory(Recording(new, frames=1), scenes, real) as copy:
         for world in range(len(scenes)):

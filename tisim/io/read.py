@@ -22,7 +22,7 @@ from tisim.scene.scene import Scene
 CAN = "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
 """What ``read`` reads."""
 SEARCH = "tisim evaluations 1"
-"""The format of a search.h5."""
+"""The format of a search.h5, which is that of a room above; a test holds them together."""
 
 
 def read(path: str | Path) -> Any:
@@ -49,10 +49,10 @@ def read(path: str | Path) -> Any:
     if not head.startswith(SIGNATURE):
         return _text(place)
     # A trajectory has its own checksums, and may be large.
-    return recorded_trajectory.RecordedTrajectory(place) if sound(head) else _sealed(place)
+    return recorded_trajectory.RecordedTrajectory(place) if sound(head) else _written_whole(place)
 
 
-def _sealed(path: Path) -> Any:
+def _written_whole(path: Path) -> Any:
     """What is in an HDF5 file that is written whole."""
     from tisim.accuracy import storage
 

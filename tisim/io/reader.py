@@ -21,7 +21,7 @@ from tisim.errors import InputError, must
 from tisim.files import checksum, regular_file
 from tisim.files.shared_hdf5 import Reading
 from tisim.files.superblock import SIGNATURE, SIZE, sound
-from tisim.interrupt import held
+from tisim.interrupt import deferred
 from tisim.io import h5md
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -69,7 +69,7 @@ class Frames:
 
     @cached_property
     def times(self) -> np.ndarray:
-        """Of each frame, s, shape (frames,)."""
+        """The time of each frame, s, shape (frames,)."""
         if self._world is None:
             return self._file.read(lambda file: np.array([0.0, file.attrs["time"]]))
         return self._clock[1]
@@ -162,7 +162,7 @@ class _File:
         self._file: h5py.File | None = None
 
     # HDF5 calls Reading, in which no signal may be raised: it would be lost.
-    @held()
+    @deferred()
     def read(self, look: Callable[[h5py.File], T]) -> T:
         """What look finds in the file; InputError where that is damaged.
 
@@ -181,7 +181,7 @@ class _File:
                 time.sleep(PAUSE)
         raise AssertionError  # not reached
 
-    @held()
+    @deferred()
     def close(self) -> None:
         if self._file is not None:
             self._file.close()

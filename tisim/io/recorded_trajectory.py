@@ -37,7 +37,7 @@ class RecordedWorld(Sequence[Frame]):
 
     @property
     def times(self) -> np.ndarray:
-        """Of each frame, s, shape (frames,)."""
+        """The time of each frame, s, shape (frames,)."""
         with self._frames() as found:
             return found.times
 

@@ -27,16 +27,18 @@ from tisim.engine.result import Result, Status
 from tisim.errors import must
 from tisim.files import checksum, lock, ownership, regular_file
 from tisim.files.atomic import replace_file
+from tisim.files.resuming import resumes
 from tisim.io.reader import RESULT, undamaged
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import SHARED, resolve_fields
 
-NAMES = (
-    "result.h5", "scene.toml", "versions.json", "cloud.png", "checkpoint.h5", "trajectory.h5", lock.LOCK,
-)  # fmt: skip
-"""Of all files that a run writes."""
+DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
+"""Names of the files that are about one run, in the order in which a new run removes them: without the result
+the folder is that of an interrupted run, and a checkpoint is of use only with the frames before it."""
+NAMES = (*DATA, lock.LOCK)
+"""Names of all files that a run writes."""
 
 
 @dataclass(frozen=True)
@@ -57,34 +59,38 @@ class Folder:
     def checkpoint(self) -> Path:
         return self.path / "checkpoint.h5"
 
-    def check(self, overwrite: bool = False, resume: bool = False) -> None:
-        """InputError when a run is under way here, or writing here would lose what is not to be lost; touches
-        nothing."""
-        lock.check(self.path)
-        self._check(overwrite, resume)
+    def check(self, fresh: bool | None = None, overwrite: bool = False) -> bool:
+        """Whether a run goes on with what is here; see ``resuming.resumes``. Touches nothing.
 
-    def _check(self, overwrite: bool, resume: bool) -> None:
-        what, begun = "output folder", regular_file.exists(self.checkpoint)
-        if resume:
-            must(begun, what, "one that an interrupted run has left", str(self.path))
-        elif not overwrite:
-            finished = regular_file.exists(self.result)
-            must(not finished, what, "without a finished run (or give --overwrite)", str(self.path))
-            how = "--resume or --overwrite" if begun else "--overwrite; there is no checkpoint to go on from"
-            rule = f"without an interrupted run (or give {how})"
-            must(not begun and not regular_file.exists(self.trajectory), what, rule, str(self.path))
-        ownership.check(self.path, NAMES, overwrite or resume)
+        InputError when a run is under way here, or writing here would lose what is not to be lost.
+        """
+        lock.check(self.path)
+        return self._check(fresh, overwrite)
+
+    def _check(self, fresh: bool | None, overwrite: bool) -> bool:
+        finished = regular_file.exists(self.result)
+        begun = regular_file.exists(self.checkpoint) and not finished
+        goes_on = resumes(self.path, "run", begun, "a finished run" * finished, fresh, overwrite)
+        lost = regular_file.exists(self.trajectory) and not (goes_on or fresh or overwrite)
+        rule = "without an interrupted run (or give --fresh; there is no checkpoint to go on from)"
+        must(not lost, "output folder", rule, str(self.path))
+        ownership.check(self.path, NAMES, overwrite)
+        return goes_on
 
     @contextmanager
-    def taken(self, overwrite: bool = False, resume: bool = False) -> Iterator[None]:
+    def taken(self, fresh: bool | None = None, overwrite: bool = False) -> Iterator[bool]:
         """Make the folder, mark it as one of tisim's, and be alone at work there while this lasts.
 
-        InputError as of check, and where that cannot be.
+        Gives whether the run goes on with what is here. Where it does not, what an earlier one has left is
+        removed, so that nothing of it is taken for the new one's, even if that is killed. InputError as of
+        check, and where that cannot be.
         """
-        ownership.take(self.path, NAMES, overwrite or resume)
+        ownership.take(self.path, NAMES, overwrite)
         with lock.held(self.path):
-            self._check(overwrite, resume)  # another run may have come and gone since that was looked at
-            yield
+            goes_on = self._check(fresh, overwrite)  # another run may have come and gone since then
+            for name in () if goes_on else DATA:
+                (self.path / name).unlink(missing_ok=True)
+            yield goes_on
 
 
 def versions() -> dict[str, str]:
@@ -155,7 +161,7 @@ def read_result(path: Path) -> Result:
 
 
 def units(scene: Scene) -> dict[str, str]:
-    """Of all quantities that particles of a scene have, by name."""
+    """The unit of each quantity that particles of a scene have, by name."""
     fields = resolve_fields((*SHARED, *needed_fields(scene.effects, scene.stepper)))
     return {field.name: field.unit for field in fields}
 

@@ -29,11 +29,11 @@ from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.atomic import replace_file
+from tisim.files.atomic import replace_file, unfinished
 from tisim.files.growing_hdf5 import Growing
-from tisim.interrupt import held
+from tisim.interrupt import deferred
 from tisim.io import h5md
-from tisim.io.reader import Frame, frames
+from tisim.io.reader import Frame, frames, worlds
 from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import Field, resolve_fields
@@ -108,7 +108,7 @@ class Trajectory:
             raise
 
     # HDF5 calls Growing, in which no signal may be raised: the HDF5 library cannot close the file any more.
-    @held()
+    @deferred()
     def _open(self) -> None:
         self.disk = self._opened.enter_context(Growing(self.path))
         self.file = self._opened.enter_context(h5py.File(self.disk, "r+", libver=LIBRARY))
@@ -134,25 +134,29 @@ class Trajectory:
 
     @classmethod
     def going_on(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
-        """The file that a stopped run has left, less its frames after ``time`` (s); a new one if none is."""
+        """The file that a stopped run has left, less its frames after ``time`` (s); a new one if none is.
+
+        InputError when the file is damaged, or of another scene; it is then as it was.
+        """
         path = Path(recording.path)
         if not regular_file.exists(path):
             return cls(recording, [scene], real)
-        unfinished = path.with_name(path.name + ".new")
-        with ExitStack() as given_up:
-            given_up.callback(unfinished.unlink, missing_ok=True)
-            made = cls(replace(recording, path=unfinished), [scene], real)
+        new = path.with_name(unfinished(path.name))
+        with frames(path) as before, ExitStack() as given_up:
+            same = worlds(path) == 1 and before.scene.digest() == scene.digest()
+            must(same, "trajectory to go on with", "of the same scene", f"{path}, of another one")
+            given_up.callback(new.unlink, missing_ok=True)
+            made = cls(replace(recording, path=new), [scene], real)
             given_up.push(made)
-            with frames(path) as before:
-                for frame in before:
-                    if frame.time <= time:
-                        made.write(0, frame)
-            unfinished.replace(path)
+            for frame in before:
+                if frame.time <= time:
+                    made.write(0, frame)
+            new.replace(path)
             given_up.pop_all()
         made.path = path
         return made
 
-    @held()
+    @deferred()
     def write(self, index: int, frame: Frame) -> None:
         """Add a frame of the scene of this index; RunError when the disk is full. Ctrl-C waits."""
         group, n = self.groups[index], len(frame.arrays["id"])
@@ -185,7 +189,7 @@ class Trajectory:
             why = self.disk.failure.strerror or self.disk.failure
             raise RunError(f"{self.path} could not be written: {why}; frames before are intact")
 
-    @held()
+    @deferred()
     def _finish(self) -> None:
         self._opened.close()
 
@@ -213,8 +217,8 @@ class Trajectory:
 def asked(path: Path, frames: int | None, every: float | None, resume: bool) -> Recording | None:
     """What the options of a command ask for; None when that is nothing."""
     if frames is None and every is None:
-        begun = resume and regular_file.exists(path)
-        must(not begun, "--frames or --every", "given as before, to go on with trajectory.h5", "neither")
+        begun, rule = resume and regular_file.exists(path), "to go on with trajectory.h5 (or give --fresh)"
+        must(not begun, "--frames or --every", f"given as before, {rule}", "neither")
         return None
     return Recording(path, frames, every)
 

@@ -12,6 +12,7 @@ from optimize.evaluation.runs import start_seed
 from optimize.problem.objective import Objective
 from optimize.report import comparison
 from optimize.report.comparison import FRESH, compare, settings_of
+from optimize.storage.cache import Cache
 from tests.optimize.drift_case import CASE
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tests.optimize.test_several import OBJECTIVES
@@ -131,6 +132,24 @@ def test_command(tmp_path, monkeypatch, capsys):
     assert "cma-es, search 2 of 2: 60 runs" in err
     with (tmp_path / "out" / "compare-drift" / "compare.csv").open() as file:
         assert len(list(csv.reader(file))) == 5
+    store = tmp_path / "out" / "compare-drift" / "compare.h5"
+    runs = len(Cache(store))
+    for more, code, message in (
+        (["--evaluations", "61", "--repeats", "1"], 0, f"compare.h5, which has {runs} runs"),
+        (["--precision", "f32"], 2, "without another comparison (or give --out or --overwrite); received"),
+        (["--fresh"], 2, "without what a comparison has found (or give --overwrite)"),
+    ):
+        with pytest.raises(SystemExit) as exit_:
+            main([*command, "--set", "search.ensemble.max_starts=4", "--fresh-starts", "4", *more])
+        assert exit_.value.code == code
+        assert message in " ".join(capsys.readouterr().err.split())
+    shown = len(Cache(store))
+    with monkeypatch.context() as patch:
+        patch.setattr(comparison, "compare", lambda *arguments: iter(()))
+        patch.setattr(comparison, "table", lambda *arguments: "")
+        with pytest.raises(SystemExit):
+            main([*command, "--overwrite"])
+    assert (shown >= runs, len(Cache(store))) == (True, 0)
     with pytest.raises(SystemExit) as exit_:
         main(["compare", "drift", "--methods", "simplex"])
     assert exit_.value.code == 2

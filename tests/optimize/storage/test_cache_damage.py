@@ -5,12 +5,12 @@ import h5py
 import pytest
 
 from optimize.storage.cache import Cache, existing
-from optimize.storage.journal import Journal, frame, scan
+from optimize.storage.journal import Journal
 from optimize.storage.maintenance import compact, verify
 from tests.optimize.cache_files import hurt, journal_of, lock_of, payloads
 from tests.optimize.fake_runs import fake_record
 from tisim import InputError
-from tisim.files.framing import MAGIC
+from tisim.files.framing import MAGIC, frame, scan
 
 
 def test_torn_tail_at_every_byte(path):
@@ -282,8 +282,10 @@ def test_paths_that_name_no_file(path):
 
 
 SPOILT = {
-    "a flipped bit in the seal": lambda content: content[:-20] + bytes([content[-20] ^ 1]) + content[-19:],
-    "without the seal": lambda content: content[: content.rfind(MAGIC)],
+    "a flipped bit in the checksum": lambda content: (
+        content[:-20] + bytes([content[-20] ^ 1]) + content[-19:]
+    ),
+    "without the checksum": lambda content: content[: content.rfind(MAGIC)],
     "garbage after it": lambda content: content + MAGIC + b"garbage",
 }
 
@@ -319,7 +321,7 @@ def test_reading_what_is_damaged_ends_in_any_case(path, monkeypatch):
     """As when HDF5 never returns; and the file is then as it was."""
     with Cache(path) as cache:
         cache.put(fake_record(1))
-    before = SPOILT["without the seal"](path.read_bytes())
+    before = SPOILT["without the checksum"](path.read_bytes())
     path.write_bytes(before)
     with monkeypatch.context() as patch:
         patch.setattr("optimize.storage.salvage.LIMIT", 1e-3)

@@ -78,7 +78,7 @@ def replaced(make):
 DAMAGE = {
     "structure": lambda path: flip(path, 100),
     "signature": lambda path: flip(path, 3),
-    "seal": lambda path: flip(path, path.read_bytes().rfind(MAGIC) + 1),
+    "checksum": lambda path: flip(path, path.read_bytes().rfind(MAGIC) + 1),
     "end": lambda path: flip(path, -1),
     "cut": lambda path: path.write_bytes(path.read_bytes()[:-700]),
     "empty": lambda path: path.write_bytes(b""),

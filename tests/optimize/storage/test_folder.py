@@ -8,7 +8,7 @@ import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from optimize.search_folder import SEARCH_FILES, clear
+from optimize.search_folder import SEARCH_FILES, going_on
 from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
@@ -45,10 +45,8 @@ def contents(folder):
 def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     folder = tmp_path / "s"
     assert optimize("--seed", 1)[0] == 0
-    first = contents(folder)
-    rule = (
-        "output folder must be without another search (or give --out, or --fresh --overwrite); received 's'"
-    )
+    first, runs = contents(folder), len(Cache(folder / "search.h5"))
+    rule = "output folder must be without another search (or give --out or --overwrite); received 's'"
     for other, differ in {
         ("--seed", 2): "search.seed = 1 and not 2",
         ("--seed", 1, "--population", 9, "--set", "search.ensemble.block=2"): (
@@ -58,11 +56,16 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
         code, err = optimize(*other)
         assert (code, err.strip()) == (2, f"{rule}, where one has {differ}")
         assert contents(folder) == first
-    assert optimize("--seed", 1, "--generations", 2)[0] == 0
+    code, err = optimize("--seed", 1, "--generations", 2)
+    assert code == 0
+    assert f"going on with s/search.h5, which has {runs} runs" in " ".join(err.split())
     assert contents(folder)["best.csv"] != first["best.csv"]
-    code, err = optimize("--seed", 2, "--overwrite")
-    assert (code, err.strip()) == (2, "--overwrite must be given with --fresh; received '--overwrite'")
-    code, err = optimize("--seed", 2, "--fresh", "--overwrite", "--target", 1e9, "--generations", 0)
+    code, err = optimize("--seed", 2, "--overwrite", "--resume")
+    assert (code, err.strip()) == (2, "--overwrite must be given without --resume; received 'both'")
+    code, err = optimize("--seed", 2, "--fresh")
+    lost = "output folder must be without what a search has found (or give --overwrite); received 's'"
+    assert (code, err.strip()) == (2, lost)
+    code, err = optimize("--seed", 2, "--overwrite", "--target", 1e9, "--generations", 0)
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
     assert optimize("--seed", 1)[0] == 2
@@ -78,13 +81,13 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
                 interrupted.append(scenes)
                 assert optimize()[0] == 0
                 with pytest.raises(InputError, match="without a command that is still at work there"):
-                    clear(tmp_path / "s", overwrite=True)
+                    going_on(tmp_path / "s", None, overwrite=True)
             return super().evaluate(scenes, progress)
 
     monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", Joined)
     assert optimize("--generations", 3)[0] == 0
     assert interrupted
-    assert optimize("--generations", 3, "--fresh", "--overwrite")[0] == 0
+    assert optimize("--generations", 3, "--overwrite")[0] == 0
 
 
 def test_population_alone_brings_the_parents_that_go_with_it(optimize, tmp_path, monkeypatch):
@@ -108,10 +111,10 @@ def test_files_of_the_user_are_not_replaced(optimize, tmp_path, name):
     assert (code, err.strip()) == (
         2,
         "output folder must be without files that tisim has not written and would replace "
-        f"(or give --fresh --overwrite); received 's' with {name}",
+        f"(or give --overwrite); received 's' with {name}",
     )
     assert contents(users.parent) == {name: b"the user's own"}
-    assert optimize("--fresh", "--overwrite")[0] == 0
+    assert optimize("--overwrite")[0] == 0
     assert contents(users.parent).get(name) != b"the user's own"
     assert optimize()[0] == 0
 
@@ -146,7 +149,7 @@ def test_a_folder_of_before_markers_goes_on_and_unrelated_files_do_not_matter(op
 def test_time_over_in_the_first_generation_says_how_to_go_on(optimize, tmp_path):
     code, err = optimize("--budget-minutes", 1e-9)
     assert code == 1
-    assert "the time was over before the first generation; to go on, give the same command again" in err
+    assert "the time was over before the first generation. To go on, give the same command again." in err
     assert optimize()[0] == 0
 
 

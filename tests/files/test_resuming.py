@@ -1,0 +1,48 @@
+"""The one rule of going on and beginning anew, that all commands share."""
+
+from pathlib import Path
+
+import pytest
+
+from tisim import InputError
+from tisim.files.resuming import how_to_go_on, resumes
+
+LEFT, KEPT = "one that an interrupted run has left", r"without a finished run \(or give --overwrite\)"
+BOTH = "--overwrite must be given without --resume"
+
+
+@pytest.mark.parametrize(
+    ("begun", "results", "without", "fresh", "resume", "overwrite"),
+    [
+        # What becomes of a command without options, with --fresh, with --resume and with --overwrite.
+        (False, "", False, False, LEFT, False),
+        (True, "", True, False, True, False),
+        (True, "a finished run", True, KEPT, True, False),
+        (False, "a finished run", KEPT, KEPT, LEFT, False),
+    ],
+)
+def test_what_a_command_does_follows_from_what_is_there(begun, results, without, fresh, resume, overwrite):
+    for options, expected in (
+        ((None, False), without),
+        ((True, False), fresh),
+        ((False, False), resume),
+        ((None, True), overwrite),
+        ((True, True), overwrite),
+        ((False, True), BOTH),
+    ):
+        arguments = (Path("out"), "run", begun, results, *options)
+        if isinstance(expected, bool):
+            assert resumes(*arguments) is expected, options
+        else:
+            with pytest.raises(InputError, match=expected):
+                resumes(*arguments)
+
+
+def test_the_same_command_goes_on_but_for_what_would_begin_anew():
+    assert how_to_go_on(None, False) == "To go on, give the same command again."
+    assert how_to_go_on(True, True) == (
+        "To go on, give the same command again, without --fresh and --overwrite."
+    )
+    assert how_to_go_on(None, True, "make room and ") == (
+        "To go on, make room and give the same command again, without --overwrite."
+    )
