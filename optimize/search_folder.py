@@ -28,7 +28,7 @@ from tisim.files.atomic import locked
 from tisim.files.regular_file import status
 from tisim.files.resuming import resumes
 
-FILE = "search.h5"
+SEARCH_FILE = "search.h5"
 BESIDE = (
     "best.csv",
     "convergence.png",
@@ -39,13 +39,13 @@ BESIDE = (
     "best_cloud.png",
     "best_run.csv",
 )
-SEARCH_FILES = (FILE, f"{FILE}.journal", f"{FILE}.lock", *BESIDE, lock.LOCK)
+SEARCH_FILES = (SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", *BESIDE, lock.LOCK)
 """The files that a search writes into its folder."""
 
 
 def going_on(
     folder: Path, fresh: bool | None, overwrite: bool,
-    what: str = "search", file: str = FILE, beside: Sequence[str] = BESIDE,
+    what: str = "search", file: str = SEARCH_FILE, beside: Sequence[str] = BESIDE,
 ) -> bool:  # fmt: skip
     """Whether a search goes on with what is in the folder (``resuming.resumes``); if not, that is removed.
 

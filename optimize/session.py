@@ -18,7 +18,7 @@ from optimize.problem.problem import Problem
 from optimize.report import report
 from optimize.report.display import Display
 from optimize.search import search
-from optimize.search_folder import FILE, SEARCH_FILES, check
+from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, check
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from tisim.backend import runtime
@@ -63,7 +63,7 @@ def run(
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
             return session(problem, wished, evaluator, Path(out), say, bar, stopping)
-        with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / FILE) as cache:
+        with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / SEARCH_FILE) as cache:
             return _shown(
                 problem, wished, evaluator, cache, err() if verbose else Console(quiet=True), stopping
             )
@@ -88,11 +88,12 @@ def session(
     """
     take(folder, SEARCH_FILES, overwrite)
     with lock.held(folder, exclusive=False):
-        with Cache(folder / FILE) as cache:
+        with Cache(folder / SEARCH_FILE) as cache:
             if check(folder, cache, identity(problem, settings, evaluator.settings)):
-                bar.print(f"going on with {folder / FILE}, which has {len(cache)} runs", highlight=False)
+                line = f"going on with {folder / SEARCH_FILE}, which has {len(cache)} runs"
+                bar.print(line, highlight=False)
             outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
-        paths = [folder / FILE]
+        paths = [folder / SEARCH_FILE]
         if outcome.best is not None:
             say.print(report.best_table(outcome))
             say.print(report.notes(outcome))

@@ -6,12 +6,6 @@ from pathlib import Path
 
 from tests import rooms
 
-SHARED = {
-    "BEFORE", "CUTS", "FARTHEST", "FILE", "FORMAT", "NAMES", "OWN", "PATIENCE", "ROUNDING", "ROWS", "SHOWN",
-    "SMALL",
-}  # fmt: skip
-"""The names that still stand for several values; none is to be added."""
-
 
 def constants(tree):
     """The public upper-case names that a module defines, and what they are set to, as it is written."""
@@ -58,7 +52,7 @@ def ambiguous(files):
 
 def test_a_name_stands_for_one_value():
     texts = {module: file.read_text(encoding="utf-8") for module, file in FILES.items()}
-    assert ambiguous(texts) == SHARED
+    assert ambiguous(texts) == set()
 
 
 def test_a_second_value_is_found():

@@ -29,8 +29,8 @@ from tisim.console import plain_table
 from tisim.errors import must
 from tisim.files import lock
 
-FILE, CSV = "compare.h5", "compare.csv"
-NAMES = (FILE, f"{FILE}.journal", f"{FILE}.lock", CSV, lock.LOCK)
+COMPARISON_FILE, CSV = "compare.h5", "compare.csv"
+COMPARISON_FILES = (COMPARISON_FILE, f"{COMPARISON_FILE}.journal", f"{COMPARISON_FILE}.lock", CSV, lock.LOCK)
 FRESH = 10**6
 """The seed of the starts from which the best designs are run again: no search has it."""
 NOTE = (

@@ -98,9 +98,9 @@ class Cache:
         """
         first = name.split("/")[0]
         must(
-            bool(first) and first != hdf5_store.ROWS,
+            bool(first) and first != hdf5_store.EVALUATIONS,
             "table name",
-            f"non-empty and not below {hdf5_store.ROWS!r}",
+            f"non-empty and not below {hdf5_store.EVALUATIONS!r}",
             name,
         )
         self._pending[name] = Hdf5Table(dict(columns), dict(attrs or {}))

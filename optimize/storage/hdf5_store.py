@@ -26,8 +26,8 @@ from tisim.errors import must
 from tisim.files import regular_file
 from tisim.files.checksum import verified, with_checksum
 
-FORMAT = "tisim evaluations 1"
-ROWS = "evaluations"
+EVALUATIONS_FORMAT = "tisim evaluations 1"
+EVALUATIONS = "evaluations"
 
 _COLUMNS: dict[str, Any] = {
     "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
@@ -70,7 +70,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
             "('tisim cache --compact' keeps what can be read)"
         )
     with h5py.File(io.BytesIO(inside), "r") as file:
-        if file.attrs.get("format") != FORMAT or ROWS not in file:
+        if file.attrs.get("format") != EVALUATIONS_FORMAT or EVALUATIONS not in file:
             raise InputError(f"{rule} one with {', '.join(file) or 'nothing in it'}")
         try:
             yield file
@@ -88,16 +88,16 @@ def image(
     damaged : whether to take over tables whose checksum fails.
     """
     with h5py.File("image", "w", driver="core", backing_store=False) as new:
-        new.attrs["format"] = FORMAT
+        new.attrs["format"] = EVALUATIONS_FORMAT
         if old is not None:
             with opened(old) as file:
-                for name in set(file) - {ROWS}:
+                for name in set(file) - {EVALUATIONS}:
                     file.copy(file[name], new, name)
         for name in [] if damaged else damaged_tables(new):
             _clear(new[name])
         for name, table in tables.items():
             _write_table(new.require_group(name), table)
-        _write_rows(new.create_group(ROWS), records)
+        _write_rows(new.create_group(EVALUATIONS), records)
         new.flush()
         data: list[tuple[int, int]] = []
         new.visititems(lambda _, item: data.append(_place(item)) if isinstance(item, h5py.Dataset) else None)
@@ -106,9 +106,9 @@ def image(
 
 def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
     """The whole evaluations in order, and a description of each row whose checksum fails."""
-    columns = {name: file[ROWS][name][...] for name in _COLUMNS}
-    if _OTHERS in file[ROWS]:
-        columns[_OTHERS] = file[ROWS][_OTHERS][...]
+    columns = {name: file[EVALUATIONS][name][...] for name in _COLUMNS}
+    if _OTHERS in file[EVALUATIONS]:
+        columns[_OTHERS] = file[EVALUATIONS][_OTHERS][...]
     lengths = {name: len(column) for name, column in columns.items()}
     must(len(set(lengths.values())) == 1, f"columns of {file.filename}", "all of one length", lengths)
     records, damaged = [], []

@@ -54,7 +54,8 @@ def _salvaged(old: bytes) -> bytes | None:
 def _read(old: bytes) -> bytes:
     """A cache file of what is whole in a damaged one; any error when nothing can be read."""
     with h5py.File(io.BytesIO(old), "r") as file:
-        must(file.attrs.get("format") == hdf5_store.FORMAT, "file", "written by a cache", "another")
+        written = file.attrs.get("format") == hdf5_store.EVALUATIONS_FORMAT
+        must(written, "file", "written by a cache", "another")
         records, _ = hdf5_store.read_rows(file)
         try:
             bad = hdf5_store.damaged_tables(file)

@@ -62,7 +62,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
     code, out, _ = tisim(*command, "1e-3")
     assert code == 0
     folder = tmp_path / "out" / "swing-cost"
-    assert {path.name for path in folder.iterdir()} == {".tisim", *storage.NAMES}
+    assert {path.name for path in folder.iterdir()} == {".tisim", *storage.COST_FILES}
     # dt = 0.0316 and 0.01 come before: their errors are 7e-3 and 7e-4.
     assert [row["setting"] for row in rows(folder)] == ["dt=0.0316", "dt=0.01", "dt=0.00316"]
     (answer,) = [line for line in out.splitlines() if line.startswith("  tisim run")]

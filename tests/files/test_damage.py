@@ -153,7 +153,7 @@ def no_file(request, tmp_path):
         worlds,
         lambda path: export(path, "vtk", path.parent),
         lambda path: checkpoint.restore(_Loaded(), path),
-        lambda path: checksum.opened(path, "file", storage.FORMAT).__enter__(),
+        lambda path: checksum.opened(path, "file", storage.COST_FORMAT).__enter__(),
     ],
     ids=["frames", "worlds", "export", "checkpoint", "cost"],
 )

@@ -7,11 +7,11 @@ from scipy.constants import g
 from tests.scenes import fixed, scene, simulate
 from tisim import Box
 from tisim.effects import Gravity, NearField
-from tisim.interactions.pair_sum import LANES
+from tisim.interactions.pair_sum import TILE
 
-NUMBERS = (1, LANES - 1, LANES, LANES + 1, 2 * LANES + 6)
+NUMBERS = (1, TILE - 1, TILE, TILE + 1, 2 * TILE + 6)
 ROOM = max(NUMBERS)
-"""No multiple of LANES: the last tile overlaps the one before."""
+"""No multiple of TILE: the last tile overlaps the one before."""
 LAW = NearField(alpha1=0.5, alpha2=0.1, strength="mass")
 
 
@@ -50,7 +50,7 @@ def test_forces_in_every_tile_are_their_numpy_twin(usual):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("schedule", "room", "numbers"),
-    [("particle", ROOM, NUMBERS), ("world", 4 * LANES, NUMBERS), ("world", LANES - 1, NUMBERS[:2])],
+    [("particle", ROOM, NUMBERS), ("world", 4 * TILE, NUMBERS), ("world", TILE - 1, NUMBERS[:2])],
     ids=["a launch per phase", "more room", "too little room for a tile"],
 )
 def test_the_same_bits(usual, schedule, room, numbers):
@@ -61,7 +61,7 @@ def test_the_same_bits(usual, schedule, room, numbers):
             np.testing.assert_array_equal(values, b.state[name], err_msg=name)
 
 
-@pytest.mark.parametrize("pair", [(3, 5), (LANES - 1, LANES), (5, ROOM - 1)])
+@pytest.mark.parametrize("pair", [(3, 5), (TILE - 1, TILE), (5, ROOM - 1)])
 def test_two_in_one_place_are_named_and_harm_no_other_world(usual, pair):
     """Whether they share a tile or not."""
     position = np.random.default_rng(1).uniform(0, 1, (ROOM, 3))

@@ -186,7 +186,7 @@ def test_what_cannot_be_read(tmp_path, name, content, message):
 
 
 def test_the_format_of_a_search_is_the_one_known():
-    assert reading.SEARCH == hdf5_store.FORMAT
+    assert reading.SEARCH == hdf5_store.EVALUATIONS_FORMAT
 
 
 def test_a_scene_of_any_name(tmp_path):

@@ -12,7 +12,7 @@ from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import lock, ownership
 from tisim.files.ownership import MARKER, writable
-from tisim.io.run_folder import DATA, NAMES, Folder, write
+from tisim.io.run_folder import DATA, RUN_FILES, Folder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
@@ -51,7 +51,7 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     assert not folder.path.exists()
     with pytest.raises(InputError, match="one that an interrupted run has left"):
         folder.check(fresh=False)
-    ownership.take(folder.path, NAMES)
+    ownership.take(folder.path, RUN_FILES)
     folder.checkpoint.touch()
     assert folder.check()
     assert folder.check(fresh=False)
@@ -88,7 +88,7 @@ def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp
     folder = Folder(tmp_path)
     for name in (*DATA, "notes.txt"):
         (tmp_path / name).touch()
-    ownership.take(tmp_path, NAMES, overwrite=True)
+    ownership.take(tmp_path, RUN_FILES, overwrite=True)
     folder.result.unlink()
     with folder.taken() as goes_on:
         assert (goes_on, folder.checkpoint.exists()) == (True, True)

@@ -71,8 +71,8 @@ def clouds(rng):
     yield "in a line", anywhere(200) * [1, 0, 0] + [0, 0, 0.5], 0.001
     yield "one", anywhere(1), 0.1
     yield "two", anywhere(2), 0.4
-    yield "last without a list", anywhere(pair_list.SMALL), 0.1
-    yield "first with a list", anywhere(pair_list.SMALL + 1), 0.1
+    yield "last without a list", anywhere(pair_list.SMALL_WORLD), 0.1
+    yield "first with a list", anywhere(pair_list.SMALL_WORLD + 1), 0.1
 
 
 def motion(rng, n):
@@ -144,7 +144,7 @@ def test_every_near_pair_is_offered_once_by_its_larger_member(rng, domain):
                 reach = start["radius"].max()
                 low, high = start["position"].min(axis=0) - reach, start["position"].max(axis=0) + reach
             spacing = (np.prod(high - low) / n) ** (1 / 3)
-            horizon = pair_list.HORIZON * spacing * (1 - 1e-12) if n > pair_list.SMALL else np.inf
+            horizon = pair_list.HORIZON * spacing * (1 - 1e-12) if n > pair_list.SMALL_WORLD else np.inf
             near = near_pairs(state["position"], state["radius"], domain, min(horizon, 10.0))
             missed = near - set(zip(owner.tolist(), other.tolist(), strict=True))
             assert not missed, f"{where}: missed {sorted(missed)[:5]}"
@@ -214,4 +214,4 @@ def test_results_do_not_depend_on_lists_at_all(rng, outcome):
     start = crowd(rng, fixed(4e-6))
     usual = outcome(start)
     assert usual.work["impacts"] > 100
-    same(usual, outcome(start, SMALL=10**4))
+    same(usual, outcome(start, SMALL_WORLD=10**4))

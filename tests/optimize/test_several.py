@@ -209,8 +209,8 @@ def test_file_of_before_there_were_several_objectives_is_read(path):
     assert Cache(path).records() == [record]
     assert compact(path) == 1
     with h5py.File(path) as file:
-        assert "others" not in file[hdf5_store.ROWS]
-        assert int(file[hdf5_store.ROWS]["crc"][0]) == zlib.crc32(old)
+        assert "others" not in file[hdf5_store.EVALUATIONS]
+        assert int(file[hdf5_store.EVALUATIONS]["crc"][0]) == zlib.crc32(old)
 
 
 def test_what_cannot_be_is_refused(path):

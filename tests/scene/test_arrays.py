@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tisim import InputError, Particles, Scene
-from tisim.components.json_text import ROWS, json_pieces
+from tisim.components.json_text import ROWS_PER_PIECE, json_pieces
 
 
 def text(value):
@@ -18,7 +18,7 @@ def text(value):
 @pytest.mark.parametrize("columns", [(), (3,)])
 def test_text_of_arrays_is_that_of_their_lists(rng, columns):
     """Of numbers of all sizes, bit patterns at random and those near where the notation changes."""
-    size = (ROWS + 5, *columns)
+    size = (ROWS_PER_PIECE + 5, *columns)
     bits = rng.integers(0, 2**64, size, dtype=np.uint64).view(np.float64)
     edges = [
         0.0,

@@ -31,9 +31,9 @@ from tisim.files.atomic import replace_file
 from tisim.files.ownership import writable
 from tisim.io.run_folder import versions
 
-FORMAT = "tisim cost 2"
+COST_FORMAT = "tisim cost 2"
 COST_CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
-NAMES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
+COST_FILES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
 _TEXTS = ("method", "setting", "python", "options", "precision", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
@@ -64,7 +64,7 @@ def table(study: Study) -> str:
 def _write_rows(study: Study, path: Path) -> None:
     with checksum.created(path) as file:
         file.attrs.update({
-            "format": FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
+            "format": COST_FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
             "settings": json.dumps(_settings(study)), "versions": json.dumps(versions()),
             "complete": json.dumps(study.sweep_settings() if study.complete else None),
         })  # fmt: skip
@@ -121,7 +121,7 @@ def resume(study: Study, folder: Path) -> None:
     path = folder / HDF5
     if not regular_file.exists(path):
         return
-    with checksum.opened(path, f"output folder's {HDF5}", FORMAT) as file:
+    with checksum.opened(path, f"output folder's {HDF5}", COST_FORMAT) as file:
         same = json.loads(file.attrs["identity"]) == study.identity()
         rule = "without the study of another scene, version, machine or depth (or give --out or --overwrite)"
         must(same, "output folder", rule, str(folder))
@@ -131,7 +131,7 @@ def resume(study: Study, folder: Path) -> None:
 
 def rows(path: Path) -> list[Row]:
     """What a study has measured, of a cost.h5. InputError when the file is none, cut short or damaged."""
-    with checksum.opened(path, "cost", FORMAT) as file:
+    with checksum.opened(path, "cost", COST_FORMAT) as file:
         return _rows(file["rows"])
 
 

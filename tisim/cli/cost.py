@@ -101,7 +101,7 @@ def cost(
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
     storage.resumes(place, fresh, overwrite)
-    ownership.take(place, storage.NAMES, overwrite)
+    ownership.take(place, storage.COST_FILES, overwrite)
     with lock.held(place):
         if storage.resumes(place, fresh, overwrite):
             storage.resume(study, place)

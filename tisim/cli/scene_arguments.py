@@ -32,7 +32,7 @@ def scene(
         if seed is not None:
             made = made.replace({"seed": seed})
     else:
-        case = targets.case(target, f"or a scene file ending in .toml, {targets.OWN}")
+        case = targets.case(target, f"or a scene file ending in .toml, {targets.OWN_FILE}")
         case.size(size or "default")
         name, made = case.name, case.scene(size or "default", seed or 0)
     return name, made.without(*absent).replace(assignments(changes))

@@ -75,7 +75,7 @@ def optimize(
     All goes to search.h5. The same command, given again, goes on where it was stopped.
     """
     from optimize.evaluation.executors import evaluator_named
-    from optimize.search_folder import FILE, going_on
+    from optimize.search_folder import SEARCH_FILE, going_on
     from optimize.session import session
     from optimize.settings import Settings, fit, followed, proposed
 
@@ -97,13 +97,13 @@ def optimize(
         going_on(place, fresh, overwrite)
         outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
     if outcome.interrupted:
-        err().print(f"stopped; {place / FILE} has all that is done. {how_to_go_on(fresh, overwrite)}")
+        err().print(f"stopped; {place / SEARCH_FILE} has all that is done. {how_to_go_on(fresh, overwrite)}")
         raise typer.Exit(130)
     if not outcome.logbook:
         how = how_to_go_on(fresh, overwrite)
         raise RunError(f"the time was over before the first generation. {how}")
     if outcome.best is None:
-        raise RunError(f"no design has run to its end; 'tisim cache {place / FILE}' says why")
+        raise RunError(f"no design has run to its end; 'tisim cache {place / SEARCH_FILE}' says why")
 
 
 def compare(
@@ -141,18 +141,18 @@ def compare(
     base = scene_arguments.nested(followed(usual, given), given)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
-    goes_on = going_on(place, fresh, overwrite, "comparison", comparison.FILE, (comparison.CSV,))
-    ownership.take(place, comparison.NAMES, overwrite)
+    goes_on = going_on(place, fresh, overwrite, "comparison", comparison.COMPARISON_FILE, (comparison.CSV,))
+    ownership.take(place, comparison.COMPARISON_FILES, overwrite)
     found = []
     with (
         closing(evaluator_named(executor, device, precision, threads)) as evaluator,
         lock.held(place, exclusive=False),
-        Cache(place / comparison.FILE) as store,
+        Cache(place / comparison.COMPARISON_FILE) as store,
         Interrupt(stopping) as ctrl_c,
     ):
         comparison.check(place, store, problem, evaluator.settings)
         if goes_on:
-            err().print(f"going on with {place / comparison.FILE}, which has {len(store)} runs")
+            err().print(f"going on with {place / comparison.COMPARISON_FILE}, which has {len(store)} runs")
         searches = comparison.compare(
             problem, base, names, evaluations, repeats, fresh_starts, evaluator, store,
             lambda _: ctrl_c.check(),
@@ -163,7 +163,7 @@ def compare(
                 line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
-            done = f"stopped; {place / comparison.FILE} has all that is done."
+            done = f"stopped; {place / comparison.COMPARISON_FILE} has all that is done."
             err().print(f"{done} {how_to_go_on(fresh, overwrite)}")
             raise
     out().print(comparison.table(problem, found))

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from optimize.problem.problem import Problem
 
 
-OWN = "or your own NAME.py with a CASE"
+OWN_FILE = "or your own NAME.py with a CASE"
 
 
-def case(target: str, besides: str = OWN) -> Case:
+def case(target: str, besides: str = OWN_FILE) -> Case:
     """The case of that name, or in that file; InputError where there is none.
 
     besides : what may be given beside a name, for the message.

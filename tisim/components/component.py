@@ -34,7 +34,7 @@ def _encodable(text: str) -> str:
 
 Text = Annotated[str, AfterValidator(_encodable)]
 """Text that a file can hold: without halves of surrogate pairs."""
-ROWS = 32
+LEAST_ROWS = 32
 """Rows that there is room for in every list."""
 
 
@@ -209,4 +209,4 @@ def _bounded(info: FieldInfo) -> bool:
 
 def room(rows: int) -> int:
     """Rows that a world's table has room for, so that scenes with lists of like lengths run as one batch."""
-    return max(ROWS, 1 << (rows - 1).bit_length())
+    return max(LEAST_ROWS, 1 << (rows - 1).bit_length())

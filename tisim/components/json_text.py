@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic_core import to_json
 
-ROWS = 1 << 10
+ROWS_PER_PIECE = 1 << 10
 """Rows of an array in a piece."""
 PLAIN = 1e-4, 1e16
 """Magnitudes that Python and pydantic write alike, without an exponent."""
@@ -38,8 +38,8 @@ def _array(array: np.ndarray) -> Iterator[str]:
         yield json.dumps(array.tolist())
         return
     yield "["
-    for begin in range(0, len(array), ROWS):
-        yield ", " * (begin > 0) + _rows(array[begin : begin + ROWS])[1:-1]
+    for begin in range(0, len(array), ROWS_PER_PIECE):
+        yield ", " * (begin > 0) + _rows(array[begin : begin + ROWS_PER_PIECE])[1:-1]
     yield "]"
 
 

@@ -18,7 +18,7 @@ from tisim.engine.simulation import Simulation
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import CORE
 
-SHOWN = 3
+ROWS_SHOWN = 3
 """Rows of a list that are shown."""
 
 
@@ -156,9 +156,9 @@ def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, 
         if name == "name":
             continue  # It stands at the head.
         if name in lists:
-            for k, row in enumerate(value[:SHOWN]):
+            for k, row in enumerate(value[:ROWS_SHOWN]):
                 yield from _values(row, f"{within}{name}.{k}.")
-            if not 0 < len(value) <= SHOWN:
+            if not 0 < len(value) <= ROWS_SHOWN:
                 yield f"{within}{name}", f"{len(value)} in all", "", text_of(info)
         elif not isinstance(value, Component):
             yield f"{within}{name}", reference.shown(value), unit_of(info), text_of(info)

@@ -19,7 +19,7 @@ from tisim.files.lock import LOCK
 from tisim.files.superblock import SIGNATURE
 
 MARKER = ".tisim"
-SHOWN = 5
+NAMES_SHOWN = 5
 """Names of files that a message spells out."""
 _HEAD = 1 << 20
 """Bytes of an HDF5 file in which its attributes are."""
@@ -34,7 +34,7 @@ class Leavings:
     others: tuple[str, ...]
 
 
-BEFORE = (
+UNMARKED_NAMES = (
     Leavings(
         ("result.h5", "checkpoint.h5", "trajectory.h5"),
         (
@@ -121,10 +121,10 @@ def writable(folder: Path) -> None:
 
 
 def _refusal(folder: Path, others: Sequence[str], why: str) -> InputError:
-    more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+    more = f" and {len(others) - NAMES_SHOWN} more" if len(others) > NAMES_SHOWN else ""
     return InputError(
         f"output folder must be without files that tisim has not written and {why}; "
-        f"received {str(folder)!r} with {', '.join(others[:SHOWN])}{more}"
+        f"received {str(folder)!r} with {', '.join(others[:NAMES_SHOWN])}{more}"
     )
 
 
@@ -133,7 +133,7 @@ def _ours(folder: Path) -> set[str]:
     marked = _marked(folder)
     if marked:
         return marked
-    found = [left for left in BEFORE if any(_is_ours(folder / name) for name in left.main)]
+    found = [left for left in UNMARKED_NAMES if any(_is_ours(folder / name) for name in left.main)]
     # A lock file is there only where a marker was, which somebody has removed.
     return {LOCK for _ in found} | {name for left in found for name in (*left.main, *left.others)}
 

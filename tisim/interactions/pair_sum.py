@@ -16,7 +16,7 @@ from tisim.worlds.bound import Bound
 from tisim.worlds.program import PerParticle
 from tisim.worlds.state import State
 
-LANES = 32
+TILE = 32
 """Particles of a tile. Measured best of 8 to 128 with AVX-512: the sums of more do not fit the registers, and
 loops over fewer are unrolled before they are vectorised. From 96 on some kernels are not vectorised."""
 
@@ -45,7 +45,7 @@ class PairSum(PerParticle):
         # A tile may reach past the particles alive, but not past the slots that there are.
         idle = s.worlds < runtime.current().threads
         self.long = bool(self.long_ranged) and idle and s.capacity >= MANY
-        self.tiled = bool(self.long_ranged) and runtime.current().device == "cpu" and s.capacity >= LANES
+        self.tiled = bool(self.long_ranged) and runtime.current().device == "cpu" and s.capacity >= TILE
 
     @ti.func
     def start(self, w, i, t):
@@ -65,7 +65,7 @@ class PairSum(PerParticle):
     def run(self, w, i):
         t = self.s.time[w]
         if ti.static(self.tiled):
-            if i % LANES == 0:
+            if i % TILE == 0:
                 self.tile(w, i, t)
         else:
             total = self.start(w, i, t)
@@ -78,20 +78,20 @@ class PairSum(PerParticle):
     def tile(self, w, begin, t):
         """The same for particles from ``begin`` on; lanes without a particle compute what nobody reads."""
         n = self.s.count[w]
-        first, end = ti.min(begin, self.s.capacity - LANES), ti.min(begin + LANES, n)
+        first, end = ti.min(begin, self.s.capacity - TILE), ti.min(begin + TILE, n)
         # An array for each component: with one of 96 numbers for all, some kernels read parameters again for
         # each pair and did not vectorise (presumably it has more uses than LLVM follows to see that nothing
         # else points to it; each number it starts with is one).
-        sums = [ti.Vector([0.0] * LANES, self.s.real) for _ in ti.static(range(self.components))]
+        sums = [ti.Vector([0.0] * TILE, self.s.real) for _ in ti.static(range(self.components))]
         # Numbers of lanes as wide as the sums: comparing integers of 64 bits would halve the lanes in f32.
-        number = ti.Vector([float(lane) for lane in range(LANES)], self.s.real)
+        number = ti.Vector([float(lane) for lane in range(TILE)], self.s.real)
         for i in range(begin, end):
             total = self.start(w, i, t)
             for c in ti.static(range(self.components)):
                 sums[c][i - first] = total[c]
         for j in range(n):
             itself = ti.cast(j - first, self.s.real)
-            for lane in range(LANES):
+            for lane in range(TILE):
                 terms = self.terms(self.long_ranged, w, first + lane, j, t)
                 for c in ti.static(range(self.components)):
                     total = sums[c][lane]

@@ -17,7 +17,7 @@ from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
-ROUNDING = 4.0
+ROUNDING_UNITS = 4.0
 """Changes of so many units in the last place are none: sweeps in f32 may go on with them for ever."""
 
 
@@ -135,7 +135,8 @@ class TakeSweep(PerParticle):
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s)
         self.solver, self.effect, self.trial = solver, solver.effect, trial
-        self.least = ROUNDING * float(np.finfo(np.float64 if solver.s.real == ti.f64 else np.float32).eps)
+        real = np.float64 if solver.s.real == ti.f64 else np.float32
+        self.least = ROUNDING_UNITS * float(np.finfo(real).eps)
 
     @ti.func
     def run(self, w, i):

@@ -24,8 +24,8 @@ from tisim.errors import must
 from tisim.files import checksum
 from tisim.scene.initial_state import Arrays
 
-FORMAT = "tisim checkpoint 4"
-BEFORE = "before"
+CHECKPOINT_FORMAT = "tisim checkpoint 4"
+BEFORE_STEP = "before"
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
     """
     simulation.s.check()
     with checksum.created(Path(path)) as file:
-        file.attrs.update({"format": FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
+        file.attrs.update({"format": CHECKPOINT_FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
         file.attrs["edits"] = json.dumps(simulation.edits)
         now = simulation.s.image()
         for name, values in now.items():
@@ -56,7 +56,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
             file[field.name].attrs["unit"] = field.unit
         if now["underway"].any():
             for name, values in simulation.monitor.replay.whole().items():
-                file[f"{BEFORE}/{name}"] = values
+                file[f"{BEFORE_STEP}/{name}"] = values
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class Snapshot:
 def snapshot(path: str | Path) -> Snapshot:
     """What a checkpoint holds of the particles; of a world in which a step is under way, from before that
     step. InputError when the file is none, or is cut short or damaged."""
-    with checksum.opened(Path(path), "checkpoint", FORMAT) as file:
-        group, worlds = file.get(BEFORE, file), len(json.loads(file.attrs["scenes"]))
+    with checksum.opened(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
+        group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
         arrays = {name: np.asarray(group[name]) for name in file if "unit" in file[name].attrs}
         counts, times, steps = (np.asarray(group[name])[:worlds] for name in ("count", "time", "steps"))
         states = tuple({k: v[w, :n].copy() for k, v in arrays.items()} for w, n in enumerate(counts))
@@ -90,12 +90,12 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     another capacity; the simulation is then as it was.
     """
     simulation.s.check()
-    with checksum.opened(Path(path), "checkpoint", FORMAT) as file:
+    with checksum.opened(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])
         wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs["edits"])
         columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
-        group = file.get(BEFORE, file)
+        group = file.get(BEFORE_STEP, file)
         before = {name: np.asarray(group[name]) for name in columns}
     simulation.put(columns)
     simulation.wall_s = wall_s

@@ -29,7 +29,7 @@ ABSENT = -1
 ASCII = h5py.string_dtype("ascii")
 CHUNK = 1 << 16
 """Particles of a frame that are stored, and compressed, together."""
-ROWS = 1024
+COPIED_ROWS = 1024
 """Frames whose times and checksums are stored together."""
 SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
 
@@ -94,8 +94,10 @@ def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: 
     for field in fields:
         element = group.create_group(field.name)
         if field.name == "position":
-            element.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(ROWS,), fillvalue=-1)
-            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(ROWS,))
+            element.create_dataset(
+                "step", (0,), np.int64, maxshape=(None,), chunks=(COPIED_ROWS,), fillvalue=-1
+            )
+            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(COPIED_ROWS,))
             _with_unit(time, "s")
         else:
             element["step"], element["time"] = group["position/step"], group["position/time"]
@@ -128,7 +130,9 @@ def scene_text(file: h5py.File, name: str) -> str:
 
 def checksums(file: h5py.File, name: str) -> h5py.Dataset:
     """For each frame of a group of particles, two numbers: see ``clock_checksum`` and ``frame_checksum``."""
-    return file.create_dataset(f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(ROWS, 2))
+    return file.create_dataset(
+        f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(COPIED_ROWS, 2)
+    )
 
 
 def clock_checksum(step: int, time: float) -> int:

@@ -62,8 +62,8 @@ def _written_whole(path: Path) -> Any:
     must(kind != SEARCH, "file to read", rule, f"{path}, of a search")
     readers: dict[str, Callable[[Path], Any]] = {
         RESULT: run_folder.read_result,
-        checkpoint.FORMAT: checkpoint.snapshot,
-        storage.FORMAT: storage.rows,
+        checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot,
+        storage.COST_FORMAT: storage.rows,
     }
     must(kind in readers, "file to read", CAN, f"{path}, of the format {kind}")
     return readers[kind](path)

@@ -26,7 +26,7 @@ from tisim.io import h5md
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
-ROUNDING = 1e-9
+TIME_ROUNDING = 1e-9
 """Part of a duration by which the sum of its steps may fall short of it."""
 RESULT = "tisim run 1"
 """The format of a result.h5."""
@@ -93,7 +93,7 @@ class Frames:
     def missing(self) -> str:
         """What there is no frame of, in words, when the run has not reached its end; empty when it has."""
         last, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
-        if last >= end * (1 - ROUNDING):
+        if last >= end * (1 - TIME_ROUNDING):
             return ""
         return f"the run has come to t = {last:.6g} s of {end:.6g} s; what follows is missing"
 

@@ -37,7 +37,7 @@ from tisim.worlds.fields import SHARED, resolve_fields
 DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
 """Names of the files that are about one run, in the order in which a new run removes them: without the result
 the folder is that of an interrupted run, and a checkpoint is of use only with the frames before it."""
-NAMES = (*DATA, lock.LOCK)
+RUN_FILES = (*DATA, lock.LOCK)
 """Names of all files that a run writes."""
 
 
@@ -74,7 +74,7 @@ class Folder:
         lost = regular_file.exists(self.trajectory) and not (goes_on or fresh or overwrite)
         rule = "without an interrupted run (or give --fresh; there is no checkpoint to go on from)"
         must(not lost, "output folder", rule, str(self.path))
-        ownership.check(self.path, NAMES, overwrite)
+        ownership.check(self.path, RUN_FILES, overwrite)
         return goes_on
 
     @contextmanager
@@ -85,7 +85,7 @@ class Folder:
         removed, so that nothing of it is taken for the new one's, even if that is killed. InputError as of
         check, and where that cannot be.
         """
-        ownership.take(self.path, NAMES, overwrite)
+        ownership.take(self.path, RUN_FILES, overwrite)
         with lock.held(self.path):
             goes_on = self._check(fresh, overwrite)  # another run may have come and gone since then
             for name in () if goes_on else DATA:

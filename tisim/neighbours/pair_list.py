@@ -17,7 +17,7 @@ from tisim.effects.base import Pairwise
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
-SMALL = 48
+SMALL_WORLD = 48
 """Worlds of at most this many particles look at all pairs."""
 MOST_NEIGHBOURS = 24
 """The neighbours that a particle can list; one with more of them looks at all particles."""
@@ -39,7 +39,7 @@ class NeighbourList:
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
-        self.small, self.room, self.ahead = SMALL, MOST_NEIGHBOURS, STEPS_OF_SKIN
+        self.small, self.room, self.ahead = SMALL_WORLD, MOST_NEIGHBOURS, STEPS_OF_SKIN
         builder = ti.FieldsBuilder()
         self.cell_start, self.cell_of, self.order, self.neighbour_count = (ti.field(ti.i32) for _ in range(4))
         self.neighbour_index = ti.field(ti.i32)

@@ -8,7 +8,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.magnetic.moment import MOMENT
 
-CUTS = (10.0, 20.0, 30.0, 60.0)
+CUTOFFS = (10.0, 20.0, 30.0, 60.0)
 """Cut-offs worth a try, in radii."""
 
 
@@ -31,7 +31,7 @@ class DipoleDipole(PairForce):
     fields = (MOMENT,)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        return tuple(TruncatedDipoleDipole(cutoff=radii) for radii in CUTS)
+        return tuple(TruncatedDipoleDipole(cutoff=radii) for radii in CUTOFFS)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

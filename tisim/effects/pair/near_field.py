@@ -20,7 +20,7 @@ from tisim.effects.base import Effect, PairForce, option, parameter
 from tisim.numerics.powers import Exponent, power
 from tisim.worlds.fields import Field
 
-CUTS = (0.1, 0.2, 0.5, 1.0)
+CUTOFF_PARTS = (0.1, 0.2, 0.5, 1.0)
 """Cut-offs worth a try, as parts of the largest distance."""
 
 
@@ -54,7 +54,7 @@ class NearField(PairForce):
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         own = {name: getattr(self, name) for name in NearField.model_fields}
-        return tuple(TruncatedNearField(**own, cutoff=three_digits(part * extent)) for part in CUTS)
+        return tuple(TruncatedNearField(**own, cutoff=three_digits(part * extent)) for part in CUTOFF_PARTS)
 
     def required_fields(self) -> tuple[str | Field, ...]:
         charge, polarity = self.fields

@@ -19,13 +19,13 @@ from tisim.numerics.elliptic import elliptic, limits
 
 SLIM = 1.0 / 36.0
 """(rho / distance to the rim)^2, seen from the axis, below which the series about the axis is used."""
-SMALL = {ti.f64: 1e-18, ti.f32: 1e-9}
+SERIES_BELOW = {ti.f64: 1e-18, ti.f32: 1e-9}
 """Powers in a series that are below this are left out."""
 
 
 def small() -> float:
-    """``SMALL`` of the precision that runs."""
-    return SMALL[runtime.current().real]
+    """``SERIES_BELOW`` of the precision that runs."""
+    return SERIES_BELOW[runtime.current().real]
 
 
 @ti.func

@@ -15,7 +15,7 @@ from tisim.components.component import Vector
 
 DIGITS, BITS = 50, 24
 """Digits of what is found here; bits of a unit vector's leading part, whose product with as many is exact."""
-FARTHEST = 1e37
+LARGEST_PLACE = 1e37
 """m: the largest place along an axis that is split, within the range of f32."""
 
 
@@ -66,7 +66,7 @@ def place(r, centre, lead, rest):
     taken = r - d
     lost = (r - (d + taken)) + (taken - centre)
     axis = lead + rest
-    along = ti.min(ti.max(d.dot(axis), -FARTHEST), FARTHEST)
+    along = ti.min(ti.max(d.dot(axis), -LARGEST_PLACE), LARGEST_PLACE)
     foot = ti.cast(ti.cast(along, ti.f32), float)
     near = (d - foot * lead) + (lost - foot * rest)
     z = near.dot(axis)

@@ -17,7 +17,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.errors import InputError
 from tisim.sources.magnetic.cylinder_end import end
 
-NEAREST, FARTHEST = -40, 16
+FIRST_OCTAVE, OCTAVES_END = -40, 16
 """Powers of two of (d / R)^2 between which the table is."""
 GRIDS = ((3, 1, 2), (3, 2, 4), (3, 4, 8), (3, 8, 16), (5, 4, 8), (5, 8, 16))
 """Degree, cells of d^2 in an octave, and of direction in a quadrant; the smallest first."""
@@ -52,7 +52,7 @@ def _made(degree: int, parts: int, slants: int) -> np.ndarray:
     x = chebyshev.chebpts1(degree + 1)
     solve = np.linalg.inv(np.vander(x, degree + 1))
     octave, i, j, side = np.meshgrid(
-        np.arange(NEAREST, FARTHEST), np.arange(parts), np.arange(slants), [-1, 1], indexing="ij"
+        np.arange(FIRST_OCTAVE, OCTAVES_END), np.arange(parts), np.arange(slants), [-1, 1], indexing="ij"
     )
     cells = (..., None, None)
     part = 1 + (i[cells] + 0.5 + 0.5 * x[:, None]) / parts
@@ -66,10 +66,10 @@ def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
     size."""
     draw = np.random.Generator(np.random.Philox(16))
     _, parts, slants, _, n, _, _ = coefficients.shape
-    octave, side = draw.integers(NEAREST, FARTHEST, points), draw.integers(0, 2, points)
+    octave, side = draw.integers(FIRST_OCTAVE, OCTAVES_END, points), draw.integers(0, 2, points)
     part, slant = draw.uniform(0, parts, points), draw.uniform(0, slants, points)
     rho, expected = _numbers(octave, 1 + part / parts, 2 * side - 1, slant / slants)
-    cell = coefficients[octave - NEAREST, part.astype(int), slant.astype(int), side]
+    cell = coefficients[octave - FIRST_OCTAVE, part.astype(int), slant.astype(int), side]
     p, q = (np.vander(2 * (v % 1) - 1, n) for v in (part, slant))
     wrong = np.einsum("ip,iq,ipqk->ik", p, q, cell) - expected
     there, weight = rho >= 0, np.stack([np.ones_like(rho), rho], axis=-1)[:, [0, 0, 1, 1, 0, 0, 0, 1]]
@@ -123,7 +123,7 @@ class TabulatedEnds:
         x, y = rho / radius - 1.0, u / radius
         square = x * x + y * y
         six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
-        if square > ti.static(2.0**NEAREST) and square < ti.static(2.0**FARTHEST):
+        if square > ti.static(2.0**FIRST_OCTAVE) and square < ti.static(2.0**OCTAVES_END):
             six = self.read(x, y, square, radius)
         else:
             six = end(rho, u, radius)
@@ -139,7 +139,7 @@ class TabulatedEnds:
         number = ti.min(ti.cast(slant, ti.i32), self.slants - 1)
         p = 2.0 * ((square * inverse - 1.0) * self.parts - part) - 1.0
         q = 2.0 * (slant - number) - 1.0
-        row = ((octave - 127 - NEAREST) * self.parts + part) * self.slants + number
+        row = ((octave - 127 - FIRST_OCTAVE) * self.parts + part) * self.slants + number
         cell = 2 * row + ti.cast(x >= 0.0, ti.i32)
         six = ti.Vector([0.0 * p, 0.0, 0.0, 0.0, 0.0, 0.0])
         for a in range(self.terms):

@@ -17,7 +17,11 @@ from tisim.steppers.brownian.drift_limit import DriftLimit
 from tisim.steppers.brownian.exact_noise import GAUSS, Exact
 from tisim.steppers.brownian.fast_noise import SUMS, Fast
 from tisim.steppers.brownian.fluid import Fluid
-from tisim.steppers.brownian.independent import OWN, EndBrownianIntervals, IndependentBrownianSteps
+from tisim.steppers.brownian.independent import (
+    OWN_BROWNIAN_FIELDS,
+    EndBrownianIntervals,
+    IndependentBrownianSteps,
+)
 from tisim.steppers.brownian.mobility import Mobility, Oseen, RotnePrager
 from tisim.steppers.brownian.vectorised import VectorisedBrownianSteps, vectorises
 from tisim.steppers.common import BeginStep
@@ -94,7 +98,7 @@ class Brownian(Stepper):
 
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         if independent:
-            return (FORCE, *OWN)
+            return (FORCE, *OWN_BROWNIAN_FIELDS)
         if self.hydrodynamics == "none":
             return (FORCE,)
         return (FORCE, GAUSS) if self.noise == "exact" else (FORCE, *SUMS)

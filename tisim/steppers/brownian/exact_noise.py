@@ -14,7 +14,7 @@ from tisim.worlds.status import WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)
 """Three standard normal numbers of a particle in a step."""
-LANES = 32
+TILE_ROWS = 32
 """Rows of the matrix that are reduced together, so that compilers vectorise it."""
 
 
@@ -27,7 +27,7 @@ class Exact:
 
     def __init__(self, fluid, mobility, domain) -> None:
         self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
-        self.rows = -(-3 * self.s.capacity // LANES) * LANES
+        self.rows = -(-3 * self.s.capacity // TILE_ROWS) * TILE_ROWS
         rule = f"within the {runtime.memory() / 1e9:.0f} GB of this machine"
         fits = self.bytes() <= runtime.memory()
         must(fits, "memory for diffusion matrices", rule, f"{self.bytes() / 1e9:.0f} GB")
@@ -117,14 +117,14 @@ class Factor(Phase):
 
     def __init__(self, exact) -> None:
         self.s, self.m = exact.s, exact
-        self.tiles = exact.rows // LANES
+        self.tiles = exact.rows // TILE_ROWS
 
     @ti.func
     def run(self, w, _k):
         n = 3 * self.s.count[w]
         for j in range(self.s.count[w]):
-            for tile in range(3 * j // LANES, (n + LANES - 1) // LANES):
-                self.reduce(w, 3 * j, tile * LANES)
+            for tile in range(3 * j // TILE_ROWS, (n + TILE_ROWS - 1) // TILE_ROWS):
+                self.reduce(w, 3 * j, tile * TILE_ROWS)
             for b in ti.static(range(3)):
                 self.close(w, j, 3 * j + b, n)
 
@@ -132,19 +132,19 @@ class Factor(Phase):
     def reduce(self, w, column, row):
         """Take what earlier columns account for off three columns, in a tile of rows."""
         matrix = ti.static(self.m.matrix)
-        left = [ti.Vector([0.0] * LANES, self.s.real) for _ in ti.static(range(3))]
+        left = [ti.Vector([0.0] * TILE_ROWS, self.s.real) for _ in ti.static(range(3))]
         for c in ti.static(range(3)):
-            for lane in range(LANES):
+            for lane in range(TILE_ROWS):
                 left[c][lane] = matrix[w, column + c, row + lane]
         for k in range(column):
             x, y, z = matrix[w, k, column], matrix[w, k, column + 1], matrix[w, k, column + 2]
-            for lane in range(LANES):
+            for lane in range(TILE_ROWS):
                 value = matrix[w, k, row + lane]
                 left[0][lane] -= x * value
                 left[1][lane] -= y * value
                 left[2][lane] -= z * value
         for c in ti.static(range(3)):
-            for lane in range(LANES):
+            for lane in range(TILE_ROWS):
                 matrix[w, column + c, row + lane] = left[c][lane]
 
     @ti.func

@@ -14,7 +14,7 @@ from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle
 from tisim.worlds.status import WorldStatus
 
-OWN = (
+OWN_BROWNIAN_FIELDS = (
     *OWN_CLOCK,
     Field("own_steps", "", 1, "keep", integer=True, scratch=True),
     Field("own_fault", "", 1, "keep", integer=True, scratch=True),

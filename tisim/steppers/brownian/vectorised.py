@@ -7,7 +7,7 @@ the same.
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
-from tisim.interactions.pair_sum import LANES
+from tisim.interactions.pair_sum import TILE
 from tisim.steppers.brownian.independent import IndependentBrownianSteps, stepped
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import beginning
@@ -18,7 +18,7 @@ def vectorises(context: StepContext) -> bool:
     """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
     as derived quantities and what operators do."""
     simple = not context.operators and not context.force_sum.derived_solvers
-    return simple and runtime.current().device == "cpu" and context.s.capacity >= LANES
+    return simple and runtime.current().device == "cpu" and context.s.capacity >= TILE
 
 
 class VectorisedBrownianSteps(IndependentBrownianSteps):
@@ -33,14 +33,14 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
     @ti.func
     def run(self, w, i):
         s = self.s
-        if i % LANES == 0:
+        if i % TILE == 0:
             done = 0
-            if i + LANES <= s.count[w] and self.level(w, i) > 0:
+            if i + TILE <= s.count[w] and self.level(w, i) > 0:
                 done = self.tile(w, i)
-                for j in range(i, i + LANES):
+                for j in range(i, i + TILE):
                     s.own_interval[w, j] = s.intervals[w] + done
             if done < s.launch_intervals[w]:
-                for j in range(i, ti.min(i + LANES, s.count[w])):
+                for j in range(i, ti.min(i + TILE, s.count[w])):
                     self.advance(w, j)
 
     @ti.func
@@ -49,7 +49,7 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
         them."""
         s = self.s
         level = ti.select(s.cut[w] > 0.0, 0, 1)
-        for j in range(first, first + LANES):
+        for j in range(first, first + TILE):
             if s.own_interval[w, j] > s.intervals[w] or s.own_elapsed[w, j] > 0.0:
                 level = 0
         return level
@@ -58,9 +58,9 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
     def tile(self, w, first):
         """Particles from ``first`` on, through as many intervals as all take in one step: that number."""
         s = self.s
-        place = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
-        drift = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
-        force = [ti.Vector([0.0] * LANES, s.real) for _ in ti.static(range(3))]
+        place = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
+        drift = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
+        force = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         intervals, done, halted = ti.cast(s.launch_intervals[w], ti.i32), 0, 0
         while done < intervals and halted == 0:
             begin = beginning(s, self.control, w, s.intervals[w] + done)
@@ -68,7 +68,7 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
             number, step = self.number(s.intervals[w] + done), ti.cast(dt, s.real)
             if not (dt > 0.0):
                 halted = 1
-            for lane in range(LANES):
+            for lane in range(TILE):
                 i = first + lane
                 f = 0.0 * s.force[w, i]
                 ti.static(self.lane.assign(f))
@@ -84,12 +84,12 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                 fine = fine and r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
                 halted += ti.select(fine, 0, 1)
             if halted == 0:
-                for lane in range(LANES):
+                for lane in range(TILE):
                     i = first + lane
                     r = ti.Vector([place[0][lane], place[1][lane], place[2][lane]])
                     s.position[w, i] = self.domain.wrap(w, r)
                     s.velocity[w, i] = ti.Vector([drift[0][lane], drift[1][lane], drift[2][lane]])
                     s.force[w, i] = ti.Vector([force[0][lane], force[1][lane], force[2][lane]])
                 done += 1
-        ti.atomic_add(s.particle_steps[w], done * LANES)
+        ti.atomic_add(s.particle_steps[w], done * TILE)
         return done

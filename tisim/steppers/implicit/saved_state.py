@@ -4,7 +4,7 @@ from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
 from tisim.worlds.fields import Field
 
-BEFORE = (
+STATE_BEFORE = (
     Field("position_before", "m", 3, "keep", scratch=True),
     Field("velocity_before", "m/s", 3, "keep", scratch=True),
     Field("force_before", "N", 3, "keep", scratch=True),
@@ -19,7 +19,7 @@ TURNING_BEFORE = (
 
 def saved_fields(turning: bool) -> tuple[Field, ...]:
     """The fields it takes, in a scene that has torques or not."""
-    return (*BEFORE, *(TURNING_BEFORE if turning else ()))
+    return (*STATE_BEFORE, *(TURNING_BEFORE if turning else ()))
 
 
 @ti.data_oriented

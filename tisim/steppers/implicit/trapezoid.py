@@ -35,7 +35,7 @@ from tisim.worlds.block_sum import BlockSums
 from tisim.worlds.fields import Field
 from tisim.worlds.program import Item
 
-OWN = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
+OWN_STEP_FIELDS = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
 """The fields of a particle that takes steps of its own: the length of the next one, and its clock."""
 
 
@@ -90,7 +90,7 @@ class Trapezoid(Stepper):
 
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
         if independent:
-            return (FORCE, *OWN, *excursion_fields(self.control.at_end))
+            return (FORCE, *OWN_STEP_FIELDS, *excursion_fields(self.control.at_end))
         accelerated = self.acceleration == "anderson"
         more = (*excursion_fields(self.control.at_end), *(memory_of_iterates(turning) if accelerated else ()))
         return (FORCE, *saved_fields(turning), CHANGE, *more)
