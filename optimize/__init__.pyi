@@ -1,4 +1,5 @@
 from .evaluation.ensemble import EnsembleSettings as EnsembleSettings
+from .fitness_record import FitnessRecord as FitnessRecord
 from .outcome import (
     Design as Design,
 )

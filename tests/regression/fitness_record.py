@@ -7,19 +7,21 @@ python tests/regression/fitness_record.py --write  store this machine's values (
 from __future__ import annotations
 
 import argparse
-import json
-import platform
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from cases.agglomeration.problem import cost
+from cases.agglomeration.scene import scene
+from optimize import FitnessRecord, Gene, Genome, Objective, Problem
+from tisim.backend import runtime
 
 FILE = Path(__file__).with_name("fitness.json")
 STARTS = 64
 GRAINS = 80
-ROUNDING = 1e-5
-"""What f32 may shift every fitness by the same way, no start having gone elsewhere."""
 
 BASE = {
     "relative_velocity": 184.7, "length_ratio": 0.79, "density": 6652.7, "hardness": 2.655e5,
@@ -34,82 +36,40 @@ DESIGNS: dict[str, dict[str, float]] = {
     "cold and reactive": {**BASE, "temperature": 100.0, "activation_energy": 1e3, "reaction": 1e7},
     "fragile": {**BASE, "surface_energy": 1e3},
 }
+PROBLEM = Problem(
+    name="agglomeration of 80 grains",
+    genome=Genome(tuple(Gene(name, "", 0.0, 1e17) for name in BASE)),
+    scene=lambda design, seed: scene(design, seed, grains=GRAINS),
+    objective=(Objective("Pi", cost),),
+)
 
 
-def fingerprint() -> str:
-    """What may change the last bits of exp and pow, and so of a chaotic trajectory, on the same settings."""
-    return " ".join((platform.system(), platform.machine(), *platform.libc_ver()))
-
-
-def measure() -> dict[str, list[float]]:
-    """Fitness of every design from every start, with the settings of the runtime. Shape (designs, starts)."""
-    import tisim
-    from cases.agglomeration.problem import cost
-    from cases.agglomeration.scene import scene
-
-    scenes = [scene(d, seed, grains=GRAINS) for d in DESIGNS.values() for seed in range(STARTS)]
-    values = [cost(result) for result in tisim.run(scenes)]
-    return {name: values[k * STARTS : (k + 1) * STARTS] for k, name in enumerate(DESIGNS)}
-
-
-def stored() -> dict[str, Any]:
-    """The record: settings, fingerprint and values."""
-    record: dict[str, Any] = json.loads(FILE.read_text())
-    return record
-
-
-def deviations(values: dict[str, list[float]], record: dict[str, Any]) -> dict[str, float]:
-    """Mean over starts of the difference now less then, in its standard errors, design by design.
-
-    Rounding that differs sends single starts elsewhere, as collisions are chaotic; the mean stays. Start by
-    start, as most starts are the same in both, so that few differ and the error is small.
-    """
-    found = {}
-    for name, now in values.items():
-        change = np.subtract(now, record["values"][name])
-        error = np.hypot(np.std(change, ddof=1) / np.sqrt(len(change)), ROUNDING)
-        found[name] = float(abs(np.mean(change)) / error)
-    return found
+def measure() -> FitnessRecord:
+    """Fitness of every design from every start, with the settings of the runtime."""
+    return FitnessRecord.measure(PROBLEM, DESIGNS, STARTS)
 
 
 def main() -> int:
     """Compare, or store."""
-    from tisim.backend import runtime
-    from tisim.scene.scene import PHYSICS_VERSION
-
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--write", action="store_true", help="store this machine's values")
+    parser.add_argument("--write", nargs="?", type=Path, const=FILE, help="store this machine's values")
     parser.add_argument("--precision", default="f64")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--json", action="store_true", help="print the values and nothing else")
     options = parser.parse_args()
     runtime.init(options.device, options.precision, options.threads)
-    values = measure()
-    if options.json:
-        print(json.dumps(values))
-        return 0
+    now = measure()
     if options.write:
-        record = {
-            "settings": runtime.current().settings, "fingerprint": fingerprint(),
-            "physics": PHYSICS_VERSION, "values": values,
-        }  # fmt: skip
-        FILE.write_text(json.dumps(record, indent=1) + "\n")
-        print(f"stored {FILE.name}")
+        now.save(options.write)
+        print(f"stored {options.write.name}")
         return 0
-    record = stored()
-    for name, deviation in deviations(values, record).items():
-        same = (
-            "same bits"
-            if values[name] == record["values"][name]
-            else f"{deviation:.2f} standard errors apart"
-        )
-        print(
-            f"{name:20s} {np.mean(values[name]):.6f} (stored {np.mean(record['values'][name]):.6f}): {same}"
-        )
+    stored = FitnessRecord.load(FILE)
+    for name, deviation in stored.deviations(now).items():
+        new, old = now.values[name]["Pi"], stored.values[name]["Pi"]
+        same = "same bits" if new == old else f"{deviation:.2f} standard errors apart"
+        print(f"{name:20s} {np.mean(new):.6f} (stored {np.mean(old):.6f}): {same}")
     return 0
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parents[2]))
     sys.exit(main())

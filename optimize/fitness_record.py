@@ -1,0 +1,125 @@
+"""What designs of an inverse problem are worth, recorded once, so that a test sees when it changes."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tisim
+from optimize.problem.problem import Problem
+from tisim.backend import runtime
+from tisim.errors import InputError, RunError, must
+from tisim.files import regular_file
+from tisim.files.atomic import replace_file
+from tisim.scene.scene import PHYSICS_VERSION
+
+RECORD_FORMAT = "tisim fitness record 1"
+ROUNDING_SHIFT = 1e-5
+"""Part of its size by which single precision may shift every value alike, no run having gone elsewhere."""
+
+Values = dict[str, dict[str, list[float]]]
+
+
+@dataclass(frozen=True)
+class FitnessRecord:
+    """The objectives of some designs of a problem, from random starts 0, 1, 2, ... each.
+
+    problem : its name. designs : genes in physical units, by the name of the design. values : of each design
+    and objective, in the unit of the objective, one for each start. settings, platform : what they were
+    computed with, which decides their last bits; physics : the version of the laws.
+    """
+
+    problem: str
+    designs: Mapping[str, Mapping[str, float]]
+    values: Values
+    settings: Mapping[str, Any]
+    platform: str
+    physics: int = PHYSICS_VERSION
+
+    @classmethod
+    def measure(
+        cls, problem: Problem, designs: Mapping[str, Mapping[str, float]], starts: int = 8
+    ) -> FitnessRecord:
+        """Run every design from so many starts, all in batches, with the settings of ``tisim.init``.
+
+        InputError for no designs, a design that the problem refuses, or fewer than 1 start; RunError naming
+        the design of which a run does not end well.
+        """
+        must(bool(designs), "designs", "at least one", dict(designs))
+        must(starts >= 1, "starts", "at least 1", starts)
+        results = iter(
+            tisim.run([problem.scene(d, seed) for d in designs.values() for seed in range(starts)])
+        )
+        values: Values = {name: {one.name: [] for one in problem.objectives} for name in designs}
+        for name in designs:
+            for seed in range(starts):
+                result = next(results)
+                if not result.status.ok:
+                    raise RunError(f"design {name!r}, start {seed}: {result.status.reason}")
+                for objective in problem.objectives:
+                    values[name][objective.name].append(float(objective.of(result)))
+        genes = {name: dict(design) for name, design in designs.items()}
+        return cls(problem.name, genes, values, runtime.current().settings, _platform())
+
+    def again(self, problem: Problem) -> FitnessRecord:
+        """Return what the same designs and starts give now; InputError for another problem."""
+        must(problem.name == self.problem, "problem", f"that of the record, {self.problem!r}", problem.name)
+        return self.measure(problem, self.designs, self.starts)
+
+    @property
+    def starts(self) -> int:
+        """The number of random starts of each design."""
+        return len(next(iter(next(iter(self.values.values())).values())))
+
+    def same_arithmetic(self, other: FitnessRecord) -> bool:
+        """Return whether both were computed with the same settings on the same platform: then the same laws
+        give the same values to the last bit."""
+        return (self.settings, self.platform) == (other.settings, other.platform)
+
+    def deviations(self, other: FitnessRecord) -> dict[str, float]:
+        """Return for each design how far the means of the other record are from these, in standard errors of
+        the difference; the largest of its objectives, 0 where all bits are the same.
+
+        Rounding that differs sends single starts elsewhere, as collisions are chaotic; the mean stays. The
+        difference is taken start by start, as most are the same in both, so that its error is small.
+        """
+        return {
+            name: max(_deviation(values, other.values[name][what]) for what, values in objectives.items())
+            for name, objectives in self.values.items()
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write the record as JSON, in place of any before; RunError when the disk is full."""
+        data = {"format": RECORD_FORMAT, **asdict(self)}
+        replace_file(Path(path), (json.dumps(data, indent=1) + "\n").encode())
+
+    @classmethod
+    def load(cls, path: str | Path) -> FitnessRecord:
+        """Read a record; InputError when the file is missing, or is none."""
+        text = regular_file.content(Path(path))
+        must(text is not None, "fitness record", "an existing file", str(path))
+        try:
+            data = json.loads(text or b"")
+            must(data.pop("format") == RECORD_FORMAT, "fitness record", RECORD_FORMAT, str(path))
+            return cls(**data)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise InputError(f"fitness record must be a file of one; received {str(path)!r}") from None
+
+
+def _deviation(recorded: list[float], now: list[float]) -> float:
+    change = np.subtract(now, recorded)
+    if not change.any():
+        return 0.0
+    error = np.std(change, ddof=1) / np.sqrt(len(change)) if len(change) > 1 else 0.0
+    return float(abs(np.mean(change)) / np.hypot(error, ROUNDING_SHIFT * np.abs(recorded).mean()))
+
+
+def _platform() -> str:
+    """What may change the last bits of exp and pow, and so of a chaotic trajectory, on the same settings."""
+    return " ".join((platform.system(), platform.machine(), *platform.libc_ver()))

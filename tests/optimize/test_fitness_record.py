@@ -1,0 +1,120 @@
+"""Records of what designs are worth: the same to the last bit, or in the mean, or changed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import optimize
+import tisim
+from optimize import FitnessRecord, Gene, Genome, Objective, Problem
+from tisim import InputError, RunError
+from tisim.backend.taichi import ti
+from tisim.effects import Force, Gravity
+from tisim.steppers import FixedStep, Verlet
+
+
+def fall(design, seed, strength=1.0):
+    """Some particles that fall from random heights."""
+    height = np.random.default_rng(seed).uniform(0.0, 1.0, 5)
+    return tisim.Scene(
+        particles=tisim.Particles(
+            position=np.column_stack([np.arange(5.0), np.zeros(5), height]),
+            velocity=np.full((5, 3), design["speed"]),
+            radius=0.1,
+            mass=1.0,
+        ),
+        effects=(Gravity(acceleration=(0.0, 0.0, -9.81 * strength)),),
+        stepper=Verlet(control=FixedStep(dt=0.01)),
+        duration=0.1,
+    )
+
+
+def problem(scene=fall):
+    objectives = (
+        Objective("height", lambda result: result.state["position"][:, 2].mean(), "m", maximise=True),
+        Objective("spread", lambda result: result.state["position"][:, 2].std(), "m"),
+    )
+    return Problem("fall", Genome((Gene("speed", "m/s", 0.0, 9.0),)), scene, objectives)
+
+
+class Blowing(Force):
+    """A force that is not a number."""
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return ti.math.nan * s.velocity[w, i]
+
+
+DESIGNS = {"slow": {"speed": 1.0}, "fast": {"speed": 8.0}}
+
+
+@pytest.fixture(scope="module")
+def record():
+    return FitnessRecord.measure(problem(), DESIGNS, starts=6)
+
+
+def test_it_is_what_the_runs_give_start_by_start(record):
+    assert record.starts == 6
+    for name, design in DESIGNS.items():
+        results = tisim.run([fall(design, seed) for seed in range(6)])
+        heights = [result.state["position"][:, 2].mean() for result in results]
+        assert record.values[name]["height"] == heights
+
+
+def test_a_file_of_it_gives_the_same_bits_again(record, tmp_path):
+    record.save(tmp_path / "fitness.json")
+    stored = FitnessRecord.load(tmp_path / "fitness.json")
+    assert stored == record
+    again = stored.again(problem())
+    assert stored.same_arithmetic(again)
+    assert stored.deviations(again) == {"slow": 0.0, "fast": 0.0}
+
+
+def test_a_change_of_the_laws_is_seen(record):
+    """Another gravity moves all heights alike, by a thousandth of the fall; the spread stays."""
+    changed = record.again(problem(lambda design, seed: fall(design, seed, 1.001)))
+    assert min(record.deviations(changed).values()) > 4.0
+
+
+def test_other_rounding_is_not(record):
+    """Single starts that have gone elsewhere, and a shift by rounding, keep the mean within its error."""
+    draw = np.random.default_rng(5)
+    values = {
+        name: {
+            what: (np.array(old) * (1 + 1e-7) + 0.1 * draw.normal(size=6) * (np.arange(6) < 3)).tolist()
+            for what, old in objectives.items()
+        }
+        for name, objectives in record.values.items()
+    }
+    assert max(record.deviations(replace(record, values=values)).values()) < 4.0
+
+
+def test_what_is_no_record_of_this_problem_is_refused(record, tmp_path):
+    path = tmp_path / "fitness.json"
+    with pytest.raises(InputError, match="fitness record must be an existing file; received"):
+        FitnessRecord.load(path)
+    for text in ("", "[1]", '{"format": "tisim fitness record 1"}', '{"format": "another"}'):
+        path.write_text(text)
+        with pytest.raises(InputError, match="fitness record must be"):
+            FitnessRecord.load(path)
+    with pytest.raises(InputError, match="problem must be that of the record, 'fall'; received 'rise'"):
+        record.again(replace(problem(), name="rise"))
+    with pytest.raises(InputError, match=r"designs must be at least one; received \{\}"):
+        FitnessRecord.measure(problem(), {})
+    with pytest.raises(InputError, match="starts must be at least 1; received 0"):
+        FitnessRecord.measure(problem(), DESIGNS, starts=0)
+
+
+def test_a_run_that_fails_names_its_design():
+    def scene(design, seed):
+        made = fall(design, seed)
+        return made.model_copy(update={"effects": (Blowing(),)}) if design["speed"] > 5 else made
+
+    wild = problem(scene)
+    with pytest.raises(RunError, match="design 'fast', start 0: "):
+        FitnessRecord.measure(wild, DESIGNS, starts=1)
+
+
+def test_it_is_among_the_public_names():
+    assert optimize.FitnessRecord is FitnessRecord
