@@ -15,7 +15,7 @@ from tisim.files.ownership import MARKER, Leavings, check, check_all, take
 def before(monkeypatch):
     """What a version without markers is said to have left."""
     left = (Leavings(("all.h5",), ("all.csv",)), Leavings(("more.h5",), ("more.csv",)))
-    monkeypatch.setattr(ownership, "BEFORE", left)
+    monkeypatch.setattr(ownership, "LEFT_UNMARKED", left)
 
 
 def written(folder, name, text="theirs"):

@@ -34,7 +34,7 @@ class Leavings:
     others: tuple[str, ...]
 
 
-UNMARKED_NAMES = (
+LEFT_UNMARKED = (
     Leavings(
         ("result.h5", "checkpoint.h5", "trajectory.h5"),
         (
@@ -133,7 +133,7 @@ def _ours(folder: Path) -> set[str]:
     marked = _marked(folder)
     if marked:
         return marked
-    found = [left for left in UNMARKED_NAMES if any(_is_ours(folder / name) for name in left.main)]
+    found = [left for left in LEFT_UNMARKED if any(_is_ours(folder / name) for name in left.main)]
     # A lock file is there only where a marker was, which somebody has removed.
     return {LOCK for _ in found} | {name for left in found for name in (*left.main, *left.others)}
 

@@ -5,6 +5,7 @@ import numpy as np
 from tests.scenes import compiled, scene
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.effects import Force
 from tisim.engine.assembly import needed_fields
 from tisim.worlds.fields import CORE, resolve_fields
 
@@ -54,8 +55,8 @@ def jacobians(scenes, step, capacity=16):
     """velocity_jacobian of the only force of these scenes, and its central difference; step in m/s."""
     simulation = compiled(scenes[0], worlds=WORLDS, capacity=capacity)
     simulation.load(scenes)
-    (force,) = simulation.assembly.forces
-    assert force.offers("velocity_jacobian")
+    (force,) = simulation.assembly.effects.of(Force)
+    assert force.data.offers("velocity_jacobian")
     claimed = np.zeros((WORLDS, capacity, 3, 3))
     _jacobians(simulation.s, force, claimed)
     start = simulation.s.read("velocity")
