@@ -34,7 +34,7 @@ OTHERS = (
 INNER = "|".join(
     (
         r"tisim\.(io\.(trajectory|recorder)|engine\.particle_state|backend\.runtime)\.\w+",
-        r"(tisim\.(worlds\.(bound|program)|neighbours\.pair_list|interactions\.force_sum)|optimize\.methods\.\w+)\.\w+",
+        r"(tisim\.(steppers\.context|worlds\.(bound|program|state)|neighbours\.pair_list|interactions\.force_sum)|optimize\.methods\.\w+)\.\w+",
     )
 )
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in OTHERS)]
