@@ -1,17 +1,19 @@
 """Force and torque on every particle."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
-from tisim.neighbours.full_list import FullNeighbourList
-from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.fields import Field
-from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
+
+if TYPE_CHECKING:
+    from tisim.components.domain import Domain
+    from tisim.neighbours.full_list import FullNeighbourList
+    from tisim.worlds.bound import Bound, Peers
+    from tisim.worlds.state import State
 
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
@@ -47,10 +49,10 @@ class SumForces(PairSum):
 
     def __init__(
         self,
-        s: State,
-        domain: Bound[Domain],
-        effects: Peers,
-        full_list: FullNeighbourList | None,
+        s: "State",
+        domain: "Bound[Domain]",
+        effects: "Peers",
+        full_list: "FullNeighbourList | None",
         derived_solvers: tuple[Any, ...],
     ) -> None:
         self.forces, self.pair_forces = effects.of(Force), effects.of(PairForce)

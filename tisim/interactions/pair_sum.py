@@ -6,15 +6,17 @@ The order in which a particle adds up the others is that of their indices all th
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
-from tisim.neighbours.full_list import FullNeighbourList
-from tisim.worlds.bound import Bound
 from tisim.worlds.program import PerParticle
-from tisim.worlds.state import State
+
+if TYPE_CHECKING:
+    from tisim.components.domain import Domain
+    from tisim.neighbours.full_list import FullNeighbourList
+    from tisim.worlds.bound import Bound
+    from tisim.worlds.state import State
 
 TILE = 32
 """Particles of a tile. Measured best of 8 to 128 with AVX-512: the sums of more do not fit the registers, and
@@ -36,7 +38,11 @@ class PairSum(PerParticle):
     components: int = 3
 
     def __init__(
-        self, s: State, domain: Bound[Domain], effects: Sequence[Any], full_list: FullNeighbourList | None
+        self,
+        s: "State",
+        domain: "Bound[Domain]",
+        effects: Sequence[Any],
+        full_list: "FullNeighbourList | None",
     ) -> None:
         super().__init__(s)
         self.domain, self.full_list = domain, full_list

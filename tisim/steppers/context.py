@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tisim.components.domain import Domain
 from tisim.effects.base import Force
-from tisim.interactions.force_sum import SumForces
-from tisim.neighbours.pair_list import NeighbourList
 from tisim.operators.base import Operator
-from tisim.worlds.bound import Bound, Peers
-from tisim.worlds.program import Item
-from tisim.worlds.state import State
+
+if TYPE_CHECKING:
+    from tisim.components.domain import Domain
+    from tisim.interactions.force_sum import SumForces
+    from tisim.neighbours.pair_list import NeighbourList
+    from tisim.worlds.bound import Bound, Peers
+    from tisim.worlds.program import Item
+    from tisim.worlds.state import State
 
 
 @dataclass(frozen=True)
