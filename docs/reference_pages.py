@@ -1,5 +1,7 @@
 """Makes the pages of docs/reference from the code: one for each family of parts, and one of the public names.
 
+    python docs/reference_pages.py    writes docs/parts.md anew, the list of all parts with a line each
+
 Docstrings are plain text: paragraphs, indented blocks such as equations, and names in double backticks.
 """
 
@@ -34,6 +36,25 @@ def write(folder: Path) -> None:
             _family(family.title, family.base, [one for one in entries if one.family == name]),
         )
     _put(folder / "api.rst", _api({one.kind: one for one in entries}))
+
+
+def parts() -> str:
+    """Return the text of docs/parts.md."""
+    lines = [
+        "# All effects, sources, operators, steppers and what else a scene is made of",
+        "",
+        "`tisim effects` prints this list; `tisim effects NAME` the law of one, its source, its parameters with",
+        "units, and a table to paste into a scene file.",
+    ]
+    entries = reference.entries()
+    for name, family in reference.FAMILIES.items():
+        lines += ["", f"## {family.title}", "", "| name | what it is |", "|---|---|"]
+        lines += [
+            f"| `{one.name}` | {one.summary.replace('|', chr(92) + '|')} |"
+            for one in entries
+            if one.family == name
+        ]
+    return "\n".join(lines) + "\n"
 
 
 def _put(path: Path, lines: Iterable[str]) -> None:
@@ -196,3 +217,7 @@ def _autodoc(package: str, name: str, value: Any) -> Iterator[str]:
         yield from (f".. autoclass:: {package}.{name}", "   :members:", "")
     elif callable(value):
         yield from (f".. autofunction:: {package}.{name}", "")
+
+
+if __name__ == "__main__":
+    (Path(__file__).parent / "parts.md").write_text(parts(), encoding="utf-8")

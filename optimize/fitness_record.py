@@ -53,6 +53,9 @@ class FitnessRecord:
         """
         must(bool(designs), "designs", "at least one", dict(designs))
         must(starts >= 1, "starts", "at least 1", starts)
+        genes = [gene.name for gene in problem.genome.genes]
+        for name, design in designs.items():
+            must(set(design) == set(genes), f"design {name!r}", f"of the genes {', '.join(genes)}", [*design])
         results = iter(
             tisim.run([problem.scene(d, seed) for d in designs.values() for seed in range(starts)])
         )
@@ -64,8 +67,8 @@ class FitnessRecord:
                     raise RunError(f"design {name!r}, start {seed}: {result.status.reason}")
                 for objective in problem.objectives:
                     values[name][objective.name].append(float(objective.of(result)))
-        genes = {name: dict(design) for name, design in designs.items()}
-        return cls(problem.name, genes, values, runtime.current().settings, _platform())
+        plain = {name: dict(design) for name, design in designs.items()}
+        return cls(problem.name, plain, values, runtime.current().settings, _platform())
 
     def again(self, problem: Problem) -> FitnessRecord:
         """Return what the same designs and starts give now; InputError for another problem."""

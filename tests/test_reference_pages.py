@@ -65,3 +65,8 @@ def test_docstrings_are_plain_text(maker):
         *(".. code-block:: text", "", "    F = |a_b|", ""),
         *("", "- name : one, and more.", "", "- third : 3, 3.", "", "- low, high : two.", "", "More.", ""),
     ]
+
+
+def test_the_list_of_parts_in_the_documents_is_that_of_the_code(maker):
+    """If not: python docs/reference_pages.py."""
+    assert (DOCS / "parts.md").read_text(encoding="utf-8") == maker.parts()

@@ -61,7 +61,7 @@ class Display:
             return f"front of {where.designs}  best{best}"
         objective, fitness = next(pairs)
         derived = "".join(f"  {name} {of(fitness):.4g}" for name, of in self.problem.derived.items())
-        return f"best {objective.name} {fitness:.4f} {objective.unit}".rstrip() + derived
+        return f"best {objective.name} {fitness:.4g} {objective.unit}".rstrip() + derived
 
     def _design(self, design: dict[str, float]) -> str:
         units = {gene.name: gene.unit for gene in self.problem.genome.genes}

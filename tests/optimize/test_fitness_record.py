@@ -102,6 +102,8 @@ def test_what_is_no_record_of_this_problem_is_refused(record, tmp_path):
         record.again(replace(problem(), name="rise"))
     with pytest.raises(InputError, match=r"designs must be at least one; received \{\}"):
         FitnessRecord.measure(problem(), {})
+    with pytest.raises(InputError, match=r"design 'slow' must be of the genes speed; received \['sped'\]"):
+        FitnessRecord.measure(problem(), {"slow": {"sped": 1.0}})
     with pytest.raises(InputError, match="starts must be at least 1; received 0"):
         FitnessRecord.measure(problem(), DESIGNS, starts=0)
 

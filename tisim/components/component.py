@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from tisim.backend.taichi import DEVICE_FUNCTION
+from tisim.backend.taichi import DEVICE_FUNCTION, is_device_function
 from tisim.components.cost_hints import AccuracyHints
 from tisim.components.invalid import explain_invalid, unit_of
 from tisim.components.ranges import WHOLE, check_magnitude
@@ -66,6 +66,13 @@ class Component(AccuracyHints, Checked):
 
     model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name, own in vars(cls).items():
+            promised = any(is_device_function(vars(base).get(name)) for base in cls.__mro__[1:])
+            rule = "decorated with ti.func, as in its contract"
+            must(not promised or is_device_function(own), f"{cls.__name__}.{name}", rule, type(own).__name__)
+
     @model_validator(mode="after")
     def _in_range(self) -> Self:
         """Refuse magnitudes with which the arithmetic does not hold (see ranges.py)."""
@@ -87,7 +94,8 @@ class Component(AccuracyHints, Checked):
     def named(cls, kind: Any, where: str) -> type[Self]:
         """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
         known = cls.known()
-        must(isinstance(kind, str) and kind in known, where, f"one of {', '.join(sorted(known))}", kind)
+        rule = f"one of {', '.join(sorted(known))} (of your own: give --plugin FILE.py, or import it first)"
+        must(isinstance(kind, str) and kind in known, where, rule, kind)
         return known[kind]
 
     @classmethod

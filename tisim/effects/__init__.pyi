@@ -20,6 +20,9 @@ from .base import (
     SelfConsistentQuantity as SelfConsistentQuantity,
 )
 from .base import (
+    Vector as Vector,
+)
+from .base import (
     option as option,
 )
 from .base import (

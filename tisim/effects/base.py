@@ -51,7 +51,7 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
-from tisim.components.component import Component, option, parameter
+from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.cost_hints import LawHints
 from tisim.worlds.bound import Peers
 from tisim.worlds.fields import Field
@@ -64,6 +64,7 @@ __all__ = [
     "PairEvent",
     "PairForce",
     "SelfConsistentQuantity",
+    "Vector",
     "option",
     "parameter",
 ]

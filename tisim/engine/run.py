@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, overload
 from tisim.backend import runtime
 from tisim.engine.batches import Batches, Progress
 from tisim.engine.result import Result
+from tisim.errors import must
 from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ def run(
     """
     if isinstance(scenes, Scene):
         return run([scenes], progress, record)[0]
+    sound = not isinstance(scenes, str) and all(isinstance(scene, Scene) for scene in scenes)
+    must(sound, "scenes", "a Scene or a list of them (Scene.from_toml reads a file)", scenes)
     with runtime.turn:
         if record is None:
             results = dict(_batches.run(scenes, progress))

@@ -12,6 +12,7 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected
 from tisim.backend.thread import in_taichi_thread
+from tisim.engine import law_errors
 from tisim.engine.assembly import Assembly, declared, needed_fields
 from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
@@ -68,9 +69,10 @@ class Simulation:
         self.program = Program(self.s, self.assembly.step, self.schedule)
         self.first = Program(self.s, self.assembly.first, self.schedule)
         self.s.write("status", WorldStatus.ENDED)
-        self.program.compile()
-        if self.first.items:
-            self.first.compile()
+        with law_errors.in_a_line():
+            self.program.compile()
+            if self.first.items:
+                self.first.compile()
         return trees
 
     def _place(self, scene: Scene, worlds: int, capacity: int) -> None:

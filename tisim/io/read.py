@@ -36,6 +36,7 @@ def read(path: str | Path) -> Any:
 
     InputError when it is anything else, is not there, or is damaged.
     """
+    must(isinstance(path, str | os.PathLike), "path", "text or a pathlib.Path", path)
     place = Path(path)
     if regular_file.is_folder(place):
         files = [place / name for name in ("result.h5", "cost.h5")]

@@ -47,6 +47,7 @@ class Scene(Component):
     @field_validator("effects", mode="before")
     @classmethod
     def _listed(cls, value: Any) -> Any:
+        must(not isinstance(value, Effect), "scene.effects", "a list or tuple of effects", value)
         return tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
 
     @model_validator(mode="after")

@@ -1,0 +1,69 @@
+"""A law that cannot be compiled is told in a line, with the line of its author's file."""
+
+import pytest
+
+import tisim
+from tests.scenes import scene
+from tisim import InputError
+from tisim.cli.main import main
+from tisim.files import python_file
+
+LAWS = """
+from tisim.backend.taichi import ti
+from tisim.effects import Force, parameter
+
+
+class UnknownName(Force):
+    k: float = parameter("N/m", "stiffness", 1.0)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return -self.kk(w) * s.position[w, i]
+
+
+class NotCalled(Force):
+    k: float = parameter("N/m", "stiffness", 1.0)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return -self.k * s.position[w, i]
+
+"""
+SAID = {
+    "UnknownName": r"laws\.py, line 11, in force, must be what Taichi can compile; received .*'kk'",
+    "NotCalled": r"laws\.py, line 19, in force, must be what Taichi can compile; received .*bad operand",
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_in_python(own_file, name):
+    laws = python_file.load(own_file("laws.py", LAWS))
+    with pytest.raises(InputError, match=SAID[name]) as told:
+        tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (getattr(laws, name)(),)))
+    assert "\n" not in str(told.value)
+
+
+def test_on_the_command_line(own_file, capsys):
+    own_file("laws.py", LAWS)
+    text = scene([[0, 0, 0]], [[0, 0, 0]], ()).to_toml() + "\n[effects.unknown_name]\n"
+    own_file("wrong.toml", text)
+    with pytest.raises(SystemExit) as end:
+        main(["run", "wrong.toml", "--plugin", "laws.py"])
+    assert end.value.code == 2
+    assert "line 11, in force, must be what Taichi can compile" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_method_of_the_contract_must_be_for_kernels(own_file):
+    """Said when the class is made, with the line of the file that a command is given."""
+    plain = LAWS.replace("    @ti.func\n", "", 1)
+    rule = r"UnknownName\.force must be decorated with ti\.func, as in its contract; received 'function'"
+    with pytest.raises(InputError, match=rule):
+        python_file.load(own_file("plain.py", plain))
+
+
+def test_what_is_run_must_be_scenes():
+    for wrong in ("scene.toml", ["scene.toml"], [None]):
+        with pytest.raises(InputError, match="scenes must be a Scene or a list of them"):
+            tisim.run(wrong)
+    with pytest.raises(InputError, match=r"path must be text or a pathlib\.Path; received 3"):
+        tisim.read(3)
