@@ -43,8 +43,8 @@ def parts() -> str:
     lines = [
         "# All effects, sources, operators, steppers and what else a scene is made of",
         "",
-        "`tisim effects` prints this list; `tisim effects NAME` the law of one, its source, its parameters with",
-        "units, and a table to paste into a scene file.",
+        "`tisim effects` prints this list; `tisim effects NAME` the law of one, its source, its parameters",
+        "with units, and a table to paste into a scene file.",
     ]
     entries = reference.entries()
     for name, family in reference.FAMILIES.items():
