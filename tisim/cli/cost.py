@@ -25,7 +25,7 @@ from tisim.cli.options import (
     Target,
     Threads,
 )
-from tisim.console import err, out, progress_bar, stopping
+from tisim.console import err, out, print_stopping, progress_bar
 from tisim.errors import must
 from tisim.files import lock, ownership
 from tisim.files.resuming import how_to_go_on
@@ -179,7 +179,7 @@ def _measure(study: Study, place: Path) -> bool:
     """Run behind a bar, with rows on the disk as they come; False when Ctrl-C has stopped it."""
     from tisim.accuracy import storage
 
-    with progress_bar("", "{task.description}") as bar, Interrupt(stopping) as ctrl_c:
+    with progress_bar("", "{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
         task = bar.add_task("", total=1.0)
 
         def progress(fraction: float, what: str) -> None:

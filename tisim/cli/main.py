@@ -32,14 +32,14 @@ from tisim.cli.options import (
     Target,
     Threads,
 )
-from tisim.console import err, out, plain_table, progress_bar, stopping
+from tisim.console import err, out, plain_table, print_stopping, progress_bar
 from tisim.engine.observer import Observer
 from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
 from tisim.files.resuming import how_to_go_on
-from tisim.interrupt import Interrupt, exit_code, handled, stop
+from tisim.interrupt import Interrupt, exit_code, handle_signals, raise_interrupt
 from tisim.version import __version__
 
 UsageError: Any = typer.BadParameter.__base__
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     Ctrl-C, SIGTERM, SIGHUP.
     """
     code = 0
-    with handled(stop):
+    with handle_signals(raise_interrupt):
         try:
             check_backend()
             code = app(arguments, prog_name="tisim", standalone_mode=False)
@@ -143,7 +143,7 @@ def run(
 
 def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -> bool:
     """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps."""
-    with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
+    with progress_bar("{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
         def show(simulation: Simulation) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from tisim.errors import InputError, shown
+from tisim.errors import InputError, abbreviated
 
 
 def nameable(path: Path | None) -> Path | None:
@@ -21,7 +21,7 @@ def nameable(path: Path | None) -> Path | None:
         # Too long, a loop of links, a NUL, or bytes that are no text.
         why = fault.strerror if isinstance(fault, OSError) else "not a name"
         raise InputError(
-            f"path must be one that this system can have; received {shown(str(path))} ({why})"
+            f"path must be one that this system can have; received {abbreviated(str(path))} ({why})"
         ) from None
     return path
 

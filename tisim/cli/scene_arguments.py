@@ -11,7 +11,7 @@ from typing import Any
 
 from tisim.cli import targets
 from tisim.components import serialization
-from tisim.errors import InputError, must, named, shown
+from tisim.errors import InputError, abbreviated, must, printable
 from tisim.scene.scene import Scene
 
 
@@ -67,7 +67,9 @@ def _value(key: str, text: str) -> Any:
         return text.strip()
     except (RecursionError, ValueError):
         # Nested too deeply to be read, or a number of thousands of digits.
-        raise InputError(f"{named(key)} must be a value that can be read; received {shown(text)}") from None
+        raise InputError(
+            f"{printable(key)} must be a value that can be read; received {abbreviated(text)}"
+        ) from None
 
 
 def below(table: str, changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from tisim.cli.options import (
     Threads,
     nameable,
 )
-from tisim.console import err, out, stopping
+from tisim.console import err, out, print_stopping
 from tisim.errors import RunError
 from tisim.files import lock, ownership
 from tisim.files.atomic import replace_file
@@ -95,7 +95,7 @@ def optimize(
     place = folder or Path("out") / problem.name
     with closing(evaluator_named(executor, device, precision, threads)) as evaluator:
         going_on(place, fresh, overwrite)
-        outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
+        outcome = session(problem, settings, evaluator, place, out(), err(), print_stopping, overwrite)
     if outcome.interrupted:
         err().print(f"stopped; {place / SEARCH_FILE} has all that is done. {how_to_go_on(fresh, overwrite)}")
         raise typer.Exit(130)
@@ -148,7 +148,7 @@ def compare(
         closing(evaluator_named(executor, device, precision, threads)) as evaluator,
         lock.held(place, exclusive=False),
         Cache(place / comparison.COMPARISON_FILE) as store,
-        Interrupt(stopping) as ctrl_c,
+        Interrupt(print_stopping) as ctrl_c,
     ):
         comparison.check(place, store, problem, evaluator.settings)
         if goes_on:

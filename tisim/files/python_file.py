@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from tisim.errors import InputError, must, named, shown
+from tisim.errors import InputError, abbreviated, must, printable
 
 OURS = frozenset({"tisim", "optimize", "cases"})
 """Packages whose version says what they compute."""
@@ -140,10 +140,10 @@ def _read(path: Path) -> bytes:
         must(path.is_file() or not path.exists(), "Python file", "a file", str(path))
         return path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"Python file must exist; received {shown(str(path))}") from None
+        raise InputError(f"Python file must exist; received {abbreviated(str(path))}") from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise InputError(f"Python file must be readable; received {shown(str(path))} ({why})") from None
+        raise InputError(f"Python file must be readable; received {abbreviated(str(path))} ({why})") from None
 
 
 def _of_that_name(file: PythonFile) -> str | None:
@@ -203,5 +203,5 @@ def _reported(file: PythonFile, error: BaseException) -> str:
         line = next((frame.lineno for frame in reversed(frames) if frame.filename == file.path), None)
         why = str(error)
     where = f"line {line}: " if line else ""
-    fault = f"{type(error).__name__}: {named(' '.join(why.split()))}"
-    return f"{named(file.path)} must be a file that Python can import; received {where}{fault}"
+    fault = f"{type(error).__name__}: {printable(' '.join(why.split()))}"
+    return f"{printable(file.path)} must be a file that Python can import; received {where}{fault}"

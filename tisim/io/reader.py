@@ -21,7 +21,7 @@ from tisim.errors import InputError, must
 from tisim.files import checksum, regular_file
 from tisim.files.shared_hdf5 import Reading
 from tisim.files.superblock import SIGNATURE, SIZE, sound
-from tisim.interrupt import deferred
+from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -162,7 +162,7 @@ class _File:
         self._file: h5py.File | None = None
 
     # HDF5 calls Reading, in which no signal may be raised: it would be lost.
-    @deferred()
+    @defer_signals()
     def read(self, look: Callable[[h5py.File], T]) -> T:
         """What look finds in the file; InputError where that is damaged.
 
@@ -181,7 +181,7 @@ class _File:
                 time.sleep(PAUSE)
         raise AssertionError  # not reached
 
-    @deferred()
+    @defer_signals()
     def close(self) -> None:
         if self._file is not None:
             self._file.close()

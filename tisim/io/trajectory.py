@@ -31,7 +31,7 @@ from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file, unfinished
 from tisim.files.growing_hdf5 import Growing
-from tisim.interrupt import deferred
+from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.io.reader import Frame, frames, worlds
 from tisim.io.recorder import Recorder
@@ -108,7 +108,7 @@ class Trajectory:
             raise
 
     # HDF5 calls Growing, in which no signal may be raised: the HDF5 library cannot close the file any more.
-    @deferred()
+    @defer_signals()
     def _open(self) -> None:
         self.disk = self._opened.enter_context(Growing(self.path))
         self.file = self._opened.enter_context(h5py.File(self.disk, "r+", libver=LIBRARY))
@@ -156,7 +156,7 @@ class Trajectory:
         made.path = path
         return made
 
-    @deferred()
+    @defer_signals()
     def write(self, index: int, frame: Frame) -> None:
         """Add a frame of the scene of this index; RunError when the disk is full. Ctrl-C waits."""
         group, n = self.groups[index], len(frame.arrays["id"])
@@ -189,7 +189,7 @@ class Trajectory:
             why = self.disk.failure.strerror or self.disk.failure
             raise RunError(f"{self.path} could not be written: {why}; frames before are intact")
 
-    @deferred()
+    @defer_signals()
     def _finish(self) -> None:
         self._opened.close()
 

@@ -17,7 +17,7 @@ from types import ModuleType
 from tisim import effects, operators, packing, sources, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
-from tisim.errors import InputError, must, named
+from tisim.errors import InputError, must, printable
 from tisim.files import python_file
 
 GROUP = "tisim.effects"
@@ -68,7 +68,7 @@ def _load_installed() -> None:
         try:
             entry.load()
         except Exception as error:
-            why = f"{type(error).__name__}: {named(' '.join(str(error).split()))}"
+            why = f"{type(error).__name__}: {printable(' '.join(str(error).split()))}"
             raise InputError(
                 f"plugin {entry.name} of {package} must be importable; received {why}"
             ) from error
