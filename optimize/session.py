@@ -26,7 +26,7 @@ from tisim.console import err, print_stopping
 from tisim.console import out as standard_output
 from tisim.files import lock
 from tisim.files.atomic import replace_file
-from tisim.files.ownership import take
+from tisim.files.ownership import claim
 from tisim.interrupt import Interrupt
 
 
@@ -86,8 +86,8 @@ def session(
     InputError when the folder is another search's, has such files, or cannot be written. Other processes may
     join the search, but not begin anew.
     """
-    take(folder, SEARCH_FILES, overwrite)
-    with lock.held(folder, exclusive=False):
+    claim(folder, SEARCH_FILES, overwrite)
+    with lock.acquire(folder, exclusive=False):
         with Cache(folder / SEARCH_FILE) as cache:
             if check(folder, cache, identity(problem, settings, evaluator.settings)):
                 line = f"going on with {folder / SEARCH_FILE}, which has {len(cache)} runs"

@@ -22,8 +22,8 @@ from optimize.storage.record import Record
 from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.framing import Scan
-from tisim.files.ownership import writable
-from tisim.files.regular_file import is_folder, status
+from tisim.files.ownership import ensure_writable
+from tisim.files.regular_file import file_status, is_folder
 
 FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file
 
@@ -44,11 +44,11 @@ class Cache:
         self._pending: dict[str, Hdf5Table] = {}
         self._version: tuple[int, ...] | None = None
         self._end = self._frames = 0
-        if status(self.path) is not None:
+        if file_status(self.path) is not None:
             with hdf5_store.opened(self.path):
                 pass  # before a lock file is left beside a file that is not ours
         if not is_folder(self.path.parent):
-            writable(self.path.parent)
+            ensure_writable(self.path.parent)
         self.refresh()
 
     def __enter__(self) -> Cache:
@@ -117,7 +117,7 @@ class Cache:
         """The attributes of all tables by name, stored or waiting for the next fold."""
         stored: dict[str, Mapping[str, Any]] = {}
         with locked(self._lock, exclusive=False):
-            if status(self.path) is not None:
+            if file_status(self.path) is not None:
                 with hdf5_store.opened(self.path) as file:
                     stored = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
         return stored | {name: table.attrs for name, table in self._pending.items()}
@@ -147,7 +147,7 @@ class Cache:
         self.fold()
 
     def _fold(self, *, damaged: bool = True) -> None:
-        old = None if status(self.path) is None else self.path
+        old = None if file_status(self.path) is None else self.path
         replace_file(self.path, hdf5_store.image(old, self.records(), self._pending, damaged))
         self._journal.clear()
         self._pending, self._version, self._end, self._frames = {}, file_version(self.path), 0, 0
@@ -184,7 +184,7 @@ def cache_files(path: str | Path) -> tuple[Path, Path, Path]:
 
 def file_version(path: Path) -> tuple[int, ...] | None:
     """What tells one state of the HDF5 file from another; None where there is none."""
-    there = status(path)
+    there = file_status(path)
     return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
 
 
@@ -203,7 +203,7 @@ def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
 def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
     """As ``cache_files``, of a cache that is there already. InputError if there is no such file."""
     file, journal, lock = cache_files(path)
-    there = status(file) or status(journal)
+    there = file_status(file) or file_status(journal)
     must(there is not None, "cache file", "an existing file", str(path))
     return file, journal, lock
 

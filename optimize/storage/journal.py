@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
-from tisim.files.regular_file import content, opened, status
+from tisim.files.regular_file import content, file_status, open_descriptor
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,14 @@ class Journal:
 
     def size(self) -> int:
         """Bytes in the file, 0 if there is none."""
-        there = status(self.path)
+        there = file_status(self.path)
         return 0 if there is None else there.st_size
 
     def read(self, offset: int = 0) -> Scan:
         """Frames from byte offset, which must be 0 or the end of an earlier scan."""
         if self.size() <= offset:
             return Scan([], offset, [], 0)
-        with os.fdopen(opened(self.path, os.O_RDONLY), "rb") as file:
+        with os.fdopen(open_descriptor(self.path, os.O_RDONLY), "rb") as file:
             file.seek(offset)
             return scan(file.read(), offset)
 

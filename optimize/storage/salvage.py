@@ -17,7 +17,7 @@ from optimize.storage import hdf5_store
 from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
-from tisim.files.regular_file import content, status
+from tisim.files.regular_file import content, file_status
 
 LIMIT = 300.0
 """s, for that process; reading a million rows takes a tenth of it."""
@@ -37,7 +37,7 @@ def mend(path: Path, lock: Path) -> None:
     beside = path.with_name(f"{path.name}.damaged")
     with locked(lock, exclusive=True):
         if content(path) == old:
-            must(status(beside) is None, "place for the damaged file", "free", str(beside))
+            must(file_status(beside) is None, "place for the damaged file", "free", str(beside))
             replace_file(beside, old)
             replace_file(path, made)
 

@@ -141,7 +141,7 @@ def no_file(request, tmp_path):
         with h5py.File(path, "w", libver="latest") as file:
             file["x"] = np.zeros(9)
     elif request.param != "none":
-        with checksum.created(path) as file:
+        with checksum.create_file(path) as file:
             file.attrs["format"] = "tisim something else"
     return path
 
@@ -153,7 +153,7 @@ def no_file(request, tmp_path):
         worlds,
         lambda path: export(path, "vtk", path.parent),
         lambda path: checkpoint.restore(_Loaded(), path),
-        lambda path: checksum.opened(path, "file", storage.COST_FORMAT).__enter__(),
+        lambda path: checksum.open_file(path, "file", storage.COST_FORMAT).__enter__(),
     ],
     ids=["frames", "worlds", "export", "checkpoint", "cost"],
 )

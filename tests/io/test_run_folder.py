@@ -11,7 +11,7 @@ from tests.scenes import scene, simulate
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import lock, ownership
-from tisim.files.ownership import MARKER, writable
+from tisim.files.ownership import MARKER, ensure_writable
 from tisim.io.run_folder import DATA, RUN_FILES, Folder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
@@ -51,7 +51,7 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
     assert not folder.path.exists()
     with pytest.raises(InputError, match="one that an interrupted run has left"):
         folder.check(fresh=False)
-    ownership.take(folder.path, RUN_FILES)
+    ownership.claim(folder.path, RUN_FILES)
     folder.checkpoint.touch()
     assert folder.check()
     assert folder.check(fresh=False)
@@ -88,7 +88,7 @@ def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp
     folder = Folder(tmp_path)
     for name in (*DATA, "notes.txt"):
         (tmp_path / name).touch()
-    ownership.take(tmp_path, RUN_FILES, overwrite=True)
+    ownership.claim(tmp_path, RUN_FILES, overwrite=True)
     folder.result.unlink()
     with folder.taken() as goes_on:
         assert (goes_on, folder.checkpoint.exists()) == (True, True)
@@ -117,7 +117,7 @@ def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
 def test_unwritable_folder_is_an_input_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="output folder must be writable; received"):
-        writable(tmp_path / "file" / "below")
+        ensure_writable(tmp_path / "file" / "below")
 
 
 def test_full_disk_leaves_no_result(result, tmp_path, monkeypatch):

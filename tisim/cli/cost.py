@@ -28,7 +28,7 @@ from tisim.cli.options import (
 from tisim.console import err, out, print_stopping, progress_bar
 from tisim.errors import must
 from tisim.files import lock, ownership
-from tisim.files.resuming import how_to_go_on
+from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
@@ -101,8 +101,8 @@ def cost(
     which = study.index(quantity)
     place = folder or Path("out") / f"{name}-cost"
     storage.resumes(place, fresh, overwrite)
-    ownership.take(place, storage.COST_FILES, overwrite)
-    with lock.held(place):
+    ownership.claim(place, storage.COST_FILES, overwrite)
+    with lock.acquire(place):
         if storage.resumes(place, fresh, overwrite):
             storage.resume(study, place)
             err().print(f"going on with {place / storage.HDF5}, which has {len(study.rows)} settings")
@@ -114,7 +114,7 @@ def cost(
             written = [*storage.write(study, place), save(study, place / storage.PICTURE)]
             out().print("\n".join([*table.sources(study), *map(str, written)]))
     if not done:
-        err().print(f"stopped; {place / storage.HDF5} has what is done. {how_to_go_on(fresh, overwrite)}")
+        err().print(f"stopped; {place / storage.HDF5} has what is done. {resume_hint(fresh, overwrite)}")
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)

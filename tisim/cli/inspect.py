@@ -57,7 +57,7 @@ def plot(
         for figure in pictures.values():
             time_series.mark_missing(figure, found)
         _tell(found.missing)
-    ownership.take(place, pictures, overwrite)
+    ownership.claim(place, pictures, overwrite)
     for name, figure in pictures.items():
         print(_saved(figure, place / name))
 
@@ -81,12 +81,12 @@ def figures(
     runtime.init(device, precision, threads)
     place = folder or Path("out") / f"{found.name}-figures"
     ownership.check_all(place, overwrite)
-    resumes(place, "figures", False, "finished figures" * ownership.results(place), None, overwrite)
-    ownership.take(place, (lock.LOCK,), overwrite)
-    with lock.held(place):
+    resumes(place, "figures", False, "finished figures" * ownership.has_results(place), None, overwrite)
+    ownership.claim(place, (lock.LOCK,), overwrite)
+    with lock.acquire(place):
         with _bar("running") as progress:
             made = found.figures(chosen, progress)
-        ownership.take(place, made, overwrite)
+        ownership.claim(place, made, overwrite)
         for name, what in made.items():
             if isinstance(what, str):
                 replace_file(place / name, what.encode())
@@ -115,7 +115,7 @@ def movie(
     path = to or file.with_suffix(".gif")
     with frames(file, world) as found:
         check(found, path, rate)
-        ownership.take(path.parent, (path.name, while_drawn(path)), overwrite)
+        ownership.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with _bar("drawing") as progress:
             draw(found, path, rate, progress)
         _tell(found.missing)
@@ -137,7 +137,7 @@ def export(
     file = _file(file)
     check(file, kind)
     place = folder or file.parent
-    ownership.take(place, names(file, kind), overwrite)
+    ownership.claim(place, names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
     for world in range(number := worlds(file)):

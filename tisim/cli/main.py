@@ -38,7 +38,7 @@ from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.resuming import how_to_go_on
+from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt, exit_code, handle_signals, raise_interrupt
 from tisim.version import __version__
 
@@ -125,13 +125,13 @@ def run(
                 done = _advance(simulation, name, [recorder, saving] if recorder else [saving])
             paths = run_folder.write(simulation.results()[0], place) if done else []
         except RunError as error:
-            how = how_to_go_on(fresh, overwrite, "make room and ")
+            how = resume_hint(fresh, overwrite, "make room and ")
             raise RunError(f"{error}. {_rescued(simulation, place.checkpoint, how)}") from error
         if not done:
             checkpoint.save(simulation, place.checkpoint)
             err().print(
                 f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
-                f"{how_to_go_on(fresh, overwrite)}"
+                f"{resume_hint(fresh, overwrite)}"
             )
             raise typer.Exit(130)
     result = simulation.results()[0]

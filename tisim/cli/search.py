@@ -26,7 +26,7 @@ from tisim.console import err, out, print_stopping
 from tisim.errors import RunError
 from tisim.files import lock, ownership
 from tisim.files.atomic import replace_file
-from tisim.files.resuming import how_to_go_on
+from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
 
 Executor = Annotated[
@@ -97,10 +97,10 @@ def optimize(
         going_on(place, fresh, overwrite)
         outcome = session(problem, settings, evaluator, place, out(), err(), print_stopping, overwrite)
     if outcome.interrupted:
-        err().print(f"stopped; {place / SEARCH_FILE} has all that is done. {how_to_go_on(fresh, overwrite)}")
+        err().print(f"stopped; {place / SEARCH_FILE} has all that is done. {resume_hint(fresh, overwrite)}")
         raise typer.Exit(130)
     if not outcome.logbook:
-        how = how_to_go_on(fresh, overwrite)
+        how = resume_hint(fresh, overwrite)
         raise RunError(f"the time was over before the first generation. {how}")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {place / SEARCH_FILE}' says why")
@@ -142,11 +142,11 @@ def compare(
     names = [name.strip() for name in methods.split(",") if name.strip()]
     place = folder or Path("out") / f"compare-{problem.name}"
     goes_on = going_on(place, fresh, overwrite, "comparison", comparison.COMPARISON_FILE, (comparison.CSV,))
-    ownership.take(place, comparison.COMPARISON_FILES, overwrite)
+    ownership.claim(place, comparison.COMPARISON_FILES, overwrite)
     found = []
     with (
         closing(evaluator_named(executor, device, precision, threads)) as evaluator,
-        lock.held(place, exclusive=False),
+        lock.acquire(place, exclusive=False),
         Cache(place / comparison.COMPARISON_FILE) as store,
         Interrupt(print_stopping) as ctrl_c,
     ):
@@ -164,7 +164,7 @@ def compare(
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
             done = f"stopped; {place / comparison.COMPARISON_FILE} has all that is done."
-            err().print(f"{done} {how_to_go_on(fresh, overwrite)}")
+            err().print(f"{done} {resume_hint(fresh, overwrite)}")
             raise
     out().print(comparison.table(problem, found))
     replace_file(place / comparison.CSV, comparison.as_csv(problem, found))

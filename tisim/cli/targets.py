@@ -52,7 +52,7 @@ def inverse(target: str, size: str | None, variant: str | None) -> tuple[Problem
         problem, settings = case(target).inverse(size or "default", variant)
     # The whole file, and those that it may have taken something from: an objective made elsewhere from
     # numbers that stand here is another when they change.
-    checksums = [file.checksum[:12] for file in python_file.loaded()]
+    checksums = [file.checksum[:12] for file in python_file.loaded_files()]
     return dataclasses.replace(problem, code=problem.code or "-".join(checksums)), settings
 
 

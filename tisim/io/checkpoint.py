@@ -46,7 +46,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
     path is, at every instant, what it was before or the whole new file. RunError when the disk is full.
     """
     simulation.s.check()
-    with checksum.created(Path(path)) as file:
+    with checksum.create_file(Path(path)) as file:
         file.attrs.update({"format": CHECKPOINT_FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
         file.attrs["edits"] = json.dumps(simulation.edits)
         now = simulation.s.image()
@@ -75,7 +75,7 @@ class Snapshot:
 def snapshot(path: str | Path) -> Snapshot:
     """What a checkpoint holds of the particles; of a world in which a step is under way, from before that
     step. InputError when the file is none, or is cut short or damaged."""
-    with checksum.opened(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
+    with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
         arrays = {name: np.asarray(group[name]) for name in file if "unit" in file[name].attrs}
         counts, times, steps = (np.asarray(group[name])[:worlds] for name in ("count", "time", "steps"))
@@ -90,7 +90,7 @@ def restore(simulation: Simulation, path: str | Path) -> None:
     another capacity; the simulation is then as it was.
     """
     simulation.s.check()
-    with checksum.opened(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
+    with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         for name, value in _identity(simulation).items():
             _agree(name, value, file.attrs[name])
         wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs["edits"])

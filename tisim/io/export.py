@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from tisim.errors import InputError, must
-from tisim.files.atomic import replace_file, replacing, unfinished
+from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, worlds
 from tisim.io.run_folder import units
 from tisim.io.trajectory import Recording, Trajectory
@@ -153,7 +153,7 @@ def _xyz(found: Frames, steps: Iterator[Frame], folder: Path, name: str) -> Path
         pbc = "T T T" if found.scene.domain.joined() else "F F F"
         box = f'Lattice="{lattice}" Origin="{origin}" pbc="{pbc}" '
     path = folder / f"{name}.xyz"
-    new = path.with_name(unfinished(path.name))
+    new = path.with_name(temporary_name(path.name))
     with replacing(path, new), new.open("w") as text:
         for frame in steps:
             columns, properties = _columns(frame.arrays)
@@ -194,7 +194,7 @@ def _h5md(file: Path, out: Path) -> Path:
         with frames(file, world) as found:
             scenes.append(found.scene)
     single = _first(file).arrays["position"].dtype == np.float32
-    new, real = out.with_name(unfinished(out.name)), "f32" if single else "f64"
+    new, real = out.with_name(temporary_name(out.name)), "f32" if single else "f64"
     with replacing(out, new), Trajectory(Recording(new, frames=1), scenes, real) as copy:
         for world in range(len(scenes)):
             with frames(file, world) as found:

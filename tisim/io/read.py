@@ -14,7 +14,7 @@ import h5py
 from tisim.components import serialization
 from tisim.errors import InputError, must
 from tisim.files import checksum, regular_file
-from tisim.files.superblock import SIGNATURE, SIZE, sound
+from tisim.files.superblock import SIGNATURE, SIZE, is_valid
 from tisim.io import checkpoint, recorded_trajectory, run_folder
 from tisim.io.reader import RESULT
 from tisim.scene.scene import Scene
@@ -49,14 +49,14 @@ def read(path: str | Path) -> Any:
     if not head.startswith(SIGNATURE):
         return _text(place)
     # A trajectory has its own checksums, and may be large.
-    return recorded_trajectory.RecordedTrajectory(place) if sound(head) else _written_whole(place)
+    return recorded_trajectory.RecordedTrajectory(place) if is_valid(head) else _written_whole(place)
 
 
 def _written_whole(path: Path) -> Any:
     """What is in an HDF5 file that is written whole."""
     from tisim.accuracy import storage
 
-    with h5py.File(io.BytesIO(checksum.image(path, "file to read", CAN)), "r") as file:
+    with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", CAN)), "r") as file:
         kind = str(file.attrs.get("format", "none"))
     rule = f"{CAN}; a search is read by `tisim cache` and by `tisim plot` of its folder"
     must(kind != SEARCH, "file to read", rule, f"{path}, of a search")

@@ -19,8 +19,8 @@ import numpy as np
 
 from tisim.errors import InputError, must
 from tisim.files import checksum, regular_file
-from tisim.files.shared_hdf5 import Reading
-from tisim.files.superblock import SIGNATURE, SIZE, sound
+from tisim.files.shared_hdf5 import SharedFile
+from tisim.files.superblock import SIGNATURE, SIZE, is_valid
 from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.scene.initial_state import Arrays
@@ -194,13 +194,13 @@ def _opened(path: Path) -> Iterator[_File]:
     rule, real = "a trajectory.h5 or result.h5 of a run", Path(os.path.realpath(path))
     head = regular_file.content(real, SIZE)
     must(head is not None and head.startswith(SIGNATURE), "file", rule, str(path))
-    if not sound(head or b""):
-        with contextlib.closing(_File(io.BytesIO(checksum.image(real, "file", rule)))) as file:
+    if not is_valid(head or b""):
+        with contextlib.closing(_File(io.BytesIO(checksum.read_image(real, "file", rule)))) as file:
             run = file.read(lambda found: found.attrs.get("format") == RESULT)
             must(run, "file", f"{rule}, of the format {RESULT!r}", str(path))
             yield file
         return
-    with Reading(real) as source, contextlib.closing(_File(source)) as file:
+    with SharedFile(real) as source, contextlib.closing(_File(source)) as file:
         must(source.whole, "file", "whole", f"{path}, which is cut short")
         file.read(lambda found: _of_tisim(found, path, rule))
         yield file
@@ -212,7 +212,7 @@ def _of_tisim(file: h5py.File, path: Path, rule: str) -> None:
     must(creator is not None and creator.attrs.get("name") == b"tisim", "file", rule, str(path))
     if h5md.CHECKSUMS not in file:
         rule = f"{rule}, with checksums"
-        raise InputError(f"file must be {rule}; received {str(path)!r}, without: {checksum.OLDER}")
+        raise InputError(f"file must be {rule}; received {str(path)!r}, without: {checksum.OLDER_VERSION}")
 
 
 def _worlds(file: h5py.File) -> list[str | None]:

@@ -85,8 +85,8 @@ class Folder:
         removed, so that nothing of it is taken for the new one's, even if that is killed. InputError as of
         check, and where that cannot be.
         """
-        ownership.take(self.path, RUN_FILES, overwrite)
-        with lock.held(self.path):
+        ownership.claim(self.path, RUN_FILES, overwrite)
+        with lock.acquire(self.path):
             goes_on = self._check(fresh, overwrite)  # another run may have come and gone since then
             for name in () if goes_on else DATA:
                 (self.path / name).unlink(missing_ok=True)
@@ -127,7 +127,7 @@ def write(result: Result, folder: Folder) -> list[Path]:
 
 def write_result(result: Result, path: Path) -> None:
     """Write the result.h5 of a run, in place of any before. RunError on a full disk."""
-    with checksum.created(path) as file:
+    with checksum.create_file(path) as file:
         file.attrs.update({
             "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,
             "reason": result.status.reason, "time": result.time, "wall_s": result.wall_s,
@@ -142,7 +142,7 @@ def write_result(result: Result, path: Path) -> None:
 
 def read_result(path: Path) -> Result:
     """The Result that ``write_result`` has written, to the bit. InputError when it is damaged or none."""
-    with checksum.opened(path, "result", RESULT) as file, undamaged():
+    with checksum.open_file(path, "result", RESULT) as file, undamaged():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}
             for group in ("start", "end")

@@ -29,8 +29,8 @@ from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.atomic import replace_file, unfinished
-from tisim.files.growing_hdf5 import Growing
+from tisim.files.atomic import replace_file, temporary_name
+from tisim.files.growing_hdf5 import GrowingFile
 from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.io.reader import Frame, frames, worlds
@@ -110,7 +110,7 @@ class Trajectory:
     # HDF5 calls Growing, in which no signal may be raised: the HDF5 library cannot close the file any more.
     @defer_signals()
     def _open(self) -> None:
-        self.disk = self._opened.enter_context(Growing(self.path))
+        self.disk = self._opened.enter_context(GrowingFile(self.path))
         self.file = self._opened.enter_context(h5py.File(self.disk, "r+", libver=LIBRARY))
         # From here on nothing can be added but rows.
         self.file.swmr_mode = True
@@ -141,7 +141,7 @@ class Trajectory:
         path = Path(recording.path)
         if not regular_file.exists(path):
             return cls(recording, [scene], real)
-        new = path.with_name(unfinished(path.name))
+        new = path.with_name(temporary_name(path.name))
         with frames(path) as before, ExitStack() as given_up:
             same = worlds(path) == 1 and before.scene.digest() == scene.digest()
             must(same, "trajectory to go on with", "of the same scene", f"{path}, of another one")

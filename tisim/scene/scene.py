@@ -104,7 +104,7 @@ class Scene(Component):
         """Return a hash, in hex, of everything that decides the result: physics version, every parameter, the
         seed, and the files that define parts of the scene that are not tisim's own."""
         order = [effect.label for effect in self.effects]
-        files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
+        files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
         for piece in json_pieces(self._data(serialization.to_dict(self.particles, arrays=True))):
             digest.update(piece.encode())
