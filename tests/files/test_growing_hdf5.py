@@ -19,7 +19,7 @@ from tisim.files.growing_hdf5 import GrowingFile
 from tisim.files.shared_hdf5 import SharedFile
 from tisim.files.superblock import SIZE, is_valid, lookup3, superblock
 from tisim.io.reader import Frame, frames
-from tisim.io.trajectory import LIBRARY, Trajectory
+from tisim.io.trajectory import LIBVER, Trajectory
 
 GRAINS = 300
 STILL = scene([(0, 0, 0)] * GRAINS, [(0.0, 0, 0)] * GRAINS)
@@ -173,10 +173,10 @@ def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, kept)
             trajectory.write(0, frame(k))
     content = path.read_bytes()
     with files_of_at_most(len(content) // 4), pytest.raises(RunError, match="could not be written"):
-        Trajectory.going_on(recording, STILL, frame(kept).time)
+        Trajectory.resume(recording, STILL, frame(kept).time)
     assert path.read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
-    with Trajectory.going_on(recording, STILL, frame(kept).time):
+    with Trajectory.resume(recording, STILL, frame(kept).time):
         assert whole_frames(path, kept + 1) == kept + 1
 
 
@@ -186,7 +186,7 @@ def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_pat
     trajectory = Trajectory(recording, [STILL])
     assert whole_frames(path, 0) == 0
     trajectory.close()
-    with Trajectory.going_on(recording, STILL, 1.0) as trajectory:
+    with Trajectory.resume(recording, STILL, 1.0) as trajectory:
         trajectory.write(0, frame(0))
     assert whole_frames(path, 1) == 1
 
@@ -270,7 +270,7 @@ def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypa
 
     def go_on():
         try:
-            Trajectory.going_on(recording, STILL, 1.0).close()
+            Trajectory.resume(recording, STILL, 1.0).close()
         finally:
             whole_frames(path, 3)
             assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
@@ -290,7 +290,7 @@ def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypat
 @pytest.mark.parametrize("size", [0, 1, 1000])
 def test_the_superblock_is_the_one_that_hdf5_writes(size):
     image = io.BytesIO()
-    with h5py.File(image, "w", libver=LIBRARY) as file:
+    with h5py.File(image, "w", libver=LIBVER) as file:
         file["x"] = np.zeros(size)
     block = image.getvalue()[:SIZE]
     assert is_valid(block)
@@ -307,7 +307,7 @@ def test_lookup3_is_that_of_its_author():
 def test_what_could_not_be_written_is_read_back(tmp_path):
     """HDF5 may read again what it has written, and must find it, or it ends the process."""
     path = tmp_path / "f"
-    with h5py.File(path, "w", libver=LIBRARY) as file:
+    with h5py.File(path, "w", libver=LIBVER) as file:
         file["x"] = np.zeros(10)
     content = path.read_bytes()
     with GrowingFile(path) as growing, files_of_at_most(len(content) + 5):

@@ -130,17 +130,17 @@ def export(
     plugins: Plugins = None,
 ) -> None:
     """Write the frames of a run for other programs; h5md is a copy."""
-    from tisim.io.export import check, names
+    from tisim.io.export import check, file_names
     from tisim.io.export import export as write
-    from tisim.io.reader import frames, worlds
+    from tisim.io.reader import frames, world_count
 
     file = _file(file)
     check(file, kind)
     place = folder or file.parent
-    ownership.claim(place, names(file, kind), overwrite)
+    ownership.claim(place, file_names(file, kind), overwrite)
     with _bar("writing") as progress:
         made = write(file, kind, place, progress)
-    for world in range(number := worlds(file)):
+    for world in range(number := world_count(file)):
         with frames(file, world) as found:
             _tell(f"world {world}: {found.missing}" if found.missing and number > 1 else found.missing)
     print(made)

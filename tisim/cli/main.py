@@ -101,18 +101,18 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
-    from tisim.io.trajectory import asked
+    from tisim.io.trajectory import recording_from_options
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads)
     name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
-    place = run_folder.Folder(folder or Path("out") / name)
+    place = run_folder.RunFolder(folder or Path("out") / name)
     resume = place.check(fresh, overwrite)
-    recording = asked(place.trajectory, frames, every, resume)
+    recording = recording_from_options(place.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)
         simulation.load([scene])
-    with place.taken(fresh, overwrite) as still:
+    with place.claim(fresh, overwrite) as still:
         must(still == resume, "output folder", "as it was when the command began", str(place.path))
         if resume:
             _restore(simulation, place.checkpoint)
