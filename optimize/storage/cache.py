@@ -45,7 +45,7 @@ class Cache:
         self._version: tuple[int, ...] | None = None
         self._end = self._frames = 0
         if file_status(self.path) is not None:
-            with hdf5_store.opened(self.path):
+            with hdf5_store.open_evaluations(self.path):
                 pass  # before a lock file is left beside a file that is not ours
         if not is_folder(self.path.parent):
             ensure_writable(self.path.parent)
@@ -110,7 +110,7 @@ class Cache:
         if name in self._pending:
             return self._pending[name]
         must(name in self.tables(), "table name", f"one of {self.tables()}", name)
-        with locked(self._lock, exclusive=False), hdf5_store.opened(self.path) as file:
+        with locked(self._lock, exclusive=False), hdf5_store.open_evaluations(self.path) as file:
             return hdf5_store.read_table(file, name)
 
     def attributes(self) -> dict[str, Mapping[str, Any]]:
@@ -118,7 +118,7 @@ class Cache:
         stored: dict[str, Mapping[str, Any]] = {}
         with locked(self._lock, exclusive=False):
             if file_status(self.path) is not None:
-                with hdf5_store.opened(self.path) as file:
+                with hdf5_store.open_evaluations(self.path) as file:
                     stored = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
         return stored | {name: table.attrs for name, table in self._pending.items()}
 
@@ -148,7 +148,7 @@ class Cache:
 
     def _fold(self, *, damaged: bool = True) -> None:
         old = None if file_status(self.path) is None else self.path
-        replace_file(self.path, hdf5_store.image(old, self.records(), self._pending, damaged))
+        replace_file(self.path, hdf5_store.build_image(old, self.records(), self._pending, damaged))
         self._journal.clear()
         self._pending, self._version, self._end, self._frames = {}, file_version(self.path), 0, 0
 
@@ -157,15 +157,17 @@ class Cache:
         if version != self._version or self._journal.size() < self._end:
             self._records, self._end, self._frames, self._version = {}, 0, 0, version
             if version is not None:
-                with hdf5_store.opened(self.path) as file:
+                with hdf5_store.open_evaluations(self.path) as file:
                     self._take(*hdf5_store.read_rows(file))
         first = self._end == 0
         scanned = self._journal.read(self._end)
         self._take(*journal_records(scanned))
         self._end, self._frames = scanned.end, self._frames + len(scanned.payloads)
         mark = Mark.read(self._lock) if first else None
-        if mark is not None and (cut := mark.cut(version, scanned)):
-            warnings.warn(f"{self.path}: {cut}; what is lost will be run again", RuntimeWarning, stacklevel=4)
+        if mark is not None and (loss := mark.loss(version, scanned)):
+            warnings.warn(
+                f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=4
+            )
 
     def _take(self, records: Sequence[Record], damaged: Sequence[str]) -> None:
         for record in records:

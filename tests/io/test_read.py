@@ -174,7 +174,7 @@ def test_rows_of_a_study(tmp_path):
         ("a.h5", b"\x89HDF\r\n\x1a\n" + bytes(200), "file to read must be .* whole and with its checksum"),
         (
             "search.h5",
-            hdf5_store.image(None, [], {}),
+            hdf5_store.build_image(None, [], {}),
             "read by `tisim cache` and by `tisim plot` of its folder",
         ),
         (".", None, r"folder must be one with a whole run or study \(what an interrupted run has left"),
