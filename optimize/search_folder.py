@@ -25,7 +25,7 @@ from tisim import InputError
 from tisim.errors import must
 from tisim.files import lock, ownership
 from tisim.files.atomic import locked
-from tisim.files.regular_file import status
+from tisim.files.regular_file import file_status
 from tisim.files.resuming import resumes
 
 SEARCH_FILE = "search.h5"
@@ -53,12 +53,12 @@ def going_on(
     files. InputError where it may do neither; also when one is at work there that would be removed.
     """
     journal, guard = f"{file}.journal", f"{file}.lock"
-    begun = any(status(folder / name) is not None for name in (file, journal))
+    begun = any(file_status(folder / name) is not None for name in (file, journal))
     goes_on = resumes(folder, what, begun, f"what a {what} has found" * begun, fresh, overwrite)
     ownership.check(folder, (file, journal, guard, *beside, lock.LOCK), overwrite)
     if begun and not goes_on:
         # The lock file stays: without it two processes could lock two different files.
-        with lock.held(folder), locked(folder / guard, exclusive=True) as handle:
+        with lock.acquire(folder), locked(folder / guard, exclusive=True) as handle:
             for name in (file, journal, *beside):
                 (folder / name).unlink(missing_ok=True)
             os.ftruncate(handle, 0)

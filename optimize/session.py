@@ -22,11 +22,11 @@ from optimize.search_folder import SEARCH_FILE, SEARCH_FILES, check
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
 from tisim.backend import runtime
-from tisim.console import err, stopping
+from tisim.console import err, print_stopping
 from tisim.console import out as standard_output
 from tisim.files import lock
 from tisim.files.atomic import replace_file
-from tisim.files.ownership import take
+from tisim.files.ownership import claim
 from tisim.interrupt import Interrupt
 
 
@@ -62,10 +62,10 @@ def run(
         )
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
-            return session(problem, wished, evaluator, Path(out), say, bar, stopping)
+            return session(problem, wished, evaluator, Path(out), say, bar, print_stopping)
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / SEARCH_FILE) as cache:
             return _shown(
-                problem, wished, evaluator, cache, err() if verbose else Console(quiet=True), stopping
+                problem, wished, evaluator, cache, err() if verbose else Console(quiet=True), print_stopping
             )
 
 
@@ -86,8 +86,8 @@ def session(
     InputError when the folder is another search's, has such files, or cannot be written. Other processes may
     join the search, but not begin anew.
     """
-    take(folder, SEARCH_FILES, overwrite)
-    with lock.held(folder, exclusive=False):
+    claim(folder, SEARCH_FILES, overwrite)
+    with lock.acquire(folder, exclusive=False):
         with Cache(folder / SEARCH_FILE) as cache:
             if check(folder, cache, identity(problem, settings, evaluator.settings)):
                 line = f"going on with {folder / SEARCH_FILE}, which has {len(cache)} runs"

@@ -44,8 +44,8 @@ def own_file(tmp_path, monkeypatch):
         return path.relative_to(tmp_path)
 
     yield write
-    for file in python_file.loaded():
-        python_file.forget(file.name)
+    for file in python_file.loaded_files():
+        python_file.unload(file.name)
 
 
 ELSEWHERE = """

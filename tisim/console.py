@@ -1,5 +1,7 @@
-"""What runs and searches print on: where text goes, bars and tables. Text is printed as it is: names of files
-and of extras may have brackets, which are no markup here."""
+"""Consoles, progress bars and tables that runs and searches print with.
+
+Text is printed as it is: names of files and of extras may have brackets, which are no markup here.
+"""
 
 import sys
 
@@ -8,23 +10,23 @@ from rich.console import Console
 from rich.table import Table
 
 FILE_WIDTH = 110
-"""Tables that do not go to a terminal have so many columns, where rich would assume 80."""
+"""Width of tables that do not go to a terminal, characters; rich would assume 80."""
 TERMINAL_WIDTH = 80
-"""Tables for a terminal have at most so many columns: every terminal has as many."""
+"""Largest width of tables for a terminal, characters: every terminal has as many."""
 
 
 def out() -> Console:
-    """For results."""
+    """Return the console for results, which writes to standard output."""
     return Console(markup=False, width=None if sys.stdout.isatty() else FILE_WIDTH)
 
 
 def err() -> Console:
-    """For progress."""
+    """Return the console for progress, which writes to standard error."""
     return Console(stderr=True, markup=False, width=None if sys.stderr.isatty() else FILE_WIDTH)
 
 
 def progress_bar(before: str, after: str = "", console: Console | None = None) -> bars.Progress:
-    """A bar with the time taken and left, between two texts with fields of its task."""
+    """Return a bar with the time taken and left, between two texts with fields of its task."""
     return bars.Progress(
         bars.TextColumn(before, markup=False), bars.BarColumn(), bars.TaskProgressColumn(),
         bars.TimeElapsedColumn(), bars.TextColumn("left"), bars.TimeRemainingColumn(),
@@ -33,13 +35,13 @@ def progress_bar(before: str, after: str = "", console: Console | None = None) -
 
 
 def plain_table(*headings: str) -> Table:
-    """A table without lines; without a head when there are no headings."""
+    """Return a table without lines; it has no head when there are no headings."""
     table = Table(*headings, show_header=bool(headings), box=None, padding=(0, 2, 0, 0))
     for column in table.columns:
         column.overflow = "fold"
     return table
 
 
-def stopping() -> None:
-    """What Ctrl-C says."""
+def print_stopping() -> None:
+    """Print, after Ctrl-C, that the command will stop at the next good moment."""
     print("stopping at the next good moment; Ctrl-C again stops at once", file=sys.stderr)

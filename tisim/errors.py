@@ -1,4 +1,4 @@
-"""Errors for people: what was wrong, what it must be, what was received."""
+"""The errors that users see: a message says what was wrong, what it must be and what was received."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import reprlib
 from typing import Any
 
 LONGEST = 200
-"""Characters of what was received, and of a name, that a message repeats."""
+"""The largest number of characters of a received value, or of a name, that a message repeats."""
 
 
 class InputError(ValueError):
-    """Something the user wrote cannot be run; raised before anything runs. The CLI exits with code 2."""
+    """The input of the user cannot be run. It is raised before anything runs; the CLI exits with code 2."""
 
 
 class RunError(RuntimeError):
-    """A run could not go on. Says when, where and why; the last good state is kept."""
+    """A run could not go on. The message says when, where and why; the last good state is kept."""
 
 
 class _Short(reprlib.Repr):
-    """The representation of a value whose length and depth are bounded, however large the value is."""
+    """This repr bounds the length and the depth of what it returns, however large the value is."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,13 +34,13 @@ class _Short(reprlib.Repr):
 _short = _Short()
 
 
-def shown(value: Any) -> str:
-    """A value as a message repeats it: on one line, of at most LONGEST characters."""
-    return named(_short.repr(value))
+def abbreviated(value: Any) -> str:
+    """Return a value as a message repeats it: on one line, with at most LONGEST characters."""
+    return printable(_short.repr(value))
 
 
-def named(text: str) -> str:
-    """Text as a message repeats it: on one line, printable, of at most LONGEST characters."""
+def printable(text: str) -> str:
+    """Return text as a message repeats it: on one line, printable, with at most LONGEST characters."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST // 2]}...{text[-LONGEST // 2 + 3 :]}"
     return text if text.isprintable() else repr(text)[1:-1]
@@ -49,4 +49,4 @@ def named(text: str) -> str:
 def must(condition: bool, what: str, rule: str, received: Any) -> None:
     """Raise ``InputError("<what> must be <rule>; received <received>")`` unless ``condition`` holds."""
     if not condition:
-        raise InputError(f"{named(what)} must be {rule}; received {shown(received)}")
+        raise InputError(f"{printable(what)} must be {rule}; received {abbreviated(received)}")

@@ -1,4 +1,4 @@
-"""Ctrl-C that waits for a good moment: between two steps, where a state is whole.
+"""Ctrl-C is made to wait for a good moment: between two steps, where a state is whole.
 
 SIGTERM and SIGHUP, by which a system asks to stop, are taken as Ctrl-C. Signals that are ignored when a
 program begins, as SIGHUP under nohup, stay so.
@@ -19,94 +19,95 @@ _last = signal.SIGINT
 
 
 def exit_code() -> int:
-    """The exit code of a process that was stopped: 128 + the number of the signal that came last."""
+    """Return the exit code of a process that was stopped: 128 + the number of the signal that came last."""
     return 128 + _last
 
 
 class Interrupt:
-    """Within ``with Interrupt(say) as ctrl_c``, the first Ctrl-C is noted, reported by ``say``, and raised
-    (KeyboardInterrupt) by the next ``ctrl_c.check()``; a second one is raised at once, and ``forced`` set.
+    """Within ``with Interrupt(notify) as ctrl_c``, the first Ctrl-C is pending: ``notify`` is called, and the
+    next ``ctrl_c.check()`` raises KeyboardInterrupt. A second one is raised at once, and sets ``forced``.
 
     SIGTERM and SIGHUP count as a first one: whoever ends a session may send them several times.
     """
 
-    def __init__(self, say: Callable[[], None]) -> None:
-        self.say, self.noted, self.forced = say, False, False
-        self._handled = handled(self._note)
+    def __init__(self, notify: Callable[[], None]) -> None:
+        self.notify, self.pending, self.forced = notify, False, False
+        self._handlers = handle_signals(self._receive)
 
     def __enter__(self) -> Interrupt:
-        self._handled.__enter__()
+        self._handlers.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._handled.__exit__(kind, error, trace)
+        self._handlers.__exit__(kind, error, trace)
 
-    def _note(self, number: int) -> None:
-        if self.noted and number == signal.SIGINT:
+    def _receive(self, number: int) -> None:
+        if self.pending and number == signal.SIGINT:
             self.forced = True
             raise KeyboardInterrupt
-        if not self.noted:
-            self.noted = True
-            self.say()
+        if not self.pending:
+            self.pending = True
+            self.notify()
 
     def check(self) -> None:
-        """Raise a noted Ctrl-C."""
-        if self.noted:
+        """Raise KeyboardInterrupt if a Ctrl-C is pending."""
+        if self.pending:
             raise KeyboardInterrupt
 
 
 @contextlib.contextmanager
-def handled(handle: Callable[[int], None]) -> Iterator[None]:
-    """Within it, ``handle`` is called with the number of each signal that asks to stop.
+def handle_signals(handle: Callable[[int], None]) -> Iterator[None]:
+    """Call ``handle`` with the number of each signal that asks to stop, within this context.
 
-    In the main thread, that is: Python handles signals in no other, and leaves those of others alone.
+    Nothing is done outside of the main thread, as Python handles signals in no other.
     """
 
-    def take(number: int, frame: FrameType | None) -> None:
+    def on_signal(number: int, frame: FrameType | None) -> None:
         global _last
         _last = signal.Signals(number)
-        _leave_dead_terminals()
+        _redirect_dead_terminals()
         handle(number)
 
-    here = threading.current_thread() is threading.main_thread()
-    before = {number: signal.getsignal(number) for number in SIGNALS if here}
-    mine = [number for number in before if before[number] not in (signal.SIG_IGN, None)]
-    for number in mine:
-        signal.signal(number, take)
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    previous = {number: signal.getsignal(number) for number in SIGNALS if in_main_thread}
+    handled = [number for number in previous if previous[number] not in (signal.SIG_IGN, None)]
+    for number in handled:
+        signal.signal(number, on_signal)
     try:
         yield
     finally:
-        for number in mine:
-            signal.signal(number, before[number])
+        for number in handled:
+            signal.signal(number, previous[number])
 
 
 @contextlib.contextmanager
-def deferred() -> Iterator[None]:
-    """Within it signals that ask to stop wait, and are raised again at its end: for a library that calls back
-    into Python and does not bear an exception from there.
+def defer_signals() -> Iterator[None]:
+    """Hold signals that ask to stop within this context, and raise them again at its end.
+
+    It is for a library that calls back into Python and does not bear an exception from there.
     """
-    came: list[int] = []
+    received: list[int] = []
     try:
-        with handled(came.append):
+        with handle_signals(received.append):
             yield
     finally:
-        for number in came:
+        for number in received:
             signal.raise_signal(number)
 
 
-def stop(number: int) -> None:
-    """Raise the KeyboardInterrupt of Ctrl-C, whatever the signal."""
+def raise_interrupt(number: int) -> None:
+    """Raise the KeyboardInterrupt of Ctrl-C, whatever the signal is."""
     raise KeyboardInterrupt
 
 
-def _leave_dead_terminals() -> None:
-    """Have what is still printed go nowhere where the terminal is gone, instead of ending in an error."""
+def _redirect_dead_terminals() -> None:
+    """Send what is still printed to the null device where the terminal is gone, to avoid an error."""
     for descriptor in (1, 2):
         try:
             os.write(descriptor, b"")
         except OSError:
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, descriptor)
-            os.close(nowhere)
+            devnull = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(devnull, descriptor)
+            os.close(devnull)

@@ -74,7 +74,7 @@ class Problem:
     @property
     def identity(self) -> str:
         """See ``code``; empty for a problem of this package, whose ``version`` says what it means."""
-        files = python_file.checksums(self.scene, *(objective.of for objective in self.objectives))
+        files = python_file.module_checksums(self.scene, *(objective.of for objective in self.objectives))
         return self.code or "-".join(checksum[:12] for checksum in files.values())
 
     @property

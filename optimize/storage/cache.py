@@ -22,8 +22,8 @@ from optimize.storage.record import Record
 from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.framing import Scan
-from tisim.files.ownership import writable
-from tisim.files.regular_file import is_folder, status
+from tisim.files.ownership import ensure_writable
+from tisim.files.regular_file import file_status, is_folder
 
 FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file
 
@@ -44,11 +44,11 @@ class Cache:
         self._pending: dict[str, Hdf5Table] = {}
         self._version: tuple[int, ...] | None = None
         self._end = self._frames = 0
-        if status(self.path) is not None:
-            with hdf5_store.opened(self.path):
+        if file_status(self.path) is not None:
+            with hdf5_store.open_evaluations(self.path):
                 pass  # before a lock file is left beside a file that is not ours
         if not is_folder(self.path.parent):
-            writable(self.path.parent)
+            ensure_writable(self.path.parent)
         self.refresh()
 
     def __enter__(self) -> Cache:
@@ -110,15 +110,15 @@ class Cache:
         if name in self._pending:
             return self._pending[name]
         must(name in self.tables(), "table name", f"one of {self.tables()}", name)
-        with locked(self._lock, exclusive=False), hdf5_store.opened(self.path) as file:
+        with locked(self._lock, exclusive=False), hdf5_store.open_evaluations(self.path) as file:
             return hdf5_store.read_table(file, name)
 
     def attributes(self) -> dict[str, Mapping[str, Any]]:
         """The attributes of all tables by name, stored or waiting for the next fold."""
         stored: dict[str, Mapping[str, Any]] = {}
         with locked(self._lock, exclusive=False):
-            if status(self.path) is not None:
-                with hdf5_store.opened(self.path) as file:
+            if file_status(self.path) is not None:
+                with hdf5_store.open_evaluations(self.path) as file:
                     stored = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
         return stored | {name: table.attrs for name, table in self._pending.items()}
 
@@ -147,8 +147,8 @@ class Cache:
         self.fold()
 
     def _fold(self, *, damaged: bool = True) -> None:
-        old = None if status(self.path) is None else self.path
-        replace_file(self.path, hdf5_store.image(old, self.records(), self._pending, damaged))
+        old = None if file_status(self.path) is None else self.path
+        replace_file(self.path, hdf5_store.build_image(old, self.records(), self._pending, damaged))
         self._journal.clear()
         self._pending, self._version, self._end, self._frames = {}, file_version(self.path), 0, 0
 
@@ -157,15 +157,17 @@ class Cache:
         if version != self._version or self._journal.size() < self._end:
             self._records, self._end, self._frames, self._version = {}, 0, 0, version
             if version is not None:
-                with hdf5_store.opened(self.path) as file:
+                with hdf5_store.open_evaluations(self.path) as file:
                     self._take(*hdf5_store.read_rows(file))
         first = self._end == 0
         scanned = self._journal.read(self._end)
         self._take(*journal_records(scanned))
         self._end, self._frames = scanned.end, self._frames + len(scanned.payloads)
         mark = Mark.read(self._lock) if first else None
-        if mark is not None and (cut := mark.cut(version, scanned)):
-            warnings.warn(f"{self.path}: {cut}; what is lost will be run again", RuntimeWarning, stacklevel=4)
+        if mark is not None and (loss := mark.loss(version, scanned)):
+            warnings.warn(
+                f"{self.path}: {loss}; what is lost will be run again", RuntimeWarning, stacklevel=4
+            )
 
     def _take(self, records: Sequence[Record], damaged: Sequence[str]) -> None:
         for record in records:
@@ -184,7 +186,7 @@ def cache_files(path: str | Path) -> tuple[Path, Path, Path]:
 
 def file_version(path: Path) -> tuple[int, ...] | None:
     """What tells one state of the HDF5 file from another; None where there is none."""
-    there = status(path)
+    there = file_status(path)
     return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
 
 
@@ -203,7 +205,7 @@ def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
 def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
     """As ``cache_files``, of a cache that is there already. InputError if there is no such file."""
     file, journal, lock = cache_files(path)
-    there = status(file) or status(journal)
+    there = file_status(file) or file_status(journal)
     must(there is not None, "cache file", "an existing file", str(path))
     return file, journal, lock
 

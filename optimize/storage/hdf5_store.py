@@ -1,4 +1,4 @@
-"""The HDF5 file of a cache: one row per evaluation in /evaluations, and any number of named tables.
+"""The HDF5 file of a cache has one row per evaluation in /evaluations, and any number of named tables.
 
 The file is always built whole, in memory, and then written by ordinary system calls: a full disk is met by
 write(), not inside the HDF5 library. Strings have one fixed length per column, so damage to a byte is damage
@@ -33,7 +33,7 @@ _COLUMNS: dict[str, Any] = {
     "key": bytes, "problem": bytes, "fitness": np.float64, "ok": np.uint8, "reason": bytes, "seed": np.int64,
     "design": bytes, "work": bytes, "wall_s": np.float64, "created": np.float64, "crc": np.uint32,
 }  # fmt: skip
-_OTHERS = "others"
+_OTHER_OBJECTIVES = "others"
 """Column with the further objectives as JSON; absent in files in which all evaluations have one."""
 
 
@@ -53,8 +53,8 @@ class Hdf5Table:
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
-    """The file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache.
+def open_evaluations(path: Path) -> Iterator[h5py.File]:
+    """Yield the file for reading. InputError, naming it, unless it is a whole HDF5 file written by a cache.
 
     HDF5 gets what its checksum says is whole, and nothing else: given a damaged structure, or another
     program's, it may never return.
@@ -63,13 +63,13 @@ def opened(path: Path) -> Iterator[h5py.File]:
     content = regular_file.content(path)
     if content is None:
         raise InputError(f"{rule} nothing")
-    inside = verified(content)
-    if inside is None:
+    image = verified(content)
+    if image is None:
         raise InputError(
             f"{rule} {len(content)} bytes that are damaged, cut short or another program's "
             "('tisim cache --compact' keeps what can be read)"
         )
-    with h5py.File(io.BytesIO(inside), "r") as file:
+    with h5py.File(io.BytesIO(image), "r") as file:
         if file.attrs.get("format") != EVALUATIONS_FORMAT or EVALUATIONS not in file:
             raise InputError(f"{rule} one with {', '.join(file) or 'nothing in it'}")
         try:
@@ -80,35 +80,36 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} must be undamaged; received {error}") from error
 
 
-def image(
+def build_image(
     old: Path | None, records: Sequence[Record], tables: Mapping[str, Hdf5Table], damaged: bool = True
 ) -> bytes:
-    """The bytes of a new file: these records, the tables of the file old, and tables (which win).
+    """Return the bytes of a new file with these records, the tables of the file old, and tables (which win).
 
     damaged : whether to take over tables whose checksum fails.
     """
-    with h5py.File("image", "w", driver="core", backing_store=False) as new:
-        new.attrs["format"] = EVALUATIONS_FORMAT
+    with h5py.File("image", "w", driver="core", backing_store=False) as file:
+        file.attrs["format"] = EVALUATIONS_FORMAT
         if old is not None:
-            with opened(old) as file:
-                for name in set(file) - {EVALUATIONS}:
-                    file.copy(file[name], new, name)
-        for name in [] if damaged else damaged_tables(new):
-            _clear(new[name])
+            with open_evaluations(old) as old_file:
+                for name in set(old_file) - {EVALUATIONS}:
+                    old_file.copy(old_file[name], file, name)
+        for name in [] if damaged else damaged_tables(file):
+            _clear_table(file[name])
         for name, table in tables.items():
-            _write_table(new.require_group(name), table)
-        _write_rows(new.create_group(EVALUATIONS), records)
-        new.flush()
-        data: list[tuple[int, int]] = []
-        new.visititems(lambda _, item: data.append(_place(item)) if isinstance(item, h5py.Dataset) else None)
-        return with_checksum(bytes(new.id.get_file_image()), data)
+            _write_table(file.require_group(name), table)
+        _write_rows(file.create_group(EVALUATIONS), records)
+        file.flush()
+        datasets: list[h5py.Dataset] = []
+        file.visititems(lambda _, item: datasets.append(item) if isinstance(item, h5py.Dataset) else None)
+        data = [_extent(dataset) for dataset in datasets]
+        return with_checksum(bytes(file.id.get_file_image()), data)
 
 
 def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
-    """The whole evaluations in order, and a description of each row whose checksum fails."""
+    """Return the whole evaluations in order, and a description of each row whose checksum fails."""
     columns = {name: file[EVALUATIONS][name][...] for name in _COLUMNS}
-    if _OTHERS in file[EVALUATIONS]:
-        columns[_OTHERS] = file[EVALUATIONS][_OTHERS][...]
+    if _OTHER_OBJECTIVES in file[EVALUATIONS]:
+        columns[_OTHER_OBJECTIVES] = file[EVALUATIONS][_OTHER_OBJECTIVES][...]
     lengths = {name: len(column) for name, column in columns.items()}
     must(len(set(lengths.values())) == 1, f"columns of {file.filename}", "all of one length", lengths)
     records, damaged = [], []
@@ -117,10 +118,10 @@ def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
         crc = int(cells.pop("crc"))
         try:
             record = _record(cells)
-            whole = zlib.crc32(record.payload()) == crc
+            intact = zlib.crc32(record.payload()) == crc
         except (ValueError, TypeError, ArithmeticError):
-            whole = False
-        if whole:
+            intact = False
+        if intact:
             records.append(record)
         else:
             damaged.append(f"row {row}: its checksum does not fit")
@@ -128,7 +129,7 @@ def read_rows(file: h5py.File) -> tuple[list[Record], list[str]]:
 
 
 def read_table(file: h5py.File, name: str) -> Hdf5Table:
-    """One table. InputError if there is none of that name, or it is damaged."""
+    """Return one table. InputError if there is none of that name, or it is damaged."""
     must(name in tables(file), "table name", f"one of {tables(file)}", name)
     must(
         name not in damaged_tables(file),
@@ -140,31 +141,31 @@ def read_table(file: h5py.File, name: str) -> Hdf5Table:
 
 
 def tables(file: h5py.File) -> list[str]:
-    """Names of the tables in the file."""
-    found: list[str] = []
-    file.visititems(lambda name, item: found.append(name) if "crc32" in item.attrs else None)
-    return found
+    """Return the names of the tables in the file."""
+    names: list[str] = []
+    file.visititems(lambda name, item: names.append(name) if "crc32" in item.attrs else None)
+    return names
 
 
 def attributes(group: h5py.Group) -> dict[str, Any]:
-    """The attributes of a table: numbers and strings."""
-    found = {
+    """Return the attributes of a table: numbers and strings."""
+    values = {
         name: getattr(value, "tolist", lambda value=value: value)() for name, value in group.attrs.items()
     }
-    return {name: value for name, value in found.items() if name not in ("columns", "crc32")}
+    return {name: value for name, value in values.items() if name not in ("columns", "crc32")}
 
 
 def damaged_tables(file: h5py.File) -> list[str]:
-    """Names of the tables whose checksum fails."""
-    bad = []
+    """Return the names of the tables whose checksum fails."""
+    damaged = []
     for name in tables(file):
         try:
-            whole = _crc(_read_table(file[name])) == int(file[name].attrs["crc32"])
+            intact = _table_checksum(_read_table(file[name])) == int(file[name].attrs["crc32"])
         except (OSError, KeyError, RuntimeError, ValueError, TypeError):
-            whole = False
-        if not whole:
-            bad.append(name)
-    return bad
+            intact = False
+        if not intact:
+            damaged.append(name)
+    return damaged
 
 
 def _record(cells: Mapping[str, Any]) -> Record:
@@ -180,7 +181,7 @@ def _record(cells: Mapping[str, Any]) -> Record:
         work=json.loads(text["work"]),
         wall_s=float(cells["wall_s"]),
         created=float(cells["created"]),
-        others=tuple(math.nan if v is None else v for v in json.loads(cells.get(_OTHERS, b"[]"))),
+        others=tuple(math.nan if v is None else v for v in json.loads(cells.get(_OTHER_OBJECTIVES, b"[]"))),
     )
 
 
@@ -196,7 +197,7 @@ def _write_rows(group: h5py.Group, records: Sequence[Record]) -> None:
             group[name] = np.array([getattr(record, name) for record in records], dtype=kind)
     if any(record.others for record in records):
         finite = [[v if math.isfinite(v) else None for v in record.others] for record in records]
-        group[_OTHERS] = _strings([canonical(others) for others in finite])
+        group[_OTHER_OBJECTIVES] = _strings([canonical(others) for others in finite])
 
 
 def _strings(values: Sequence[bytes]) -> np.ndarray:
@@ -204,8 +205,8 @@ def _strings(values: Sequence[bytes]) -> np.ndarray:
     return np.array(values, dtype=h5py.string_dtype("utf-8", longest))
 
 
-def _clear(group: h5py.Group) -> None:
-    """Take a table away; those below it stay."""
+def _clear_table(group: h5py.Group) -> None:
+    """Remove a table; those below it stay."""
     for name in [name for name, item in group.items() if isinstance(item, h5py.Dataset)]:
         del group[name]
     for name in list(group.attrs):
@@ -213,34 +214,34 @@ def _clear(group: h5py.Group) -> None:
 
 
 def _write_table(group: h5py.Group, table: Hdf5Table) -> None:
-    _clear(group)
+    _clear_table(group)
     for name, column in table.columns.items():
         text = any(isinstance(value, str) for value in column)
         data = _strings([str(value).encode() for value in column]) if text else np.asarray(column)
-        group[_dataset(name)] = data
+        group[_dataset_name(name)] = data
     for name, value in table.attrs.items():
         group.attrs[name] = value
     group.attrs["columns"] = json.dumps(list(table.columns))
-    group.attrs["crc32"] = _crc(_read_table(group))
+    group.attrs["crc32"] = _table_checksum(_read_table(group))
 
 
 def _read_table(group: h5py.Group) -> Hdf5Table:
     columns = {}
     for name in json.loads(group.attrs["columns"]):
-        values = group[_dataset(name)][...].tolist()
+        values = group[_dataset_name(name)][...].tolist()
         columns[name] = [value.decode() if isinstance(value, bytes) else value for value in values]
     return Hdf5Table(columns, attributes(group))
 
 
-def _place(dataset: h5py.Dataset) -> tuple[int, int]:
-    """Offset and size in bytes of a dataset's raw data; an empty one has none."""
+def _extent(dataset: h5py.Dataset) -> tuple[int, int]:
+    """Return offset and size in bytes of a dataset's raw data; those of an empty one are 0."""
     return dataset.id.get_offset() or 0, dataset.id.get_storage_size()
 
 
-def _dataset(heading: str) -> str:
-    """HDF5 takes "/" for a path; headings have units like m/s. U+2215 looks the same."""
+def _dataset_name(heading: str) -> str:
+    """Return the name of a column's dataset: HDF5 takes "/" for a path, so a unit like m/s gets U+2215."""
     return heading.replace("/", "\u2215")
 
 
-def _crc(table: Hdf5Table) -> int:
+def _table_checksum(table: Hdf5Table) -> int:
     return zlib.crc32(canonical([list(table.columns), dict(table.columns), dict(table.attrs)]))

@@ -1,6 +1,6 @@
-"""Write-ahead journal: framed, checksummed payloads appended to one file (see tisim/files/framing.py).
+"""The write-ahead journal is a file of framed, checksummed payloads (see tisim/files/framing.py).
 
-Beside it, in the lock file, stands how far it had been written: what is missing of that was cut off.
+The lock file beside it says how far it had been written: what is missing of that was cut off.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from pathlib import Path
 
 from tisim.files.atomic import append_at
 from tisim.files.framing import Scan, frame, scan
-from tisim.files.regular_file import content, opened, status
+from tisim.files.regular_file import content, file_status, open_descriptor
 
 
 @dataclass(frozen=True)
 class Mark:
-    """How far a journal had been written.
+    """A mark says how far a journal had been written.
 
-    base : what it goes with, in numbers; None where it stands alone. end : bytes. frames : in them.
+    base : numbers of the version of the file that it belongs to; None where there is no such file.
+    end : length, bytes. frames : their number within this length.
     """
 
     base: tuple[int, ...] | None
@@ -28,43 +29,45 @@ class Mark:
     frames: int
 
     def write(self, lock: int) -> None:
-        """Put it into the open lock file. Nothing that is stored hangs on it: no error where it cannot be."""
+        """Write the mark into the open lock file. No stored record depends on it: a failure is no error."""
         with contextlib.suppress(OSError):
             os.pwrite(lock, frame(json.dumps(astuple(self)).encode()), 0)
 
     @classmethod
     def read(cls, lock: Path) -> Mark | None:
-        """The mark in a lock file, None where there is no whole one."""
+        """Return the mark in a lock file, None where there is no whole one."""
         try:
             base, end, frames = json.loads(scan(content(lock) or b"").payloads[0])
             return cls(None if base is None else tuple(base), int(end), int(frames))
         except (IndexError, ValueError, TypeError):
             return None
 
-    def cut(self, base: tuple[int, ...] | None, found: Scan) -> str | None:
-        """In words, what is missing in a journal that was read from its beginning; None when nothing is."""
-        if self.base != base or found.end >= self.end:
+    def loss(self, base: tuple[int, ...] | None, journal: Scan) -> str | None:
+        """Return a description of what a journal, read from its beginning, has lost; None for a whole one."""
+        if self.base != base or journal.end >= self.end:
             return None
-        lost = max(1, self.frames - len(found.payloads) - len(found.damaged))
-        return f"journal, byte {found.end}: {lost} evaluation(s) cut off, {self.end - found.end} bytes"
+        lost_count = max(1, self.frames - len(journal.payloads) - len(journal.damaged))
+        return (
+            f"journal, byte {journal.end}: {lost_count} evaluation(s) cut off, {self.end - journal.end} bytes"
+        )
 
 
 class Journal:
-    """The journal file at path. Callers hold the lock (tisim.files.atomic.locked)."""
+    """The journal is the file at path. Callers hold the lock (tisim.files.atomic.locked)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def size(self) -> int:
-        """Bytes in the file, 0 if there is none."""
-        there = status(self.path)
-        return 0 if there is None else there.st_size
+        """Return the number of bytes in the file, 0 if there is none."""
+        info = file_status(self.path)
+        return 0 if info is None else info.st_size
 
     def read(self, offset: int = 0) -> Scan:
-        """Frames from byte offset, which must be 0 or the end of an earlier scan."""
+        """Return the frames from byte offset on, which must be 0 or the end of an earlier scan."""
         if self.size() <= offset:
             return Scan([], offset, [], 0)
-        with os.fdopen(opened(self.path, os.O_RDONLY), "rb") as file:
+        with os.fdopen(open_descriptor(self.path, os.O_RDONLY), "rb") as file:
             file.seek(offset)
             return scan(file.read(), offset)
 

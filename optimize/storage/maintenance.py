@@ -46,14 +46,14 @@ def verify(path: str | Path) -> VerifyReport:
         damaged: list[str] = []
         version = file_version(path)
         if version is not None:
-            with hdf5_store.opened(path) as file:
+            with hdf5_store.open_evaluations(path) as file:
                 rows, damaged = hdf5_store.read_rows(file)
                 bad = hdf5_store.damaged_tables(file)
                 damaged += [f"table {name}: its checksum does not fit" for name in bad]
         scanned, mark = Journal(journal).read(), Mark.read(lock)
     frames, none = journal_records(scanned)
-    cut = None if mark is None else mark.cut(version, scanned)
-    damaged += [*none, *([cut] if cut else [])]
+    loss = None if mark is None else mark.loss(version, scanned)
+    damaged += [*none, *([loss] if loss else [])]
     first: dict[str, Record] = {}
     for record in (*rows, *frames):
         first.setdefault(record.key, record)
@@ -74,7 +74,7 @@ def compact(path: str | Path) -> int:
     A file that is damaged as a whole is kept as FILE.damaged; FILE then has what could be read of it.
     """
     file, _, lock = existing_files(path)
-    salvage.mend(file, lock)
+    salvage.repair(file, lock)
     cache = Cache(file)
     cache.compact()
     return len(cache)

@@ -1,4 +1,4 @@
-"""What can still be read of a cache file whose structure is damaged, or that another program has written to.
+"""A cache file whose structure is damaged, or that another program has written to, is read in part.
 
 HDF5 may crash on such a file, or never return: it is read in a process of its own, ended after a while. Rows
 and tables count when their own checksums fit.
@@ -17,55 +17,54 @@ from optimize.storage import hdf5_store
 from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
 from tisim.files.checksum import verified
-from tisim.files.regular_file import content, status
+from tisim.files.regular_file import content, file_status
 
-LIMIT = 300.0
-"""s, for that process; reading a million rows takes a tenth of it."""
+TIME_LIMIT = 300.0
+"""Longest time of that process, s; reading a million rows takes a tenth of it."""
 
 
-def mend(path: Path, lock: Path) -> None:
-    """Put what can be read in the place of the file, and the damaged one beside it as FILE.damaged.
+def repair(path: Path, lock: Path) -> None:
+    """Replace a damaged file by what can be read of it, and keep the damaged one as FILE.damaged.
 
     Nothing happens when the file is whole, or nothing can be read. InputError when FILE.damaged is there.
     """
     old = content(path)
     if old is None or verified(old) is not None:
         return
-    made = _salvaged(old)
-    if made is None:
+    salvaged = _salvage(old)
+    if salvaged is None:
         return
-    beside = path.with_name(f"{path.name}.damaged")
+    damaged_path = path.with_name(f"{path.name}.damaged")
     with locked(lock, exclusive=True):
         if content(path) == old:
-            must(status(beside) is None, "place for the damaged file", "free", str(beside))
-            replace_file(beside, old)
-            replace_file(path, made)
+            must(file_status(damaged_path) is None, "place for the damaged file", "free", str(damaged_path))
+            replace_file(damaged_path, old)
+            replace_file(path, salvaged)
 
 
-def _salvaged(old: bytes) -> bytes | None:
+def _salvage(old: bytes) -> bytes | None:
     command = [sys.executable, "-m", "optimize.storage.salvage"]
     try:
-        done = subprocess.run(command, input=old, capture_output=True, timeout=LIMIT, check=False)
+        process = subprocess.run(command, input=old, capture_output=True, timeout=TIME_LIMIT, check=False)
     except subprocess.TimeoutExpired:
         return None
-    return done.stdout if done.returncode == 0 and verified(done.stdout) is not None else None
+    return process.stdout if process.returncode == 0 and verified(process.stdout) is not None else None
 
 
-def _read(old: bytes) -> bytes:
-    """A cache file of what is whole in a damaged one; any error when nothing can be read."""
+def _rebuild(old: bytes) -> bytes:
+    """Return a cache file of what is whole in a damaged one; any error when nothing can be read."""
     with h5py.File(io.BytesIO(old), "r") as file:
-        written = file.attrs.get("format") == hdf5_store.EVALUATIONS_FORMAT
-        must(written, "file", "written by a cache", "another")
+        by_cache = file.attrs.get("format") == hdf5_store.EVALUATIONS_FORMAT
+        must(by_cache, "file", "written by a cache", "another")
         records, _ = hdf5_store.read_rows(file)
         try:
-            bad = hdf5_store.damaged_tables(file)
-            tables = {
-                name: hdf5_store.read_table(file, name) for name in hdf5_store.tables(file) if name not in bad
-            }
+            damaged = hdf5_store.damaged_tables(file)
+            whole = [name for name in hdf5_store.tables(file) if name not in damaged]
+            tables = {name: hdf5_store.read_table(file, name) for name in whole}
         except (OSError, KeyError, RuntimeError, ValueError):
             tables = {}  # evaluations cost hours, tables nothing
-    return hdf5_store.image(None, records, tables)
+    return hdf5_store.build_image(None, records, tables)
 
 
 if __name__ == "__main__":
-    sys.stdout.buffer.write(_read(sys.stdin.buffer.read()))
+    sys.stdout.buffer.write(_rebuild(sys.stdin.buffer.read()))

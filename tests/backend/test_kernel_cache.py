@@ -19,11 +19,11 @@ print(tisim.run(head_on(1.0, ())).status.ok, flush=True)
 QUEUES = """
 from tisim.files import atomic
 
-def wait(handle, path, *how, wait=atomic._wait):
+def wait(handle, path, *how, wait=atomic._wait_for_lock):
     print("queues", path.name, flush=True)
     wait(handle, path, *how)
 
-atomic._wait = wait
+atomic._wait_for_lock = wait
 """
 """Before it: says when it comes to wait for a lock of ours."""
 

@@ -71,7 +71,7 @@ def test_a_run_is_alone_in_its_folder_until_it_is_gone(tisim, toml, tmp_path, un
 def at_work(tmp_path):
     """A folder in which another process is at work."""
     (tmp_path / "out").mkdir()
-    with lock.held(tmp_path / "out"):
+    with lock.acquire(tmp_path / "out"):
         yield "out"
 
 

@@ -122,7 +122,7 @@ def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, mon
 def parsed(command, *words):
     """Of the words of a command the scene, the precision, and what the parser makes of those of a scene."""
     found = get_command(app).commands[command].make_context(command, list(words)).params
-    _, scene = scene_arguments.scene(
+    _, scene = scene_arguments.load_scene(
         found["target"], found["size"], found["seed"], found["absent"] or (), found["changes"] or ()
     )
     asked = ("target", "size", "seed", "changes", "device", "threads", "plugins")

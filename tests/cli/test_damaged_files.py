@@ -30,7 +30,7 @@ def another_program(path):
 
 
 def another_of_ours(path):
-    with checksum.created(path) as file:
+    with checksum.create_file(path) as file:
         file.attrs["format"] = "tisim something else"
 
 

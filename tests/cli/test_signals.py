@@ -55,10 +55,10 @@ def test_only_ctrl_c_forces():
 def test_signal_that_is_ignored_stays_so(number, code):
     """As SIGHUP under nohup."""
     signal.signal(number, signal.SIG_IGN)
-    with interrupt.handled(interrupt.stop), Interrupt(lambda: None) as asked:
+    with interrupt.handle_signals(interrupt.raise_interrupt), Interrupt(lambda: None) as asked:
         os.kill(os.getpid(), number)
         asked.check()
-    assert not asked.noted
+    assert not asked.pending
     assert signal.getsignal(number) is signal.SIG_IGN
 
 

@@ -40,7 +40,7 @@ WAYS = {
     "replace": lambda path: replace_file(path.with_suffix(""), b"new"),
     "replace by name": replace_by_name,
     "read": regular_file.content,
-    "look": regular_file.status,
+    "look": regular_file.file_status,
 }
 """What is done with the file "file.new"."""
 
@@ -135,7 +135,7 @@ for number, what in enumerate((
     lambda: regular_file.content(folder / "secret"),
     lambda: append_at(folder / "lock", 0, b"new"),
     lambda: replace_file(folder / "lock", b"new"),
-    lambda: regular_file.status(folder / "closed" / "file"),
+    lambda: regular_file.file_status(folder / "closed" / "file"),
 )):
     try:
         print(number, what())

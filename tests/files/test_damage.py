@@ -15,8 +15,8 @@ from tisim.accuracy import storage
 from tisim.files import checksum
 from tisim.io import checkpoint, h5md
 from tisim.io.export import export
-from tisim.io.reader import frames, worlds
-from tisim.io.trajectory import LIBRARY, Trajectory
+from tisim.io.reader import frames, world_count
+from tisim.io.trajectory import LIBVER, Trajectory
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_damage_to_a_frame_is_damage_to_that_frame(tmp_path):
             found[3]
     recording = Recording(path, frames=99)
     with pytest.raises(InputError, match="file must be undamaged; received"):
-        Trajectory.going_on(recording, STILL, 1.0)
+        Trajectory.resume(recording, STILL, 1.0)
     assert [file.name for file in tmp_path.iterdir()] == ["trajectory.h5"]
 
 
@@ -141,7 +141,7 @@ def no_file(request, tmp_path):
         with h5py.File(path, "w", libver="latest") as file:
             file["x"] = np.zeros(9)
     elif request.param != "none":
-        with checksum.created(path) as file:
+        with checksum.create_file(path) as file:
             file.attrs["format"] = "tisim something else"
     return path
 
@@ -150,10 +150,10 @@ def no_file(request, tmp_path):
     "read",
     [
         lambda path: frames(path).__enter__(),
-        worlds,
+        world_count,
         lambda path: export(path, "vtk", path.parent),
         lambda path: checkpoint.restore(_Loaded(), path),
-        lambda path: checksum.opened(path, "file", storage.COST_FORMAT).__enter__(),
+        lambda path: checksum.open_file(path, "file", storage.COST_FORMAT).__enter__(),
     ],
     ids=["frames", "worlds", "export", "checkpoint", "cost"],
 )
@@ -171,8 +171,8 @@ def test_files_of_versions_without_checksums_are_told_from_those_of_others(tmp_p
     if name == "result.h5":
         path.write_bytes(checksum.verified(damage._result(tmp_path).read_bytes()))
     else:
-        with h5py.File(path, "w", libver="earliest" if "older" in name else LIBRARY) as file:
-            h5md.metadata(file, "0.1.0")
+        with h5py.File(path, "w", libver="earliest" if "older" in name else LIBVER) as file:
+            h5md.write_metadata(file, "0.1.0")
             file["particles/all/position/step"] = [0, 10]
     told = "an older version has written it, whose files h5py still reads$"
     with pytest.raises(InputError, match=told), frames(path):

@@ -15,11 +15,11 @@ import pytest
 from tests.scenes import scene
 from tisim import InputError, Recording, RunError
 from tisim.files import atomic
-from tisim.files.growing_hdf5 import Growing
-from tisim.files.shared_hdf5 import Reading
-from tisim.files.superblock import SIZE, lookup3, sound, superblock
+from tisim.files.growing_hdf5 import GrowingFile
+from tisim.files.shared_hdf5 import SharedFile
+from tisim.files.superblock import SIZE, is_valid, lookup3, superblock
 from tisim.io.reader import Frame, frames
-from tisim.io.trajectory import LIBRARY, Trajectory
+from tisim.io.trajectory import LIBVER, Trajectory
 
 GRAINS = 300
 STILL = scene([(0, 0, 0)] * GRAINS, [(0.0, 0, 0)] * GRAINS)
@@ -69,11 +69,11 @@ def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows)
     """So at whatever write the writer is killed. HDF5 opens it as any other file, and finds all frames."""
     path, left = tmp_path / "t.h5", []
 
-    def note(self, at, piece, put=Growing._put):
+    def note(self, at, piece, put=GrowingFile._write_piece):
         put(self, at, piece)
         left.append((path.read_bytes(), written))
 
-    monkeypatch.setattr(Growing, "_put", note)
+    monkeypatch.setattr(GrowingFile, "_write_piece", note)
     written = 0
     with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
         for written in range(rows):
@@ -114,13 +114,13 @@ def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
         trajectory.write(0, frame(0))
     calls, at = 0, 0
 
-    def torn(self, size, settled=Reading._settled):
+    def torn(self, size, settled=SharedFile._read_stable):
         nonlocal calls
         calls += 1
         found = settled(self, size)
         return bytes(len(found) // 2) + found[len(found) // 2 :] if calls == at else found
 
-    monkeypatch.setattr(Reading, "_settled", torn)
+    monkeypatch.setattr(SharedFile, "_read_stable", torn)
     while calls >= at:
         calls, at = 0, at + 1
         assert whole_frames(path, 1) == 1
@@ -173,10 +173,10 @@ def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, kept)
             trajectory.write(0, frame(k))
     content = path.read_bytes()
     with files_of_at_most(len(content) // 4), pytest.raises(RunError, match="could not be written"):
-        Trajectory.going_on(recording, STILL, frame(kept).time)
+        Trajectory.resume(recording, STILL, frame(kept).time)
     assert path.read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
-    with Trajectory.going_on(recording, STILL, frame(kept).time):
+    with Trajectory.resume(recording, STILL, frame(kept).time):
         assert whole_frames(path, kept + 1) == kept + 1
 
 
@@ -186,7 +186,7 @@ def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_pat
     trajectory = Trajectory(recording, [STILL])
     assert whole_frames(path, 0) == 0
     trajectory.close()
-    with Trajectory.going_on(recording, STILL, 1.0) as trajectory:
+    with Trajectory.resume(recording, STILL, 1.0) as trajectory:
         trajectory.write(0, frame(0))
     assert whole_frames(path, 1) == 1
 
@@ -249,7 +249,7 @@ def test_ctrl_c_while_hdf5_writes_waits_for_the_frame(tmp_path, monkeypatch, nam
             whole_frames(path, written)
 
     stride, least = {"write": (4, 50), "readinto": (7, 2), "truncate": (1, 0)}[name]
-    assert interrupted(monkeypatch, Growing, name, write, stride) > least
+    assert interrupted(monkeypatch, GrowingFile, name, write, stride) > least
 
 
 @pytest.mark.parametrize("name", ["readinto", "seek"])
@@ -258,7 +258,7 @@ def test_ctrl_c_while_hdf5_reads_waits_for_the_frame(tmp_path, monkeypatch, name
     with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
         for k in range(2):
             trajectory.write(0, frame(k))
-    assert interrupted(monkeypatch, Reading, name, lambda: whole_frames(path, 2), 3) > 1
+    assert interrupted(monkeypatch, SharedFile, name, lambda: whole_frames(path, 2), 3) > 1
 
 
 def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypatch):
@@ -270,12 +270,12 @@ def test_ctrl_c_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, monkeypa
 
     def go_on():
         try:
-            Trajectory.going_on(recording, STILL, 1.0).close()
+            Trajectory.resume(recording, STILL, 1.0).close()
         finally:
             whole_frames(path, 3)
             assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
 
-    assert interrupted(monkeypatch, Growing, "write", go_on, 17) > 50
+    assert interrupted(monkeypatch, GrowingFile, "write", go_on, 17) > 50
 
 
 def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypatch):
@@ -290,13 +290,13 @@ def test_a_file_that_another_process_holds_is_no_wrong_input(tmp_path, monkeypat
 @pytest.mark.parametrize("size", [0, 1, 1000])
 def test_the_superblock_is_the_one_that_hdf5_writes(size):
     image = io.BytesIO()
-    with h5py.File(image, "w", libver=LIBRARY) as file:
+    with h5py.File(image, "w", libver=LIBVER) as file:
         file["x"] = np.zeros(size)
     block = image.getvalue()[:SIZE]
-    assert sound(block)
+    assert is_valid(block)
     assert superblock(block, len(image.getvalue())) == block
-    assert not any(sound(block[:k] + bytes([block[k] ^ 1]) + block[k + 1 :]) for k in range(SIZE))
-    assert not sound(block[:-1])
+    assert not any(is_valid(block[:k] + bytes([block[k] ^ 1]) + block[k + 1 :]) for k in range(SIZE))
+    assert not is_valid(block[:-1])
 
 
 def test_lookup3_is_that_of_its_author():
@@ -307,10 +307,10 @@ def test_lookup3_is_that_of_its_author():
 def test_what_could_not_be_written_is_read_back(tmp_path):
     """HDF5 may read again what it has written, and must find it, or it ends the process."""
     path = tmp_path / "f"
-    with h5py.File(path, "w", libver=LIBRARY) as file:
+    with h5py.File(path, "w", libver=LIBVER) as file:
         file["x"] = np.zeros(10)
     content = path.read_bytes()
-    with Growing(path) as growing, files_of_at_most(len(content) + 5):
+    with GrowingFile(path) as growing, files_of_at_most(len(content) + 5):
         growing.seek(0, os.SEEK_END)
         growing.write(b"0123456789")
         assert growing.failure.strerror == "File too large"

@@ -8,14 +8,14 @@ import pytest
 from tisim import InputError
 from tisim.files import ownership
 from tisim.files.framing import MAGIC
-from tisim.files.ownership import MARKER, Leavings, check, check_all, take
+from tisim.files.ownership import MARKER, LegacyFiles, check, check_all, claim
 
 
 @pytest.fixture(autouse=True)
 def before(monkeypatch):
     """What a version without markers is said to have left."""
-    left = (Leavings(("all.h5",), ("all.csv",)), Leavings(("more.h5",), ("more.csv",)))
-    monkeypatch.setattr(ownership, "LEFT_UNMARKED", left)
+    left = (LegacyFiles(("all.h5",), ("all.csv",)), LegacyFiles(("more.h5",), ("more.csv",)))
+    monkeypatch.setattr(ownership, "LEGACY_FILES", left)
 
 
 def written(folder, name, text="theirs"):
@@ -26,16 +26,16 @@ def test_what_was_taken_may_be_replaced_and_nothing_else(tmp_path):
     folder = tmp_path / "new" / "below"
     check(folder, ["a", "b"])
     assert not folder.exists()
-    take(folder, ["a", "b"])
+    claim(folder, ["a", "b"])
     written(folder, "a")
     written(folder, "a.new")
     written(folder, "c")
-    take(folder, ["a", "b"])
+    claim(folder, ["a", "b"])
     for names, found in ((["a", "c"], "c"), (["c", "d"], "c")):
         with pytest.raises(InputError, match=rf"\(or give --overwrite\); received '.*/below' with {found}$"):
-            take(folder, names)
-    take(folder, ["c"], overwrite=True)
-    take(folder, ["c"])
+            claim(folder, names)
+    claim(folder, ["c"], overwrite=True)
+    claim(folder, ["c"])
     assert (folder / MARKER).read_text() == "a\nb\nc\n"
 
 
@@ -49,12 +49,12 @@ def test_many_files_are_not_all_spelled_out(tmp_path):
 
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_links_and_folders_are_refused_even_where_all_may_be_replaced(tmp_path, overwrite):
-    take(tmp_path, ["a", "b"])
+    claim(tmp_path, ["a", "b"])
     (tmp_path / "a").symlink_to("elsewhere")
     (tmp_path / "b.new").mkdir()
     for name, what in (("a", "a symbolic link"), ("b", "a folder")):
         with pytest.raises(InputError, match=rf"must be a regular file of its own .* received {what}"):
-            take(tmp_path, [name], overwrite)
+            claim(tmp_path, [name], overwrite)
 
 
 def hdf5(path, creator):
@@ -78,12 +78,12 @@ def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_pat
     written(tmp_path, "all.csv")
     written(tmp_path, "other.csv")
     if ours:
-        take(tmp_path, ["new.csv"])
+        claim(tmp_path, ["new.csv"])
         assert (tmp_path / MARKER).read_text() == ".tisim.lock\nall.csv\nall.h5\nnew.csv\n"
-        take(tmp_path, ["all.csv"])
+        claim(tmp_path, ["all.csv"])
     else:
         with pytest.raises(InputError, match=r"with all\.csv"):
-            take(tmp_path, ["all.csv"])
+            claim(tmp_path, ["all.csv"])
         assert not (tmp_path / MARKER).exists()
     with pytest.raises(InputError, match=r"with other\.csv"):
         check(tmp_path, ["other.csv"])
@@ -92,7 +92,7 @@ def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_pat
 def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
     check_all(tmp_path / "none")
     check_all(tmp_path)
-    take(tmp_path, ["a"])
+    claim(tmp_path, ["a"])
     written(tmp_path, "a")
     written(tmp_path, "a.new")
     check_all(tmp_path)
@@ -103,15 +103,15 @@ def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
 
 
 def test_a_name_that_a_killed_process_has_not_finished_is_nobodys(tmp_path):
-    take(tmp_path, ["first"])
+    claim(tmp_path, ["first"])
     (tmp_path / MARKER).write_text("first\nsec")
-    take(tmp_path, ["third"])
+    claim(tmp_path, ["third"])
     assert (tmp_path / MARKER).read_text() == "first\nsec\nthird\n"
 
 
 def _take(folder, worker):
     for k in range(20):
-        take(folder, [f"{worker}-{k}", "shared"])
+        claim(folder, [f"{worker}-{k}", "shared"])
 
 
 def test_processes_that_take_one_folder_lose_no_name(tmp_path):

@@ -18,17 +18,17 @@ def test_a_file_is_imported_once_under_its_own_name(own_file):
     assert sys.modules["a_law"] is module
     assert python_file.load("a_law.py") is module
     assert pickle.loads(pickle.dumps(module.Pull(strength=2.0))) == module.Pull(strength=2.0)
-    assert [file.name for file in python_file.loaded()] == ["a_law"]
+    assert [file.name for file in python_file.loaded_files()] == ["a_law"]
 
 
 def test_a_changed_file_is_another_and_its_old_classes_are_not_known(own_file):
     first = python_file.load(own_file("a_law.py", LAW))
-    before = python_file.checksums(first.Pull)
+    before = python_file.module_checksums(first.Pull)
     again = python_file.load(own_file("a_law.py", LAW + "\nMORE = 1\n"))
     assert again is not first
-    assert python_file.checksums(again.Pull) != before
+    assert python_file.module_checksums(again.Pull) != before
     assert Force.known()["pull"] is again.Pull
-    assert python_file.superseded(first.Pull)
+    assert python_file.is_superseded(first.Pull)
 
 
 def test_the_text_that_was_loaded_is_what_is_compiled(own_file):
@@ -67,7 +67,7 @@ def test_what_cannot_be_imported_is_told_in_a_line(own_file, text):
     assert FAULTS[text] in str(fault.value)
     assert "\n" not in str(fault.value)
     assert "faulty" not in sys.modules
-    assert python_file.loaded() == ()
+    assert python_file.loaded_files() == ()
 
 
 @pytest.mark.parametrize(
@@ -88,9 +88,9 @@ def test_checksums_name_what_is_not_of_this_package(own_file):
     """A function, one that is part of another, a class with its bases, and files that a file takes from."""
     python_file.load(own_file("a_law.py", LAW))
     problem = python_file.load(own_file("uses_law.py", "from a_law import Pull\ndef of(r): return 1.0\n"))
-    one, two = (file.checksum for file in python_file.loaded())
-    assert python_file.checksums(problem.Pull) == {"a_law": one}
-    assert python_file.checksums(problem.of) == {"uses_law": two, "a_law": one}
-    assert python_file.checksums(functools.partial(problem.of, 1)) == {"uses_law": two, "a_law": one}
-    assert python_file.checksums(Force, len, python_file.load) == {}
-    assert set(python_file.checksums(test_what_is_no_file_is_refused)) == {__name__}
+    one, two = (file.checksum for file in python_file.loaded_files())
+    assert python_file.module_checksums(problem.Pull) == {"a_law": one}
+    assert python_file.module_checksums(problem.of) == {"uses_law": two, "a_law": one}
+    assert python_file.module_checksums(functools.partial(problem.of, 1)) == {"uses_law": two, "a_law": one}
+    assert python_file.module_checksums(Force, len, python_file.load) == {}
+    assert set(python_file.module_checksums(test_what_is_no_file_is_refused)) == {__name__}

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tisim import InputError
-from tisim.files.resuming import how_to_go_on, resumes
+from tisim.files.resuming import resume_hint, resumes
 
 LEFT, KEPT = "one that an interrupted run has left", r"without a finished run \(or give --overwrite\)"
 BOTH = "--overwrite must be given without --resume"
@@ -39,10 +39,10 @@ def test_what_a_command_does_follows_from_what_is_there(begun, results, without,
 
 
 def test_the_same_command_goes_on_but_for_what_would_begin_anew():
-    assert how_to_go_on(None, False) == "To go on, give the same command again."
-    assert how_to_go_on(True, True) == (
+    assert resume_hint(None, False) == "To go on, give the same command again."
+    assert resume_hint(True, True) == (
         "To go on, give the same command again, without --fresh and --overwrite."
     )
-    assert how_to_go_on(None, True, "make room and ") == (
+    assert resume_hint(None, True, "make room and ") == (
         "To go on, make room and give the same command again, without --overwrite."
     )

@@ -15,9 +15,9 @@ from tests.files.test_growing_hdf5 import STILL
 from tests.files.test_growing_hdf5 import frame as grown
 from tests.scenes import flow, scene
 from tisim import InputError, Recording
-from tisim.io.export import export, names
+from tisim.io.export import export, file_names
 from tisim.io.reader import frames
-from tisim.io.run_folder import Folder, write
+from tisim.io.run_folder import RunFolder, write
 from tisim.io.trajectory import Trajectory
 from tisim.plotting.movie import movie
 
@@ -148,8 +148,8 @@ def test_a_world_without_a_frame_yet_is_copied_as_one(growing, tmp_path):
 def test_worlds_with_and_without_frames_are_exported(growing, tmp_path):
     for kind, written in (("xyz", "t_1.xyz"), ("vtk", "t_1_00000.vtu")):
         export(growing, kind, tmp_path)
-        assert set(names(growing, kind)) <= {path.name for path in tmp_path.iterdir()}
-        assert written in names(growing, kind)
+        assert set(file_names(growing, kind)) <= {path.name for path in tmp_path.iterdir()}
+        assert written in file_names(growing, kind)
     (alone,) = ase.io.read(tmp_path / "t_1.xyz", index=":", format="extxyz")
     assert alone.info["Step"] == grown(4).step
     with frames(growing) as found, pytest.raises(InputError, match="file must be one with"):
@@ -158,7 +158,7 @@ def test_worlds_with_and_without_frames_are_exported(growing, tmp_path):
 
 def test_a_result_has_its_start_and_end(tmp_path):
     result = tisim.run(scene([(0, 0, 0)], [(3.0, 0, 0)], dt=1e-3))
-    write(result, Folder(tmp_path))
+    write(result, RunFolder(tmp_path))
     read = ase.io.read(export(tmp_path / "result.h5", "xyz", tmp_path), index=":", format="extxyz")
     assert [atoms.positions[0, 0] for atoms in read] == [0.0, pytest.approx(3e-3)]
     with pytest.raises(InputError, match=r"file must be a trajectory.h5 for format h5md"):

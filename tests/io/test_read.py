@@ -18,7 +18,7 @@ from tisim.accuracy.row import Row
 from tisim.effects import Contact, ContactFriction
 from tisim.io import read as reading
 from tisim.io import run_folder
-from tisim.io.run_folder import Folder
+from tisim.io.run_folder import RunFolder
 
 FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
 CONTACT = Contact(stiffness=1.0), ContactFriction(stiffness=1.0, static=0.5, dynamic=0.4)
@@ -59,7 +59,7 @@ def identical(found, wanted):
 
 @pytest.mark.parametrize("world", [0, 1])
 def test_a_result_is_the_same_to_the_bit(ran, tmp_path, world):
-    folder, result = Folder(tmp_path), ran.results[world]
+    folder, result = RunFolder(tmp_path), ran.results[world]
     run_folder.write(result, folder)
     identical(tisim.read(tmp_path), result)
     identical(tisim.read(str(folder.result)), result)
@@ -121,9 +121,11 @@ def test_worlds_of_a_trajectory(ran):
 def test_a_frame_is_read_when_it_is_asked_for(ran, monkeypatch):
     """Of a thousand frames one costs as much as of one."""
     seen = []
-    row = reading.recorded_trajectory.Frames._row
+    row = reading.recorded_trajectory.Frames._read_row
     monkeypatch.setattr(
-        reading.recorded_trajectory.Frames, "_row", lambda self, file, k: seen.append(k) or row(self, file, k)
+        reading.recorded_trajectory.Frames,
+        "_read_row",
+        lambda self, file, k: seen.append(k) or row(self, file, k),
     )
     trajectory = tisim.read(ran.folder / "one.h5")
     assert len(trajectory.times) == 6
@@ -172,7 +174,7 @@ def test_rows_of_a_study(tmp_path):
         ("a.h5", b"\x89HDF\r\n\x1a\n" + bytes(200), "file to read must be .* whole and with its checksum"),
         (
             "search.h5",
-            hdf5_store.image(None, [], {}),
+            hdf5_store.build_image(None, [], {}),
             "read by `tisim cache` and by `tisim plot` of its folder",
         ),
         (".", None, r"folder must be one with a whole run or study \(what an interrupted run has left"),
@@ -186,7 +188,7 @@ def test_what_cannot_be_read(tmp_path, name, content, message):
 
 
 def test_the_format_of_a_search_is_the_one_known():
-    assert reading.SEARCH == hdf5_store.EVALUATIONS_FORMAT
+    assert reading.SEARCH_FORMAT == hdf5_store.EVALUATIONS_FORMAT
 
 
 def test_a_scene_of_any_name(tmp_path):

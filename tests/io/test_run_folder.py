@@ -11,8 +11,8 @@ from tests.scenes import scene, simulate
 from tisim import InputError, RunError, Scene
 from tisim.backend import runtime
 from tisim.files import lock, ownership
-from tisim.files.ownership import MARKER, writable
-from tisim.io.run_folder import DATA, RUN_FILES, Folder, write
+from tisim.files.ownership import MARKER, ensure_writable
+from tisim.io.run_folder import DATA, RUN_FILES, RunFolder, write
 from tisim.plotting.cloud import PIXELS, _draw, cloud
 
 ONE = [(0.0, 0.0, 0.0)]
@@ -24,7 +24,7 @@ def result():
 
 
 def test_whole_run_is_in_the_folder(result, tmp_path):
-    folder = Folder(tmp_path)
+    folder = RunFolder(tmp_path)
     folder.checkpoint.write_bytes(b"of before")
     paths = write(result, folder)
     names = {"result.h5", "scene.toml", "versions.json", "cloud.png"}
@@ -46,12 +46,12 @@ def test_whole_run_is_in_the_folder(result, tmp_path):
 
 
 def test_folder_that_holds_a_run_is_refused(tmp_path):
-    folder = Folder(tmp_path / "out")
+    folder = RunFolder(tmp_path / "out")
     folder.check()
     assert not folder.path.exists()
     with pytest.raises(InputError, match="one that an interrupted run has left"):
         folder.check(fresh=False)
-    ownership.take(folder.path, RUN_FILES)
+    ownership.claim(folder.path, RUN_FILES)
     folder.checkpoint.touch()
     assert folder.check()
     assert folder.check(fresh=False)
@@ -74,10 +74,10 @@ def test_folder_that_holds_a_run_is_refused(tmp_path):
 
 
 def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
-    folder = Folder(tmp_path / "out")
-    with folder.taken():
+    folder = RunFolder(tmp_path / "out")
+    with folder.claim():
         folder.checkpoint.touch()
-        for call in (folder.check, lambda: folder.taken(overwrite=True).__enter__()):
+        for call in (folder.check, lambda: folder.claim(overwrite=True).__enter__()):
             with pytest.raises(InputError, match="must be without a command that is still at work there"):
                 call()
     assert folder.check()
@@ -85,39 +85,39 @@ def test_a_folder_belongs_to_one_run_at_a_time(tmp_path):
 
 @pytest.mark.parametrize("options", [{"fresh": True}, {"overwrite": True}])
 def test_to_begin_anew_is_to_remove_what_is_there_before_anything_is_written(tmp_path, options):
-    folder = Folder(tmp_path)
+    folder = RunFolder(tmp_path)
     for name in (*DATA, "notes.txt"):
         (tmp_path / name).touch()
-    ownership.take(tmp_path, RUN_FILES, overwrite=True)
+    ownership.claim(tmp_path, RUN_FILES, overwrite=True)
     folder.result.unlink()
-    with folder.taken() as goes_on:
+    with folder.claim() as goes_on:
         assert (goes_on, folder.checkpoint.exists()) == (True, True)
-    with folder.taken(**options) as goes_on:
+    with folder.claim(**options) as goes_on:
         assert not goes_on
         assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", MARKER, lock.LOCK}
 
 
 def test_looking_whether_a_folder_is_in_use_makes_nothing(tmp_path):
-    Folder(tmp_path).check()
+    RunFolder(tmp_path).check()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_another_run_has_left_meanwhile_is_not_replaced(tmp_path):
-    folder = Folder(tmp_path)
+    folder = RunFolder(tmp_path)
     folder.check()
-    with folder.taken():
+    with folder.claim():
         folder.result.touch()
-    with pytest.raises(InputError, match="without a finished run"), folder.taken():
+    with pytest.raises(InputError, match="without a finished run"), folder.claim():
         pass
     folder.result.unlink()
-    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.taken(fresh=False):
+    with pytest.raises(InputError, match="one that an interrupted run has left"), folder.claim(fresh=False):
         pass
 
 
 def test_unwritable_folder_is_an_input_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="output folder must be writable; received"):
-        writable(tmp_path / "file" / "below")
+        ensure_writable(tmp_path / "file" / "below")
 
 
 def test_full_disk_leaves_no_result(result, tmp_path, monkeypatch):
@@ -126,7 +126,7 @@ def test_full_disk_leaves_no_result(result, tmp_path, monkeypatch):
 
     monkeypatch.setattr("tisim.files.atomic.os.fsync", full)
     with pytest.raises(RunError, match="No space left on device"):
-        write(result, Folder(tmp_path))
+        write(result, RunFolder(tmp_path))
     assert list(tmp_path.iterdir()) == []
 
 

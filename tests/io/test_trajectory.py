@@ -18,8 +18,8 @@ from tests.scenes import by_id, compiled, flow, scene
 from tisim import Box, InputError, Recording
 from tisim.io import h5md
 from tisim.io.checkpoint import restore, save
-from tisim.io.reader import Frame, frames, worlds
-from tisim.io.trajectory import Trajectory, written
+from tisim.io.reader import Frame, frames, world_count
+from tisim.io.trajectory import Trajectory, recorded_fields
 
 FLOWS = [flow(0, surface_energy=1e3, threshold=0.9, images=True), flow(1, duration=4e-4, images=True)]
 """Worlds in which grains merge and break, of different durations."""
@@ -124,7 +124,7 @@ def test_scenes_of_different_structure_go_to_one_file(tmp_path):
     mixed = [scene([(k * 1e-3, 0, 0)], [(1.0, 0, 0)], dt=1e-4, steps=4) for k in range(3)]
     mixed[1] = mixed[1].model_copy(update={"domain": Box(low=(-1,) * 3, high=(1,) * 3)})
     results = tisim.run(mixed, record=Recording(tmp_path / "t.h5", frames=2))
-    assert worlds(tmp_path / "t.h5") == 3
+    assert world_count(tmp_path / "t.h5") == 3
     for w, result in enumerate(results):
         with frames(tmp_path / "t.h5", w) as found:
             assert found.scene == mixed[w]
@@ -167,7 +167,7 @@ def test_layout_is_that_of_the_specification(file):
             assert box.attrs["boundary"].tolist() == [b"periodic"] * 3
             low, high = made.domain.bounds()
             np.testing.assert_array_equal(box["edges"], high - low)
-            assert set(group) - {"box"} == {field.name for field in written(made)}
+            assert set(group) - {"box"} == {field.name for field in recorded_fields(made)}
             position = group["position"]
             assert (np.diff(position["step"]) > 0).all()
             for name in set(group) - {"box"}:
@@ -200,7 +200,7 @@ def test_layout_is_that_of_the_specification(file):
     ],
 )
 def test_units_are_written_as_the_units_module_says(text, expected):
-    assert h5md.unit(text) == expected
+    assert h5md.unit_string(text) == expected
 
 
 def test_open_space_has_no_edges(tmp_path):
@@ -248,7 +248,7 @@ def test_it_does_not_go_on_with_the_frames_of_another_scene(tmp_path, worlds):
     content = path.read_bytes()
     rule = r"trajectory to go on with must be of the same scene; received '.*t\.h5, of another one'"
     with pytest.raises(InputError, match=rule):
-        Trajectory.going_on(recording, mine, 1.0)
+        Trajectory.resume(recording, mine, 1.0)
     assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("t.h5", content)]
 
 

@@ -29,7 +29,7 @@ def test_the_largest_displacement_is_kept_and_not_the_last(tmp_path):
     np.testing.assert_allclose(peaks, expected, rtol=1e-3)
     end = results[0].state["position"] - results[0].start["position"]
     assert np.abs(end).max() < 1e-2 * peaks[0]
-    folder = run_folder.Folder(tmp_path)
+    folder = run_folder.RunFolder(tmp_path)
     run_folder.write(results[1], folder)
     with h5py.File(folder.result) as file:
         assert file["measures"].attrs["peak_displacement"] == peaks[1]

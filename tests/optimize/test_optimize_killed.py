@@ -43,7 +43,7 @@ def at_work(folder):
     if not (folder / lock.LOCK).exists():
         return False
     try:
-        with lock.held(folder, timeout=0.0):
+        with lock.acquire(folder, timeout=0.0):
             return False
     except InputError:
         return True

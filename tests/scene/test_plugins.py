@@ -76,7 +76,7 @@ def test_an_installed_package_offers_its_effects(installed):
     made = Scene.from_dict({**data(), "effects": {"tug": {"strength": 1.0}}})
     assert type(made.effects[0]).__module__ == "laws_of_a_package"
     assert len(versions()["plugin laws_of_a_package"]) == 12
-    assert "laws_of_a_package" in plugins.python_file.checksums(type(made.effects[0]))
+    assert "laws_of_a_package" in plugins.python_file.module_checksums(type(made.effects[0]))
 
 
 def test_an_installed_package_that_is_broken_is_told_in_a_line(installed):

@@ -28,7 +28,7 @@ from tisim.backend import runtime
 from tisim.errors import must
 from tisim.files import checksum, lock, regular_file, resuming
 from tisim.files.atomic import replace_file
-from tisim.files.ownership import writable
+from tisim.files.ownership import ensure_writable
 from tisim.io.run_folder import versions
 
 COST_FORMAT = "tisim cost 2"
@@ -40,7 +40,7 @@ _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "reje
 
 def write(study: Study, folder: Path) -> list[Path]:
     """Write cost.csv and cost.h5, in place of any before; returns their paths. RunError on a full disk."""
-    writable(folder)
+    ensure_writable(folder)
     replace_file(folder / COST_CSV, table(study).encode())
     _write_rows(study, folder / HDF5)
     return [folder / COST_CSV, folder / HDF5]
@@ -62,7 +62,7 @@ def table(study: Study) -> str:
 
 
 def _write_rows(study: Study, path: Path) -> None:
-    with checksum.created(path) as file:
+    with checksum.create_file(path) as file:
         file.attrs.update({
             "format": COST_FORMAT, "scene": study.scene.to_toml(), "identity": json.dumps(study.identity()),
             "settings": json.dumps(_settings(study)), "versions": json.dumps(versions()),
@@ -121,7 +121,7 @@ def resume(study: Study, folder: Path) -> None:
     path = folder / HDF5
     if not regular_file.exists(path):
         return
-    with checksum.opened(path, f"output folder's {HDF5}", COST_FORMAT) as file:
+    with checksum.open_file(path, f"output folder's {HDF5}", COST_FORMAT) as file:
         same = json.loads(file.attrs["identity"]) == study.identity()
         rule = "without the study of another scene, version, machine or depth (or give --out or --overwrite)"
         must(same, "output folder", rule, str(folder))
@@ -131,7 +131,7 @@ def resume(study: Study, folder: Path) -> None:
 
 def rows(path: Path) -> list[Row]:
     """What a study has measured, of a cost.h5. InputError when the file is none, cut short or damaged."""
-    with checksum.opened(path, "cost", COST_FORMAT) as file:
+    with checksum.open_file(path, "cost", COST_FORMAT) as file:
         return _rows(file["rows"])
 
 

@@ -1,4 +1,4 @@
-"""The command ``tisim cost``: what accuracy costs in time."""
+"""The command ``tisim cost`` measures what accuracy costs in time."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from tisim.cli.options import (
     Target,
     Threads,
 )
-from tisim.console import err, out, progress_bar, stopping
+from tisim.console import err, out, print_stopping, progress_bar
 from tisim.errors import must
 from tisim.files import lock, ownership
-from tisim.files.resuming import how_to_go_on
+from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def cost(
 
     must(error is None or error > 0, "--error", "greater than 0", error)
     runtime.init(device, "f64", threads)
-    name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
+    name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
     study = Study(
         scene,
         _quantities(target, scene),
@@ -95,61 +95,61 @@ def cost(
         finer=(-1 if quick else 0) if finer is None else finer,
         repeats=(1 if quick else 3) if repeats is None else repeats,
         precisions=("f64", "f32") if single else ("f64",),
-        starts=((4, 16, 64) if quick else (8, 32, 128)) if starts is None else _numbers(starts),
+        starts=((4, 16, 64) if quick else (8, 32, 128)) if starts is None else _whole_numbers(starts),
         budget=60 * budget,
     )
-    which = study.index(quantity)
-    place = folder or Path("out") / f"{name}-cost"
-    storage.resumes(place, fresh, overwrite)
-    ownership.take(place, storage.COST_FILES, overwrite)
-    with lock.held(place):
-        if storage.resumes(place, fresh, overwrite):
-            storage.resume(study, place)
-            err().print(f"going on with {place / storage.HDF5}, which has {len(study.rows)} settings")
+    quantity_index = study.index(quantity)
+    out_folder = folder or Path("out") / f"{name}-cost"
+    storage.resumes(out_folder, fresh, overwrite)
+    ownership.claim(out_folder, storage.COST_FILES, overwrite)
+    with lock.acquire(out_folder):
+        if storage.resumes(out_folder, fresh, overwrite):
+            storage.resume(study, out_folder)
+            err().print(f"going on with {out_folder / storage.HDF5}, which has {len(study.rows)} settings")
         else:
-            storage.clear(place)
-        done = _measure(study, place)
+            storage.clear(out_folder)
+        finished = _measure(study, out_folder)
         if study.truths and study.rows:
             out().print(table.table(study))
-            written = [*storage.write(study, place), save(study, place / storage.PICTURE)]
-            out().print("\n".join([*table.sources(study), *map(str, written)]))
-    if not done:
-        err().print(f"stopped; {place / storage.HDF5} has what is done. {how_to_go_on(fresh, overwrite)}")
+            paths = [*storage.write(study, out_folder), save(study, out_folder / storage.PICTURE)]
+            out().print("\n".join([*table.sources(study), *map(str, paths)]))
+    if not finished:
+        err().print(f"stopped; {out_folder / storage.HDF5} has what is done. {resume_hint(fresh, overwrite)}")
         raise typer.Exit(130)
     if error is not None:
         row = study.cheapest(error, quantity)
-        found = answer(row, which, scene, target, size, seed, changes, device, threads, plugins)
-        print(f"cheapest with an error of at most {error:g}:\n{found}")
+        commands = answer(row, quantity_index, scene, target, size, seed, changes, device, threads, plugins)
+        print(f"cheapest with an error of at most {error:g}:\n{commands}")
 
 
 def answer(
     row: Row, quantity: int, scene: Scene, target: str, size: str | None, seed: int | None,
     changes: Sequence[str] | None, device: str, threads: int, plugins: Sequence[str] | None,
 ) -> str:  # fmt: skip
-    """How to run a row of the study of a scene, which this command has made of these words."""
+    """Return the commands that run a row of the study of a scene, from the options given to this command."""
     from tisim.accuracy import table
     from tisim.accuracy.formatting import options
 
-    words = shlex.split(row.options)
-    pairs = list(zip(words[::2], words[1::2], strict=True))
-    absent, own = ([value for key, value in pairs if key == name] for name in ("--without", "--set"))
-    measured = scene.without(*absent).replace(scene_arguments.assignments(own))
+    tokens = shlex.split(row.options)
+    pairs = list(zip(tokens[::2], tokens[1::2], strict=True))
+    absent, settings = ([value for key, value in pairs if key == name] for name in ("--without", "--set"))
+    measured_scene = scene.without(*absent).replace(scene_arguments.assignments(settings))
     # Stepper and effects as they have become, whoever has changed them; all else as it was given.
-    _, base = scene_arguments.scene(target, size, seed)
-    given = [target, *_given(size, seed, changes, device, threads, plugins)]
-    return table.recipe(row, given + options(base, measured, row.precision), quantity)
+    _, base = scene_arguments.load_scene(target, size, seed)
+    arguments = [target, *_run_options(size, seed, changes, device, threads, plugins)]
+    return table.recipe(row, arguments + options(base, measured_scene, row.precision), quantity)
 
 
-def _given(
+def _run_options(
     size: str | None, seed: int | None, changes: Sequence[str] | None,
     device: str, threads: int, plugins: Sequence[str] | None,
 ) -> Iterator[str]:  # fmt: skip
-    """The options given to this command that ``tisim run`` needs too, but those of stepper and effects."""
-    for name, value, usual in (
+    """Yield the options of this command that ``tisim run`` needs too, but those of stepper and effects."""
+    for name, value, default in (
         ("--size", size, None), ("--seed", seed, None),
         ("--device", device, "cpu"), ("--threads", threads, 0),
     ):  # fmt: skip
-        if value != usual:
+        if value != default:
             yield from (name, str(value))
     for change in changes or ():
         if change.partition("=")[0].strip().partition(".")[0] not in ("stepper", "effects"):
@@ -159,12 +159,12 @@ def _given(
 
 
 def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:
-    """What the case compares; nothing for a scene file."""
+    """Return the quantities that the case compares; none for a scene file."""
     quantities = None if target.endswith(".toml") else targets.case(target).quantities
     return quantities(scene) if quantities else ()
 
 
-def _numbers(text: str) -> tuple[int, ...]:
+def _whole_numbers(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
     must(
         all(part.isdecimal() and len(part) < 10 for part in parts),
@@ -175,19 +175,19 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(map(int, parts))
 
 
-def _measure(study: Study, place: Path) -> bool:
-    """Run behind a bar, with rows on the disk as they come; False when Ctrl-C has stopped it."""
+def _measure(study: Study, out_folder: Path) -> bool:
+    """Run behind a bar, with rows on the disk as they come; return False when Ctrl-C has stopped it."""
     from tisim.accuracy import storage
 
-    with progress_bar("", "{task.description}") as bar, Interrupt(stopping) as ctrl_c:
+    with progress_bar("", "{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
         task = bar.add_task("", total=1.0)
 
-        def progress(fraction: float, what: str) -> None:
-            bar.update(task, completed=fraction, description=what[:48])
+        def progress(fraction: float, step: str) -> None:
+            bar.update(task, completed=fraction, description=step[:48])
             ctrl_c.check()
 
         try:
-            study.run(progress, lambda: storage.write(study, place))
+            study.run(progress, lambda: storage.write(study, out_folder))
         except KeyboardInterrupt:
             if ctrl_c.forced:
                 raise

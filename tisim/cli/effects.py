@@ -1,4 +1,4 @@
-"""``tisim effects``: what there is to make a scene of."""
+"""The command ``tisim effects`` lists and explains what a scene can be made of."""
 
 from __future__ import annotations
 
@@ -21,38 +21,40 @@ def effects(name: Name = None, plugins: Plugins = None) -> None:
     """List effects, sources, operators, steppers, step controls, placements and others, or explain one."""
     from tisim.engine import reference
 
-    out().print(_index(reference) if name is None else _page(reference.find(name)))
+    out().print(_list_families(reference) if name is None else _describe(reference.find(name)))
 
 
-def _index(reference) -> RenderableType:
-    """A line for each, family by family."""
-    shown: list[RenderableType] = []
+def _list_families(reference) -> RenderableType:
+    """Return a table with a line for each entry, family by family."""
+    lines: list[RenderableType] = []
     entries = reference.entries()
     for name, family in reference.FAMILIES.items():
         table = plain_table("name", "class", "what it is", "source")
         for entry in entries:
             if entry.family == name:
                 table.add_row(entry.name, entry.kind.__name__, entry.summary, entry.source)
-        shown += [Text(family.title, "bold"), table, ""]
-    return Group(*shown, "'tisim effects NAME' explains one.")
+        lines += [Text(family.title, "bold"), table, ""]
+    return Group(*lines, "'tisim effects NAME' explains one.")
 
 
-def _page(entry) -> RenderableType:
-    """All there is to say of one."""
-    head = Text.assemble((entry.name, "bold"), f"  {entry.kind.__module__}.{entry.kind.__name__}")
-    shown: list[RenderableType] = [head, "", f"{entry.summary}.", ""]
-    shown += [entry.body, ""] if entry.body else []
-    cited = [f"Source: {entry.source}", *(f"    {work}" for work in entry.publications()), ""]
-    shown += cited if entry.source else []
+def _describe(entry) -> RenderableType:
+    """Return all that the reference has of one entry."""
+    heading = Text.assemble((entry.name, "bold"), f"  {entry.kind.__module__}.{entry.kind.__name__}")
+    lines: list[RenderableType] = [heading, "", f"{entry.summary}.", ""]
+    lines += [entry.body, ""] if entry.body else []
+    references = [f"Source: {entry.source}", *(f"    {work}" for work in entry.publications()), ""]
+    lines += references if entry.source else []
     if entry.settings:
         table = plain_table("parameter", "unit", "default", "must be", "what it is")
-        for one in entry.settings:
-            table.add_row(one.name, one.unit, one.default or "(required)", one.rule, one.text)
-        shown += [table, ""]
+        for setting in entry.settings:
+            table.add_row(
+                setting.name, setting.unit, setting.default or "(required)", setting.rule, setting.text
+            )
+        lines += [table, ""]
     facts = {
         "needs": "; ".join(entry.needs),
         "particle fields": ", ".join(f"{name} ({unit})" if unit else name for name, unit in entry.fields),
         "counts and measures": ", ".join(entry.gives),
     }
-    shown += [f"{what}: {text}" for what, text in facts.items() if text]
-    return Group(*shown, *(["", "In a scene file:", "", entry.toml] if entry.toml else []))
+    lines += [f"{what}: {text}" for what, text in facts.items() if text]
+    return Group(*lines, *(["", "In a scene file:", "", entry.toml] if entry.toml else []))

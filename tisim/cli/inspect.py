@@ -1,4 +1,4 @@
-"""The commands that show what runs have left: ``tisim plot``, ``movie``, ``export``, ``figures``."""
+"""The commands ``tisim plot``, ``movie``, ``export`` and ``figures`` show what runs have left."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ File = Annotated[
     ),
 ]
 World = Annotated[int, typer.Option(help="Which world of a batch, from 0.")]
-Into = Annotated[
+IntoFolder = Annotated[
     Path | None,
     typer.Option(
         "--out", metavar="DIR", callback=nameable, help="Folder to write to; that of the file by default."
@@ -40,26 +40,33 @@ Into = Annotated[
 
 
 def plot(
-    file: File, world: World = 0, folder: Into = None, overwrite: Overwrite = False, plugins: Plugins = None
+    file: File,
+    world: World = 0,
+    folder: IntoFolder = None,
+    overwrite: Overwrite = False,
+    plugins: Plugins = None,
 ) -> None:
     """Draw the cloud, energy, centre of gravity and number of particles in time, and what its case shows."""
     from cases.case import every
     from tisim.io.reader import frames
     from tisim.plotting import time_series
 
-    file = _file(file)
-    place = folder or file.parent
-    with frames(file, world) as found:
-        pictures = {"cloud.png": time_series.clouds(found), "time_series.png": time_series.quantities(found)}
-        case = every().get(found.scene.name)
+    file = _trajectory_file(file)
+    out_folder = folder or file.parent
+    with frames(file, world) as trajectory:
+        pictures = {
+            "cloud.png": time_series.clouds(trajectory),
+            "time_series.png": time_series.quantities(trajectory),
+        }
+        case = every().get(trajectory.scene.name)
         if case and case.pictures:
-            pictures |= case.pictures(found)
+            pictures |= case.pictures(trajectory)
         for figure in pictures.values():
-            time_series.mark_missing(figure, found)
-        _tell(found.missing)
-    ownership.take(place, pictures, overwrite)
+            time_series.mark_missing(figure, trajectory)
+        _print_missing(trajectory.missing)
+    ownership.claim(out_folder, pictures, overwrite)
     for name, figure in pictures.items():
-        print(_saved(figure, place / name))
+        print(_save_figure(figure, out_folder / name))
 
 
 def figures(
@@ -73,26 +80,28 @@ def figures(
     """
     from tisim.files.atomic import replace_file
 
-    found = targets.case(case)
-    chosen = size or "default"
-    found.size(chosen)
-    if found.figures is None:
+    chosen_case = targets.case(case)
+    size_name = size or "default"
+    chosen_case.size(size_name)
+    if chosen_case.figures is None:
         raise InputError(f"case must be one with figures; received {case!r}")
     runtime.init(device, precision, threads)
-    place = folder or Path("out") / f"{found.name}-figures"
-    ownership.check_all(place, overwrite)
-    resumes(place, "figures", False, "finished figures" * ownership.results(place), None, overwrite)
-    ownership.take(place, (lock.LOCK,), overwrite)
-    with lock.held(place):
-        with _bar("running") as progress:
-            made = found.figures(chosen, progress)
-        ownership.take(place, made, overwrite)
-        for name, what in made.items():
-            if isinstance(what, str):
-                replace_file(place / name, what.encode())
-                print(place / name)
+    out_folder = folder or Path("out") / f"{chosen_case.name}-figures"
+    ownership.check_all(out_folder, overwrite)
+    resumes(
+        out_folder, "figures", False, "finished figures" * ownership.has_results(out_folder), None, overwrite
+    )
+    ownership.claim(out_folder, (lock.LOCK,), overwrite)
+    with lock.acquire(out_folder):
+        with _progress("running") as progress:
+            results = chosen_case.figures(size_name, progress)
+        ownership.claim(out_folder, results, overwrite)
+        for name, content in results.items():
+            if isinstance(content, str):
+                replace_file(out_folder / name, content.encode())
+                print(out_folder / name)
             else:
-                print(_saved(what, place / name))
+                print(_save_figure(content, out_folder / name))
 
 
 def movie(
@@ -111,64 +120,68 @@ def movie(
     from tisim.plotting.movie import check, while_drawn
     from tisim.plotting.movie import movie as draw
 
-    file = _file(file)
+    file = _trajectory_file(file)
     path = to or file.with_suffix(".gif")
-    with frames(file, world) as found:
-        check(found, path, rate)
-        ownership.take(path.parent, (path.name, while_drawn(path)), overwrite)
-        with _bar("drawing") as progress:
-            draw(found, path, rate, progress)
-        _tell(found.missing)
+    with frames(file, world) as trajectory:
+        check(trajectory, path, rate)
+        ownership.claim(path.parent, (path.name, while_drawn(path)), overwrite)
+        with _progress("drawing") as progress:
+            draw(trajectory, path, rate, progress)
+        _print_missing(trajectory.missing)
     print(path)
 
 
 def export(
     file: File,
     kind: Annotated[str, typer.Option("--format", help="vtk (ParaView), xyz (OVITO, ASE) or h5md.")] = "vtk",
-    folder: Into = None,
+    folder: IntoFolder = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
     """Write the frames of a run for other programs; h5md is a copy."""
-    from tisim.io.export import check, names
+    from tisim.io.export import check, file_names
     from tisim.io.export import export as write
-    from tisim.io.reader import frames, worlds
+    from tisim.io.reader import frames, world_count
 
-    file = _file(file)
+    file = _trajectory_file(file)
     check(file, kind)
-    place = folder or file.parent
-    ownership.take(place, names(file, kind), overwrite)
-    with _bar("writing") as progress:
-        made = write(file, kind, place, progress)
-    for world in range(number := worlds(file)):
-        with frames(file, world) as found:
-            _tell(f"world {world}: {found.missing}" if found.missing and number > 1 else found.missing)
-    print(made)
+    out_folder = folder or file.parent
+    ownership.claim(out_folder, file_names(file, kind), overwrite)
+    with _progress("writing") as progress:
+        path = write(file, kind, out_folder, progress)
+    for world in range(count := world_count(file)):
+        with frames(file, world) as trajectory:
+            _print_missing(
+                f"world {world}: {trajectory.missing}"
+                if trajectory.missing and count > 1
+                else trajectory.missing
+            )
+    print(path)
 
 
-def _tell(missing: str) -> None:
+def _print_missing(missing: str) -> None:
     if missing:
         print(missing, file=sys.stderr)
 
 
-def _file(path: Path) -> Path:
-    """The trajectory in a folder, or its result where it has none; InputError where there is neither."""
+def _trajectory_file(path: Path) -> Path:
+    """Return the trajectory in a folder, or its result where it has none; InputError where it has neither."""
     if not regular_file.is_folder(path):
         return path
     for file in (path / "trajectory.h5", path / "result.h5"):
         if regular_file.exists(file):
             return file
-    begun = regular_file.exists(path / "checkpoint.h5")
-    why = ", with only the checkpoint of an unfinished run" if begun else ", with neither"
+    unfinished = regular_file.exists(path / "checkpoint.h5")
+    why = ", with only the checkpoint of an unfinished run" if unfinished else ", with neither"
     if regular_file.exists(path / "search.h5"):
-        drawn = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
+        pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
         raise InputError(
-            f"folder must be that of a run; received that of a search, whose pictures are: {drawn}"
+            f"folder must be that of a run; received that of a search, whose pictures are: {pictures}"
         )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 
 
-def _saved(figure: Figure, path: Path) -> Path:
+def _save_figure(figure: Figure, path: Path) -> Path:
     from tisim.files.atomic import replace_file
 
     image = io.BytesIO()
@@ -178,7 +191,7 @@ def _saved(figure: Figure, path: Path) -> Path:
 
 
 @contextmanager
-def _bar(what: str) -> Iterator[Callable[[float], None]]:
+def _progress(what: str) -> Iterator[Callable[[float], None]]:
     with progress_bar("{task.description}", console=err()) as bar:
         task = bar.add_task(what, total=1.0)
         yield lambda fraction: bar.update(task, completed=fraction)

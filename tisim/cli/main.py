@@ -1,4 +1,4 @@
-"""The command line. Thin: a command calls what a script would call, and prints it."""
+"""The command line is thin: a command calls what a script would call, and prints it."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from tisim.cli.options import (
     Target,
     Threads,
 )
-from tisim.console import err, out, plain_table, progress_bar, stopping
+from tisim.console import err, out, plain_table, print_stopping, progress_bar
 from tisim.engine.observer import Observer
 from tisim.engine.result import Result
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.resuming import how_to_go_on
-from tisim.interrupt import Interrupt, exit_code, handled, stop
+from tisim.files.resuming import resume_hint
+from tisim.interrupt import Interrupt, exit_code, handle_signals, raise_interrupt
 from tisim.version import __version__
 
 UsageError: Any = typer.BadParameter.__base__
-"""What typer raises for words that no command knows."""
+"""Exception that typer raises for words that no command knows."""
 
 app = typer.Typer(
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
@@ -52,11 +52,11 @@ app = typer.Typer(
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Exit codes: 0 done; 1 a run or check failed; 2 wrong input, nothing was run; 130, 143, 129 stopped by
-    Ctrl-C, SIGTERM, SIGHUP.
+    """Run a command and exit: with 0 when it is done; 1 when a run or check failed; 2 at wrong input, when
+    nothing was run; 130, 143, 129 when stopped by Ctrl-C, SIGTERM, SIGHUP.
     """
     code = 0
-    with handled(stop):
+    with handle_signals(raise_interrupt):
         try:
             check_backend()
             code = app(arguments, prog_name="tisim", standalone_mode=False)
@@ -101,58 +101,61 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
-    from tisim.io.trajectory import asked
+    from tisim.io.trajectory import recording_from_options
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads)
-    name, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
-    place = run_folder.Folder(folder or Path("out") / name)
-    resume = place.check(fresh, overwrite)
-    recording = asked(place.trajectory, frames, every, resume)
+    name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
+    out_folder = run_folder.RunFolder(folder or Path("out") / name)
+    resume = out_folder.check(fresh, overwrite)
+    recording = recording_from_options(out_folder.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)
         simulation.load([scene])
-    with place.taken(fresh, overwrite) as still:
-        must(still == resume, "output folder", "as it was when the command began", str(place.path))
+    with out_folder.claim(fresh, overwrite) as resume_now:
+        must(resume_now == resume, "output folder", "as it was when the command began", str(out_folder.path))
         if resume:
-            _restore(simulation, place.checkpoint)
-        observed = recording.observer(simulation, resume) if recording else nullcontext()
-        saving = checkpoint.PeriodicCheckpoint(place.checkpoint, scene_arguments.checkpoint_seconds())
+            _restore(simulation, out_folder.checkpoint)
+        observer_context = recording.observer(simulation, resume) if recording else nullcontext()
+        seconds = scene_arguments.checkpoint_seconds()
+        checkpoints = checkpoint.PeriodicCheckpoint(out_folder.checkpoint, seconds)
         try:
-            with observed as recorder:
+            with observer_context as recorder:
                 if resume:
-                    err().print(f"going on with {place.checkpoint}, from {simulation.fraction():.1%}")
-                done = _advance(simulation, name, [recorder, saving] if recorder else [saving])
-            paths = run_folder.write(simulation.results()[0], place) if done else []
+                    err().print(f"going on with {out_folder.checkpoint}, from {simulation.fraction():.1%}")
+                observers = [recorder, checkpoints] if recorder else [checkpoints]
+                finished = _advance(simulation, name, observers)
+            paths = run_folder.write(simulation.results()[0], out_folder) if finished else []
         except RunError as error:
-            how = how_to_go_on(fresh, overwrite, "make room and ")
-            raise RunError(f"{error}. {_rescued(simulation, place.checkpoint, how)}") from error
-        if not done:
-            checkpoint.save(simulation, place.checkpoint)
+            hint = resume_hint(fresh, overwrite, "make room and ")
+            advice = _save_after_error(simulation, out_folder.checkpoint, hint)
+            raise RunError(f"{error}. {advice}") from error
+        if not finished:
+            checkpoint.save(simulation, out_folder.checkpoint)
             err().print(
-                f"stopped at {simulation.fraction():.1%}; {place.checkpoint} is written. "
-                f"{how_to_go_on(fresh, overwrite)}"
+                f"stopped at {simulation.fraction():.1%}; {out_folder.checkpoint} is written. "
+                f"{resume_hint(fresh, overwrite)}"
             )
             raise typer.Exit(130)
     result = simulation.results()[0]
-    paths += [place.trajectory] if recording else []
+    paths += [out_folder.trajectory] if recording else []
     out().print(_summary(result, simulation.setup_s, paths))
     if not result.status.ok:
         raise RunError(f"run failed {result.status.reason}")
 
 
 def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -> bool:
-    """Run to the end behind a bar; False when Ctrl-C has stopped it, between two steps."""
-    with progress_bar("{task.description}") as bar, Interrupt(stopping) as ctrl_c:
+    """Run to the end behind a bar; return False when Ctrl-C has stopped it, between two steps."""
+    with progress_bar("{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
         task = bar.add_task(name, total=1.0)
 
-        def show(simulation: Simulation) -> None:
-            ahead = f"{name}, {simulation.ahead():.3g} steps ahead"
-            bar.update(task, completed=simulation.fraction(), description=ahead)
+        def report(simulation: Simulation) -> None:
+            description = f"{name}, {simulation.ahead():.3g} steps ahead"
+            bar.update(task, completed=simulation.fraction(), description=description)
             ctrl_c.check()
 
         try:
-            simulation.run(observers=[*observers, show])
+            simulation.run(observers=[*observers, report])
         except KeyboardInterrupt:
             if ctrl_c.forced:
                 raise
@@ -170,10 +173,10 @@ def _restore(simulation: Simulation, path: Path) -> None:
         raise InputError(f"{error} (to begin anew, give --out or --fresh)") from None
 
 
-def _rescued(simulation: Simulation, path: Path, how: str) -> str:
-    """What there is to go on from, once something could not be written: a checkpoint, where it finds room.
+def _save_after_error(simulation: Simulation, path: Path, hint: str) -> str:
+    """Save a checkpoint after a file could not be written; return sentences that say what can be resumed.
 
-    how : which command goes on, as a sentence.
+    hint : which command resumes the run, as a sentence.
     """
     from tisim.io import checkpoint
 
@@ -183,7 +186,7 @@ def _rescued(simulation: Simulation, path: Path, how: str) -> str:
         return "No checkpoint could be written either" + "; that of before is intact." * regular_file.exists(
             path
         )
-    return f"{path} is written. {how}"
+    return f"{path} is written. {hint}"
 
 
 def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
@@ -192,13 +195,13 @@ def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
     table.add_row("status", "ok" if result.status.ok else "failed")
     table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s")
     table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
-    for name, n in result.work.items():
-        table.add_row(name.replace("_", " "), str(n))
+    for name, count in result.work.items():
+        table.add_row(name.replace("_", " "), str(count))
     for name, value in result.measures.items():
         table.add_row(name.replace("_", " "), f"{value:.6g}")
-    ran = result.settings
-    threads = f", {ran['threads']} threads" if "threads" in ran else ""
-    table.add_row("device", f"{ran['device']}, {ran['precision']}{threads}")
+    settings = result.settings
+    threads = f", {settings['threads']} threads" if "threads" in settings else ""
+    table.add_row("device", f"{settings['device']}, {settings['precision']}{threads}")
     table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
     table.add_row("written", "\n".join(map(str, paths)))
     return table
@@ -230,7 +233,7 @@ def explain(
     from tisim.engine.explain import explain, render
 
     runtime.init(device, precision)
-    _, scene = scene_arguments.scene(target, size, seed, absent or (), changes or ())
+    _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
     with err().status("compiling"):
         explanation = explain(scene)
     out().print(render(explanation))

@@ -1,4 +1,4 @@
-"""The command ``tisim new``: a file of one's own that runs, to go on from, with its test beside it."""
+"""The command ``tisim new`` writes a file that runs, for users to extend, with its test beside it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KINDS = {
     "case": "tisim check {}",
     "problem": "tisim optimize {}",
 }
-"""What there is, and how it is used."""
+"""Kinds of files, and the command that uses each."""
 
 Kind = Annotated[str, typer.Argument(metavar="KIND", help=f"{', '.join(KINDS)}.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the file NAME.py, such as soft_shell.")]
@@ -33,19 +33,19 @@ def new(kind: Kind, name: Name) -> None:
     must(kind in KINDS, "kind", f"one of {', '.join(KINDS)}", kind)
     must(name.isidentifier() and name == name.lower() and not keyword.iskeyword(name), "name",
          "a name of Python in lower case", name)  # fmt: skip
-    words = {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
+    fields = {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
     files = {Path(f"{name}.py"): f"{kind}.txt", Path(f"test_{name}.py"): f"test_{kind}.txt"}
     for path in files:
         must(not regular_file.exists(path), "file to write", "one that is not there yet", str(path))
-    _check_free(kind, name)
+    _check_name(kind, name)
     for path, template in files.items():
-        _write(path, Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(words))
+        _write(path, Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(fields))
         print(path)
     print(f"to try it: {KINDS[kind].format(f'{name}.py')}; python -m pytest test_{name}.py")
 
 
-def _check_free(kind: str, name: str) -> None:
-    """InputError where Python, or for an effect a scene, would take the name for something else."""
+def _check_name(kind: str, name: str) -> None:
+    """Raise InputError where Python, or for an effect a scene, would take the name for something else."""
     from tisim.effects import Effect
     from tisim.scene import plugins
 

@@ -1,15 +1,15 @@
-"""Options that commands share."""
+"""Commands share these options."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tisim.errors import InputError, shown
+from tisim.errors import InputError, abbreviated
 
 
 def nameable(path: Path | None) -> Path | None:
-    """A path of a command line, where the system can have one of this name; InputError otherwise."""
+    """Return a path of a command line; InputError where the system can have none of this name."""
     if path is None:
         return None
     try:
@@ -17,17 +17,17 @@ def nameable(path: Path | None) -> Path | None:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
-    except (OSError, ValueError) as fault:
+    except (OSError, ValueError) as error:
         # Too long, a loop of links, a NUL, or bytes that are no text.
-        why = fault.strerror if isinstance(fault, OSError) else "not a name"
+        why = error.strerror if isinstance(error, OSError) else "not a name"
         raise InputError(
-            f"path must be one that this system can have; received {shown(str(path))} ({why})"
+            f"path must be one that this system can have; received {abbreviated(str(path))} ({why})"
         ) from None
     return path
 
 
 def _load_plugins(paths: list[str] | None) -> list[str] | None:
-    """Before anything else is done: what is read later may be made of what they define."""
+    """Load plugins before anything else is done: what is read later may be made of what they define."""
     from tisim.scene import plugins
 
     for path in paths or ():

@@ -1,4 +1,4 @@
-"""The commands of inverse design: ``tisim optimize``, ``tisim compare`` and ``tisim cache``."""
+"""The commands ``tisim optimize``, ``tisim compare`` and ``tisim cache`` are those of inverse design."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from tisim.cli.options import (
     Threads,
     nameable,
 )
-from tisim.console import err, out, stopping
+from tisim.console import err, out, print_stopping
 from tisim.errors import RunError
 from tisim.files import lock, ownership
 from tisim.files.atomic import replace_file
-from tisim.files.resuming import how_to_go_on
+from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
 
 Executor = Annotated[
@@ -79,31 +79,35 @@ def optimize(
     from optimize.session import session
     from optimize.settings import Settings, fit, followed, proposed
 
-    problem, usual = targets.inverse(case, size, variant)
-    wishes = {
+    problem, defaults = targets.inverse_problem(case, size, variant)
+    options = {
         "seed": seed,
         "generations": generations,
         "options.population": population,
         "target": target,
         "max_evaluations": budget_evaluations,
         "wall_clock_s": None if budget_minutes is None else 60 * budget_minutes,
-        **scene_arguments.below("search", scene_arguments.assignments(changes or ())),
+        **scene_arguments.table_changes("search", scene_arguments.assignments(changes or ())),
     }
-    given = {key: value for key, value in wishes.items() if value is not None}
-    settings = Settings(**scene_arguments.nested(followed(proposed(problem, usual, method), given), given))
+    changed = {key: value for key, value in options.items() if value is not None}
+    settings = Settings(
+        **scene_arguments.with_changes(followed(proposed(problem, defaults, method), changed), changed)
+    )
     fit(problem, settings)
-    place = folder or Path("out") / problem.name
+    out_folder = folder or Path("out") / problem.name
     with closing(evaluator_named(executor, device, precision, threads)) as evaluator:
-        going_on(place, fresh, overwrite)
-        outcome = session(problem, settings, evaluator, place, out(), err(), stopping, overwrite)
+        going_on(out_folder, fresh, overwrite)
+        outcome = session(problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite)
     if outcome.interrupted:
-        err().print(f"stopped; {place / SEARCH_FILE} has all that is done. {how_to_go_on(fresh, overwrite)}")
+        err().print(
+            f"stopped; {out_folder / SEARCH_FILE} has all that is done. {resume_hint(fresh, overwrite)}"
+        )
         raise typer.Exit(130)
     if not outcome.logbook:
-        how = how_to_go_on(fresh, overwrite)
-        raise RunError(f"the time was over before the first generation. {how}")
+        hint = resume_hint(fresh, overwrite)
+        raise RunError(f"the time was over before the first generation. {hint}")
     if outcome.best is None:
-        raise RunError(f"no design has run to its end; 'tisim cache {place / SEARCH_FILE}' says why")
+        raise RunError(f"no design has run to its end; 'tisim cache {out_folder / SEARCH_FILE}' says why")
 
 
 def compare(
@@ -136,39 +140,43 @@ def compare(
     from optimize.settings import followed
     from optimize.storage.cache import Cache
 
-    problem, usual = targets.inverse(case, size, variant)
-    given = scene_arguments.below("search", scene_arguments.assignments(changes or ()))
-    base = scene_arguments.nested(followed(usual, given), given)
+    problem, defaults = targets.inverse_problem(case, size, variant)
+    changed = scene_arguments.table_changes("search", scene_arguments.assignments(changes or ()))
+    base = scene_arguments.with_changes(followed(defaults, changed), changed)
     names = [name.strip() for name in methods.split(",") if name.strip()]
-    place = folder or Path("out") / f"compare-{problem.name}"
-    goes_on = going_on(place, fresh, overwrite, "comparison", comparison.COMPARISON_FILE, (comparison.CSV,))
-    ownership.take(place, comparison.COMPARISON_FILES, overwrite)
-    found = []
+    out_folder = folder or Path("out") / f"compare-{problem.name}"
+    resume = going_on(
+        out_folder, fresh, overwrite, "comparison", comparison.COMPARISON_FILE, (comparison.CSV,)
+    )
+    ownership.claim(out_folder, comparison.COMPARISON_FILES, overwrite)
+    results = []
     with (
         closing(evaluator_named(executor, device, precision, threads)) as evaluator,
-        lock.held(place, exclusive=False),
-        Cache(place / comparison.COMPARISON_FILE) as store,
-        Interrupt(stopping) as ctrl_c,
+        lock.acquire(out_folder, exclusive=False),
+        Cache(out_folder / comparison.COMPARISON_FILE) as run_cache,
+        Interrupt(print_stopping) as ctrl_c,
     ):
-        comparison.check(place, store, problem, evaluator.settings)
-        if goes_on:
-            err().print(f"going on with {place / comparison.COMPARISON_FILE}, which has {len(store)} runs")
+        comparison.check(out_folder, run_cache, problem, evaluator.settings)
+        if resume:
+            err().print(
+                f"going on with {out_folder / comparison.COMPARISON_FILE}, which has {len(run_cache)} runs"
+            )
         searches = comparison.compare(
-            problem, base, names, evaluations, repeats, fresh_starts, evaluator, store,
+            problem, base, names, evaluations, repeats, fresh_starts, evaluator, run_cache,
             lambda _: ctrl_c.check(),
         )  # fmt: skip
         try:
-            for one in searches:
-                found.append(one)
-                line = f"{one.method}, search {one.repeat + 1} of {repeats}: {one.evaluations} runs"
+            for result in searches:
+                results.append(result)
+                line = f"{result.method}, search {result.repeat + 1} of {repeats}: {result.evaluations} runs"
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
-            done = f"stopped; {place / comparison.COMPARISON_FILE} has all that is done."
-            err().print(f"{done} {how_to_go_on(fresh, overwrite)}")
+            message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all that is done."
+            err().print(f"{message} {resume_hint(fresh, overwrite)}")
             raise
-    out().print(comparison.table(problem, found))
-    replace_file(place / comparison.CSV, comparison.as_csv(problem, found))
-    out().print(f"written  {place / comparison.CSV}", highlight=False, markup=False)
+    out().print(comparison.table(problem, results))
+    replace_file(out_folder / comparison.CSV, comparison.as_csv(problem, results))
+    out().print(f"written  {out_folder / comparison.CSV}", highlight=False, markup=False)
 
 
 def cache(
@@ -180,19 +188,19 @@ def cache(
 ) -> None:
     """List the evaluations in a search's file; verify or compact it."""
     from optimize.report.cache_summary import summary
-    from optimize.storage import maintenance as store
+    from optimize.storage import maintenance
 
     if compact:
-        print(f"{store.compact(file)} evaluations kept")
+        print(f"{maintenance.compact(file)} evaluations kept")
     if verify:
-        found = store.verify(file)
+        report = maintenance.verify(file)
         print(
-            f"{found.rows} evaluations and {found.journal} in the journal; {len(found.damaged)} damaged, "
-            f"{len(found.conflicts)} in conflict, {found.duplicates} double, {found.torn} bytes unfinished"
+            f"{report.rows} evaluations and {report.journal} in the journal; {len(report.damaged)} damaged, "
+            f"{len(report.conflicts)} in conflict, {report.duplicates} double, {report.torn} bytes unfinished"
         )
-        for fault in (*found.damaged, *(f"in conflict: {key}" for key in found.conflicts)):
-            print(fault, file=sys.stderr)
-        if not found.ok:
+        for damage in (*report.damaged, *(f"in conflict: {key}" for key in report.conflicts)):
+            print(damage, file=sys.stderr)
+        if not report.ok:
             raise typer.Exit(1)
     if not (compact or verify):
         out().print(summary(file))

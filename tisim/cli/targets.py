@@ -1,4 +1,4 @@
-"""What a command is about: a case of 'tisim cases', or one of the user's own in a Python file.
+"""A command is about a case of 'tisim cases', or one of the user's own in a Python file.
 
 Such a file is named NAME.py. Its CASE is used as those of the package ``cases`` are; instead of a CASE, or
 beside it, it may have a PROBLEM, an inverse problem by itself, and SEARCH, the settings of its search.
@@ -23,41 +23,41 @@ if TYPE_CHECKING:
 OWN_FILE = "or your own NAME.py with a CASE"
 
 
-def case(target: str, besides: str = OWN_FILE) -> Case:
-    """The case of that name, or in that file; InputError where there is none.
+def case(target: str, alternatives: str = OWN_FILE) -> Case:
+    """Return the case of that name, or in that file; InputError where there is none.
 
-    besides : what may be given beside a name, for the message.
+    alternatives : what may be given beside a name, for the message.
     """
     from cases.case import Case, every
 
-    if not is_file(target):
+    if not is_python_file(target):
         known = every()
-        must(target in known, "case", f"one of {', '.join(known)}, {besides}", target)
+        must(target in known, "case", f"one of {', '.join(known)}, {alternatives}", target)
         return known[target]
     module = plugins.load(target)
-    must(hasattr(module, "CASE"), target, "a file with a CASE", _found(module))
+    must(hasattr(module, "CASE"), target, "a file with a CASE", _module_names(module))
     must(isinstance(module.CASE, Case), f"CASE of {target}", "a cases.case.Case", module.CASE)
     return module.CASE
 
 
-def inverse(target: str, size: str | None, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
-    """The inverse problem of a case or a file, and settings of its search; InputError where there is none."""
-    if not is_file(target):
+def inverse_problem(target: str, size: str | None, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
+    """Return the inverse problem of a case or a file, and settings of its search; InputError without one."""
+    if not is_python_file(target):
         return case(target).inverse(size or "default", variant)
     module = plugins.load(target)
     if hasattr(module, "PROBLEM"):
         problem, settings = _problem(module, target, size, variant)
     else:
-        must(hasattr(module, "CASE"), target, "a file with a PROBLEM or a CASE", _found(module))
+        must(hasattr(module, "CASE"), target, "a file with a PROBLEM or a CASE", _module_names(module))
         problem, settings = case(target).inverse(size or "default", variant)
     # The whole file, and those that it may have taken something from: an objective made elsewhere from
     # numbers that stand here is another when they change.
-    checksums = [file.checksum[:12] for file in python_file.loaded()]
+    checksums = [file.checksum[:12] for file in python_file.loaded_files()]
     return dataclasses.replace(problem, code=problem.code or "-".join(checksums)), settings
 
 
-def is_file(target: str) -> bool:
-    """Whether it is a Python file by its name."""
+def is_python_file(target: str) -> bool:
+    """Return whether the target is a Python file by its name."""
     return target.endswith(".py")
 
 
@@ -74,6 +74,6 @@ def _problem(
     return module.PROBLEM, settings
 
 
-def _found(module: ModuleType) -> list[str]:
-    """Names that a file has, beside those that every module has."""
+def _module_names(module: ModuleType) -> list[str]:
+    """Return the names that a file has, beside those that every module has."""
     return [name for name in vars(module) if not name.startswith("__")]

@@ -108,7 +108,7 @@ class Component(AccuracyHints, Checked):
         """Every part made after this contract, but those of a file of which another version has been
         loaded."""
         for kind in (cls, *_descendants(cls)):
-            if not kind.__dict__.get("contract") and not python_file.superseded(kind):
+            if not kind.__dict__.get("contract") and not python_file.is_superseded(kind):
                 yield kind
 
     def parts(self) -> Iterator[Component]:

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from tisim.errors import InputError, named, shown
+from tisim.errors import InputError, abbreviated, printable
 
 
 def unit_of(info: FieldInfo) -> str:
@@ -61,7 +61,7 @@ def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, F
     received: dict[str, str] = {}
     for fault in invalid.errors(include_url=False):
         loc = tuple(itertools.takewhile(lambda part: not _is_choice(part), fault["loc"]))
-        name = named(".".join([where, *map(str, loc)]))
+        name = printable(".".join([where, *map(str, loc)]))
         context: Mapping[str, Any] = fault.get("ctx", {})
         if isinstance(context.get("error"), InputError):
             for line in _named_within(name, loc, str(context["error"])):
@@ -74,7 +74,7 @@ def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, F
         elif len(loc) == 1 and fault["type"] == "extra_forbidden":
             rule = f"{rule}: {' or '.join(', '.join(fields).rsplit(', ', 1)) or 'there is none'}"
         lines.setdefault(name, []).append(rule)
-        received.setdefault(name, "nothing" if fault["type"] == "missing" else shown(fault["input"]))
+        received.setdefault(name, "nothing" if fault["type"] == "missing" else abbreviated(fault["input"]))
     text = [
         f"{name} must be {' or '.join(dict.fromkeys(rules))}; received {received[name]}" if rules else name
         for name, rules in lines.items()

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any, TypeVar, get_args
 
 from tisim.components.component import Component
-from tisim.errors import InputError, must, named, shown
+from tisim.errors import InputError, abbreviated, must, printable
 
 Part = TypeVar("Part", bound=Component)
 
@@ -123,7 +123,9 @@ def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
     try:
         return parse(text)
     except RecursionError:
-        raise InputError(f"{what} must be less deeply nested; received {shown(source)}") from None
+        raise InputError(f"{what} must be less deeply nested; received {abbreviated(source)}") from None
     except ValueError as fault:
         # Not of the format, or a number of more digits than Python reads.
-        raise InputError(f"{what} must be TOML; received {shown(source)} ({named(str(fault))})") from None
+        raise InputError(
+            f"{what} must be TOML; received {abbreviated(source)} ({printable(str(fault))})"
+        ) from None

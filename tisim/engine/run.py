@@ -46,6 +46,6 @@ def run(
         if record is None:
             results = dict(_batches.run(scenes, progress))
         else:
-            with record.begun(scenes, runtime.current().precision) as trajectory:
+            with record.create(scenes, runtime.current().precision) as trajectory:
                 results = dict(_batches.run(scenes, progress, trajectory=trajectory))
     return [results[index] for index in range(len(scenes))]

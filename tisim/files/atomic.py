@@ -1,4 +1,4 @@
-"""Files that survive a kill at any instant and a full disk: locks, appends and whole-file replacement."""
+"""Locks, appends and whole-file replacement leave files whole after a kill at any instant or a full disk."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tisim.errors import InputError, RunError
-from tisim.files.regular_file import opened, status
+from tisim.files.regular_file import file_status, open_descriptor
 
 try:
     import fcntl
@@ -25,29 +25,29 @@ def locked(path: Path, *, exclusive: bool, timeout: float | None = None) -> Iter
     """Hold the advisory lock of a lock file, among processes and threads; a killed holder lets go of it.
 
     timeout : s, to wait for another holder; LOCK_TIMEOUT unless given.
-    Gives a handle of the file; of its folder, to one that only reads where no lock file is and none can be
-    made. A lock file stays behind on purpose: removing it would let two processes lock two different files.
+    It yields a handle of the file; of its folder, to a reader where no lock file is and none can be made.
+    A lock file stays behind on purpose: removing it would let two processes lock two different files.
     InputError where it cannot be had, RunError when another process holds it for longer.
     """
     if fcntl is None:
         raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
-    handle = opened(path, os.O_RDWR | os.O_CREAT) if exclusive else _for_reading(path)
+    handle = open_descriptor(path, os.O_RDWR | os.O_CREAT) if exclusive else _open_for_reading(path)
     try:
         kind = fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH
-        _wait(handle, path, kind, LOCK_TIMEOUT if timeout is None else timeout)
+        _wait_for_lock(handle, path, kind, LOCK_TIMEOUT if timeout is None else timeout)
         yield handle
     finally:
         os.close(handle)
 
 
-def _for_reading(path: Path) -> int:
-    """A handle to lock: of the lock file, which may be another user's."""
+def _open_for_reading(path: Path) -> int:
+    """Return a handle to lock for reading: of the lock file, which may be another user's."""
     try:
-        return opened(path, os.O_RDONLY)
+        return open_descriptor(path, os.O_RDONLY)
     except FileNotFoundError:
         pass
     try:
-        return opened(path, os.O_RDONLY | os.O_CREAT)
+        return open_descriptor(path, os.O_RDONLY | os.O_CREAT)
     except InputError as refused:
         try:
             return os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
@@ -55,13 +55,13 @@ def _for_reading(path: Path) -> int:
             raise refused from None
 
 
-def _wait(handle: int, path: Path, kind: int, timeout: float) -> None:
-    until = time.monotonic() + timeout
+def _wait_for_lock(handle: int, path: Path, kind: int, timeout: float) -> None:
+    deadline = time.monotonic() + timeout
     while True:
         try:
             return fcntl.flock(handle, kind | fcntl.LOCK_NB)
         except BlockingIOError:
-            if time.monotonic() > until:
+            if time.monotonic() > deadline:
                 raise RunError(f"{path} has been locked by another process for {timeout:g} s") from None
             time.sleep(0.002)
         except OSError as error:
@@ -75,7 +75,7 @@ def append_at(path: Path, end: int, data: bytes) -> int:
     InputError when something that is no file is in its place.
     """
     try:
-        handle = opened(path, os.O_RDWR | os.O_CREAT)
+        handle = open_descriptor(path, os.O_RDWR | os.O_CREAT)
         try:
             if os.fstat(handle).st_size > end:
                 os.ftruncate(handle, end)
@@ -90,7 +90,7 @@ def append_at(path: Path, end: int, data: bytes) -> int:
         if end == 0:
             _sync_folder(path)
     except OSError as error:
-        raise _full(path, error) from error
+        raise _write_error(path, error) from error
     return end + len(data)
 
 
@@ -101,58 +101,58 @@ def replace_file(path: Path, data: bytes) -> None:
     RunError if the disk is full; path is then the old file. InputError when something that is no file has the
     unfinished one's name; a link in the place of path is replaced itself, not what it points to.
     """
-    new = path.with_name(unfinished(path.name))
+    new = path.with_name(temporary_name(path.name))
     try:
         while True:
             with locked(new, exclusive=True) as handle:
                 # Whoever had it before may have put it in its place; then that is the file locked here.
-                if _names(new, handle):
-                    _finish(handle, new, path, data)
+                if _refers_to(new, handle):
+                    _write_and_rename(handle, new, path, data)
                     break
         _sync_folder(path)
     except OSError as error:
-        raise _full(path, error) from error
+        raise _write_error(path, error) from error
 
 
-def unfinished(name: str) -> str:
-    """What a file of this name is called while it is written."""
+def temporary_name(name: str) -> str:
+    """Return what a file of this name is called while it is written."""
     return f"{name}.new"
 
 
 @contextlib.contextmanager
 def replacing(path: Path, new: Path) -> Iterator[None]:
-    """While this lasts, ``new``, an empty file at first, is written; then it is put in the place of path.
+    """Let the caller write ``new``, an empty file at first; at the end put it in the place of path.
 
     RunError if the disk is full; path is then the old file, and nothing unfinished is left. InputError when
     something that is no file is in the place of ``new``.
     """
     try:
-        _fresh(new)
+        _create_empty(new)
         try:
             yield
             new.replace(path)
         finally:
             new.unlink(missing_ok=True)
     except OSError as error:
-        raise _full(path, error) from error
+        raise _write_error(path, error) from error
 
 
-def _fresh(path: Path) -> None:
+def _create_empty(path: Path) -> None:
     """Make an empty file for those who write by name, in place of one that a killed process has left: that
     may have another name, and a link in its place would have them write over what it points to."""
-    if status(path) is not None:
+    if file_status(path) is not None:
         path.unlink()
-    os.close(opened(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
+    os.close(open_descriptor(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
 
 
-def _names(path: Path, handle: int) -> bool:
+def _refers_to(path: Path, handle: int) -> bool:
     try:
         return os.path.samestat(path.lstat(), os.fstat(handle))
     except FileNotFoundError:
         return False
 
 
-def _finish(handle: int, new: Path, path: Path, data: bytes) -> None:
+def _write_and_rename(handle: int, new: Path, path: Path, data: bytes) -> None:
     """Make data all that is in the file, on the disk, and put it in its place; take it away if that fails."""
     try:
         os.ftruncate(handle, 0)
@@ -168,12 +168,12 @@ def write_at(handle: int, data: bytes, offset: int) -> None:
     """Write all of data into an open file from a byte on; OSError when there is no room for it."""
     view = memoryview(data)
     while view:
-        written = os.pwrite(handle, view, offset)
-        view, offset = view[written:], offset + written
+        count = os.pwrite(handle, view, offset)
+        view, offset = view[count:], offset + count
 
 
 def _sync_folder(path: Path) -> None:
-    """A new name is on the disk only when its folder is."""
+    """Flush the folder of a file to the disk: a new name is on the disk only when its folder is."""
     handle = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -181,7 +181,7 @@ def _sync_folder(path: Path) -> None:
         os.close(handle)
 
 
-def _full(path: Path, error: OSError) -> RunError:
+def _write_error(path: Path, error: OSError) -> RunError:
     return RunError(
         f"{path} could not be written: {error.strerror or error}; everything stored before is intact"
     )

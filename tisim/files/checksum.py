@@ -1,4 +1,4 @@
-"""Checksums of HDF5 files that are written whole: behind their end, where HDF5 does not look.
+"""HDF5 files that are written whole get a checksum behind their end, where HDF5 does not look.
 
 The HDF5 library, given a damaged structure, may read wrong data or never return: it must not be given one.
 The checksum is of the file, or of all of it but data that has checksums of its own.
@@ -22,14 +22,13 @@ from tisim.files.atomic import replace_file
 from tisim.files.framing import MAGIC, frame, scan
 from tisim.files.superblock import SIGNATURE
 
-OLDER = "an older version has written it, whose files h5py still reads"
-"""What messages say of a file that is of tisim but has no checksum."""
+OLDER_VERSION = "an older version has written it, whose files h5py still reads"
+"""Text of messages about a file that is of tisim but has no checksum."""
 
 
 @contextlib.contextmanager
-def created(path: Path) -> Iterator[h5py.File]:
-    """A new HDF5 file in memory; at the end of the ``with`` it gets its checksum and is put in the
-    place of path.
+def create_file(path: Path) -> Iterator[h5py.File]:
+    """Yield a new HDF5 file in memory; at the end give it its checksum and put it in the place of path.
 
     RunError when it cannot be written; path is then what it was.
     """
@@ -40,48 +39,48 @@ def created(path: Path) -> Iterator[h5py.File]:
 
 
 @contextlib.contextmanager
-def opened(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> Iterator[h5py.File]:
-    """A file that ``created`` has left. InputError unless it is there, whole and of this kind.
+def open_file(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> Iterator[h5py.File]:
+    """Yield a file that ``create_file`` has written. InputError unless it is there, whole and of this kind.
 
     kind : its attribute ``format``. what, rule : what it is called in messages, and what it must be.
     """
-    with h5py.File(io.BytesIO(image(path, what, rule)), "r") as found:
-        must(found.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
-        yield found
+    with h5py.File(io.BytesIO(read_image(path, what, rule)), "r") as file:
+        must(file.attrs.get("format") == kind, what, f"{rule}, of the format {kind!r}", str(path))
+        yield file
 
 
-def image(path: Path, what: str, rule: str) -> bytes:
-    """The HDF5 file that was given to ``with_checksum``; InputError unless it is there and whole.
+def read_image(path: Path, what: str, rule: str) -> bytes:
+    """Return the HDF5 file that was given to ``with_checksum``; InputError unless it is there and whole.
 
-    what, rule : as of opened.
+    what, rule : what it is called in messages, and what it must be.
     """
     content = regular_file.content(Path(os.path.realpath(path)))
     if content is None:
         raise InputError(f"{what} must be an existing file; received {str(path)!r}")
-    found = verified(content)
-    if found is None:
-        bare = MAGIC not in content and content.startswith(SIGNATURE) and b"tisim" in content
-        why = f", without one: it was cut short or damaged, or {OLDER}" if bare else ""
+    image = verified(content)
+    if image is None:
+        without_checksum = MAGIC not in content and content.startswith(SIGNATURE) and b"tisim" in content
+        why = f", without one: it was cut short or damaged, or {OLDER_VERSION}" if without_checksum else ""
         raise InputError(f"{what} must be {rule}, whole and with its checksum; received {str(path)!r}{why}")
-    return found
+    return image
 
 
 def with_checksum(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
-    """The file image with its checksum; data : (offset, size) in bytes of data that this leaves out."""
+    """Return the file image with its checksum; data : (offset, size) in bytes of data that it leaves out."""
     spans = sorted(data)
-    about = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
-    return image + frame(json.dumps(about).encode())
+    trailer = {"size": len(image), "data": spans, "crc": _checksum(image, spans)}
+    return image + frame(json.dumps(trailer).encode())
 
 
 def verified(content: bytes) -> bytes | None:
-    """The HDF5 file without its checksum; None where that is missing or damaged, or does not fit."""
+    """Return the HDF5 file without its checksum; None where that is missing or damaged, or does not fit."""
     start = max(content.rfind(MAGIC), 0)
     payloads = scan(content[start:]).payloads
     if not content.startswith(SIGNATURE) or not payloads:
         return None
     try:
-        about = json.loads(payloads[0])
-        size, spans, crc = about["size"], about["data"], about["crc"]
+        trailer = json.loads(payloads[0])
+        size, spans, crc = trailer["size"], trailer["data"], trailer["crc"]
     except (ValueError, KeyError, TypeError):
         # A frame, but of something else.
         return None
@@ -90,7 +89,7 @@ def verified(content: bytes) -> bytes | None:
 
 
 def _checksum(image: bytes, spans: Iterable[Iterable[int]]) -> int:
-    crc = at = 0
+    crc = position = 0
     for offset, size in spans:
-        crc, at = zlib.crc32(image[at:offset], crc), offset + size
-    return zlib.crc32(image[at:], crc)
+        crc, position = zlib.crc32(image[position:offset], crc), offset + size
+    return zlib.crc32(image[position:], crc)

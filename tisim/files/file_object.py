@@ -1,4 +1,4 @@
-"""An open file of the system as a file object for ``h5py.File``: where it is read and written next."""
+"""The base class of files that ``h5py.File`` reads or writes keeps the position of the next access."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ import os
 
 
 class Seekable(io.RawIOBase):
-    """Subclasses say where the file ends, and read and write from the byte ``_at`` on. It owns the handle."""
+    """Subclasses say where the file ends, and access it from ``_position`` (bytes). It owns the handle."""
 
     def __init__(self, handle: int) -> None:
-        self._handle, self._at = handle, 0
+        self._handle, self._position = handle, 0
 
     def _size(self) -> int:
-        """Where the file ends, bytes."""
+        """Return where the file ends, bytes."""
         raise NotImplementedError
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size()}[whence]
-        return self._at
+        self._position = (
+            offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size()}[whence]
+        )
+        return self._position
 
     def tell(self) -> int:
-        return self._at
+        return self._position
 
     def readable(self) -> bool:
         return True

@@ -1,4 +1,4 @@
-"""Frames: payloads with a length and a checksum, one after another in a stretch of bytes.
+"""Frames: payloads with a length and a checksum, one after another in a sequence of bytes.
 
 A frame is magic (4 bytes), length (u32), CRC-32 of the payload (u32), payload. The magic is not ASCII and
 payloads are, so it never occurs inside one.
@@ -16,11 +16,11 @@ _HEAD = struct.Struct("<4sII")
 
 @dataclass(frozen=True)
 class Scan:
-    """What a stretch of frames holds.
+    """The frames that were found in a sequence of bytes.
 
-    payloads : of the whole frames, in order; end : byte offset after the last whole frame.
-    damaged : offsets where whole frames follow something that is none: not a torn tail but damage.
-    torn : bytes after end, left by a writer that was killed.
+    payloads : those of the whole frames, in order; end : byte offset after the last whole frame.
+    damaged : byte offsets where whole frames follow something that is none: not a torn tail but damage.
+    torn : number of bytes after end, left by a writer that was killed.
     """
 
     payloads: list[bytes]
@@ -30,15 +30,15 @@ class Scan:
 
 
 def frame(payload: bytes) -> bytes:
-    """The payload with its header."""
+    """Return the payload with its header."""
     return _HEAD.pack(MAGIC, len(payload), zlib.crc32(payload)) + payload
 
 
-def _whole(data: bytes, at: int) -> bytes | None:
-    if at + _HEAD.size > len(data):
+def _payload_at(data: bytes, offset: int) -> bytes | None:
+    if offset + _HEAD.size > len(data):
         return None
-    magic, length, crc = _HEAD.unpack_from(data, at)
-    payload = data[at + _HEAD.size : at + _HEAD.size + length]
+    magic, length, crc = _HEAD.unpack_from(data, offset)
+    payload = data[offset + _HEAD.size : offset + _HEAD.size + length]
     return payload if magic == MAGIC and len(payload) == length and zlib.crc32(payload) == crc else None
 
 
@@ -46,15 +46,15 @@ def scan(data: bytes, base: int = 0) -> Scan:
     """Read frames from data, whose first byte lies at offset base of the file."""
     payloads: list[bytes] = []
     damaged: list[int] = []
-    at = end = 0
-    while at < len(data):
-        payload = _whole(data, at)
+    offset = end = 0
+    while offset < len(data):
+        payload = _payload_at(data, offset)
         if payload is not None:
-            if at > end:
+            if offset > end:
                 damaged.append(base + end)
             payloads.append(payload)
-            at = end = at + _HEAD.size + len(payload)
+            offset = end = offset + _HEAD.size + len(payload)
         else:
-            following = data.find(MAGIC, at + 1)
-            at = following if following >= 0 else len(data)
+            following = data.find(MAGIC, offset + 1)
+            offset = following if following >= 0 else len(data)
     return Scan(payloads, base + end, damaged, len(data) - end)

@@ -4,7 +4,7 @@ HDF5 in its single-writer mode writes what is new before what refers to it, so a
 write but for its superblock: that marks the file as open, which keeps readers out for good when the writer
 is killed, and says where the file ended when it was opened. And when a write fails, HDF5 ends the process.
 So it writes to the object below, which leaves the mark out, keeps the superblock's end of the file up to
-date, and of what could not be written tells its owner and not HDF5, for which it is kept in memory.
+date, and reports what could not be written to its owner and not to HDF5, for which it is kept in memory.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from tisim.files.file_object import Seekable
 from tisim.files.superblock import SIZE, superblock
 
 
-class Growing(Seekable):
-    """The HDF5 file at path, made with a superblock of version 3, as a file object for ``h5py.File``.
+class GrowingFile(Seekable):
+    """It is the HDF5 file at path, made with a superblock of version 3, as a file object for ``h5py.File``.
 
     failure : why something could not be written, after which nothing is; None while all is well.
     """
@@ -31,31 +31,31 @@ class Growing(Seekable):
         self._unwritten: list[tuple[int, bytes]] = []
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
-        at, piece = self._at, bytes(data)
-        self._at += len(piece)
+        offset, piece = self._position, bytes(data)
+        self._position += len(piece)
         if self.failure is None:
             try:
-                self._put(at, piece)
+                self._write_piece(offset, piece)
             except OSError as failure:
-                self._fail(failure)
+                self._record_failure(failure)
         if self.failure is not None:
-            self._unwritten.append((at, piece))
+            self._unwritten.append((offset, piece))
         return len(piece)
 
-    def _put(self, at: int, piece: bytes) -> None:
-        if at == 0:
+    def _write_piece(self, offset: int, piece: bytes) -> None:
+        if offset == 0:
             self._superblock = piece
-            self._tell_end(self._end)
+            self._publish_end(self._end)
             return
-        write_at(self._handle, piece, at)
-        if at + len(piece) > self._end:
-            self._tell_end(at + len(piece))
+        write_at(self._handle, piece, offset)
+        if offset + len(piece) > self._end:
+            self._publish_end(offset + len(piece))
 
-    def _tell_end(self, end: int) -> None:
+    def _publish_end(self, end: int) -> None:
         write_at(self._handle, superblock(self._superblock, end), 0)
         self._end = end
 
-    def _fail(self, failure: OSError) -> None:
+    def _record_failure(self, failure: OSError) -> None:
         """Note the failure, and give back what was written of a piece behind the end."""
         self.failure = failure
         os.ftruncate(self._handle, self._end)
@@ -66,25 +66,25 @@ class Growing(Seekable):
         if self.failure is None and end > self._end:
             try:
                 os.ftruncate(self._handle, end)
-                self._tell_end(end)
+                self._publish_end(end)
             except OSError as failure:
-                self._fail(failure)
+                self._record_failure(failure)
         return end
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
         view = memoryview(buffer).cast("B")
-        first, last = self._at, self._at + len(view)
-        found = bytearray(os.pread(self._handle, len(view), first).ljust(len(view), b"\0"))
-        for at, piece in self._unwritten:
-            a, b = max(at, first), min(at + len(piece), last)
-            if a < b:
-                found[a - first : b - first] = piece[a - at : b - at]
-        view[:] = found
-        self._at = last
+        first, last = self._position, self._position + len(view)
+        content = bytearray(os.pread(self._handle, len(view), first).ljust(len(view), b"\0"))
+        for offset, piece in self._unwritten:
+            begin, end = max(offset, first), min(offset + len(piece), last)
+            if begin < end:
+                content[begin - first : end - first] = piece[begin - offset : end - offset]
+        view[:] = content
+        self._position = last
         return len(view)
 
     def _size(self) -> int:
-        return max([self._end, *(at + len(piece) for at, piece in self._unwritten)])
+        return max([self._end, *(offset + len(piece) for offset, piece in self._unwritten)])
 
     def writable(self) -> bool:
         return True

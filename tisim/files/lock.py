@@ -16,21 +16,21 @@ from tisim.files.atomic import locked
 
 LOCK = ".tisim.lock"
 AT_WORK_TIMEOUT = 1.0
-"""s, far longer than it takes to look whether a folder is in use, for which the lock is held as well."""
+"""s, far longer than it takes to see whether a folder is in use, for which the lock is held as well."""
 
 
 def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
     """InputError where another process is at work in the folder; touches nothing."""
-    if regular_file.status(folder / LOCK) is not None:
-        with held(folder, exclusive=False, timeout=timeout):
+    if regular_file.file_status(folder / LOCK) is not None:
+        with acquire(folder, exclusive=False, timeout=timeout):
             pass
 
 
 @contextmanager
-def held(folder: Path, *, exclusive: bool = True, timeout: float = AT_WORK_TIMEOUT) -> Iterator[None]:
-    """Be alone at work in a folder, which exists; InputError where another process still is.
+def acquire(folder: Path, *, exclusive: bool = True, timeout: float = AT_WORK_TIMEOUT) -> Iterator[None]:
+    """Hold the lock of a folder, which exists; InputError where another process holds it.
 
-    exclusive : False to share it with those who only look. timeout : to wait for the other one, s.
+    exclusive : False to share it with those who only read. timeout : to wait for the other one, s.
     """
     with ExitStack() as stack:
         try:

@@ -1,4 +1,4 @@
-"""A Python file of the user's, imported under its own name with the text that it had then.
+"""Python files of the user are imported under their own names, with the text that they had then.
 
 Pickles name a class by module and name, so a worker imports the same texts under the same names before it
 reads one. A checksum of the text tells physics and objectives of one version of a file from those of another.
@@ -19,15 +19,18 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from tisim.errors import InputError, must, named, shown
+from tisim.errors import InputError, abbreviated, must, printable
 
-OURS = frozenset({"tisim", "optimize", "cases"})
+OWN_PACKAGES = frozenset({"tisim", "optimize", "cases"})
 """Packages whose version says what they compute."""
 
 
 @dataclass(frozen=True)
 class PythonFile:
-    """name : under which it is imported. path : where it was read. text : its bytes."""
+    """A Python file that was read.
+
+    name : under which it is imported. path : where it was read. text : its bytes.
+    """
 
     name: str
     path: str
@@ -35,12 +38,12 @@ class PythonFile:
 
     @property
     def checksum(self) -> str:
-        """SHA-256 of the text, hex."""
-        return checksum(self.text)
+        """Return the SHA-256 of the text, hex."""
+        return sha256(self.text)
 
 
-def checksum(text: bytes) -> str:
-    """SHA-256, hex."""
+def sha256(text: bytes) -> str:
+    """Return the SHA-256 of a text, hex."""
     return hashlib.sha256(text).hexdigest()
 
 
@@ -55,12 +58,12 @@ def load(path: str | Path) -> ModuleType:
     InputError in one line when there is no such file, it cannot be imported (which line, and why), or another
     module has its name.
     """
-    place = Path(path)
-    must(place.suffix == ".py" and "." not in place.stem, "Python file", "named NAME.py", str(path))
-    file = PythonFile(place.stem, str(place.absolute()), _read(place))
-    other = _of_that_name(file)
-    free = other is None or Path(other).resolve() == place.resolve()
-    must(free, f"name of {path}", "one that no other module has", other)
+    file_path = Path(path)
+    must(file_path.suffix == ".py" and "." not in file_path.stem, "Python file", "named NAME.py", str(path))
+    file = PythonFile(file_path.stem, str(file_path.absolute()), _read(file_path))
+    existing = _existing_module(file)
+    free = existing is None or Path(existing).resolve() == file_path.resolve()
+    must(free, f"name of {path}", "one that no other module has", existing)
     return install(file)
 
 
@@ -71,67 +74,67 @@ def install(file: PythonFile) -> ModuleType:
     linecache.cache[file.path] = (len(file.text), None, lines, file.path)
     _names.add(file.name)
     if file not in _modules:
-        _modules[file] = _run(file)
+        _modules[file] = _execute(file)
     sys.modules[file.name] = _modules[file]
     _current[file.name] = file
     return _modules[file]
 
 
-def forget(name: str) -> None:
-    """Take a file back that has been imported: its classes are no longer known."""
+def unload(name: str) -> None:
+    """Undo the import of a file: its classes are no longer known."""
     sys.modules.pop(name, None)
     _modules.pop(_current.pop(name))
 
 
-def loaded() -> tuple[PythonFile, ...]:
-    """All files of the user's that have been imported, in order."""
+def loaded_files() -> tuple[PythonFile, ...]:
+    """Return all files of the user that have been imported, in order."""
     return tuple(_current.values())
 
 
-def superseded(kind: type) -> bool:
-    """Whether a class is of a text that another has replaced since."""
+def is_superseded(kind: type) -> bool:
+    """Return whether a class is of a text that another has replaced since."""
     if kind.__module__ not in _names:
         return False
     return vars(sys.modules.get(kind.__module__, object)).get(kind.__name__) is not kind
 
 
-def checksums(*things: Any) -> dict[str, str]:
-    """Checksum of each module outside of this package that defines these functions, classes or their bases.
+def module_checksums(*items: Any) -> dict[str, str]:
+    """Return the checksum of each module outside of tisim that defines these functions, classes or bases.
 
-    For a file that was loaded here, also those of other loaded files that it takes something from.
+    A file that was loaded here brings those of the other loaded files that it takes something from.
     """
-    found: dict[str, str] = {}
-    for thing in things:
-        while isinstance(thing, functools.partial):
-            thing = thing.func
-        owner = thing if inspect.isroutine(thing) or isinstance(thing, type) else type(thing)
-        for one in inspect.getmro(owner) if isinstance(owner, type) else (owner,):
-            _add(one.__module__ or "builtins", one, found)
-    return found
+    result: dict[str, str] = {}
+    for item in items:
+        while isinstance(item, functools.partial):
+            item = item.func
+        owner = item if inspect.isroutine(item) or isinstance(item, type) else type(item)
+        for cls in inspect.getmro(owner) if isinstance(owner, type) else (owner,):
+            _add(cls.__module__ or "builtins", cls, result)
+    return result
 
 
-def _add(module: str, thing: Any, found: dict[str, str]) -> None:
+def _add(module: str, item: Any, result: dict[str, str]) -> None:
     root = module.partition(".")[0]
-    if root in OURS or root in sys.stdlib_module_names or root == "pydantic" or module in found:
+    if root in OWN_PACKAGES or root in sys.stdlib_module_names or root == "pydantic" or module in result:
         return
     if module not in _current:
-        found[module] = _checksum(module, thing)
+        result[module] = _file_checksum(module, item)
         return
-    found[module] = _current[module].checksum
+    result[module] = _current[module].checksum
     for value in vars(sys.modules[module]).values():
-        used = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
-        if used in _current:
-            _add(used, value, found)
+        source = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
+        if source in _current:
+            _add(source, value, result)
 
 
-def _checksum(module: str, thing: Any) -> str:
-    """SHA-256 of the file of a module that Python has imported by itself, or of what a notebook defines."""
+def _file_checksum(module: str, item: Any) -> str:
+    """Return the SHA-256 of the file of a module that Python imported itself, or of code of a notebook."""
     path = getattr(sys.modules.get(module), "__file__", None)
     try:
-        text = Path(path).read_bytes() if path else inspect.getsource(thing).encode()
+        text = Path(path).read_bytes() if path else inspect.getsource(item).encode()
     except (OSError, TypeError):
         return ""
-    return checksum(text)
+    return sha256(text)
 
 
 def _read(path: Path) -> bytes:
@@ -140,14 +143,14 @@ def _read(path: Path) -> bytes:
         must(path.is_file() or not path.exists(), "Python file", "a file", str(path))
         return path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"Python file must exist; received {shown(str(path))}") from None
+        raise InputError(f"Python file must exist; received {abbreviated(str(path))}") from None
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise InputError(f"Python file must be readable; received {shown(str(path))} ({why})") from None
+        raise InputError(f"Python file must be readable; received {abbreviated(str(path))} ({why})") from None
 
 
-def _of_that_name(file: PythonFile) -> str | None:
-    """Where the module of this name is, imported already or to be found; None where there is none."""
+def _existing_module(file: PythonFile) -> str | None:
+    """Return where the module of this name is, imported already or to be found; None where there is none."""
     if file.name in _current:
         return _current[file.name].path
     if file.name in sys.modules:
@@ -156,8 +159,8 @@ def _of_that_name(file: PythonFile) -> str | None:
     return None if spec is None else spec.origin or "a package"
 
 
-class _Text(importlib.abc.SourceLoader):
-    """Has Python import the text that was read, whatever has become of the file."""
+class _TextLoader(importlib.abc.SourceLoader):
+    """The loader gives Python the text that was read, whatever has become of the file."""
 
     def __init__(self, file: PythonFile) -> None:
         self.file = file
@@ -169,11 +172,11 @@ class _Text(importlib.abc.SourceLoader):
         return self.file.text
 
 
-def _run(file: PythonFile) -> ModuleType:
-    there = sys.modules.get(file.name)
-    if there is not None and _of_python(there, file):
-        return there
-    spec = importlib.util.spec_from_file_location(file.name, file.path, loader=_Text(file))
+def _execute(file: PythonFile) -> ModuleType:
+    previous = sys.modules.get(file.name)
+    if previous is not None and _imported_by_python(previous, file):
+        return previous
+    spec = importlib.util.spec_from_file_location(file.name, file.path, loader=_TextLoader(file))
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -182,20 +185,20 @@ def _run(file: PythonFile) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         sys.modules.pop(file.name)
-        if there is not None:
-            sys.modules[file.name] = there
-        raise InputError(_reported(file, error)) from error
+        if previous is not None:
+            sys.modules[file.name] = previous
+        raise InputError(_import_error(file, error)) from error
     return module
 
 
-def _of_python(module: ModuleType, file: PythonFile) -> bool:
-    """Whether Python itself has imported this text."""
+def _imported_by_python(module: ModuleType, file: PythonFile) -> bool:
+    """Return whether Python itself has imported this text."""
     path = getattr(module, "__file__", None)
     return file.name not in _current and path is not None and Path(path).read_bytes() == file.text
 
 
-def _reported(file: PythonFile, error: BaseException) -> str:
-    """That a file cannot be imported: where, and why; in one line."""
+def _import_error(file: PythonFile, error: BaseException) -> str:
+    """Return the message that a file cannot be imported: where, and why; in one line."""
     if isinstance(error, SyntaxError) and error.filename == file.path:
         line, why = error.lineno, error.msg
     else:
@@ -203,5 +206,5 @@ def _reported(file: PythonFile, error: BaseException) -> str:
         line = next((frame.lineno for frame in reversed(frames) if frame.filename == file.path), None)
         why = str(error)
     where = f"line {line}: " if line else ""
-    fault = f"{type(error).__name__}: {named(' '.join(why.split()))}"
-    return f"{named(file.path)} must be a file that Python can import; received {where}{fault}"
+    fault = f"{type(error).__name__}: {printable(' '.join(why.split()))}"
+    return f"{printable(file.path)} must be a file that Python can import; received {where}{fault}"

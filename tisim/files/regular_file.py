@@ -1,4 +1,4 @@
-"""Files that are files and nothing else: opened without following a link and without waiting.
+"""Regular files are opened without following a link and without waiting.
 
 A link in the place of a file of ours would have us write over what it points to; a fifo would have us wait
 for ever. Both are refused, and so is what may not be opened, in words.
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tisim.errors import InputError
 
-_REFUSED = {
+_REFUSALS = {
     errno.ELOOP: "a symbolic link",
     errno.EMLINK: "a symbolic link",  # what FreeBSD says
     errno.EISDIR: "a folder",
@@ -27,52 +27,55 @@ _REFUSED = {
 _WRITING = os.O_WRONLY | os.O_RDWR
 
 
-def opened(path: Path, flags: int) -> int:
-    """A handle of the file of this name, for functions of os; flags : of os.open.
+def open_descriptor(path: Path, flags: int) -> int:
+    """Return a file descriptor of the file of this name; flags : those of os.open.
 
     InputError unless it is a regular file that may be opened, and one to be written to has no other name (a
     hard link). Other errors (no such file, a full disk) are those of os.open.
     """
     try:
-        handle = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC, 0o644)
+        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC, 0o644)
     except OSError as error:
-        raise _refusal(path, error) or error from None
-    kind = os.fstat(handle)
-    found = _unfit(kind)
-    if found is None and flags & _WRITING and kind.st_nlink > 1:
-        found = f"one with {kind.st_nlink} names (hard links)"
-    if found is not None:
-        os.close(handle)
-        raise _refused(path, found)
-    return handle
+        raise _translated(path, error) or error from None
+    info = os.fstat(descriptor)
+    fault = _irregular_kind(info)
+    if fault is None and flags & _WRITING and info.st_nlink > 1:
+        fault = f"one with {info.st_nlink} names (hard links)"
+    if fault is not None:
+        os.close(descriptor)
+        raise _not_regular(path, fault)
+    return descriptor
 
 
-def status(path: Path) -> os.stat_result | None:
-    """What the system knows of the file of this name, None where there is none; InputError as of opened."""
+def file_status(path: Path) -> os.stat_result | None:
+    """Return the os.stat_result of the file of this name, None where there is none.
+
+    InputError unless it is a regular file; see ``open_descriptor``.
+    """
     try:
-        kind = path.lstat()
+        info = path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise _refusal(path, error) or error from None
-    found = _unfit(kind)
-    if found is not None:
-        raise _refused(path, found)
-    return kind
+        raise _translated(path, error) or error from None
+    fault = _irregular_kind(info)
+    if fault is not None:
+        raise _not_regular(path, fault)
+    return info
 
 
 def exists(path: Path) -> bool:
-    """Whether there is anything of this name, links followed; InputError where that may not be known."""
-    return _followed(path) is not None
+    """Return whether anything of this name exists, links followed; InputError where that is forbidden."""
+    return _stat_following_links(path) is not None
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is a folder of this name, links followed; InputError where that may not be known."""
-    kind = _followed(path)
-    return kind is not None and stat.S_ISDIR(kind.st_mode)
+    """Return whether a folder of this name exists, links followed; InputError where that is forbidden."""
+    info = _stat_following_links(path)
+    return info is not None and stat.S_ISDIR(info.st_mode)
 
 
-def _followed(path: Path) -> os.stat_result | None:
+def _stat_following_links(path: Path) -> os.stat_result | None:
     try:
         return path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -83,33 +86,33 @@ def _followed(path: Path) -> os.stat_result | None:
 
 
 def content(path: Path, most: int = -1) -> bytes | None:
-    """The bytes of a file, at most so many from its beginning; None where there is none.
+    """Return the bytes of a file, at most ``most`` from its beginning; None where there is none.
 
-    InputError as of opened, and where it cannot be read.
+    InputError unless it is a regular file that can be read; see ``open_descriptor``.
     """
     try:
-        with os.fdopen(opened(path, os.O_RDONLY), "rb") as file:
+        with os.fdopen(open_descriptor(path, os.O_RDONLY), "rb") as file:
             return file.read(most)
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise _refused(path, str(error.strerror or error)) from error
+        raise _not_regular(path, str(error.strerror or error)) from error
 
 
-def _unfit(kind: os.stat_result) -> str | None:
-    if stat.S_ISREG(kind.st_mode):
+def _irregular_kind(info: os.stat_result) -> str | None:
+    if stat.S_ISREG(info.st_mode):
         return None
-    known = {
+    kinds = {
         stat.S_IFLNK: "a symbolic link", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a fifo",
         stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
     }  # fmt: skip
-    return known.get(stat.S_IFMT(kind.st_mode), "something else")
+    return kinds.get(stat.S_IFMT(info.st_mode), "something else")
 
 
-def _refusal(path: Path, error: OSError) -> InputError | None:
-    found = _REFUSED.get(error.errno or 0)
-    return None if found is None else _refused(path, found)
+def _translated(path: Path, error: OSError) -> InputError | None:
+    received = _REFUSALS.get(error.errno or 0)
+    return None if received is None else _not_regular(path, received)
 
 
-def _refused(path: Path, found: str) -> InputError:
-    return InputError(f"{path} must be a regular file of its own that may be opened; received {found}")
+def _not_regular(path: Path, received: str) -> InputError:
+    return InputError(f"{path} must be a regular file of its own that may be opened; received {received}")

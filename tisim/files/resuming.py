@@ -1,4 +1,4 @@
-"""What a command does in a folder where an earlier one has left something: one rule for all commands.
+"""One rule says whether a command resumes what an earlier one has left in its folder.
 
 The same command, given again, goes on where it was stopped. With ``--fresh`` it begins anew, with
 ``--overwrite`` also where results are lost by that, and with ``--resume`` it has to find something to go on
@@ -13,27 +13,27 @@ from tisim.errors import must
 
 
 def resumes(
-    folder: Path, command: str, begun: bool, results: str, fresh: bool | None, overwrite: bool
+    folder: Path, command: str, resumable: bool, results: str, fresh: bool | None, overwrite: bool
 ) -> bool:
-    """Whether a command goes on with what is in its folder; InputError where it may not, nor begin anew.
+    """Return whether a command resumes what is in its folder; InputError where it may not, nor begin anew.
 
-    command : what it makes, for messages, such as "run". begun : whether there is something to go on with.
+    command : what it makes, for messages, such as "run". resumable : whether there is something to resume.
     results : in words, what would be lost by beginning anew; empty where that is nothing. fresh : True for
     ``--fresh``, False for ``--resume``, None where neither is given.
     """
-    what = "output folder"
+    place = "output folder"
     must(fresh is not False or not overwrite, "--overwrite", "given without --resume", "both")
-    must(fresh is not False or begun, what, f"one that an interrupted {command} has left", str(folder))
-    goes_on = begun and not fresh and not overwrite
-    must(goes_on or overwrite or not results, what, f"without {results} (or give --overwrite)", str(folder))
-    return goes_on
+    must(fresh is not False or resumable, place, f"one that an interrupted {command} has left", str(folder))
+    resume = resumable and not fresh and not overwrite
+    must(resume or overwrite or not results, place, f"without {results} (or give --overwrite)", str(folder))
+    return resume
 
 
-def how_to_go_on(fresh: bool | None, overwrite: bool, first: str = "") -> str:
-    """What a command with these options says when it was stopped: which command goes on.
+def resume_hint(fresh: bool | None, overwrite: bool, first: str = "") -> str:
+    """Return the sentence that says which command resumes one that was stopped, given its options.
 
     first : what is to be done before.
     """
-    left_out = [name for name, given in (("--fresh", fresh), ("--overwrite", overwrite)) if given]
-    without = f", without {' and '.join(left_out)}" if left_out else ""
+    omitted = [name for name, given in (("--fresh", fresh), ("--overwrite", overwrite)) if given]
+    without = f", without {' and '.join(omitted)}" if omitted else ""
     return f"To go on, {first}give the same command again{without}."

@@ -1,4 +1,4 @@
-"""An HDF5 file that another process may be writing (see growing_hdf5.py), to be read as a file object.
+"""An HDF5 file that another process may be writing (see growing_hdf5.py) is read as a file object.
 
 A reader that has found the end of the file meets, a moment later, data behind that end. HDF5 refuses them, so
 it hears that the file ends where no file does; what is not there is then missing from a block that has a
@@ -12,42 +12,42 @@ from pathlib import Path
 
 from tisim.files import regular_file
 from tisim.files.file_object import Seekable
-from tisim.files.superblock import SIZE, ends, superblock
+from tisim.files.superblock import SIZE, file_end, superblock
 
-_FAR = 1 << 62
-"""bytes"""
-LOOKS = 100
-"""Times that a block is read at most, as HDF5 does it for files that it knows to be written."""
+_END_OUT_OF_REACH = 1 << 62
+"""End of the file that HDF5 is given, bytes: beyond that of any file."""
+READ_ATTEMPTS = 100
+"""Largest number of times that a block is read, as HDF5 does it for files that it knows to be written."""
 
 
-class Reading(Seekable):
-    """The file at path, whose superblock is sound; ``whole``: whether it is as long as that says."""
+class SharedFile(Seekable):
+    """The file at path has a valid superblock; ``whole`` is whether it is as long as that says."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(regular_file.opened(path, os.O_RDONLY))
+        super().__init__(regular_file.open_descriptor(path, os.O_RDONLY))
         block = os.pread(self._handle, SIZE, 0)
         # The writer makes the file longer before it says so: this order, and no other, is safe.
-        self.whole = os.fstat(self._handle).st_size >= ends(block)
-        self._superblock = superblock(block, _FAR)
+        self.whole = os.fstat(self._handle).st_size >= file_end(block)
+        self._superblock = superblock(block, _END_OUT_OF_REACH)
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
         view = memoryview(buffer).cast("B")
-        found = bytearray(self._settled(len(view)).ljust(len(view), b"\0"))
-        if self._at < SIZE:
-            there = self._superblock[self._at : self._at + len(view)]
-            found[: len(there)] = there
-        view[:] = found
-        self._at += len(view)
+        content = bytearray(self._read_stable(len(view)).ljust(len(view), b"\0"))
+        if self._position < SIZE:
+            header = self._superblock[self._position : self._position + len(view)]
+            content[: len(header)] = header
+        view[:] = content
+        self._position += len(view)
         return len(view)
 
-    def _settled(self, size: int) -> bytes:
-        """Bytes that are the same when they are read twice: a block may be half written at a first look."""
-        found = b""
-        for _ in range(LOOKS):
-            again, found = found, os.pread(self._handle, size, self._at)
-            if again == found:
+    def _read_stable(self, size: int) -> bytes:
+        """Return bytes that are the same when they are read twice: a block may be half written at first."""
+        content = b""
+        for _ in range(READ_ATTEMPTS):
+            previous, content = content, os.pread(self._handle, size, self._position)
+            if previous == content:
                 break
-        return found
+        return content
 
     def _size(self) -> int:
-        return _FAR
+        return _END_OUT_OF_REACH

@@ -1,4 +1,4 @@
-"""The first bytes of an HDF5 file, its superblock of version 3 (HDF5 File Format Specification 4.0, II.A)."""
+"""An HDF5 file begins with a superblock, here of version 3 (HDF5 File Format Specification 4.0, II.A)."""
 
 from __future__ import annotations
 
@@ -10,47 +10,47 @@ extension, end of the file, address of the root group, checksum."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """The bytes with which every HDF5 file begins."""
 SIZE = _LAYOUT.size
-"""bytes"""
+"""Length of a superblock, bytes."""
 
 
 def superblock(block: bytes, end: int) -> bytes:
-    """The superblock again, of a file that ends at this byte and that nobody is writing."""
+    """Return the superblock of the file when it ends at this byte and nobody is writing it."""
     signature, version, offsets, lengths, _, base, extension, _, root, _ = _LAYOUT.unpack(block)
     body = _LAYOUT.pack(signature, version, offsets, lengths, 0, base, extension, end, root, 0)[:-4]
     return body + struct.pack("<I", lookup3(body))
 
 
-def sound(block: bytes) -> bool:
-    """Whether these are SIZE bytes of an undamaged superblock of version 3, of a file that nobody writes."""
-    ours = len(block) == SIZE and block.startswith(SIGNATURE + b"\x03")
-    return ours and block == superblock(block, ends(block))
+def is_valid(block: bytes) -> bool:
+    """Return whether this is an undamaged superblock of version 3, of a file that nobody is writing."""
+    complete = len(block) == SIZE and block.startswith(SIGNATURE + b"\x03")
+    return complete and block == superblock(block, file_end(block))
 
 
-def ends(block: bytes) -> int:
-    """Where the file ends, by its superblock, bytes."""
+def file_end(block: bytes) -> int:
+    """Return where the file ends, by its superblock, bytes."""
     return int(_LAYOUT.unpack(block)[7])
 
 
 def lookup3(data: bytes) -> int:
-    """The checksum of HDF5's metadata: ``hashlittle`` of B. Jenkins, lookup3.c (2006), seeded with 0."""
+    """Return the checksum of HDF5 metadata: ``hashlittle`` of B. Jenkins, lookup3.c (2006), seeded with 0."""
     padded = data.ljust(-(-len(data) // 12) * 12, b"\0")
     words = struct.unpack(f"<{len(padded) // 4}I", padded)
     s = [(0xDEADBEEF + len(data)) & _ALL] * 3
     for k in range(0, len(words), 3):
         s = [(x + word) & _ALL for x, word in zip(s, words[k : k + 3], strict=True)]
         if k + 3 < len(words):
-            for step, turn in enumerate((4, 6, 8, 16, 19, 4)):
+            for step, bits in enumerate((4, 6, 8, 16, 19, 4)):
                 i, j, other = step % 3, (step - 1) % 3, (step + 1) % 3
-                s[i] = ((s[i] - s[j]) & _ALL) ^ _turned(s[j], turn)
+                s[i] = ((s[i] - s[j]) & _ALL) ^ _rotated(s[j], bits)
                 s[j] = (s[j] + s[other]) & _ALL
-    for step, turn in enumerate((14, 11, 25, 16, 4, 14, 24)):
+    for step, bits in enumerate((14, 11, 25, 16, 4, 14, 24)):
         i, j = (step + 2) % 3, (step + 1) % 3
-        s[i] = ((s[i] ^ s[j]) - _turned(s[j], turn)) & _ALL
+        s[i] = ((s[i] ^ s[j]) - _rotated(s[j], bits)) & _ALL
     return s[2]
 
 
 _ALL = 0xFFFFFFFF
 
 
-def _turned(x: int, bits: int) -> int:
+def _rotated(x: int, bits: int) -> int:
     return (x << bits | x >> (32 - bits)) & _ALL

@@ -1,4 +1,4 @@
-"""Save a simulation between two steps, and go on from there to the same bits.
+"""A simulation is saved between two steps, and resumed from there to the same bits.
 
 A checkpoint holds every particle field, the clock, the books and the counters of every world. Pair lists are
 not in it: they are made anew, and results do not depend on when that was. A world that has failed is in it
@@ -29,7 +29,7 @@ BEFORE_STEP = "before"
 
 
 def _identity(simulation: Simulation) -> dict[str, Any]:
-    """What a checkpoint must have in common with the simulation it is restored to."""
+    """Return what a checkpoint must have in common with the simulation it is restored to."""
     return {
         "scenes": json.dumps([scene.digest() for scene in simulation.scenes]),
         "precision": simulation.runtime.precision,
@@ -43,28 +43,28 @@ def _identity(simulation: Simulation) -> dict[str, Any]:
 def save(simulation: Simulation, path: str | Path) -> None:
     """Write a checkpoint of a loaded simulation that is between two steps.
 
-    path is, at every instant, what it was before or the whole new file. RunError when the disk is full.
+    At every instant, path is what it was before or the whole new file. RunError when the disk is full.
     """
     simulation.s.check()
-    with checksum.created(Path(path)) as file:
+    with checksum.create_file(Path(path)) as file:
         file.attrs.update({"format": CHECKPOINT_FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
         file.attrs["edits"] = json.dumps(simulation.edits)
-        now = simulation.s.image()
-        for name, values in now.items():
+        image = simulation.s.image()
+        for name, values in image.items():
             file[name] = values
         for field in simulation.s.reported:
             file[field.name].attrs["unit"] = field.unit
-        if now["underway"].any():
+        if image["underway"].any():
             for name, values in simulation.monitor.replay.whole().items():
                 file[f"{BEFORE_STEP}/{name}"] = values
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The particles of each world at a moment, as a checkpoint has them.
+    """The particles of each world at the time of a checkpoint.
 
-    times : s, shape (worlds,). steps : taken until then, shape (worlds,). states : for each world the arrays
-    of its live particles by field name, SI; shape (n,) or (n, 3).
+    times : s, shape (worlds,). steps : number taken until then, shape (worlds,). states : for each world the
+    arrays of its live particles by field name, SI; shape (n,) or (n, 3).
     """
 
     times: np.ndarray
@@ -73,9 +73,11 @@ class Snapshot:
 
 
 def snapshot(path: str | Path) -> Snapshot:
-    """What a checkpoint holds of the particles; of a world in which a step is under way, from before that
-    step. InputError when the file is none, or is cut short or damaged."""
-    with checksum.opened(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
+    """Return the particles that a checkpoint holds; where a step is under way, those from before that step.
+
+    InputError when the file is no checkpoint, or is cut short or damaged.
+    """
+    with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
         arrays = {name: np.asarray(group[name]) for name in file if "unit" in file[name].attrs}
         counts, times, steps = (np.asarray(group[name])[:worlds] for name in ("count", "time", "steps"))
@@ -86,13 +88,13 @@ def snapshot(path: str | Path) -> Snapshot:
 def restore(simulation: Simulation, path: str | Path) -> None:
     """Bring a simulation, loaded with the same scenes, to where the checkpoint was saved.
 
-    InputError when the file is none, is cut short or damaged, or is of other scenes, another precision or
-    another capacity; the simulation is then as it was.
+    InputError when the file is no checkpoint, is cut short or damaged, or is of other scenes, another
+    precision or another capacity; the simulation is then as it was.
     """
     simulation.s.check()
-    with checksum.opened(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
+    with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         for name, value in _identity(simulation).items():
-            _agree(name, value, file.attrs[name])
+            _require_equal(name, value, file.attrs[name])
         wall_s, edits = float(file.attrs["wall_s"]), json.loads(file.attrs["edits"])
         columns = {name: np.asarray(file[name]) for name in simulation.s.saved()}
         group = file.get(BEFORE_STEP, file)
@@ -105,22 +107,22 @@ def restore(simulation: Simulation, path: str | Path) -> None:
 
 
 class PeriodicCheckpoint(Observer):
-    """An observer that saves a checkpoint now and then, so that a run that is killed can go on from the last.
+    """This observer saves a checkpoint now and then, so that a killed run can be resumed from the last.
 
-    seconds : wall time between two of them.
+    seconds : wall time between two checkpoints, s.
     """
 
     def __init__(self, path: str | Path, seconds: float = 60.0) -> None:
         must(seconds >= 0, "seconds between checkpoints", "at least 0", seconds)
-        self.path, self.seconds, self.saved = Path(path), seconds, time.monotonic()
+        self.path, self.seconds, self.last_saved = Path(path), seconds, time.monotonic()
 
     def observe(self, simulation: Simulation) -> None:
-        if time.monotonic() - self.saved > self.seconds:
+        if time.monotonic() - self.last_saved > self.seconds:
             save(simulation, self.path)
-            self.saved = time.monotonic()
+            self.last_saved = time.monotonic()
 
 
-def _agree(name: str, value: Any, received: Any) -> None:
+def _require_equal(name: str, value: Any, received: Any) -> None:
     if name == "scenes":
         must(value == received, "checkpoint", "of the same scenes", "one of others")
     must(value == received, f"checkpoint's {name}", str(value), received)

@@ -1,10 +1,10 @@
-"""The layout of H5MD 1.1 files (P. de Buyl, P. H. Colberg and F. Hoefling, Comput. Phys. Commun. 185 (2014)
-1546, and nongnu.org/h5md).
+"""Trajectories are laid out as H5MD 1.1 (P. de Buyl, P. H. Colberg and F. Hoefling, Comput. Phys. Commun. 185
+(2014) 1546, and nongnu.org/h5md).
 
-Of the specification this needs the metadata, the units module, and groups of particles whose number varies:
-entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``, which is for what
-programs add, has the scenes as TOML and checksums of all that frames hold: HDF5 1.10 and later check the
-structure of a file but not the data in it.
+The parts of the specification in use are the metadata, the units module, and groups of particles whose
+number varies: entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``,
+which is for what programs add, has the scenes as TOML and checksums of all that frames hold: HDF5 1.10 and
+later check the structure of a file but not the data in it.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ ABSENT = -1
 """Id of an entry that is no particle; its other values are not-a-number, or 0 where they are integers."""
 ASCII = h5py.string_dtype("ascii")
 CHUNK = 1 << 16
-"""Particles of a frame that are stored, and compressed, together."""
-COPIED_ROWS = 1024
-"""Frames whose times and checksums are stored together."""
+"""Number of particles of a frame that are stored, and compressed, together."""
+CHUNK_ROWS = 1024
+"""Number of frames whose times and checksums are stored together."""
 SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
 
 
-def names(worlds: int) -> list[str]:
-    """The names of the groups of particles of so many worlds."""
+def group_names(worlds: int) -> list[str]:
+    """Return the names of the groups of particles for a number of worlds."""
     return ["all"] if worlds == 1 else [f"world_{index}" for index in range(worlds)]
 
 
-def metadata(file: h5py.File, version: str) -> None:
-    """The group ``h5md``: who made the file, by which program and by which rules."""
+def write_metadata(file: h5py.File, version: str) -> None:
+    """Write the group ``h5md``: who made the file, by which program and by which rules."""
     group = file.create_group("h5md")
     group.attrs.create("version", VERSION, dtype=np.int32)
     group.create_group("author").attrs["name"] = np.bytes_(_author())
@@ -58,46 +58,46 @@ def _author() -> str:
         return "unknown"
 
 
-def unit(text: str) -> str:
-    """A unit as the units module writes it: "kg/m^3" is "kg m-3"."""
-    found = []
+def unit_string(text: str) -> str:
+    """Return a unit as the units module writes it: "kg/m^3" is "kg m-3"."""
+    symbols = []
     for sign, part in zip((1, -1), text.split("/", 1), strict=False):
         for symbol, power in re.findall(r"([A-Za-z]+)(?:\^?(-?\d+))?", part):
-            n = sign * int(power or 1)
-            found.append(symbol if n == 1 else f"{symbol}{n:+d}")
-    return " ".join(found)
+            exponent = sign * int(power or 1)
+            symbols.append(symbol if exponent == 1 else f"{symbol}{exponent:+d}")
+    return " ".join(symbols)
 
 
-def box(group: h5py.Group, domain: Domain) -> None:
-    """The group ``box``. Where it is periodic, positions are those of the image that lies in the domain.
+def write_box(group: h5py.Group, domain: Domain) -> None:
+    """Write the group ``box``. Where it is periodic, positions are those of the image in the domain.
 
     Beyond the specification, ``origin`` is the lower corner of the domain, m.
     """
     low, high = domain.bounds()
     kind = b"periodic" if low is not None and domain.joined() else b"none"
-    made = group.create_group("box")
-    made.attrs.create("dimension", 3, dtype=np.int32)
-    made.attrs["boundary"] = np.array([kind] * 3)
+    box = group.create_group("box")
+    box.attrs.create("dimension", 3, dtype=np.int32)
+    box.attrs["boundary"] = np.array([kind] * 3)
     if low is not None and high is not None:
         # Within the header of the dataset, of which HDF5 checks the checksum.
         compact = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         compact.set_layout(h5py.h5d.COMPACT)
         for name, values in (("edges", high - low), ("origin", low)):
             space, double = h5py.h5s.create_simple(values.shape), h5py.h5t.NATIVE_DOUBLE
-            h5py.h5d.create(made.id, name.encode(), double, space, compact)
-            made[name][...] = values
-            _with_unit(made[name], "m")
+            h5py.h5d.create(box.id, name.encode(), double, space, compact)
+            box[name][...] = values
+            _with_unit(box[name], "m")
 
 
-def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: Any) -> None:
-    """A time-dependent element for each field, empty as yet, all on the ``step`` and ``time`` of position."""
+def create_elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: Any) -> None:
+    """Create an empty time-dependent element for each field, all on the ``step`` and ``time`` of position."""
     for field in fields:
         element = group.create_group(field.name)
         if field.name == "position":
             element.create_dataset(
-                "step", (0,), np.int64, maxshape=(None,), chunks=(COPIED_ROWS,), fillvalue=-1
+                "step", (0,), np.int64, maxshape=(None,), chunks=(CHUNK_ROWS,), fillvalue=-1
             )
-            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(COPIED_ROWS,))
+            time = element.create_dataset("time", (0,), float, maxshape=(None,), chunks=(CHUNK_ROWS,))
             _with_unit(time, "s")
         else:
             element["step"], element["time"] = group["position/step"], group["position/time"]
@@ -111,37 +111,37 @@ def elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int, real: 
         _with_unit(value, field.unit)
 
 
-def scene(file: h5py.File, name: str, text: str) -> None:
-    """The scene of a group of particles, as TOML."""
+def write_scene(file: h5py.File, name: str, text: str) -> None:
+    """Write the scene of a group of particles, as TOML."""
     data = text.encode()
-    numbers = np.frombuffer(data, np.uint8)
-    stored = file.create_dataset(f"{SCENES}/{name}", data=numbers, chunks=True, compression="gzip")
-    stored.attrs["crc32"] = np.uint32(zlib.crc32(data))
+    array = np.frombuffer(data, np.uint8)
+    dataset = file.create_dataset(f"{SCENES}/{name}", data=array, chunks=True, compression="gzip")
+    dataset.attrs["crc32"] = np.uint32(zlib.crc32(data))
 
 
-def scene_text(file: h5py.File, name: str) -> str:
-    """What ``scene`` has written; InputError when it is damaged."""
-    stored = file[f"{SCENES}/{name}"]
-    text = stored[:].tobytes()
-    same = zlib.crc32(text) == stored.attrs["crc32"]
-    must(same, "file", "undamaged", "a scene whose checksum does not fit")
+def read_scene(file: h5py.File, name: str) -> str:
+    """Return the TOML that ``write_scene`` has written; InputError when it is damaged."""
+    dataset = file[f"{SCENES}/{name}"]
+    text = dataset[:].tobytes()
+    intact = zlib.crc32(text) == dataset.attrs["crc32"]
+    must(intact, "file", "undamaged", "a scene whose checksum does not fit")
     return text.decode()
 
 
-def checksums(file: h5py.File, name: str) -> h5py.Dataset:
-    """For each frame of a group of particles, two numbers: see ``clock_checksum`` and ``frame_checksum``."""
+def create_checksums(file: h5py.File, name: str) -> h5py.Dataset:
+    """Create the dataset of two numbers for each frame: its ``clock_checksum`` and ``frame_checksum``."""
     return file.create_dataset(
-        f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(COPIED_ROWS, 2)
+        f"{CHECKSUMS}/{name}", (0, 2), np.uint32, maxshape=(None, 2), chunks=(CHUNK_ROWS, 2)
     )
 
 
 def clock_checksum(step: int, time: float) -> int:
-    """CRC-32 of a frame's step and time (s)."""
+    """Return the CRC-32 of a frame's step and time (s)."""
     return zlib.crc32(struct.pack("<qd", step, time))
 
 
 def frame_checksum(clock: int, arrays: Arrays) -> int:
-    """CRC-32 of a frame's clock, of which the checksum is given, and its arrays as stored, by name."""
+    """Return the CRC-32 of a frame: of its clock, whose checksum is given, and of its arrays, by name."""
     crc = clock
     for name in sorted(arrays):
         crc = zlib.crc32(arrays[name].tobytes(), crc)
@@ -150,4 +150,4 @@ def frame_checksum(clock: int, arrays: Arrays) -> int:
 
 def _with_unit(dataset: h5py.Dataset, text: str) -> None:
     if text:
-        dataset.attrs.create("unit", unit(text), dtype=ASCII)
+        dataset.attrs.create("unit", unit_string(text), dtype=ASCII)

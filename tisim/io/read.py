@@ -1,4 +1,4 @@
-"""Read back anything that a run has written, known by what is in the file."""
+"""Whatever a run has written is read back, and recognised by what is in the file."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ import h5py
 from tisim.components import serialization
 from tisim.errors import InputError, must
 from tisim.files import checksum, regular_file
-from tisim.files.superblock import SIGNATURE, SIZE, sound
+from tisim.files.superblock import SIGNATURE, SIZE, is_valid
 from tisim.io import checkpoint, recorded_trajectory, run_folder
 from tisim.io.reader import RESULT
 from tisim.scene.scene import Scene
 
-CAN = "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
-"""What ``read`` reads."""
-SEARCH = "tisim evaluations 1"
-"""The format of a search.h5, which is that of a room above; a test holds them together."""
+READABLE = (
+    "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
+)
+"""The files that ``read`` reads, as messages list them."""
+SEARCH_FORMAT = "tisim evaluations 1"
+"""Format of a search.h5, which a room above defines; a test holds them together."""
 
 
 def read(path: str | Path) -> Any:
-    """What a file or folder holds that a run has written.
+    """Return what a file or folder holds that a run has written.
 
     - The folder of a run, or a result.h5: its ``Result``, whole. The folder of a study: as its cost.h5.
     - A trajectory.h5, also while it grows: a ``RecordedTrajectory``, whose frames are read when asked for.
@@ -37,53 +39,53 @@ def read(path: str | Path) -> Any:
     InputError when it is anything else, is not there, or is damaged.
     """
     must(isinstance(path, str | os.PathLike), "path", "text or a pathlib.Path", path)
-    place = Path(path)
-    if regular_file.is_folder(place):
-        files = [place / name for name in ("result.h5", "cost.h5")]
-        whole = next((file for file in files if regular_file.exists(file)), None)
+    file_path = Path(path)
+    if regular_file.is_folder(file_path):
+        files = [file_path / name for name in ("result.h5", "cost.h5")]
+        file = next((file for file in files if regular_file.exists(file)), None)
         rule = "one with a whole run or study (what an interrupted run has left is read file by file)"
-        if whole is None:
+        if file is None:
             raise InputError(f"folder must be {rule}; received {str(path)!r}")
-        return read(whole)
-    must(regular_file.exists(place), "file to read", "there", str(path))
-    head = regular_file.content(Path(os.path.realpath(place)), SIZE) or b""
+        return read(file)
+    must(regular_file.exists(file_path), "file to read", "there", str(path))
+    head = regular_file.content(Path(os.path.realpath(file_path)), SIZE) or b""
     if not head.startswith(SIGNATURE):
-        return _text(place)
+        return _read_text(file_path)
     # A trajectory has its own checksums, and may be large.
-    return recorded_trajectory.RecordedTrajectory(place) if sound(head) else _written_whole(place)
+    return recorded_trajectory.RecordedTrajectory(file_path) if is_valid(head) else _read_hdf5(file_path)
 
 
-def _written_whole(path: Path) -> Any:
-    """What is in an HDF5 file that is written whole."""
+def _read_hdf5(path: Path) -> Any:
+    """Return what is in an HDF5 file that is written whole."""
     from tisim.accuracy import storage
 
-    with h5py.File(io.BytesIO(checksum.image(path, "file to read", CAN)), "r") as file:
+    with h5py.File(io.BytesIO(checksum.read_image(path, "file to read", READABLE)), "r") as file:
         kind = str(file.attrs.get("format", "none"))
-    rule = f"{CAN}; a search is read by `tisim cache` and by `tisim plot` of its folder"
-    must(kind != SEARCH, "file to read", rule, f"{path}, of a search")
+    rule = f"{READABLE}; a search is read by `tisim cache` and by `tisim plot` of its folder"
+    must(kind != SEARCH_FORMAT, "file to read", rule, f"{path}, of a search")
     readers: dict[str, Callable[[Path], Any]] = {
         RESULT: run_folder.read_result,
         checkpoint.CHECKPOINT_FORMAT: checkpoint.snapshot,
         storage.COST_FORMAT: storage.rows,
     }
-    must(kind in readers, "file to read", CAN, f"{path}, of the format {kind}")
+    must(kind in readers, "file to read", READABLE, f"{path}, of the format {kind}")
     return readers[kind](path)
 
 
-def _text(path: Path) -> Any:
-    """What is in a text file: JSON or TOML."""
+def _read_text(path: Path) -> Any:
+    """Return what is in a text file: JSON or TOML."""
     content = regular_file.content(Path(os.path.realpath(path))) or b""
     try:
         text = content.decode()
         if text.lstrip().startswith("{"):
             versions = json.loads(text)
-            must("tisim" in versions, "file to read", CAN, f"{path}, JSON of something else")
+            must("tisim" in versions, "file to read", READABLE, f"{path}, JSON of something else")
             return versions
         table = serialization.parse(text)
-    except (UnicodeDecodeError, RecursionError, ValueError) as fault:
-        if isinstance(fault, InputError):
+    except (UnicodeDecodeError, RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
             raise
         if path.suffix == ".toml":
             return Scene.from_toml(path)
-        raise InputError(f"file to read must be {CAN}; received {str(path)!r}") from None
+        raise InputError(f"file to read must be {READABLE}; received {str(path)!r}") from None
     return Scene.from_dict(table)

@@ -1,4 +1,4 @@
-"""Read back what a run has left: the frames of a trajectory, or the start and the end of a result.h5."""
+"""Frames of a run are read: those of a trajectory, or the start and the end of a result.h5."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ import numpy as np
 
 from tisim.errors import InputError, must
 from tisim.files import checksum, regular_file
-from tisim.files.shared_hdf5 import Reading
-from tisim.files.superblock import SIGNATURE, SIZE, sound
-from tisim.interrupt import deferred
+from tisim.files.shared_hdf5 import SharedFile
+from tisim.files.superblock import SIGNATURE, SIZE, is_valid
+from tisim.interrupt import defer_signals
 from tisim.io import h5md
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 TIME_ROUNDING = 1e-9
-"""Part of a duration by which the sum of its steps may fall short of it."""
+"""Fraction of a duration by which the sum of its steps may fall short of it."""
 RESULT = "tisim run 1"
-"""The format of a result.h5."""
-TRIES, PAUSE = 5, 0.01
-"""Times that what looks damaged is read at most, for it may be half written; s between them."""
+"""Format of a result.h5."""
+FILE_READ_ATTEMPTS, RETRY_PAUSE = 5, 0.01
+"""Largest number of times that a file is read while it looks damaged, as it may be half written, and the
+time between them, s."""
 Clock = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Steps, times (s) and checksums of the frames of a trajectory."""
 T = TypeVar("T")
@@ -41,7 +42,7 @@ T = TypeVar("T")
 class Frame:
     """The particles at a time.
 
-    time : s. step : how many steps the run has taken. arrays : as a Result's, shape (n,) or (n, 3), SI.
+    time : s. step : number of steps that the run has taken. arrays : by field name, shape (n,) or (n, 3), SI.
     """
 
     time: float
@@ -50,26 +51,26 @@ class Frame:
 
 
 class Frames:
-    """Frames of one world in an open file, read one at a time: ``len``, index, iteration.
+    """Frames of one world in an open file are read one at a time: ``len``, index, iteration.
 
     Reading raises InputError where the file is damaged.
     """
 
-    def __init__(self, file: _File, world: str | None) -> None:
+    def __init__(self, file: _RetryingFile, world: str | None) -> None:
         """world : the name of its group; None in a result.h5."""
         self._file, self._world = file, world
 
     @cached_property
     def scene(self) -> Scene:
-        """What was run."""
-        return Scene.from_dict(tomllib.loads(self._file.read(self._scene)))
+        """Return the scene that was run."""
+        return Scene.from_dict(tomllib.loads(self._file.read(self._read_scene)))
 
-    def _scene(self, file: h5py.File) -> str:
-        return str(file.attrs["scene"]) if self._world is None else h5md.scene_text(file, self._world)
+    def _read_scene(self, file: h5py.File) -> str:
+        return str(file.attrs["scene"]) if self._world is None else h5md.read_scene(file, self._world)
 
     @cached_property
     def times(self) -> np.ndarray:
-        """The time of each frame, s, shape (frames,)."""
+        """Return the time of each frame, s, shape (frames,)."""
         if self._world is None:
             return self._file.read(lambda file: np.array([0.0, file.attrs["time"]]))
         return self._clock[1]
@@ -82,43 +83,43 @@ class Frames:
         position = file[f"particles/{self._world}/position"]
         steps = position["step"][:]
         # A killed run may have left a last row that has no step yet.
-        whole = len(steps) - int(len(steps) > 0 and steps[-1] == h5md.ABSENT)
-        times, checksums = position["time"][:whole], file[f"{h5md.CHECKSUMS}/{self._world}"][:whole]
-        for k in range(whole):
-            same = h5md.clock_checksum(int(steps[k]), float(times[k])) == checksums[k, 0]
-            must(same, "file", "undamaged", f"frame {k}, the checksum of whose time does not fit")
-        return steps[:whole], times, checksums
+        count = len(steps) - int(len(steps) > 0 and steps[-1] == h5md.ABSENT)
+        times, checksums = position["time"][:count], file[f"{h5md.CHECKSUMS}/{self._world}"][:count]
+        for k in range(count):
+            intact = h5md.clock_checksum(int(steps[k]), float(times[k])) == checksums[k, 0]
+            must(intact, "file", "undamaged", f"frame {k}, the checksum of whose time does not fit")
+        return steps[:count], times, checksums
 
     @property
     def missing(self) -> str:
-        """What there is no frame of, in words, when the run has not reached its end; empty when it has."""
-        last, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
-        if last >= end * (1 - TIME_ROUNDING):
+        """Return a sentence on the missing frames of an unfinished run; it is empty for a finished one."""
+        reached, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
+        if reached >= end * (1 - TIME_ROUNDING):
             return ""
-        return f"the run has come to t = {last:.6g} s of {end:.6g} s; what follows is missing"
+        return f"the run has come to t = {reached:.6g} s of {end:.6g} s; what follows is missing"
 
     def __len__(self) -> int:
         return len(self.times)
 
     def __getitem__(self, k: int) -> Frame:
-        k, read = range(len(self))[k], self._end if self._world is None else self._row
+        k, read = range(len(self))[k], self._read_end if self._world is None else self._read_row
         return self._file.read(lambda file: read(file, k))
 
-    def _end(self, file: h5py.File, k: int) -> Frame:
-        """The start or the end of a result.h5."""
+    def _read_end(self, file: h5py.File, k: int) -> Frame:
+        """Return the start (k = 0) or the end (k = 1) of a result.h5."""
         arrays = {name: np.asarray(values) for name, values in file[("start", "end")[k]].items()}
         return Frame(float(self.times[k]), int(k and file["work"].attrs["steps"]), arrays)
 
-    def _row(self, file: h5py.File, k: int) -> Frame:
-        """A frame of a trajectory."""
+    def _read_row(self, file: h5py.File, k: int) -> Frame:
+        """Return frame k of a trajectory."""
         steps, times, checksums = self._clock
         group = file[f"particles/{self._world}"]
-        there = group["id/value"][k] != h5md.ABSENT
+        present = group["id/value"][k] != h5md.ABSENT
         arrays = {
-            name: np.asarray(element["value"][k])[there] for name, element in group.items() if name != "box"
+            name: np.asarray(element["value"][k])[present] for name, element in group.items() if name != "box"
         }
-        same = h5md.frame_checksum(int(checksums[k, 0]), arrays) == checksums[k, 1]
-        must(same, "file", "undamaged", f"frame {k}, whose checksum does not fit")
+        intact = h5md.frame_checksum(int(checksums[k, 0]), arrays) == checksums[k, 1]
+        must(intact, "file", "undamaged", f"frame {k}, whose checksum does not fit")
         return Frame(float(times[k]), int(steps[k]), arrays)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -127,25 +128,25 @@ class Frames:
 
 @contextmanager
 def frames(path: str | Path, world: int = 0) -> Iterator[Frames]:
-    """Frames of a world in a trajectory, or in a result.h5 (its start and end); while the ``with`` lasts.
+    """Yield the frames of a world in a trajectory, or in a result.h5 (its start and end).
 
-    Also of a run that goes on or was killed. InputError when there is no such file or world.
+    The run may be going on, or have been killed. InputError when there is no such file or world.
     """
-    with _opened(Path(path)) as file:
-        names = file.read(_worlds)
+    with _open_file(Path(path)) as file:
+        names = file.read(_world_groups)
         must(0 <= world < len(names), "world", f"0 to {len(names) - 1}", world)
         yield Frames(file, names[world])
 
 
-def worlds(path: str | Path) -> int:
-    """How many worlds a file has."""
-    with _opened(Path(path)) as file:
-        return len(file.read(_worlds))
+def world_count(path: str | Path) -> int:
+    """Return the number of worlds in a file."""
+    with _open_file(Path(path)) as file:
+        return len(file.read(_world_groups))
 
 
 @contextmanager
 def undamaged() -> Iterator[None]:
-    """While this lasts, what HDF5 says of a damaged file is an InputError."""
+    """Turn the errors of HDF5 at a damaged file into an InputError."""
     try:
         yield
     except InputError:
@@ -154,34 +155,34 @@ def undamaged() -> Iterator[None]:
         raise InputError(f"file must be undamaged; received one that cannot be read ({error})") from error
 
 
-class _File:
-    """An HDF5 file to be read through ``source``."""
+class _RetryingFile:
+    """The HDF5 file is read through ``source``, again where it looks damaged."""
 
     def __init__(self, source: io.IOBase) -> None:
         self._source = source
         self._file: h5py.File | None = None
 
     # HDF5 calls Reading, in which no signal may be raised: it would be lost.
-    @deferred()
-    def read(self, look: Callable[[h5py.File], T]) -> T:
-        """What look finds in the file; InputError where that is damaged.
+    @defer_signals()
+    def read(self, extract: Callable[[h5py.File], T]) -> T:
+        """Return what ``extract`` takes from the file; InputError where that is damaged.
 
         A writer that comes between two reads of one structure leaves HDF5 with what looks like damage; then
         HDF5 begins anew.
         """
-        for left in reversed(range(TRIES)):
+        for attempts_left in reversed(range(FILE_READ_ATTEMPTS)):
             try:
                 with undamaged():
                     self._file = self._file or h5py.File(self._source, "r")
-                    return look(self._file)
+                    return extract(self._file)
             except InputError:
                 self.close()
-                if not left:
+                if not attempts_left:
                     raise
-                time.sleep(PAUSE)
+                time.sleep(RETRY_PAUSE)
         raise AssertionError  # not reached
 
-    @deferred()
+    @defer_signals()
     def close(self) -> None:
         if self._file is not None:
             self._file.close()
@@ -189,32 +190,32 @@ class _File:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[_File]:
-    """The file, once the checksum of its superblock or of all of it has been found true."""
+def _open_file(path: Path) -> Iterator[_RetryingFile]:
+    """Yield the file, once the checksum of its superblock or of all of it has been verified."""
     rule, real = "a trajectory.h5 or result.h5 of a run", Path(os.path.realpath(path))
     head = regular_file.content(real, SIZE)
     must(head is not None and head.startswith(SIGNATURE), "file", rule, str(path))
-    if not sound(head or b""):
-        with contextlib.closing(_File(io.BytesIO(checksum.image(real, "file", rule)))) as file:
-            run = file.read(lambda found: found.attrs.get("format") == RESULT)
-            must(run, "file", f"{rule}, of the format {RESULT!r}", str(path))
+    if not is_valid(head or b""):
+        with contextlib.closing(_RetryingFile(io.BytesIO(checksum.read_image(real, "file", rule)))) as file:
+            is_result = file.read(lambda hdf5: hdf5.attrs.get("format") == RESULT)
+            must(is_result, "file", f"{rule}, of the format {RESULT!r}", str(path))
             yield file
         return
-    with Reading(real) as source, contextlib.closing(_File(source)) as file:
+    with SharedFile(real) as source, contextlib.closing(_RetryingFile(source)) as file:
         must(source.whole, "file", "whole", f"{path}, which is cut short")
-        file.read(lambda found: _of_tisim(found, path, rule))
+        file.read(lambda hdf5: _check_creator(hdf5, path, rule))
         yield file
 
 
-def _of_tisim(file: h5py.File, path: Path, rule: str) -> None:
-    """InputError unless a trajectory is of tisim's writing, and has checksums."""
+def _check_creator(file: h5py.File, path: Path, rule: str) -> None:
+    """Raise InputError unless tisim has written a trajectory, with checksums."""
     creator = file.get("h5md/creator")
     must(creator is not None and creator.attrs.get("name") == b"tisim", "file", rule, str(path))
     if h5md.CHECKSUMS not in file:
         rule = f"{rule}, with checksums"
-        raise InputError(f"file must be {rule}; received {str(path)!r}, without: {checksum.OLDER}")
+        raise InputError(f"file must be {rule}; received {str(path)!r}, without: {checksum.OLDER_VERSION}")
 
 
-def _worlds(file: h5py.File) -> list[str | None]:
-    """The groups of particles of the worlds in a trajectory; None for that in a result.h5."""
-    return [None] if "start" in file else list(h5md.names(len(file["particles"])))
+def _world_groups(file: h5py.File) -> list[str | None]:
+    """Return the groups of particles of the worlds in a trajectory; None for that in a result.h5."""
+    return [None] if "start" in file else list(h5md.group_names(len(file["particles"])))

@@ -1,4 +1,4 @@
-"""A trajectory that a run has written, or still writes: a sequence of frames for each of its worlds."""
+"""A trajectory that a run has written, or still writes, is a sequence of frames for each of its worlds."""
 
 from __future__ import annotations
 
@@ -12,57 +12,61 @@ from typing import Self, overload
 import numpy as np
 
 from tisim.errors import must
-from tisim.io.reader import Frame, Frames, frames, worlds
+from tisim.io.reader import Frame, Frames, frames, world_count
 from tisim.scene.scene import Scene
 
 
 class RecordedWorld(Sequence[Frame]):
-    """The frames of a world, in the order of their times: ``len``, index, slice, iteration.
+    """The frames of a world are a sequence in the order of their times: ``len``, index, slice, iteration.
 
     A frame is read when it is asked for; what a run that goes on adds is seen when ``len`` is asked anew.
     """
 
     def __init__(self, path: Path, world: int) -> None:
         self._path, self._world = path, world
-        self._held: Frames | None = None
+        self._open_frames: Frames | None = None
 
     def _frames(self) -> AbstractContextManager[Frames]:
-        return nullcontext(self._held) if self._held is not None else frames(self._path, self._world)
+        return (
+            nullcontext(self._open_frames)
+            if self._open_frames is not None
+            else frames(self._path, self._world)
+        )
 
     @cached_property
     def scene(self) -> Scene:
-        """What was run."""
-        with self._frames() as found:
-            return found.scene
+        """Return the scene that was run."""
+        with self._frames() as sequence:
+            return sequence.scene
 
     @property
     def times(self) -> np.ndarray:
-        """The time of each frame, s, shape (frames,)."""
-        with self._frames() as found:
-            return found.times
+        """Return the time of each frame, s, shape (frames,)."""
+        with self._frames() as sequence:
+            return sequence.times
 
     def __len__(self) -> int:
-        with self._frames() as found:
-            return len(found)
+        with self._frames() as sequence:
+            return len(sequence)
 
     @overload
     def __getitem__(self, k: int) -> Frame: ...
     @overload
     def __getitem__(self, k: slice) -> list[Frame]: ...
     def __getitem__(self, k: int | slice) -> Frame | list[Frame]:
-        with self._frames() as found:
-            return [found[n] for n in range(len(found))[k]] if isinstance(k, slice) else found[k]
+        with self._frames() as sequence:
+            return [sequence[n] for n in range(len(sequence))[k]] if isinstance(k, slice) else sequence[k]
 
     def __iter__(self) -> Iterator[Frame]:
-        with self._frames() as found:
-            yield from found
+        with self._frames() as sequence:
+            yield from sequence
 
     def __repr__(self) -> str:
         return f"<{len(self)} frames of world {self._world} in {self._path}>"
 
 
 class RecordedTrajectory(RecordedWorld):
-    """The file of a trajectory. Of a single world it is the sequence of its frames; of several, each of
+    """The file of a trajectory. With a single world it is the sequence of its frames; with several, each of
     ``worlds`` is one.
 
     Without ``with``, the file is opened for each thing asked for, or once for a loop. While a ``with`` lasts
@@ -72,9 +76,9 @@ class RecordedTrajectory(RecordedWorld):
     def __init__(self, path: str | Path) -> None:
         """InputError when there is no such file."""
         super().__init__(Path(path).absolute(), 0)
-        number = worlds(self._path)
-        self.worlds: list[RecordedWorld] = [RecordedWorld(self._path, w) for w in range(number)]
-        self._opened = ExitStack()
+        count = world_count(self._path)
+        self.worlds: list[RecordedWorld] = [RecordedWorld(self._path, w) for w in range(count)]
+        self._resources = ExitStack()
 
     def _frames(self) -> AbstractContextManager[Frames]:
         rule = "of one world (or ask worlds[w])"
@@ -83,15 +87,15 @@ class RecordedTrajectory(RecordedWorld):
 
     def __enter__(self) -> Self:
         for world in self.worlds:
-            world._held = self._opened.enter_context(world._frames())
+            world._open_frames = self._resources.enter_context(world._frames())
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         for world in self.worlds:
-            world._held = None
-        self._opened.close()
+            world._open_frames = None
+        self._resources.close()
 
     def __repr__(self) -> str:
         return f"<trajectory of {len(self.worlds)} worlds in {self._path}>"

@@ -1,4 +1,4 @@
-"""The observer that writes a trajectory while a simulation runs: it says when frames are due."""
+"""The observer that writes a trajectory while a simulation runs decides when frames are due."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ if TYPE_CHECKING:
     from tisim.engine.simulation import Simulation
     from tisim.io.trajectory import Trajectory
 
-EARLY = 1e-9
-"""Part of an interval by which a frame may come early, so that rounding of times costs no further step."""
+EARLY_FRACTION = 1e-9
+"""Fraction of an interval by which a frame may come early, so that rounding of times costs no step."""
 
 
 class Recorder(Observer):
-    """Writes the frames that are due, and has worlds wait for those that come."""
+    """This observer writes the frames that are due, and has worlds wait for those that come."""
 
     def __init__(self, trajectory: Trajectory, simulation: Simulation, indices: Sequence[int]) -> None:
-        """indices : of the trajectory's scenes, which the worlds of the loaded simulation are."""
+        """indices : of the scenes of the trajectory, one for each world of the loaded simulation."""
         self.trajectory, self.indices = trajectory, list(indices)
         self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
-        self.last = [_last(trajectory.groups[index]) for index in self.indices]
+        self.last = [_last_time(trajectory.groups[index]) for index in self.indices]
         # A run that goes on may owe the frame of the time where it goes on: the disk was full.
         self.due = np.array(
             [
-                0.0 if last < 0 else self._after(last, interval)
+                0.0 if last < 0 else self._next_due(last, interval)
                 for last, interval in zip(self.last, self.interval, strict=True)
             ]
         )
 
     @staticmethod
-    def _after(time: float, interval: float) -> float:
-        """The first time after this one at which a frame is due, s."""
-        return float((np.floor(time / interval + EARLY) + 1 - EARLY) * interval)
+    def _next_due(time: float, interval: float) -> float:
+        """Return the first time after this one at which a frame is due, s."""
+        return float((np.floor(time / interval + EARLY_FRACTION) + 1 - EARLY_FRACTION) * interval)
 
     def pause(self, simulation: Simulation) -> np.ndarray:
         return self.due
@@ -52,15 +52,15 @@ class Recorder(Observer):
             time = float(good["time"][w])
             if time < self.due[w] and running[w]:
                 continue
-            self.due[w] = self._after(time, interval)
+            self.due[w] = self._next_due(time, interval)
             if time > self.last[w]:
-                n = int(good["count"][w])
-                arrays = {f.name: good[f.name][w, :n] for f in self.trajectory.fields[self.indices[w]]}
+                count = int(good["count"][w])
+                arrays = {f.name: good[f.name][w, :count] for f in self.trajectory.fields[self.indices[w]]}
                 self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
                 self.last[w] = time
 
 
-def _last(group: h5py.Group) -> float:
-    """Time of the last frame, s; below 0 when there is none."""
+def _last_time(group: h5py.Group) -> float:
+    """Return the time of the last frame, s; below 0 when there is none."""
     times = group["position/time"]
     return float(times[-1]) if len(times) else -1.0

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder: result.h5, scene.toml, versions.json, cloud.png; trajectory.h5 if asked.
+"""A run writes result.h5, scene.toml, versions.json and cloud.png to its folder; trajectory.h5 if asked.
 
 result.h5 is written last, so a folder that holds one holds a whole run. Its groups ``start`` and ``end`` have
 one array per particle quantity, shape (n,) or (n, 3), with its unit; ``work`` has the counts, ``measures``
@@ -42,8 +42,8 @@ RUN_FILES = (*DATA, lock.LOCK)
 
 
 @dataclass(frozen=True)
-class Folder:
-    """Where a run goes."""
+class RunFolder:
+    """The folder that a run writes to."""
 
     path: Path
 
@@ -60,7 +60,7 @@ class Folder:
         return self.path / "checkpoint.h5"
 
     def check(self, fresh: bool | None = None, overwrite: bool = False) -> bool:
-        """Whether a run goes on with what is here; see ``resuming.resumes``. Touches nothing.
+        """Return whether a run resumes what is here (see ``resuming.resumes``); touch nothing.
 
         InputError when a run is under way here, or writing here would lose what is not to be lost.
         """
@@ -69,32 +69,32 @@ class Folder:
 
     def _check(self, fresh: bool | None, overwrite: bool) -> bool:
         finished = regular_file.exists(self.result)
-        begun = regular_file.exists(self.checkpoint) and not finished
-        goes_on = resumes(self.path, "run", begun, "a finished run" * finished, fresh, overwrite)
-        lost = regular_file.exists(self.trajectory) and not (goes_on or fresh or overwrite)
+        resumable = regular_file.exists(self.checkpoint) and not finished
+        resume = resumes(self.path, "run", resumable, "a finished run" * finished, fresh, overwrite)
+        frames_lost = regular_file.exists(self.trajectory) and not (resume or fresh or overwrite)
         rule = "without an interrupted run (or give --fresh; there is no checkpoint to go on from)"
-        must(not lost, "output folder", rule, str(self.path))
+        must(not frames_lost, "output folder", rule, str(self.path))
         ownership.check(self.path, RUN_FILES, overwrite)
-        return goes_on
+        return resume
 
     @contextmanager
-    def taken(self, fresh: bool | None = None, overwrite: bool = False) -> Iterator[bool]:
-        """Make the folder, mark it as one of tisim's, and be alone at work there while this lasts.
+    def claim(self, fresh: bool | None = None, overwrite: bool = False) -> Iterator[bool]:
+        """Make the folder, mark it as one of tisim's, and hold its lock.
 
-        Gives whether the run goes on with what is here. Where it does not, what an earlier one has left is
-        removed, so that nothing of it is taken for the new one's, even if that is killed. InputError as of
-        check, and where that cannot be.
+        It yields whether the run resumes what is here. Where it does not, what an earlier one has left is
+        removed, so that nothing of it is taken for the new one's, even if that is killed. InputError where
+        ``check`` raises it, and where the folder cannot be made or locked.
         """
-        ownership.take(self.path, RUN_FILES, overwrite)
-        with lock.held(self.path):
-            goes_on = self._check(fresh, overwrite)  # another run may have come and gone since then
-            for name in () if goes_on else DATA:
+        ownership.claim(self.path, RUN_FILES, overwrite)
+        with lock.acquire(self.path):
+            resume = self._check(fresh, overwrite)  # another run may have come and gone since then
+            for name in () if resume else DATA:
                 (self.path / name).unlink(missing_ok=True)
-            yield goes_on
+            yield resume
 
 
 def versions() -> dict[str, str]:
-    """What a result depends on beside its scene."""
+    """Return the versions of what a result depends on beside its scene."""
     return {
         "tisim": version.__version__,
         "backend": runtime.backend(),
@@ -106,8 +106,8 @@ def versions() -> dict[str, str]:
     }
 
 
-def write(result: Result, folder: Folder) -> list[Path]:
-    """Write all files of a run, in place of any before; returns their paths. RunError on a full disk."""
+def write(result: Result, folder: RunFolder) -> list[Path]:
+    """Write all files of a run, in place of any before; return their paths. RunError on a full disk."""
     from tisim.plotting import cloud
 
     folder.result.unlink(missing_ok=True)
@@ -127,7 +127,7 @@ def write(result: Result, folder: Folder) -> list[Path]:
 
 def write_result(result: Result, path: Path) -> None:
     """Write the result.h5 of a run, in place of any before. RunError on a full disk."""
-    with checksum.created(path) as file:
+    with checksum.create_file(path) as file:
         file.attrs.update({
             "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,
             "reason": result.status.reason, "time": result.time, "wall_s": result.wall_s,
@@ -141,8 +141,8 @@ def write_result(result: Result, path: Path) -> None:
 
 
 def read_result(path: Path) -> Result:
-    """The Result that ``write_result`` has written, to the bit. InputError when it is damaged or none."""
-    with checksum.opened(path, "result", RESULT) as file, undamaged():
+    """Return the Result that ``write_result`` has written, to the bit. InputError unless it is whole."""
+    with checksum.open_file(path, "result", RESULT) as file, undamaged():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}
             for group in ("start", "end")
@@ -161,7 +161,7 @@ def read_result(path: Path) -> Result:
 
 
 def units(scene: Scene) -> dict[str, str]:
-    """The unit of each quantity that particles of a scene have, by name."""
+    """Return the unit of each quantity that particles of a scene have, by name."""
     fields = resolve_fields((*SHARED, *needed_fields(scene.effects, scene.stepper)))
     return {field.name: field.unit for field in fields}
 

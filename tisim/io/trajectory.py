@@ -1,4 +1,4 @@
-"""Trajectories: a run's particles at many times, written to an H5MD file as it goes.
+"""A trajectory, the particles of a run at many times, is written to an H5MD file during the run.
 
 A frame is the state at the end of the first step at or after each wanted time; the steps are those of a run
 without a trajectory. The file has a group of particles for each scene: ``all``, or ``world_0`` and so on.
@@ -29,23 +29,23 @@ from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
-from tisim.files.atomic import replace_file, unfinished
-from tisim.files.growing_hdf5 import Growing
-from tisim.interrupt import deferred
+from tisim.files.atomic import replace_file, temporary_name
+from tisim.files.growing_hdf5 import GrowingFile
+from tisim.interrupt import defer_signals
 from tisim.io import h5md
-from tisim.io.reader import Frame, frames, worlds
+from tisim.io.reader import Frame, frames, world_count
 from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import Field, resolve_fields
 
-LIBRARY = ("v110", "v110")
-"""The versions of HDF5 that can read the file; earlier ones have no checksums of its structure."""
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+LIBVER = ("v110", "v110")
+"""Versions of HDF5 that can read the file; earlier ones have no checksums of its structure."""
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What to record: so many ``frames`` evenly over the duration, or one ``every`` so much time (s).
+    """A trajectory to record: ``frames`` evenly over the duration, or one frame ``every`` so much time (s).
 
     The start and the end are recorded always; with ``frames`` the start is one more.
     """
@@ -62,34 +62,34 @@ class Recording:
         must(sound, "every", "above 0 s, and finite", self.every)
 
     def interval(self, scene: Scene) -> float:
-        """Between wanted times, s."""
+        """Return the time between frames, s."""
         return self.every if self.every is not None else scene.duration / (self.frames or 1)
 
-    def begun(self, scenes: Sequence[Scene], real: str = "f64") -> Trajectory:
-        """The file, made anew, for these scenes."""
+    def create(self, scenes: Sequence[Scene], real: str = "f64") -> Trajectory:
+        """Create the file for these scenes, in place of any before."""
         return Trajectory(self, scenes, real)
 
     @contextmanager
     def observer(self, simulation: Simulation, resume: bool = False) -> Iterator[Recorder]:
-        """The file, made anew, for all worlds of a loaded simulation while this lasts: what writes to it is
-        an observer, to give to each ``run``.
+        """Yield the observer, to give to each ``run``, that writes all worlds of a loaded simulation.
 
-        resume : of a simulation with one world, go on with the file that a stopped run has left.
+        The file is created, in place of any before. resume : True to append to the file that a stopped run
+        has left, for a simulation with one world.
         """
         scenes, real = simulation.scenes, simulation.runtime.precision
         if resume:
             time = float(simulation.monitor.good["time"][0])
-            made = Trajectory.going_on(self, scenes[0], time, real)
+            trajectory_file = Trajectory.resume(self, scenes[0], time, real)
         else:
-            made = self.begun(scenes, real)
-        with made as trajectory:
+            trajectory_file = self.create(scenes, real)
+        with trajectory_file as trajectory:
             yield trajectory.recorder(simulation, range(len(scenes)))
 
 
 class Trajectory:
-    """A file that frames are written to, for scenes that run one after another or side by side.
+    """The file that frames are written to, for scenes that run one after another or side by side.
 
-    A context manager: without ``with``, ``close`` must be called.
+    It is a context manager: without ``with``, ``close`` must be called.
     """
 
     def __init__(self, recording: Recording, scenes: Sequence[Scene], real: str = "f64") -> None:
@@ -98,9 +98,9 @@ class Trajectory:
         InputError when it cannot be made, RunError when the disk is full.
         """
         self.recording, self.scenes, self.path = recording, list(scenes), Path(recording.path)
-        self.fields = [written(scene) for scene in scenes]
-        _put(self.path, self._empty(np.float64 if real == "f64" else np.float32))
-        self._opened = ExitStack()
+        self.fields = [recorded_fields(scene) for scene in scenes]
+        _replace(self.path, self._empty_image(np.float64 if real == "f64" else np.float32))
+        self._resources = ExitStack()
         try:
             self._open()
         except BaseException:
@@ -108,66 +108,66 @@ class Trajectory:
             raise
 
     # HDF5 calls Growing, in which no signal may be raised: the HDF5 library cannot close the file any more.
-    @deferred()
+    @defer_signals()
     def _open(self) -> None:
-        self.disk = self._opened.enter_context(Growing(self.path))
-        self.file = self._opened.enter_context(h5py.File(self.disk, "r+", libver=LIBRARY))
+        self.disk = self._resources.enter_context(GrowingFile(self.path))
+        self.file = self._resources.enter_context(h5py.File(self.disk, "r+", libver=LIBVER))
         # From here on nothing can be added but rows.
         self.file.swmr_mode = True
-        names = h5md.names(len(self.scenes))
+        names = h5md.group_names(len(self.scenes))
         self.groups = [self.file[f"particles/{name}"] for name in names]
         self.checksums = [self.file[f"{h5md.CHECKSUMS}/{name}"] for name in names]
 
-    def _empty(self, real: Any) -> bytes:
-        """The file without frames."""
+    def _empty_image(self, real: Any) -> bytes:
+        """Return the bytes of the file without frames."""
         image = io.BytesIO()
-        with h5py.File(image, "w", libver=LIBRARY) as file:
-            h5md.metadata(file, version.__version__)
-            names = h5md.names(len(self.scenes))
+        with h5py.File(image, "w", libver=LIBVER) as file:
+            h5md.write_metadata(file, version.__version__)
+            names = h5md.group_names(len(self.scenes))
             for name, scene, fields in zip(names, self.scenes, self.fields, strict=True):
                 group = file.create_group(f"particles/{name}")
-                h5md.box(group, scene.domain)
-                h5md.elements(group, fields, scene.capacity(), real)
-                h5md.scene(file, name, scene.to_toml())
-                h5md.checksums(file, name)
+                h5md.write_box(group, scene.domain)
+                h5md.create_elements(group, fields, scene.capacity(), real)
+                h5md.write_scene(file, name, scene.to_toml())
+                h5md.create_checksums(file, name)
         return image.getvalue()
 
     @classmethod
-    def going_on(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
-        """The file that a stopped run has left, less its frames after ``time`` (s); a new one if none is.
+    def resume(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
+        """Open the file that a stopped run has left, less its frames after ``time`` (s), or create one.
 
         InputError when the file is damaged, or of another scene; it is then as it was.
         """
         path = Path(recording.path)
         if not regular_file.exists(path):
             return cls(recording, [scene], real)
-        new = path.with_name(unfinished(path.name))
-        with frames(path) as before, ExitStack() as given_up:
-            same = worlds(path) == 1 and before.scene.digest() == scene.digest()
-            must(same, "trajectory to go on with", "of the same scene", f"{path}, of another one")
-            given_up.callback(new.unlink, missing_ok=True)
-            made = cls(replace(recording, path=new), [scene], real)
-            given_up.push(made)
+        new = path.with_name(temporary_name(path.name))
+        with frames(path) as before, ExitStack() as cleanup:
+            same_scene = world_count(path) == 1 and before.scene.digest() == scene.digest()
+            must(same_scene, "trajectory to go on with", "of the same scene", f"{path}, of another one")
+            cleanup.callback(new.unlink, missing_ok=True)
+            trajectory = cls(replace(recording, path=new), [scene], real)
+            cleanup.push(trajectory)
             for frame in before:
                 if frame.time <= time:
-                    made.write(0, frame)
+                    trajectory.write(0, frame)
             new.replace(path)
-            given_up.pop_all()
-        made.path = path
-        return made
+            cleanup.pop_all()
+        trajectory.path = path
+        return trajectory
 
-    @deferred()
+    @defer_signals()
     def write(self, index: int, frame: Frame) -> None:
         """Add a frame of the scene of this index; RunError when the disk is full. Ctrl-C waits."""
-        group, n = self.groups[index], len(frame.arrays["id"])
+        group, count = self.groups[index], len(frame.arrays["id"])
         order = np.argsort(frame.arrays["id"], kind="stable")
         row = group["position/step"].shape[0]
         arrays = {}
         for field in self.fields[index]:
             value = group[field.name]["value"]
             arrays[field.name] = frame.arrays[field.name][order].astype(value.dtype)
-            value.resize((row + 1, max(n, value.shape[1]), *value.shape[2:]))
-            value[row, :n] = arrays[field.name]
+            value.resize((row + 1, max(count, value.shape[1]), *value.shape[2:]))
+            value[row, :count] = arrays[field.name]
             self._flush(value)
         clock = h5md.clock_checksum(frame.step, frame.time)
         # The step comes last: it says that the row is whole.
@@ -189,9 +189,9 @@ class Trajectory:
             why = self.disk.failure.strerror or self.disk.failure
             raise RunError(f"{self.path} could not be written: {why}; frames before are intact")
 
-    @deferred()
+    @defer_signals()
     def _finish(self) -> None:
-        self._opened.close()
+        self._resources.close()
 
     def close(self) -> None:
         """Finish the file; RunError when not all could be written."""
@@ -209,32 +209,39 @@ class Trajectory:
             self._check()
 
     def recorder(self, simulation: Simulation, indices: Sequence[int]) -> Recorder:
-        """What writes frames of a loaded simulation, whose worlds are the scenes of these indices: an
-        observer, to give to its ``run``."""
+        """Return the observer, to give to ``run``, that writes frames of a loaded simulation.
+
+        indices : of the scenes of the file, one for each world of the simulation.
+        """
         return Recorder(self, simulation, indices)
 
 
-def asked(path: Path, frames: int | None, every: float | None, resume: bool) -> Recording | None:
-    """What the options of a command ask for; None when that is nothing."""
+def recording_from_options(
+    path: Path, frames: int | None, every: float | None, resume: bool
+) -> Recording | None:
+    """Return the recording that the options of a command ask for; None when they ask for none."""
     if frames is None and every is None:
-        begun, rule = resume and regular_file.exists(path), "to go on with trajectory.h5 (or give --fresh)"
-        must(not begun, "--frames or --every", f"given as before, {rule}", "neither")
+        resumable, rule = (
+            resume and regular_file.exists(path),
+            "to go on with trajectory.h5 (or give --fresh)",
+        )
+        must(not resumable, "--frames or --every", f"given as before, {rule}", "neither")
         return None
     return Recording(path, frames, every)
 
 
-def _put(path: Path, image: bytes) -> None:
+def _replace(path: Path, image: bytes) -> None:
     try:
         replace_file(path, image)
     except RunError as error:
         cause = error.__cause__
-        if not isinstance(cause, OSError) or cause.errno in NO_ROOM:
+        if not isinstance(cause, OSError) or cause.errno in DISK_FULL:
             raise
         rule = "a file that can be written"
         raise InputError(f"trajectory must be {rule}; received {str(path)!r} ({cause})") from None
 
 
-def written(scene: Scene) -> tuple[Field, ...]:
-    """The quantities in a trajectory of a scene: all but what particles remember of each other."""
+def recorded_fields(scene: Scene) -> tuple[Field, ...]:
+    """Return the quantities in a trajectory of a scene: all but what particles remember of each other."""
     fields = resolve_fields(needed_fields(scene.effects, scene.stepper))
     return tuple(field for field in fields if not (field.slots or field.scratch))

@@ -12,7 +12,7 @@ from tisim.components.arrays import Numbers, Rows, equal, frozen
 from tisim.components.component import Component, Text, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
-from tisim.errors import InputError, must, shown
+from tisim.errors import InputError, abbreviated, must
 from tisim.packing.placement import Placement, RandomInDomain
 from tisim.scene.initial_velocity import Pulse
 
@@ -73,7 +73,7 @@ class Particles(Start):
         try:
             column = np.asarray(value)
         except (ValueError, RecursionError):
-            raise InputError(f"particles.{name} must be numbers; received {shown(value)}") from None
+            raise InputError(f"particles.{name} must be numbers; received {abbreviated(value)}") from None
         # Neither text nor whole numbers of more than 64 bits.
         must(column.dtype.kind in "biuf", f"particles.{name}", "numbers", value)
         column = column.astype(float)

@@ -17,7 +17,7 @@ from types import ModuleType
 from tisim import effects, operators, packing, sources, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
-from tisim.errors import InputError, must, named
+from tisim.errors import InputError, must, printable
 from tisim.files import python_file
 
 GROUP = "tisim.effects"
@@ -33,7 +33,7 @@ def load(path: str | Path) -> ModuleType:
     try:
         _check(module)
     except InputError:
-        python_file.forget(module.__name__)
+        python_file.unload(module.__name__)
         raise
     return module
 
@@ -46,7 +46,7 @@ def load_parts() -> None:
 
 def versions() -> dict[str, str]:
     """A checksum of the file of each plugin, by its name: of those loaded, and of packages installed."""
-    own = {f"plugin {file.name}": file.checksum[:12] for file in python_file.loaded()}
+    own = {f"plugin {file.name}": file.checksum[:12] for file in python_file.loaded_files()}
     return own | installed()
 
 
@@ -68,7 +68,7 @@ def _load_installed() -> None:
         try:
             entry.load()
         except Exception as error:
-            why = f"{type(error).__name__}: {named(' '.join(str(error).split()))}"
+            why = f"{type(error).__name__}: {printable(' '.join(str(error).split()))}"
             raise InputError(
                 f"plugin {entry.name} of {package} must be importable; received {why}"
             ) from error
@@ -78,7 +78,7 @@ def _load_installed() -> None:
 def _checksum(entry: EntryPoint) -> str:
     spec = find_spec(entry.module)
     path = spec.origin if spec else None
-    return python_file.checksum(Path(path).read_bytes())[:12] if path else ""
+    return python_file.sha256(Path(path).read_bytes())[:12] if path else ""
 
 
 def _check(module: ModuleType) -> None:

@@ -15,7 +15,7 @@ from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.json_text import json_pieces
 from tisim.effects.base import Effect
-from tisim.errors import InputError, must, shown
+from tisim.errors import InputError, abbreviated, must
 from tisim.files import python_file
 from tisim.scene import plugins
 from tisim.scene.initial_state import Start
@@ -105,7 +105,7 @@ class Scene(Component):
         """Return a hash, in hex, of everything that decides the result: physics version, every parameter, the
         seed, and the files that define parts of the scene that are not tisim's own."""
         order = [effect.label for effect in self.effects]
-        files = python_file.checksums(*dict.fromkeys(map(type, self.parts())))
+        files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
         for piece in json_pieces(self._data(serialization.to_dict(self.particles, arrays=True))):
             digest.update(piece.encode())
@@ -161,15 +161,15 @@ class Scene(Component):
             if file.is_file() or not file.exists():
                 text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise InputError(f"{what} must exist; received {shown(str(path))}") from None
+            raise InputError(f"{what} must exist; received {abbreviated(str(path))}") from None
         except OSError as error:
-            received = f"{shown(str(path))} ({error.strerror})"
+            received = f"{abbreviated(str(path))} ({error.strerror})"
             raise InputError(f"{what} must be readable; received {received}") from None
         except ValueError as fault:
             # Bytes that are no text, or a name with a NUL.
-            raise InputError(f"{what} must be TOML; received {shown(str(path))} ({fault})") from None
+            raise InputError(f"{what} must be TOML; received {abbreviated(str(path))} ({fault})") from None
         if text is None:
-            raise InputError(f"{what} must be a file; received {shown(str(path))}")
+            raise InputError(f"{what} must be a file; received {abbreviated(str(path))}")
         return cls.from_dict(serialization.read_toml(text, what, str(path)))
 
     def to_toml(self) -> str:

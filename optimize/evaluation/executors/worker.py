@@ -29,7 +29,7 @@ class WorkerSettings:
     device: str = "cpu"
     precision: str = "f64"
     threads: int = 0
-    files: tuple[PythonFile, ...] = field(default_factory=python_file.loaded)
+    files: tuple[PythonFile, ...] = field(default_factory=python_file.loaded_files)
 
     def __post_init__(self) -> None:
         runtime.Runtime(self.device, self.precision, self.threads)

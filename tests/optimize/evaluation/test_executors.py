@@ -122,7 +122,7 @@ def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
     law = python_file.load(own_file("own_law.py", LAW))
     sent = working.packed([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
     here = WorkerSettings()
-    python_file.forget("own_law")
+    python_file.unload("own_law")
     with pytest.raises(
         InputError, match=r"^worker \(process .* must be able to import .* --plugin\); received No"
     ):

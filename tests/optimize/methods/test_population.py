@@ -9,7 +9,7 @@ from optimize.methods.breeding_settings import Breeding
 from optimize.settings import Settings, followed, proposed
 from tests.optimize.fake_runs import fake_problem
 from tisim import InputError
-from tisim.cli.scene_arguments import nested
+from tisim.cli.scene_arguments import with_changes
 
 GENES = 3
 POPULATIONS = range(2, 101)
@@ -40,7 +40,7 @@ def generations(settings):
 def settings_of(usual, method, given):
     """As the command line makes them: --method, --population or --set, on a case."""
     wishes = {f"options.{name}": value for name, value in given.items()}
-    return Settings(**nested(followed(proposed(fake_problem(GENES), usual, method), wishes), wishes))
+    return Settings(**with_changes(followed(proposed(fake_problem(GENES), usual, method), wishes), wishes))
 
 
 def test_the_table_is_of_the_cases_there_are():

@@ -324,7 +324,7 @@ def test_reading_what_is_damaged_ends_in_any_case(path, monkeypatch):
     before = SPOILT["without the checksum"](path.read_bytes())
     path.write_bytes(before)
     with monkeypatch.context() as patch:
-        patch.setattr("optimize.storage.salvage.LIMIT", 1e-3)
+        patch.setattr("optimize.storage.salvage.TIME_LIMIT", 1e-3)
         with pytest.raises(InputError, match=r"cache\.h5 must be a whole HDF5 file written by a cache"):
             compact(path)
     assert path.read_bytes() == before

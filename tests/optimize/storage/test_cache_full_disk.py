@@ -6,7 +6,7 @@ import h5py
 import pytest
 
 from optimize.storage.cache import Cache
-from optimize.storage.hdf5_store import image
+from optimize.storage.hdf5_store import build_image
 from optimize.storage.maintenance import verify
 from tests.optimize.cache_files import journal_of, payloads
 from tests.optimize.fake_runs import fake_record
@@ -79,7 +79,7 @@ def test_killed_fold_leaves_no_trace(path):
 def test_replace_file_is_all_or_nothing(tmp_path):
     target = tmp_path / "file"
     replace_file(target, b"old")
-    replace_file(target, image(None, [fake_record(1)], {}))
+    replace_file(target, build_image(None, [fake_record(1)], {}))
     with h5py.File(target) as file:
         assert len(file["evaluations/key"]) == 1
 
