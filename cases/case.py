@@ -118,7 +118,10 @@ class Case:
         if search is None:
             sizes = ", ".join(key for key, one in self.sizes.items() if one.search is not None)
             raise InputError(f"size must be one of {sizes} for the inverse problem; received {size!r}")
-        return self.problem(size, variant or next(iter(self.variants), "")), search
+        chosen = next(iter(self.variants), "") if variant is None else variant
+        rule = f"one of {', '.join(self.variants)}"
+        must(chosen in self.variants or not self.variants, "variant", rule, chosen)
+        return self.problem(size, chosen), search
 
 
 def every() -> dict[str, Case]:

@@ -15,7 +15,7 @@ def test_variants_are_those_of_the_inverse_problem(name):
     case = every()[name]
     size = next(key for key, one in case.sizes.items() if one.search is not None)
     with pytest.raises(InputError, match=f"variant must be one of {', '.join(case.variants)}; received ''"):
-        case.problem(size, "")
+        case.inverse(size, "")
     problems = [case.problem(size, variant) for variant in case.variants]
     assert len({problem.name for problem in problems}) == len(problems)
 

@@ -8,6 +8,7 @@ import signal
 import pytest
 from typer.main import get_command
 
+from cases.case import every
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
 from tisim.accuracy import Row, Study, storage
@@ -16,7 +17,7 @@ from tisim.accuracy.sweep import methods
 from tisim.cli import cost, scene_arguments
 from tisim.cli.main import app
 
-CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
+CASES = ", ".join(sorted(every()))
 WRONG = [
     (["nosuch"], f"case must be one of {CASES}, or a scene file ending in"),
     (["vibration", "--size", "huge"], "size must be one of alone, default, equilibrium"),

@@ -6,7 +6,9 @@ import sys
 
 import pytest
 
-CASES = "agglomeration, blast, capture, cascade, concentration, vibration"
+from cases.case import every
+
+CASES = ", ".join(sorted(every()))
 
 WRONG = [
     (["run", "nosuch"], f"case must be one of {CASES}, or a scene file ending in"),

@@ -220,7 +220,9 @@ def cases() -> None:
         if case.problem is not None:
             for variant in case.variants:
                 problem = case.problem("default", variant)
-                table.add_row(f"    --variant {variant}", f"of tisim optimize: {problem.description}")
+                table.add_row(
+                    f"    --variant {variant}", f"of tisim optimize: {problem.description or problem.title}"
+                )
         out().print(table)
 
 

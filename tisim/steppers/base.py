@@ -84,5 +84,12 @@ class Stepper(StepperHints, Component):
         has left it; and say how far particles have moved: ``displacement`` relative to the frame, then
         ``neighbour_list.moved(w)``, or simply ``neighbour_list.stale[w] = 1``. Verlet is a pattern. In
         kernels a parameter of the stepper is read of ``context.stepper``.
+
+        Forces are summed at ``time``. A stepper that sums them within a step puts ``time`` there, as Boris
+        does, and keeps where the step began in ``time_before``, which it names in ``world_quantities``:
+        ``apply_operators`` and ``AdvanceClock`` (steppers/common.py) go on from it. One that moves particles
+        twice reports both displacements with ``report_displacement``, which sets them to 0 after each.
+        ``s.axes(s.frame, w)`` is the velocity of the frame (m/s). Forces and derived quantities that the step
+        leaves may be those of its middle; the next one must not rely on others.
         """
         raise NotImplementedError(f"{type(self).__name__} must define step")
