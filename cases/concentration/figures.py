@@ -84,7 +84,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     for axis, (n, c), result in zip(grid.flat, keys, results, strict=True):
         snapshot(axis, result.state)
         length = chain(result.state, result.state["moment"])
-        axis.set_title(f"{n} nm, {c:g} g/mL, coupling Γ = {coupling(n):.3g}: mean chain {length:.1f}")
+        axis.set_title(f"{n} nm, {c:g} g/mL\ncoupling Γ = {coupling(n):.3g}, mean chain {length:.1f}")
     letters(grid.flat)
     curves = captured(share(progress, 1, 2))
     return {"snapshots.png": figure, "captured.png": captured_figure(curves), "captured.csv": table(curves)}
