@@ -2,6 +2,7 @@
 
 import io
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import ClassVar
 
 import pytest
@@ -17,6 +18,7 @@ from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import decades, tied
 from tisim.accuracy.sweep import exchanged, finest, methods, parts, rivals
+from tisim.accuracy.table import sources
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects import InducedMoment, MutualInducedMoment, NearField, Tether, TruncatedNearField
@@ -310,3 +312,13 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
     (whole,) = [line for line in lines if "1.2e-04" in line]
     assert whole.split()[-8:-1] == ["0.05", "0", "123456", "1234567", "12345", "1.2e-04", "1.2e-04"]
     assert "  error=1e-05: a quantity is not finite" in lines
+
+
+def test_a_reference_that_tells_nothing_apart_is_said_to():
+    """Its own error is of the size of the motion, as where paths are chaotic."""
+    quantity = Quantity("positions", lambda result: result.state["position"])
+    for error, said in ((1e-3, False), (1.3, True)):
+        truth = SimpleNamespace(error=error, source="a finer run")
+        study = SimpleNamespace(quantities=[quantity], truths=[truth], decades=dict, complete=True, rows=[])
+        text = " ".join(sources(study))
+        assert ("the reference itself is off by 1 of the motion" in text) == said

@@ -13,6 +13,8 @@ from tisim.accuracy.formatting import shell_line
 from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
 
+USELESS = 0.1
+"""A reference whose own error, over the size of the motion, is above this does not tell settings apart."""
 NARROW = 16
 """The column with the settings of a method has at least so many characters."""
 
@@ -66,6 +68,12 @@ def sources(study: Study) -> list[str]:
     for quantity, truth in zip(study.quantities, study.truths, strict=False):
         own = f"; its own error at most {truth.error:.1e}" if truth.error else ""
         lines.append(f"error of {quantity.name}: against {truth.source}{own}")
+        if truth.error > USELESS and not quantity.random:
+            lines.append(
+                f"{quantity.name}: the reference itself is off by {truth.error:.1g} of the motion, so errors "
+                "say little: paths are chaotic, or hard to resolve. A shorter duration may do; or ask for a "
+                "quantity of many random starts (docs/accuracy.md)"
+            )
     if any(len(rows) > 1 for rows in study.decades().values()):
         lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
     if not study.complete:

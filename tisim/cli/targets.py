@@ -43,7 +43,7 @@ def case(target: str, alternatives: str = OWN_FILE) -> Case:
 def inverse_problem(target: str, size: str | None, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
     """Return the inverse problem of a case or a file, and settings of its search; InputError without one."""
     if not is_python_file(target):
-        return case(target).inverse(size or "default", variant)
+        return case(target, f"{OWN_FILE} or a PROBLEM").inverse(size or "default", variant)
     module = plugins.load(target)
     if hasattr(module, "PROBLEM"):
         problem, settings = _problem(module, target, size, variant)
