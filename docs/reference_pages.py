@@ -46,7 +46,7 @@ def parts() -> str:
         "`tisim effects` prints this list; `tisim effects NAME` the law of one, its source, its parameters",
         "with units, and a table to paste into a scene file.",
     ]
-    entries = reference.entries()
+    entries = [one for one in reference.entries() if one.kind.__module__.startswith("tisim.")]
     for name, family in reference.FAMILIES.items():
         lines += ["", f"## {family.title}", "", "| name | what it is |", "|---|---|"]
         lines += [
