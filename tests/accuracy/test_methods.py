@@ -300,15 +300,19 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
     """Two quantities with long names, and a method with long settings."""
     many = {"seconds": (0.05,), "steps": 123456.0, "sums": 1234567.0, "rejections": 12345.0}
     long = Row("Long", "error=1e-04, tolerance=1e-05", "", "", "f64", 1, errors=((1.2e-4, 0.0),) * 2, **many)
+    limits = Row(
+        "Long", "longest=6.51e-05, tolerance=0.001", "", "", "f64", 1, errors=((1.0, 0.0),) * 2, **many
+    )
     failed = Row("Long", "error=1e-05", "", "", "f64", 1, failed="a quantity is not finite")
     cost_study = Study(
         oscillator(), [replace(KNOWN, name=name) for name in ("positions", "centre of gravity")]
     )
-    cost_study.rows = [long, failed]
+    cost_study.rows = [long, limits, failed]
     console = Console(width=80, file=io.StringIO())
     console.print(cost_study.table())
     lines = console.file.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
+    assert any(line.startswith(" longest=6.51e-05,") for line in lines)
     (whole,) = [line for line in lines if "1.2e-04" in line]
     assert whole.split()[-8:-1] == ["0.05", "0", "123456", "1234567", "12345", "1.2e-04", "1.2e-04"]
     assert "  error=1e-05: a quantity is not finite" in lines

@@ -15,22 +15,22 @@ from tisim.console import TERMINAL_WIDTH
 
 USELESS = 0.1
 """A reference whose own error, over the size of the motion, is above this does not tell settings apart."""
-NARROW = 16
-"""The column with the settings of a method has at least so many characters."""
 
 
 def table(study: Study) -> RenderableType:
     """Every setting by method, with its median time, work and errors; for what error it is the cheapest, in
     brackets where timings do not tell it from the one that is chosen; below, what has failed and why."""
     names = [quantity.name.replace(" ", "\n") for quantity in study.quantities]
-    heads = ["", "time\n(s)", "spread\n(s)", "steps", "forces", "rejected", *names, "best\nfor"]
+    heads = ["", "time\n(s)", "spread\n(s)", "steps", "forces", "re-\njected", *names, "best\nfor"]
     best: dict[tuple[str, str], str] = {}
     for error, (chosen, *others) in study.decades().items():
         best |= {row.key: f"({error:.0e})" for row in others} | {chosen.key: f"{error:.0e}"}
     cells = {row.key: _cells(row, best.get(row.key, "")) for row in study.rows if not row.failed}
     columns = zip(heads, *cells.values(), strict=True)
     first, *widths = (max(len(line) for cell in column for line in cell.split("\n")) for column in columns)
-    widths = [max(NARROW, min(first, TERMINAL_WIDTH - sum(widths) - len(widths))), *widths]
+    # No number is cut: the settings wrap between them, and have room for the longest.
+    longest = max((len(word) for row in study.rows for word in row.setting.split()), default=0)
+    widths = [max(1 + longest, min(first, TERMINAL_WIDTH - sum(widths) - len(widths))), *widths]
     relative = ", ".join(f"{q.name}: relative to {q.relative_to}" for q in study.quantities)
     blocks: list[RenderableType] = [Text(f"errors of {relative}"), _grid([heads], widths, "bold")]
     for method in dict.fromkeys(row.method for row in study.rows):
@@ -59,7 +59,7 @@ def _cells(row: Row, best: str) -> list[str]:
     ]
     work = [f"{value:.0f}" for value in (row.steps, row.sums, row.rejections)]
     note = "no change" if row.same else best
-    return [f"  {row.setting}", f"{row.median:.3g}", f"{row.spread:.1g}", *work, *errors, note]
+    return [f" {row.setting}", f"{row.median:.3g}", f"{row.spread:.1g}", *work, *errors, note]
 
 
 def sources(study: Study) -> list[str]:

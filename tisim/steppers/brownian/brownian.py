@@ -88,7 +88,7 @@ class Brownian(Stepper):
         return alone and self.hydrodynamics == "none"
 
     def countable(self, effects: Sequence[Effect]) -> float:
-        # Where each takes its own, the noise of a step is numbered by 32 bits of its window.
+        # Where each takes its own, the noise of a step is numbered by 32 bits of its interval.
         return 2**32 if self.independent(effects) else super().countable(effects)
 
     def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Stepper, ...]:
