@@ -60,7 +60,12 @@ Changes = Annotated[
 ]
 Out = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", callback=nameable, help="Folder to write to; out/NAME by default."),
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        callback=nameable,
+        help="Folder to write to; out/NAME by default, out/NAME-cost of cost, out/NAME-figures of figures.",
+    ),
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed of all that is random.")]
 Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
