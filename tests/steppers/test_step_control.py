@@ -84,3 +84,6 @@ def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
     along = scene(apart, [[5.0, 0, 0]] * 2, (Impact(hardness=1e5),), stepper=Verlet(), **given)
     free = scene(apart, speed, (), stepper=Verlet(), **given)
     assert all(result.status.ok for result in (*run([along]), *run([free])))
+    beyond = scene(apart, [[1e155, 0, 0], [0, 0, 0]], (Impact(hardness=1e5),), stepper=Verlet(), **given)
+    with pytest.raises(InputError, match=r"^stepper\.control\.shortest must be so short"):
+        run([beyond])

@@ -111,7 +111,9 @@ class ApproachTime(Controller):
 
     def suits_start(self, radius: np.ndarray, velocity: np.ndarray) -> None:
         # In one step of a radius each, two that meet head on are past each other: no impact is seen.
-        fastest = float(np.linalg.norm(velocity - velocity.mean(axis=0), axis=1).max(initial=0.0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            # Speeds whose squares are more than numbers hold are infinite here, and refused.
+            fastest = float(np.linalg.norm(velocity - velocity.mean(axis=0), axis=1).max(initial=0.0))
         smallest = float(radius.min(initial=np.inf))
         rule = f"so short that no particle moves by more than the smallest radius, {smallest:.3g} m, in it"
         rule += f" at {fastest:.3g} m/s"
