@@ -116,11 +116,15 @@ class FitnessRecord:
 
 
 def _deviation(recorded: list[float], now: list[float]) -> float:
-    change = np.subtract(now, recorded)
-    if not change.any():
+    """Return the change of the mean in its standard errors; infinite for what is no number any more."""
+    if recorded == now:
         return 0.0
+    if not (np.isfinite(recorded).all() and np.isfinite(now).all()):
+        return float("inf")
+    change = np.subtract(now, recorded)
     error = np.std(change, ddof=1) / np.sqrt(len(change)) if len(change) > 1 else 0.0
-    return float(abs(np.mean(change)) / np.hypot(error, ROUNDING_SHIFT * np.abs(recorded).mean()))
+    scale = np.hypot(error, ROUNDING_SHIFT * np.abs(recorded).mean())
+    return float(abs(np.mean(change)) / scale) if scale > 0 else float("inf")
 
 
 def _platform() -> str:

@@ -27,7 +27,7 @@ def centre(result: Result) -> np.ndarray:
 
 
 def exact(result: Result) -> np.ndarray:
-    """The same in closed form, for a scene that has ``constants``."""
+    """Return the displacement of the centre of gravity (m) in closed form, for a scene with ``constants``."""
     place = complex(response(result.time, **(constants(result.scene) or {})))
     return np.array([place.real, place.imag, 0.0])
 

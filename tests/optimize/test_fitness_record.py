@@ -90,6 +90,15 @@ def test_other_rounding_is_not(record):
     assert max(record.deviations(replace(record, values=values)).values()) < 4.0
 
 
+@pytest.mark.parametrize(("recorded", "now"), [(1.0, np.nan), (1.0, np.inf), (0.0, 1.0)])
+def test_what_is_no_number_any_more_or_was_nothing_is_a_change(record, recorded, now):
+    """Also where another objective of the design has not changed."""
+    before, after = (
+        replace(record, values={"slow": {"height": [1.0], "spread": [value]}}) for value in (recorded, now)
+    )
+    assert before.deviations(after) == {"slow": np.inf}
+
+
 def test_what_is_no_record_of_this_problem_is_refused(record, tmp_path):
     path = tmp_path / "fitness.json"
     with pytest.raises(InputError, match="fitness record must be an existing file; received"):

@@ -83,7 +83,8 @@ def pair_rate() -> float:
 
 
 def rate_of(backend: str) -> float | None:
-    """The same for any backend, in a process of its own; None where it is not installed or fails."""
+    """Return the pairs per second of any backend, measured in a process of its own; None where it is not
+    installed or fails."""
     if importlib.util.find_spec(backend) is None:
         return None
     command = [sys.executable, "-c", "from tisim.backend.diagnostics import pair_rate; print(pair_rate())"]

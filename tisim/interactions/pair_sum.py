@@ -82,7 +82,8 @@ class PairSum(PerParticle):
 
     @ti.func
     def tile(self, w, begin, t):
-        """The same for particles from ``begin`` on; lanes without a particle compute what nobody reads."""
+        """Sum over the others for a tile of particles from ``begin`` on; what lanes without one compute,
+        nobody reads."""
         n = self.s.count[w]
         first, end = ti.min(begin, self.s.capacity - TILE), ti.min(begin + TILE, n)
         # An array for each component: with one of 96 numbers for all, some kernels read parameters again for

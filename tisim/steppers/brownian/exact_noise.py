@@ -149,7 +149,8 @@ class Factor(Phase):
 
     @ti.func
     def close(self, w, j, column, n):
-        """The same for those of the three that are earlier; then divide by the root of the pivot."""
+        """Take what the earlier of the three columns account for off a column, and divide it by the root of
+        the pivot."""
         matrix = ti.static(self.m.matrix)
         for k in range(3 * j, column):
             x = matrix[w, k, column]
