@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import reprlib
+from collections.abc import Iterable
 from typing import Any
 
 LONGEST = 200
@@ -50,3 +52,9 @@ def must(condition: bool, what: str, rule: str, received: Any) -> None:
     """Raise ``InputError("<what> must be <rule>; received <received>")`` unless ``condition`` holds."""
     if not condition:
         raise InputError(f"{printable(what)} must be {rule}; received {abbreviated(received)}")
+
+
+def did_you_mean(received: str, known: Iterable[str]) -> str:
+    """Return the end of a message that names the known name next to the one received; empty for none."""
+    nearest = difflib.get_close_matches(received, known, n=1)
+    return f"; did you mean {abbreviated(nearest[0])}?" if nearest else ""

@@ -25,6 +25,7 @@ from tisim import InputError
 from tisim.errors import must
 from tisim.files import regular_file
 from tisim.files.checksum import verified, with_checksum
+from tisim.files.superblock import SIGNATURE
 
 EVALUATIONS_FORMAT = "tisim evaluations 1"
 EVALUATIONS = "evaluations"
@@ -63,6 +64,8 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
     content = regular_file.content(path)
     if content is None:
         raise InputError(f"{rule} nothing")
+    if content and not content.startswith(SIGNATURE):
+        raise InputError(f"{rule} a file that is another program's, or damaged at its start")
     image = verified(content)
     if image is None:
         raise InputError(

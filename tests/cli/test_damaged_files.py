@@ -96,7 +96,7 @@ def compiled_once(monkeypatch):
         made[:] = made or [Simulation(scene)]
         return made[0]
 
-    monkeypatch.setattr("tisim.cli.main.Simulation", simulation)
+    monkeypatch.setattr("tisim.cli.run.Simulation", simulation)
 
 
 @pytest.mark.long

@@ -1,16 +1,51 @@
 """``tisim effects``: the index, one of them, and what is none of them."""
 
+import re
+import sys
+
+import pytest
+
 from tisim.engine import reference
 
 
-def test_the_index_has_a_line_for_each(tisim):
+def test_the_index_has_a_whole_line_for_each(tisim):
     code, out, err = tisim("effects")
     assert (code, err) == (0, "")
-    lines = [line.split()[:2] for line in out.splitlines()]
+    lines = out.splitlines()
     for entry in reference.entries():
-        assert [entry.name, entry.kind.__name__] in lines, entry.name
+        (line,) = [line for line in lines if line.split()[:1] == [entry.name]]
+        words = re.split("  +", line)
+        assert words == [entry.name, entry.kind.__name__, entry.summary, *filter(None, [entry.source])]
     titles = {family.title for family in reference.FAMILIES.values()}
-    assert titles <= set(out.splitlines())
+    assert titles <= set(lines)
+    assert len(lines) == len(reference.entries()) + 2 * len(titles) + 1
+
+
+def test_on_a_terminal_lines_end_between_words(tisim, monkeypatch):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERM", "dumb")
+    _, out, _ = tisim("effects", "impact")
+    listed = out[out.index("Effects\n") :].splitlines()[1:-1]
+    assert len(listed) == len(reference.groups()["impact"])
+    for line, entry in zip(listed, reference.groups()["impact"], strict=True):
+        assert len(line) <= 80
+        words = re.split("  +", line, maxsplit=2)[2].removesuffix(" ...").split()
+        assert words == f"{entry.summary} {entry.source}".split()[: len(words)]
+
+
+@pytest.mark.parametrize("group", ["operators", "sources", "steppers", "step_controls", "pair", "magnetic"])
+def test_a_family_or_a_room_is_listed(tisim, group):
+    code, out, err = tisim("effects", group)
+    assert (code, err) == (0, "")
+    members = {
+        entry.name
+        for entry in reference.entries()
+        if entry.family == group or f".{group}." in entry.kind.__module__.removeprefix(f"tisim.{group}.")
+    }
+    titles = [family.title for family in reference.FAMILIES.values()]
+    assert {line.split()[0] for line in out.splitlines() if line and line not in titles} == members
+    assert group not in reference.names()
 
 
 def test_one_of_them_says_all_that_is_known_of_it(tisim):
@@ -22,6 +57,7 @@ def test_one_of_them_says_all_that_is_known_of_it(tisim):
     assert "Vickers hardness H_0" in out
     assert "particle fields: velocity (m/s), mass (kg), radius (m)" in out
     assert reference.find("impact").toml in out
+    assert "\nsoftening " in out, "those of the room of this name"
     assert "needs: impact" in tisim("effects", "friction")[1]
 
 
@@ -29,4 +65,5 @@ def test_an_unknown_one_is_wrong_input(tisim):
     code, out, err = tisim("effects", "impcat")
     assert (code, out) == (2, "")
     assert err.startswith("effect must be one of agglomeration, ")
-    assert err.endswith("; received 'impcat'\n")
+    assert err.endswith("; received 'impcat'; did you mean 'impact'?\n")
+    assert tisim("effects", "operatrs")[2].endswith("; received 'operatrs'; did you mean 'operators'?\n")

@@ -1,12 +1,17 @@
 """Wrong input: a message of one line, exit code 2, and nothing written."""
 
+import inspect
 import os
+import re
 import subprocess
 import sys
+from typing import get_args, get_type_hints
 
 import pytest
+from typer.main import get_command
 
 from cases.case import every
+from tisim.cli.main import app
 
 CASES = ", ".join(sorted(every()))
 
@@ -39,8 +44,22 @@ WRONG = [
     (["optimize", "capture", "--size", "huge"], "size must be one of default, longitudinal, long, 25nm; rec"),
     (["optimize", "cascade"], "case must be one with an inverse problem; received 'cascade'"),
     (["cache", "none.h5"], "cache file must be an existing file; received 'none.h5'"),
-    (["cache", "flow.toml"], "must be a whole HDF5 file written by a cache"),
-    (["frobnicate"], "No such command 'frobnicate'"),
+    (["cache", "flow.toml"], "by a cache; received a file that is another program's, or damaged at its"),
+    (["frobnicate"], "command must be one of run, cases, explain, "),
+    (["optimise"], "export; received 'optimise'; did you mean 'optimize'?\n"),
+    (["--verson"], "option must be one of 'tisim --help'; received '--verson'; did you mean '--version'?\n"),
+    (["run"], "CASE_OR_FILE must be given (A case of 'tisim cases', a scene file, or your own"),
+    (["cache"], "FILE must be given (The search.h5 of a search); received nothing\n"),
+    (["run", "FLOW", "FLOW"], "arguments must be CASE_OR_FILE and no more; received also 'flow.toml'\n"),
+    (["cases", "all", "of"], "arguments must be none; received also 'all', 'of'\n"),
+    (["run", "FLOW", "--seed"], "--seed must be given with a value; received nothing\n"),
+    (["run", "FLOW", "--fresh=3"], "--fresh must be given without a value; received '--fresh=3'\n"),
+    (["run", "FLOW", "--seed", "1.5"], "--seed must be a whole number; received '1.5'\n"),
+    (["run", "FLOW", "--every=often"], "--every must be a number; received 'often'\n"),
+    (["movie", "o", "--rate", "x"], "--rate must be a whole number; received 'x'\n"),
+    (["cost", "FLOW", "--finer", "17"], "--finer must be a whole number, at least -16, at most 16; rece"),
+    (["run", "FLOW", "--frmes", "3"], "'tisim run --help'; received '--frmes'; did you mean '--frames'?\n"),
+    (["run", "FLOW", "-x"], "option must be one of 'tisim run --help'; received '-x'\n"),
 ]  # fmt: skip
 
 
@@ -50,6 +69,7 @@ def test_wrong_input_is_told_and_nothing_written(tisim, impacts, tmp_path, argum
     assert code == 2
     assert message in err
     assert "Traceback" not in err
+    assert "--compact" not in err
     assert out == ""
     assert [path.name for path in tmp_path.iterdir()] == [impacts]
 
@@ -84,13 +104,29 @@ def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
     assert (code, out, err) == (2, "", said)
 
 
+def number_options():
+    """(command, option) of all options that are numbers."""
+    for name, command in get_command(app).commands.items():
+        types = get_type_hints(inspect.unwrap(command.callback))
+        for option in command.params:
+            if {int, float} & {types[option.name], *get_args(types[option.name])}:
+                yield name, option.opts[0]
+
+
+@pytest.mark.parametrize(("command", "option"), list(number_options()))
+def test_a_word_for_a_number_is_told_in_one_form(tisim, command, option):
+    code, out, err = tisim(command, "FLOW", option, "many")
+    assert (code, out) == (2, "")
+    assert re.fullmatch(rf"{option} must be a (whole )?number.*; received 'many'\n", err)
+
+
 @pytest.mark.parametrize(
-    "code", ["from tisim.cli.main import main; main(['cases'])", "import tisim.cli.main as c; c.main()"]
+    "words", [["-c", "from tisim.cli.main import main; main(['cases'])"], ["-m", "tisim", "cases"]]
 )
-def test_a_backend_that_is_none(code):
+def test_a_backend_that_is_none(words):
     """Told in a line by the command, as importing the package has gone well."""
     environment = {**os.environ, "TISIM_BACKEND": "os"}
-    command = [sys.executable, "-c", code]
+    command = [sys.executable, *words]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     said = "TISIM_BACKEND must be taichi or quadrants; received 'os'\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)

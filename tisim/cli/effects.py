@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+from collections.abc import Sequence
+from textwrap import shorten
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Group, RenderableType
@@ -11,33 +14,65 @@ from rich.text import Text
 from tisim.cli.options import Plugins
 from tisim.console import out, plain_table
 
+if TYPE_CHECKING:
+    from tisim.engine.reference import Entry
+
 Name = Annotated[
     str | None,
-    typer.Argument(metavar="NAME", help="One of them, in full: impact; all, a line each, without."),
+    typer.Argument(
+        metavar="NAME",
+        help="One of them, in full: impact. Or those of a family or a room, a line each: operators, pair. "
+        "All, without.",
+    ),
 ]
+LEAST_WIDTH = 20
+"""So much of what a part is stands in its line on any terminal, characters."""
 
 
 def effects(name: Name = None, plugins: Plugins = None) -> None:
     """List effects, sources, operators, steppers, step controls, placements and others, or explain one."""
     from tisim.engine import reference
 
-    out().print(_list_families(reference) if name is None else _describe(reference.find(name)))
+    groups = reference.groups()
+    if name is None:
+        _print_list(reference.entries())
+        print(
+            f"'tisim effects NAME' explains one, or lists those of a family or a room: {', '.join(groups)}."
+        )
+        return
+    # A room may have the name of its first law, such as impact: that is explained, and the others are listed.
+    if name not in groups or name in reference.names():
+        out().print(_describe(reference.find(name)))
+    if name in groups:
+        _print_list(groups[name])
 
 
-def _list_families(reference) -> RenderableType:
-    """Return a table with a line for each entry, family by family."""
-    lines: list[RenderableType] = []
-    entries = reference.entries()
-    for name, family in reference.FAMILIES.items():
-        table = plain_table("name", "class", "what it is", "source")
+def _print_list(entries: Sequence[Entry]) -> None:
+    """Print a line for each entry, family by family: whole into a file, as much as fits on a terminal."""
+    from tisim.engine.reference import FAMILIES
+
+    width = out().width if sys.stdout.isatty() else None
+    columns = [max(map(len, column)) for column in zip(*map(_names, entries), strict=True)]
+    for family in dict.fromkeys(entry.family for entry in entries):
+        out().print(Text(FAMILIES[family].title, "bold"))
         for entry in entries:
-            if entry.family == name:
-                table.add_row(entry.name, entry.kind.__name__, entry.summary, entry.source)
-        lines += [Text(family.title, "bold"), table, ""]
-    return Group(*lines, "'tisim effects NAME' explains one.")
+            if entry.family == family:
+                names = "  ".join(f"{name:<{n}}" for name, n in zip(_names(entry), columns, strict=True))
+                text = "  ".join(filter(None, (entry.summary, entry.source)))
+                print(names, text if width is None else _fitting(text, width - len(names) - 2), sep="  ")
+        print()
 
 
-def _describe(entry) -> RenderableType:
+def _fitting(text: str, width: int) -> str:
+    """Return as many words of a text as fit, with no number cut."""
+    return shorten(text, max(width, LEAST_WIDTH), placeholder=" ...")
+
+
+def _names(entry: Entry) -> tuple[str, str]:
+    return entry.name, entry.kind.__name__
+
+
+def _describe(entry: Entry) -> RenderableType:
     """Return all that the reference has of one entry."""
     heading = Text.assemble((entry.name, "bold"), f"  {entry.kind.__module__}.{entry.kind.__name__}")
     lines: list[RenderableType] = [heading, "", f"{entry.summary}.", ""]

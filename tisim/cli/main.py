@@ -4,51 +4,32 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
-from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
-from rich.table import Table
-from rich.text import Text
 
 from tisim.backend import runtime
 from tisim.backend.taichi import check_backend
-from tisim.cli import cost, effects, inspect, new, scene_arguments, search, targets
-from tisim.cli.options import (
-    Absent,
-    CaseName,
-    Changes,
-    Device,
-    Every,
-    Frames,
-    Fresh,
-    Out,
-    Overwrite,
-    Plugins,
-    Precision,
-    Seed,
-    Size,
-    Target,
-    Threads,
-)
-from tisim.console import err, out, plain_table, print_stopping, progress_bar
-from tisim.engine.observer import Observer
-from tisim.engine.result import Result
-from tisim.engine.simulation import Simulation
-from tisim.errors import InputError, RunError, must
-from tisim.files import regular_file
-from tisim.files.resuming import resume_hint
-from tisim.interrupt import Interrupt, exit_code, handle_signals, raise_interrupt
+from tisim.cli import cost, describe, effects, inspect, new, run, search
+from tisim.cli.usage import Command, CommandGroup, UsageError
+from tisim.errors import InputError, RunError
+from tisim.interrupt import exit_code, handle_signals, raise_interrupt
 from tisim.version import __version__
 
-UsageError: Any = typer.BadParameter.__base__
-"""Exception that typer raises for words that no command knows."""
+COMMANDS = (
+    run.run, describe.cases, describe.explain, describe.check, describe.doctor, effects.effects, new.new,
+    cost.cost, search.optimize, search.compare, search.cache,
+    inspect.plot, inspect.figures, inspect.movie, inspect.export,
+)  # fmt: skip
+"""The functions of all commands, whose names they have, in the order of ``tisim --help``."""
 
 app = typer.Typer(
+    cls=CommandGroup,
     help="Clouds of interacting particles, and a genetic algorithm that designs them backwards.",
     no_args_is_help=True, pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None,
 )  # fmt: skip
+for _command in COMMANDS:
+    app.command(cls=Command)(_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -63,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
             # 130 is what commands, and Typer for a KeyboardInterrupt, say whatever the signal was.
             code = exit_code() if code == 130 else code
         except UsageError as error:
-            # Of one line; but where no command was named, this is the help.
+            # No command was named: this is the help.
             print(error.format_message(), file=sys.stderr)
             code = 2
         except InputError as error:
@@ -90,197 +71,3 @@ def _options(
     ] = False,
 ) -> None:
     pass
-
-
-@app.command()
-def run(
-    target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
-    seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
-    threads: Threads = 0, fresh: Fresh = None, overwrite: Overwrite = False,
-    frames: Frames = None, every: Every = None, plugins: Plugins = None,
-) -> None:  # fmt: skip
-    """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
-    from tisim.io import checkpoint, run_folder
-    from tisim.io.trajectory import recording_from_options
-
-    scene_arguments.checkpoint_seconds()
-    runtime.init(device, precision, threads)
-    name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
-    out_folder = run_folder.RunFolder(folder or Path("out") / name)
-    resume = out_folder.check(fresh, overwrite)
-    recording = recording_from_options(out_folder.trajectory, frames, every, resume)
-    with err().status("compiling"):
-        simulation = Simulation(scene)
-        simulation.load([scene])
-    with out_folder.claim(fresh, overwrite) as resume_now:
-        must(resume_now == resume, "output folder", "as it was when the command began", str(out_folder.path))
-        if resume:
-            _restore(simulation, out_folder.checkpoint)
-        observer_context = recording.observer(simulation, resume) if recording else nullcontext()
-        seconds = scene_arguments.checkpoint_seconds()
-        checkpoints = checkpoint.PeriodicCheckpoint(out_folder.checkpoint, seconds)
-        try:
-            with observer_context as recorder:
-                if resume:
-                    err().print(f"going on with {out_folder.checkpoint}, from {simulation.fraction():.1%}")
-                observers = [recorder, checkpoints] if recorder else [checkpoints]
-                finished = _advance(simulation, name, observers)
-            paths = run_folder.write(simulation.results()[0], out_folder) if finished else []
-        except RunError as error:
-            hint = resume_hint(fresh, overwrite, "make room and ")
-            advice = _save_after_error(simulation, out_folder.checkpoint, hint)
-            raise RunError(f"{error}. {advice}") from error
-        if not finished:
-            checkpoint.save(simulation, out_folder.checkpoint)
-            err().print(
-                f"stopped at {simulation.fraction():.1%}; {out_folder.checkpoint} is written. "
-                f"{resume_hint(fresh, overwrite)}"
-            )
-            raise typer.Exit(130)
-    result = simulation.results()[0]
-    paths += [out_folder.trajectory] if recording else []
-    out().print(_summary(result, simulation.setup_s, paths))
-    if not result.status.ok:
-        raise RunError(f"run failed {result.status.reason}")
-
-
-def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -> bool:
-    """Run to the end behind a bar; return False when Ctrl-C has stopped it, between two steps."""
-    with progress_bar("{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
-        task = bar.add_task(name, total=1.0)
-
-        def report(simulation: Simulation) -> None:
-            description = f"{name}, {simulation.ahead():.3g} steps ahead"
-            bar.update(task, completed=simulation.fraction(), description=description)
-            ctrl_c.check()
-
-        try:
-            simulation.run(observers=[*observers, report])
-        except KeyboardInterrupt:
-            if ctrl_c.forced:
-                raise
-            return False
-    return True
-
-
-def _restore(simulation: Simulation, path: Path) -> None:
-    """Bring a simulation to where the run was stopped."""
-    from tisim.io import checkpoint
-
-    try:
-        checkpoint.restore(simulation, path)
-    except InputError as error:
-        raise InputError(f"{error} (to begin anew, give --out or --fresh)") from None
-
-
-def _save_after_error(simulation: Simulation, path: Path, hint: str) -> str:
-    """Save a checkpoint after a file could not be written; return sentences that say what can be resumed.
-
-    hint : which command resumes the run, as a sentence.
-    """
-    from tisim.io import checkpoint
-
-    try:
-        checkpoint.save(simulation, path)
-    except RunError:
-        return "No checkpoint could be written either" + "; that of before is intact." * regular_file.exists(
-            path
-        )
-    return f"{path} is written. {hint}"
-
-
-def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
-    counts = len(result.start["mass"]), len(result.state["mass"])
-    table = plain_table()
-    table.add_row("status", "ok" if result.status.ok else "failed")
-    table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s")
-    table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
-    for name, count in result.work.items():
-        table.add_row(name.replace("_", " "), str(count))
-    for name, value in result.measures.items():
-        table.add_row(name.replace("_", " "), f"{value:.6g}")
-    settings = result.settings
-    threads = f", {settings['threads']} threads" if "threads" in settings else ""
-    table.add_row("device", f"{settings['device']}, {settings['precision']}{threads}")
-    table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
-    table.add_row("written", "\n".join(map(str, paths)))
-    return table
-
-
-@app.command()
-def cases() -> None:
-    """List the cases."""
-    from cases.case import every
-
-    for case in every().values():
-        out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))
-        table = plain_table()
-        for name, size in case.sizes.items():
-            table.add_row(f"    --size {name}", size.summary)
-        if case.problem is not None:
-            for variant in case.variants:
-                problem = case.problem("default", variant)
-                table.add_row(
-                    f"    --variant {variant}", f"of tisim optimize: {problem.description or problem.title}"
-                )
-        out().print(table)
-
-
-@app.command()
-def explain(
-    target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
-    size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
-) -> None:  # fmt: skip
-    """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
-    from tisim.engine.explain import explain, render
-
-    runtime.init(device, precision)
-    _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
-    with err().status("compiling"):
-        explanation = explain(scene)
-    out().print(render(explanation))
-
-
-@app.command()
-def check(
-    case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
-    plugins: Plugins = None,
-) -> None:  # fmt: skip
-    """Run a case's own checks; exit code 1 when one fails."""
-    checks = targets.case(case).check()
-    runtime.init(device, precision, threads)
-    table = plain_table("check", "measured", "expected", "off by", "allowed", "")
-    failed = 0
-    with err().status("checking") as status:
-        for item in checks:
-            failed += not item.ok
-            verdict = Text("pass", "green") if item.ok else Text("FAIL", "bold red")
-            table.add_row(item.name, *item.cells, verdict)
-            status.update(f"checked: {item.name}")
-    out().print(table)
-    if failed:
-        raise RunError(f"{failed} of {table.row_count} checks failed")
-
-
-@app.command()
-def doctor() -> None:
-    """Say what this machine is to tisim, and what the other backend would give."""
-    from tisim.backend.diagnostics import findings
-
-    table = plain_table()
-    with err().status("measuring"):
-        for finding in findings():
-            table.add_row(finding.name, finding.value, finding.note)
-    out().print(table)
-
-
-app.command()(effects.effects)
-app.command()(new.new)
-app.command()(cost.cost)
-app.command()(search.optimize)
-app.command()(search.compare)
-app.command()(search.cache)
-app.command()(inspect.plot)
-app.command()(inspect.figures)
-app.command()(inspect.movie)
-app.command()(inspect.export)

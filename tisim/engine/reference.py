@@ -21,7 +21,7 @@ from tisim.components.domain import Domain
 from tisim.components.invalid import text_of, unit_of
 from tisim.effects.base import Effect
 from tisim.engine import template
-from tisim.errors import must
+from tisim.errors import InputError, abbreviated, did_you_mean
 from tisim.operators.base import Operator
 from tisim.packing.placement import Placement
 from tisim.scene import plugins
@@ -125,10 +125,28 @@ def entries() -> list[Entry]:
     return [describe(kind, name) for name, family in FAMILIES.items() for kind in family.kinds().values()]
 
 
+def names() -> dict[str, tuple[type[Component], str]]:
+    """Return class and family of all parts that are known, by name."""
+    return {kind: (cls, family) for family, of in FAMILIES.items() for kind, cls in of.kinds().items()}
+
+
+def groups() -> dict[str, list[Entry]]:
+    """Return the entries of each family, and of each room within one (``contact``), by name."""
+    groups: dict[str, list[Entry]] = {name: [] for name in FAMILIES}
+    for entry in entries():
+        groups[entry.family].append(entry)
+        top, *rooms, _ = entry.kind.__module__.split(".")
+        for room in rooms[1:] if top == "tisim" else ():
+            groups.setdefault(room, []).append(entry)
+    return groups
+
+
 def find(name: str) -> Entry:
-    """The entry of a part by name; InputError listing the known ones where there is none."""
-    known = {kind: (cls, family) for family, of in FAMILIES.items() for kind, cls in of.kinds().items()}
-    must(name in known, "effect", f"one of {', '.join(sorted(known))}", name)
+    """Return the entry of a part by name; InputError with the known ones, and the nearest, for no part."""
+    known = names()
+    if name not in known:
+        rule, nearest = f"one of {', '.join(sorted(known))}", did_you_mean(name, (*known, *groups()))
+        raise InputError(f"effect must be {rule}; received {abbreviated(name)}{nearest}")
     return describe(*known[name])
 
 

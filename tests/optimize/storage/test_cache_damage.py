@@ -163,12 +163,12 @@ def test_a_damaged_seal_does_not_open_the_door_to_a_damaged_structure(path):
         hit[at] ^= 0x10
         hit[at * 7919 % end] ^= 1
         path.write_bytes(hit)
-        with pytest.raises(InputError, match=r"damaged, cut short or another program's"):
+        with pytest.raises(InputError, match=r"; received .* damaged"):
             Cache(path)
-        with pytest.raises(InputError, match=r"damaged, cut short or another program's"):
+        with pytest.raises(InputError, match=r"; received .* damaged"):
             verify(path)
     path.write_bytes(good[:end])
-    with pytest.raises(InputError, match=r"damaged, cut short or another program's"):
+    with pytest.raises(InputError, match=r"; received .* damaged"):
         Cache(path)
 
 

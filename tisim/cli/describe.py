@@ -1,0 +1,85 @@
+"""The commands ``cases``, ``explain``, ``check`` and ``doctor`` tell of cases, a scene and the machine."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tisim.backend import runtime
+from tisim.cli import scene_arguments, targets
+from tisim.cli.options import (
+    Absent,
+    CaseName,
+    Changes,
+    Device,
+    Plugins,
+    Precision,
+    Seed,
+    Size,
+    Target,
+    Threads,
+)
+from tisim.console import err, out, plain_table
+from tisim.errors import RunError
+
+
+def cases() -> None:
+    """List the cases."""
+    from cases.case import every
+
+    for case in every().values():
+        out().print(Text.assemble((case.name, "bold"), f"  {case.title}\n    {case.source}"))
+        table = plain_table()
+        for name, size in case.sizes.items():
+            table.add_row(f"    --size {name}", size.summary)
+        if case.problem is not None:
+            for variant in case.variants:
+                problem = case.problem("default", variant)
+                table.add_row(
+                    f"    --variant {variant}", f"of tisim optimize: {problem.description or problem.title}"
+                )
+        out().print(table)
+
+
+def explain(
+    target: Target, absent: Absent = None, changes: Changes = None, seed: Seed = None,
+    size: Size = None, device: Device = "cpu", precision: Precision = "f64", plugins: Plugins = None,
+) -> None:  # fmt: skip
+    """Say what a scene is made of - effects, memory, phases of a step - and what it leaves out."""
+    from tisim.engine.explain import explain, render
+
+    runtime.init(device, precision)
+    _, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
+    with err().status("compiling"):
+        explanation = explain(scene)
+    out().print(render(explanation))
+
+
+def check(
+    case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
+    plugins: Plugins = None,
+) -> None:  # fmt: skip
+    """Run a case's own checks; exit code 1 when one fails."""
+    checks = targets.case(case).check()
+    runtime.init(device, precision, threads)
+    table = plain_table("check", "measured", "expected", "off by", "allowed", "")
+    failed = 0
+    with err().status("checking") as status:
+        for item in checks:
+            failed += not item.ok
+            verdict = Text("pass", "green") if item.ok else Text("FAIL", "bold red")
+            table.add_row(item.name, *item.cells, verdict)
+            status.update(f"checked: {item.name}")
+    out().print(table)
+    if failed:
+        raise RunError(f"{failed} of {table.row_count} checks failed")
+
+
+def doctor() -> None:
+    """Say what this machine is to tisim, and what the other backend would give."""
+    from tisim.backend.diagnostics import findings
+
+    table = plain_table()
+    with err().status("measuring"):
+        for finding in findings():
+            table.add_row(finding.name, finding.value, finding.note)
+    out().print(table)

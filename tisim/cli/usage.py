@@ -1,0 +1,105 @@
+"""What is wrong with the words of a command line, as tisim says it: "X must be Y; received Z"."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Sequence
+from typing import Any, get_args, get_type_hints
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.models import ParameterInfo
+
+from tisim.errors import InputError, abbreviated, did_you_mean
+
+_exceptions: Any = sys.modules[typer.BadParameter.__module__]
+"""The module of typer's exceptions: its own, or that of click, by the version of typer."""
+UsageError: Any = _exceptions.UsageError
+"""Exception that typer raises for words that no command knows, and to show the help where there are none."""
+NUMBERS = {int: "a whole number", float: "a number"}
+"""What a word must be to be a value of these types; any word is text or a path."""
+
+
+class Command(TyperCommand):
+    """A command whose wrong words are an InputError."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return the words that are left, none; options and arguments are then in the context."""
+        words = list(args)
+        try:
+            return super().parse_args(ctx, args)
+        except UsageError as error:
+            raise InputError(_fault(self, ctx, words, error)) from None
+
+
+class CommandGroup(TyperGroup):
+    """All commands: the word for one of them that is unknown, or an option before it, is an InputError."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return the words of the command and after it."""
+        words = list(args)
+        try:
+            return super().parse_args(ctx, args)
+        except (_exceptions.NoSuchOption, _exceptions.BadOptionUsage) as error:
+            raise InputError(_fault(self, ctx, words, error)) from None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name of the command, the command, and the words after it."""
+        try:
+            return super().resolve_command(ctx, args)
+        except UsageError:
+            known, word = list(self.commands), args[0]
+            raise InputError(
+                f"command must be one of {', '.join(known)}; received {abbreviated(word)}"
+                f"{did_you_mean(word, known)}"
+            ) from None
+
+
+def _fault(command: Any, ctx: Any, words: Sequence[str], error: Any) -> str:
+    """Return what is wrong with the words of a command, for which typer has raised this error."""
+    if isinstance(error, _exceptions.NoSuchOption):
+        known = [
+            name for parameter in command.get_params(ctx) for name in _names(parameter) if name[0] == "-"
+        ]
+        suggestion = did_you_mean(error.option_name, known)
+        rule = f"one of '{ctx.command_path} --help'"
+        return f"option must be {rule}; received {abbreviated(error.option_name)}{suggestion}"
+    if isinstance(error, _exceptions.BadOptionUsage):
+        given = next((word for word in words if word.startswith(f"{error.option_name}=")), None)
+        if given is not None:
+            return f"{error.option_name} must be given without a value; received {abbreviated(given)}"
+        return f"{error.option_name} must be given with a value; received nothing"
+    if isinstance(error, _exceptions.MissingParameter):
+        text = f" ({error.param.help.rstrip('.')})" if error.param.help else ""
+        return f"{_argument(error.param)} must be given{text}; received nothing"
+    values, surplus, _ = command.make_parser(ctx).parse_args(list(words))
+    if isinstance(error, _exceptions.BadParameter):
+        name, rule = max(_names(error.param), key=len), _rule(command, error.param.name)
+        return f"{name} must be {rule}; received {abbreviated(values[error.param.name])}"
+    arguments = [one for one in command.params if one.param_type_name == "argument"]
+    rule = f"{' '.join(map(_argument, arguments))} and no more" if arguments else "none"
+    return f"arguments must be {rule}; received also {', '.join(map(abbreviated, surplus))}"
+
+
+def _argument(parameter: Any) -> str:
+    """Return the name of an argument, as the help has it."""
+    return parameter.metavar or parameter.name.upper()
+
+
+def _names(parameter: Any) -> list[str]:
+    """Return the names of a parameter as they are typed."""
+    return [*parameter.opts, *parameter.secondary_opts]
+
+
+def _rule(command: Any, name: str) -> str:
+    """Return what a word must be to be the value of the option of this name."""
+    annotation = get_type_hints(inspect.unwrap(command.callback), include_extras=True)[name]
+    kind, *declared = get_args(annotation)
+    rule = next(rule for number, rule in NUMBERS.items() if number in (kind, *get_args(kind)))
+    for info in declared:
+        if isinstance(info, ParameterInfo) and info.min is not None:
+            rule += f", at least {info.min:g}"
+        if isinstance(info, ParameterInfo) and info.max is not None:
+            rule += f", at most {info.max:g}"
+    return rule
