@@ -2,7 +2,8 @@
 
 import pytest
 
-from tisim import Scene
+from tisim.cli import new
+from tisim.files import python_file
 from tisim.scene import plugins
 
 
@@ -14,18 +15,36 @@ def run_tests(name):
         test()
 
 
+PARTS = {
+    "pair": (["effect", "soft_law"], "return -self.strength(w)", "return self.strength(w)"),
+    "external": (["effect", "own_spring", "--kind", "external"], "return -self", "return -2.0 * self"),
+    "operator": (["operator", "condensing"], "** 3", "** 2"),
+    "source": (["source", "sheared_flow"], "0.0, 0.0, rate]", "0.0, rate, 0.0]"),
+    "stepper": (["stepper", "own_euler"], "+= dt / s.mass", "+= 0.9 * dt / s.mass"),
+}
+"""Words of the command, and a slip in the law that it writes, for each template."""
+
+
 @pytest.mark.long
-def test_an_effect(tisim, own_file, toml):
-    code, out, _ = tisim("new", "effect", "soft_law")
-    assert code == 0
-    assert out.split("\n")[:2] == ["soft_law.py", "test_soft_law.py"]
-    text = Scene.from_toml(toml).to_toml()
-    own_file(
-        toml, f"{text}\n[effects.soft_law]\nstrength = 1e-6\nlength = 1e-4\n".replace("\n[effects]\n", "")
-    )
-    code, _, err = tisim("run", toml, "--plugin", "soft_law.py")
+@pytest.mark.parametrize("template", PARTS)
+def test_a_part_of_scenes(tisim, own_file, tmp_path, template):
+    words, law, slip = PARTS[template]
+    name = words[1]
+    code, out, err = tisim("new", *words)
     assert code == 0, err
-    run_tests("soft_law")
+    *files, advice = out.splitlines()
+    assert files == [f"{name}.py", f"test_{name}.py", f"{name}.toml"]
+    assert advice == f"to try it: tisim run {name}.toml --plugin {name}.py; python -m pytest test_{name}.py"
+    code, _, err = tisim("run", f"{name}.toml", "--plugin", f"{name}.py")
+    assert code == 0, err
+    run_tests(name)
+    text = (tmp_path / f"{name}.py").read_text()
+    assert text.count(law) == 1
+    own_file(f"{name}.py", text.replace(law, slip))
+    python_file.unload(f"test_{name}")
+    plugins.load(f"{name}.py")
+    with pytest.raises(AssertionError):
+        run_tests(name)
 
 
 @pytest.mark.long
@@ -47,12 +66,21 @@ def test_a_problem(tisim, own_file):
     run_tests("my_throw")
 
 
+KEPT = ("there.py", "test_tested.py", "settled.toml")
 WRONG = [
-    (["law", "soft_law"], "kind must be one of effect, case, problem; received 'law'"),
+    (["law", "soft_law"], f"WHAT must be one of {', '.join(new.COMMANDS)}; received 'law'"),
+    (
+        ["efect", "x"],
+        f"WHAT must be one of {', '.join(new.COMMANDS)}; received 'efect'; did you mean 'effect'?",
+    ),
+    (["effect", "x", "--kind", "trio"], "--kind must be one of pair, external; received 'trio'"),
+    (["source", "x", "--kind", "pair"], "--kind must be given for an effect only; received 'pair'"),
     (["effect", "SoftLaw"], "name must be a name of Python in lower case; received 'SoftLaw'"),
     (["effect", "class"], "name must be a name of Python in lower case; received 'class'"),
     (["case", "json"], "name must be one that no other module has; received 'json'"),
-    (["effect", "gravity"], "name must be one that no other effect has; received 'gravity'"),
+    (["effect", "gravity"], "name must be one that no other part of scenes has; received 'gravity'"),
+    (["stepper", "verlet"], "name must be one that no other part of scenes has; received 'verlet'"),
+    (["operator", "settled"], "file to write must be one that is not there yet; received 'settled.toml'"),
     (["effect", "there"], "file to write must be one that is not there yet; received 'there.py'"),
     (["effect", "tested"], "file to write must be one that is not there yet; received 'test_tested.py'"),
 ]
@@ -60,9 +88,8 @@ WRONG = [
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
 def test_nothing_is_overwritten_and_wrong_names_are_refused(tisim, own_file, tmp_path, arguments, message):
-    own_file("there.py", "kept"), own_file("test_tested.py", "kept")
+    for file in KEPT:
+        own_file(file, "kept")
     code, out, err = tisim("new", *arguments)
     assert (code, out, err) == (2, "", f"{message}\n")
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
-        "there.py": "kept", "test_tested.py": "kept"
-    }  # fmt: skip
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(KEPT, "kept")

@@ -10,48 +10,65 @@ from typing import Annotated
 
 import typer
 
-from tisim.errors import InputError, must
+from tisim.errors import InputError, abbreviated, did_you_mean, must
 from tisim.files import regular_file
 
 TEMPLATES = Path(__file__).with_name("templates")
-KINDS = {
-    "effect": "tisim run scene.toml --plugin {}",
-    "case": "tisim check {}",
-    "problem": "tisim optimize {}",
+SCENE_COMMAND = "tisim run {0}.toml --plugin {0}.py"
+COMMANDS = {
+    "effect": SCENE_COMMAND,
+    "operator": SCENE_COMMAND,
+    "source": SCENE_COMMAND,
+    "stepper": SCENE_COMMAND,
+    "case": "tisim check {}.py",
+    "problem": "tisim optimize {}.py",
 }
-"""Kinds of files, and the command that uses each."""
+"""What can be written, and the command that uses each."""
+EFFECTS = ("pair", "external")
+"""Sorts of effects: of forces between two particles, and on each by itself."""
 
-Kind = Annotated[str, typer.Argument(metavar="KIND", help=f"{', '.join(KINDS)}.")]
+What = Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(COMMANDS)}.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the file NAME.py, such as soft_shell.")]
+Sort = Annotated[
+    str | None,
+    typer.Option("--kind", help="Of an effect: pair (between two particles; default) or external (on each)."),
+]
 
 
-def new(kind: Kind, name: Name) -> None:
-    """Write NAME.py with a pair force, a case or an inverse problem that runs, and test_NAME.py.
+def new(what: What, name: Name, kind: Sort = None) -> None:
+    """Write NAME.py with a part of scenes, a case or an inverse problem that runs, and test_NAME.py.
 
-    Files that are there already stay as they are.
+    Beside an effect, operator, source or stepper stands NAME.toml, a scene with it. Files that are there
+    already stay as they are.
     """
-    must(kind in KINDS, "kind", f"one of {', '.join(KINDS)}", kind)
+    rule = f"one of {', '.join(COMMANDS)}"
+    if what not in COMMANDS:
+        raise InputError(f"WHAT must be {rule}; received {abbreviated(what)}{did_you_mean(what, COMMANDS)}")
+    must(kind is None or what == "effect", "--kind", "given for an effect only", kind)
+    must(kind is None or kind in EFFECTS, "--kind", f"one of {', '.join(EFFECTS)}", kind)
     must(name.isidentifier() and name == name.lower() and not keyword.iskeyword(name), "name",
          "a name of Python in lower case", name)  # fmt: skip
-    fields = {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
-    files = {Path(f"{name}.py"): f"{kind}.txt", Path(f"test_{name}.py"): f"test_{kind}.txt"}
+    template = (kind or EFFECTS[0]) if what == "effect" else what
+    files = {Path(f"{name}.py"): f"{template}.txt", Path(f"test_{name}.py"): f"test_{template}.txt"}
+    if COMMANDS[what] == SCENE_COMMAND:
+        files[Path(f"{name}.toml")] = f"scene_{template}.txt"
     for path in files:
         must(not regular_file.exists(path), "file to write", "one that is not there yet", str(path))
-    _check_name(kind, name)
-    for path, template in files.items():
-        _write(path, Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(fields))
+    _check_name(what, name)
+    fields = {"name": name, "Class": "".join(word.capitalize() for word in name.split("_"))}
+    for path, text in files.items():
+        _write(path, Template((TEMPLATES / text).read_text(encoding="utf-8")).substitute(fields))
         print(path)
-    print(f"to try it: {KINDS[kind].format(f'{name}.py')}; python -m pytest test_{name}.py")
+    print(f"to try it: {COMMANDS[what].format(name)}; python -m pytest test_{name}.py")
 
 
-def _check_name(kind: str, name: str) -> None:
-    """Raise InputError where Python, or for an effect a scene, would take the name for something else."""
-    from tisim.effects import Effect
-    from tisim.scene import plugins
+def _check_name(what: str, name: str) -> None:
+    """Raise InputError where Python, or a scene for its parts, would take the name for something else."""
+    from tisim.engine import reference
 
     must(find_spec(name) is None, "name", "one that no other module has", name)
-    plugins.load_parts()
-    must(kind != "effect" or name not in Effect.known(), "name", "one that no other effect has", name)
+    of_scene = COMMANDS[what] == SCENE_COMMAND
+    must(not of_scene or name not in reference.names(), "name", "one that no other part of scenes has", name)
 
 
 def _write(path: Path, text: str) -> None:
