@@ -18,7 +18,7 @@ from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import decades, tied
 from tisim.accuracy.sweep import exchanged, finest, methods, parts, rivals
-from tisim.accuracy.table import sources
+from tisim.accuracy.table import notes
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects import InducedMoment, MutualInducedMoment, NearField, Tether, TruncatedNearField
@@ -323,6 +323,7 @@ def test_a_reference_that_tells_nothing_apart_is_said_to():
     quantity = Quantity("positions", lambda result: result.state["position"])
     for error, said in ((1e-3, False), (1.3, True)):
         truth = SimpleNamespace(error=error, source="a finer run")
-        study = SimpleNamespace(quantities=[quantity], truths=[truth], decades=dict, complete=True, rows=[])
-        text = " ".join(sources(study))
+        study = Study(oscillator(), [quantity])
+        study.truths, study.complete = (truth,), True
+        text = " ".join(notes(study))
         assert ("the reference itself is off by 1 of the motion" in text) == said

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tests.accuracy.scenes import RATE, SPEED, only, oscillator, place
-from tisim.accuracy import Quantity, Study, storage, study
+from tisim import RunError
+from tisim.accuracy import Quantity, Study, reference, storage, study
 from tisim.accuracy.quantity import displacement
-from tisim.accuracy.table import sources
+from tisim.accuracy.table import notes
 from tisim.accuracy.timing import OBSERVATIONS, SimulationCache
 from tisim.backend import runtime
 from tisim.effects import Tether
@@ -104,10 +105,52 @@ def test_compiling_takes_nothing_of_the_budget(verlet_only, monkeypatch):
     assert len(cost_study.rows) == 3
 
 
+def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch, tmp_path):
+    now, late = time.monotonic, [0.0]
+
+    def slowly(self, scenes, progress, on_result=None, run=SimulationCache.run):
+        if scenes[0].stepper.control.dt == 0.01:
+            progress(0.0)
+            late[0] += 1e4
+            progress(0.5)
+        return run(self, scenes, progress, on_result)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(time, "monotonic", lambda: now() + late[0])
+        patch.setattr(SimulationCache, "run", slowly)
+        cost_study = study(closed(), **FEW, limit=3e3)
+    assert [row.failed for row in cost_study.rows] == [
+        "over the limit of 3000 s" * (k == 0) for k in range(3)
+    ]
+    assert cost_study.complete
+    assert cost_study.cheapest(1.0) in cost_study.rows[1:]
+    assert "  dt=0.01: over the limit of 3000 s" in map(str, cost_study.table().renderables)
+    cost_study.write(tmp_path)
+    for limit, known in ((3e3, 3), (1e3, 3), (4e3, 2), (np.inf, 2)):
+        again = Study(closed(), **FEW, limit=limit)
+        storage.resume(again, tmp_path)
+        assert (len(again.rows), again.complete) == (known, known == 3)
+    again.run()
+    assert sorted(len(row.errors) for row in again.rows) == [1, 1, 1]
+
+
+def test_a_reference_that_tells_nothing_apart_ends_a_study_that_needs_one(verlet_only, monkeypatch):
+    """Before any setting is run; its truth is kept."""
+    monkeypatch.setattr(reference, "USELESS", 1e-12)
+    cost_study = Study(closed(), **FEW, require_reference=True)
+    refusal = r"^displacement must be known by the reference to 1e-12 of the motion; received .* are chaotic"
+    for _ in range(2):
+        with pytest.raises(RunError, match=refusal):
+            cost_study.run()
+    assert cost_study.rows == []
+    assert len(cost_study.truths) == 1
+    assert len(study(closed(), **FEW).rows) == 3
+
+
 def test_a_law_that_makes_no_difference_is_called_the_same(verlet_only, monkeypatch):
     softer = Tether(stiffness=(10.0,) * 3)
     monkeypatch.setattr(Tether, "approximations", lambda self, extent: (softer, self.model_copy()))
     cost_study = study(closed(), **FEW)
     assert [row.same for row in cost_study.line("Tether")] == [False, True]
     assert not any(row.same for row in cost_study.line("Verlet, FixedStep: dt"))
-    assert "no change: the same as of the law that it stands for, but for rounding" in sources(cost_study)
+    assert "no change: the same as of the law that it stands for, but for rounding" in notes(cost_study)

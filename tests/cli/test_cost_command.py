@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import shlex
 import signal
 
@@ -11,7 +12,7 @@ from typer.main import get_command
 from cases.case import every
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
-from tisim.accuracy import Row, Study, storage
+from tisim.accuracy import Row, Study, reference, storage
 from tisim.accuracy.formatting import options, shell_line
 from tisim.accuracy.sweep import methods
 from tisim.cli import cost, scene_arguments
@@ -27,6 +28,7 @@ WRONG = [
     (["vibration", "--quantity", "speed"], "quantity must be one of positions, centre of gravity; received"),
     (["vibration", "--repeats", "0"], "repeats must be at least 1; received 0"),
     (["vibration", "--coarser", "-2"], "coarser + finer must be at least 0; received -2"),
+    (["vibration", "--limit", "0"], "limit must be greater than 0; received 0.0"),
     (["vibration", "--budget", "-1"], "budget must be greater than 0; received -60.0"),
     (["agglomeration", "--starts", "4,x"], "--starts must be whole numbers with commas between; received"),
     (["agglomeration", "--starts", "1"], "starts must be at least 2; received [1]"),
@@ -58,10 +60,27 @@ def rows(folder):
 
 
 @pytest.mark.long
-def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path):
+def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--quick", "--error")
-    code, out, _ = tisim(*command, "1e-3")
+    with monkeypatch.context() as patch:
+        patch.setattr(reference, "USELESS", 1e-12)
+        code, out, err = tisim(*command, "1e-3")
+        assert (code, out) == (1, "")
+        assert "displacement must be known by the reference to 1e-12 of the motion; received" in err
+        assert "dt=" not in err
+        code, out, err = tisim(*command, "1e-3", "--anyway")
     assert code == 0
+    # Nothing is said at the end only: where the error is from, and what is wrong with it, comes first.
+    truth, advice, *measured = [
+        line for line in err.splitlines() if not line.startswith(("running", "going"))
+    ]
+    assert truth.startswith("error of displacement: against Verlet, FixedStep at ")
+    assert advice.startswith("displacement: the reference itself is off by ")
+    settings = [
+        re.fullmatch(r"Verlet, FixedStep: dt, (dt=\S+): error \S+; \S+ s(; .* left)?", line)[1]
+        for line in measured
+    ]
+    assert settings == ["dt=0.0316", "dt=0.01", "dt=0.00316"]
     folder = tmp_path / "out" / "swing-cost"
     assert {path.name for path in folder.iterdir()} == {".tisim", *storage.COST_FILES}
     # dt = 0.0316 and 0.01 come before: their errors are 7e-3 and 7e-4.

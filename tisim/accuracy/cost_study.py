@@ -23,11 +23,15 @@ if TYPE_CHECKING:
 class Study:
     """Settings of a scene, what they cost and how accurate they are.
 
-    quantities : what errors are of; by default ``quantity.usual``. coarser, finer : decades of error on
-    either side of what the scene asks for. repeats : of each timing. precisions : "f64" and others to try.
-    starts : numbers of random starts, for quantities that are random. budget : wall seconds of running, of
-    which compiling takes nothing; what would not fit is left out. rows, truths : what is known so far, in
-    order; a truth for each quantity.
+    quantities : what errors are of; by default ``quantity.usual``.
+    coarser, finer : decades of error on either side of what the scene asks for.
+    repeats : of each timing. precisions : "f64" and others to try.
+    starts : numbers of random starts, for quantities that are random.
+    budget : wall seconds of running, of which compiling takes nothing; what would not fit is left out.
+    limit : wall seconds, without compiling, after which the run of a setting is stopped; its row says so.
+    require_reference : whether to stop with a RunError, before any setting is run, where the reference does
+        not tell settings apart.
+    rows, truths : what is known so far, in order; a truth for each quantity.
     complete : nothing is left to measure.
 
     To measure another precision, tisim starts anew: simulations made before must not be used afterwards.
@@ -44,6 +48,8 @@ class Study:
         precisions: Sequence[str] = ("f64", "f32"),
         starts: Sequence[int] = (8, 32, 128),
         budget: float = math.inf,
+        limit: float = math.inf,
+        require_reference: bool = False,
     ) -> None:
         must(repeats >= 1, "repeats", "at least 1", repeats)
         must(coarser + finer >= 0, "coarser + finer", "at least 0", coarser + finer)
@@ -53,6 +59,7 @@ class Study:
         must(list(starts) == sorted(set(starts)), "starts", "given from few to many", list(starts))
         must(len(starts) > 0 and starts[0] > 1, "starts", "at least 2", list(starts))
         must(budget > 0, "budget", "greater than 0", budget)
+        must(limit > 0, "limit", "greater than 0", limit)
         self.scene = scene
         self.quantities = tuple(quantities) or usual(scene)
         kinds = {quantity.random for quantity in self.quantities}
@@ -61,7 +68,8 @@ class Study:
         must(len(kinds) == 1, "quantities", "all random, or none", sorted(kinds))
         self.random = kinds == {True}
         self.levels = tuple(float(k) for k in range(coarser, -finer - 1, -1))
-        self.repeats, self.precisions, self.budget = repeats, tuple(precisions), budget
+        self.repeats, self.precisions = repeats, tuple(precisions)
+        self.budget, self.limit, self.require_reference = budget, limit, require_reference
         self.starts = tuple(starts) if self.random else (1,)
         self.rows: list[Row] = []
         self.truths: tuple[Truth, ...] = ()

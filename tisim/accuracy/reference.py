@@ -21,6 +21,13 @@ from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.scene import Scene
 
+USELESS = 0.1
+"""A reference whose own error, over the size of the motion, is above this does not tell settings apart."""
+ADVICE = (
+    "paths are chaotic, or hard to resolve. A shorter duration may do; or ask for a quantity of many random "
+    "starts (docs/accuracy.md)"
+)
+"""What to do where the reference does not tell settings apart."""
 TIGHTER = 2.0
 """Decades between the finest setting of the sweep and the reference."""
 
@@ -98,6 +105,15 @@ def compared(
     source += "".join(f" and by {attempt.name}" for attempt in references[2:3])
     # What the stepper does to every start, and what so few starts leave open.
     return _truth(quantity, QuantityEstimate(best.value, off + best.uncertainty), source, largest)
+
+
+def tells_apart(quantity: Quantity, truth: Truth) -> bool:
+    """Return whether errors against the truth of a quantity tell settings apart.
+
+    They do not where the reference itself is off by a good part of the size of the motion. What is left open
+    by a number of random starts is no fault of the reference: more starts are a setting like others.
+    """
+    return quantity.random or truth.error <= USELESS
 
 
 def _truth(quantity: Quantity, estimated: QuantityEstimate, source: str, largest: float) -> Truth:

@@ -30,7 +30,8 @@ class Row:
     seconds : wall seconds of each repeat. steps, sums, rejections : steps, sums of forces and rejected steps
     of a particle, the mean over particles and starts.
     errors : for each quantity the error, and how far that may be off; both relative.
-    failed : why there is no result, or nothing. same : whether it is a law that makes no difference here to
+    failed : why there is no result, or nothing; of a run that was stopped as it took too long ``seconds`` is
+    the limit. same : whether it is a law that makes no difference here to
     the one it stands for.
     """
 
@@ -68,6 +69,11 @@ class Row:
         """The least and the most wall time that it may take, s: as measured, or as well as a clock tells."""
         uncertainty = max(CLOCK_RESOLUTION, (ALWAYS if len(self.seconds) > 1 else ONCE) * self.median)
         return min(*self.seconds, self.median - uncertainty), max(*self.seconds, self.median + uncertainty)
+
+    @property
+    def stopped_after(self) -> float:
+        """The limit at which it was stopped, wall seconds; infinite for any other row."""
+        return max(self.seconds) if self.failed and self.seconds else math.inf
 
     def same_errors(self, other: Row) -> bool:
         """Whether another row has the same errors, but for rounding."""

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tisim.accuracy import reference
-from tisim.accuracy.formatting import expression, options, shell_line
-from tisim.accuracy.quantity import estimate
-from tisim.accuracy.row import Row
-from tisim.accuracy.sweep import Setting, SettingSweep, ensembles, in_steps_of_at_most, methods
+from tisim.accuracy.sweep import SettingSweep, ensembles, in_steps_of_at_most, methods
 from tisim.accuracy.timing import OBSERVATIONS, Limit, OutOfTime, ResultCallback, SimulationCache, Timed
+from tisim.accuracy.trial import Trial
 from tisim.backend import runtime
 from tisim.components.accuracy_parameter import three_digits
 from tisim.engine.result import Result
@@ -65,6 +63,7 @@ class Run:
         ]
         rest = sum(self._cost(m, k) for items in plan for m, k in items)
         self._truths(base, sweeps, rest)
+        self._check_truths()
         for precision in study.precisions:
             if runtime.current().precision != precision:
                 self.simulations.close()
@@ -89,16 +88,13 @@ class Run:
     def _cost(self, method: SettingSweep, k: int) -> float:
         """Guess of the seconds that a setting takes, all repeats, from another of its method if known."""
         weights, repeats = method.weights, self.study.repeats
+        most = repeats * self.study.limit
         guesses = dict(zip((setting.description for setting in method.settings), weights, strict=True))
         for row in self.study.line(method.name):
             if row.seconds and row.setting in guesses:
-                return repeats * row.median * weights[k] / guesses[row.setting]
-        return (
-            repeats
-            * self.base
-            * method.settings[k].starts
-            * (weights[k] if method.accuracy_parameter else 1.0)
-        )
+                return min(repeats * row.median * weights[k] / guesses[row.setting], most)
+        weight = weights[k] if method.accuracy_parameter else 1.0
+        return min(repeats * self.base * method.settings[k].starts * weight, most)
 
     def _largest(self) -> list[float]:
         """How large each quantity has been on the way, in steps that no observation has to wait for; 0 where
@@ -134,11 +130,12 @@ class Run:
             for attempt, cost in zip(references, costs, strict=True):
                 self.what = f"{'reference' if attempt is references[0] else 'its check'}: {attempt.name}"
                 try:
-                    runs.append(
-                        self._run(self._starts(attempt.scene, n, REFERENCE_SEED_OFFSET), cost).results
-                    )
+                    starts = self._starts(attempt.scene, n, REFERENCE_SEED_OFFSET)
+                    runs.append(self._run(starts, cost, self._left()).results)
                 except RunError as error:
                     raise RunError(f"the {self.what}: {error}") from None
+                except OutOfTime:
+                    raise RunError(f"the {self.what}: takes more running than the budget has") from None
         largest = self._largest()
         study.truths = tuple(
             reference.compared(q, runs, references, most)
@@ -148,6 +145,16 @@ class Run:
         )
         self.finished()
 
+    def _check_truths(self) -> None:
+        """RunError where the truth of a quantity does not tell settings apart, and it was asked to."""
+        for quantity, truth in zip(self.study.quantities, self.study.truths, strict=True):
+            if self.study.require_reference and not reference.tells_apart(quantity, truth):
+                raise RunError(
+                    f"{quantity.name} must be known by the reference to {reference.USELESS:g} of the motion; "
+                    f"received {truth.error:.1g}: {reference.ADVICE}. To go on: --anyway, or a Study with "
+                    "require_reference=False"
+                )
+
     def _starts(self, scene: Scene, n: int, first: int = 0) -> list[Scene]:
         seed = scene.seed + first
         return (
@@ -155,30 +162,37 @@ class Run:
         )
 
     def _round(self, items: Sequence[tuple[SettingSweep, int]]) -> None:
-        """Settings of one level, repeats in turns; then their rows."""
-        runs: dict[int, list[Timed]] = {at: [] for at in range(len(items))}
-        failed: dict[int, str] = {}
-        costs = [self._cost(method, k) for method, k in items]
+        """Run the settings of one level, repeats in turns; the row of each is made when its last is done."""
+        repeats = self.study.repeats
+        trials = [Trial(method, k, self._cost(method, k) / repeats) for method, k in items]
         try:
-            for repeat in range(self.study.repeats):
-                for at, (method, k) in enumerate(items):
-                    cost, setting = costs[at] / self.study.repeats, method.settings[k]
-                    self.what = f"{method.name}, {setting.description}"
-                    if at in failed or (repeat == 0 and self._left() < costs[at]):
-                        self.done += cost
-                        continue
-                    try:
-                        scenes = self._starts(setting.scene, setting.starts)
-                        runs[at].append(self._run(scenes, cost, self._left()))
-                    except OutOfTime:
-                        self.done += cost
-                    except (RunError, InputError) as error:
-                        failed[at] = str(error)
+            for repeat in range(repeats):
+                for trial in trials:
+                    trial.left_out |= repeat == 0 and self._left() < trial.cost * repeats
+                    self._repeat(trial)
+                    if repeat == repeats - 1:
+                        self._row(trial)
         finally:
             # Also when it is stopped half-way: what is measured stays.
-            for at, (method, k) in enumerate(items):
-                if runs[at] or at in failed:
-                    self._row(method, k, runs[at], failed.get(at, ""))
+            for trial in trials:
+                self._row(trial)
+
+    def _repeat(self, trial: Trial) -> None:
+        """Run a setting once more, unless it has failed or would not fit the budget."""
+        self.what = f"{trial.method.name}, {trial.setting.description}"
+        if trial.failed or trial.left_out:
+            self.done += trial.cost
+            return
+        left, limit = self._left(), self.study.limit
+        try:
+            scenes = self._starts(trial.setting.scene, trial.setting.starts)
+            trial.runs.append(self._run(scenes, trial.cost, min(left, limit)))
+        except OutOfTime:
+            self.done += trial.cost
+            if limit <= left and not trial.runs:
+                trial.failed, trial.stopped_after = f"over the limit of {limit:g} s", (limit,)
+        except (RunError, InputError) as error:
+            trial.failed = str(error)
 
     def _compare_laws(self, sweeps: Sequence[SettingSweep]) -> None:
         """Cheaper laws that make the same errors as the law they stand for are no laws of their own."""
@@ -218,26 +232,9 @@ class Run:
         self.done = done_before + cost
         return timed
 
-    def _row(self, method: SettingSweep, k: int, runs: Sequence[Timed], failed: str) -> None:
-        study, setting = self.study, method.settings[k]
-        row = Row(
-            method.name, setting.description, self._python(setting),
-            shell_line(options(study.scene, setting.scene, setting.precision)),
-            setting.precision, setting.starts, failed=failed,
-        )  # fmt: skip
-        if not failed:
-            steps, sums, rejections = runs[0].work
-            errors = tuple(
-                estimate(q, runs[0].results).error(truth.estimate, truth.size)
-                for q, truth in zip(study.quantities, study.truths, strict=True)
-            )
-            row = replace(
-                row, seconds=tuple(run.seconds for run in runs), steps=steps, sums=sums,
-                rejections=rejections, errors=errors,
-            )  # fmt: skip
-        study.rows.append(row)
-        self.finished()
-
-    def _python(self, setting: Setting) -> str:
-        laws = [e for e in setting.scene.effects if e not in self.study.scene.effects]
-        return "; ".join(expression(part) for part in (setting.scene.stepper, *laws))
+    def _row(self, trial: Trial) -> None:
+        """Make the row of a setting that has been run, once."""
+        if not trial.in_rows and (trial.runs or trial.failed):
+            trial.in_rows = True
+            self.study.rows.append(trial.row(self.study))
+            self.finished()

@@ -116,7 +116,8 @@ def clear(folder: Path) -> None:
 def resume(study: Study, folder: Path) -> None:
     """Give a study the rows and truths that an earlier one of the same scene has left in a folder.
 
-    InputError when what is there is of another one; nothing happens where nothing is.
+    What was stopped at a shorter limit than the study has is left to be measured again. InputError when what
+    is there is of another one; nothing happens where nothing is.
     """
     path = folder / HDF5
     if not regular_file.exists(path):
@@ -125,8 +126,11 @@ def resume(study: Study, folder: Path) -> None:
         same = json.loads(file.attrs["identity"]) == study.identity()
         rule = "without the study of another scene, version, machine or depth (or give --out or --overwrite)"
         must(same, "output folder", rule, str(folder))
-        study.rows, study.truths = _rows(file["rows"]), _truths(file["truths"], study)
-        study.complete = file.attrs["complete"] == json.dumps(study.sweep_settings())
+        stored = _rows(file["rows"])
+        study.rows = [row for row in stored if row.stopped_after >= study.limit]
+        study.truths = _truths(file["truths"], study)
+        complete = file.attrs["complete"] == json.dumps(study.sweep_settings())
+        study.complete = complete and len(study.rows) == len(stored)
 
 
 def rows(path: Path) -> list[Row]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -10,11 +11,9 @@ from rich.text import Text
 
 from tisim.accuracy.cost_study import Study
 from tisim.accuracy.formatting import shell_line
+from tisim.accuracy.reference import ADVICE, tells_apart
 from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
-
-USELESS = 0.1
-"""A reference whose own error, over the size of the motion, is above this does not tell settings apart."""
 
 
 def table(study: Study) -> RenderableType:
@@ -30,7 +29,9 @@ def table(study: Study) -> RenderableType:
     first, *widths = (max(len(line) for cell in column for line in cell.split("\n")) for column in columns)
     # No number is cut: the settings wrap between them, and have room for the longest.
     longest = max((len(word) for row in study.rows for word in row.setting.split()), default=0)
-    widths = [max(1 + longest, min(first, TERMINAL_WIDTH - sum(widths) - len(widths))), *widths]
+    widths = [max(1 + longest, min(1 + first, TERMINAL_WIDTH - sum(widths) - len(widths))), *widths]
+    for cell in cells.values():
+        cell[0] = fill(cell[0], widths[0], initial_indent=" ", subsequent_indent=" ")
     relative = ", ".join(f"{q.name}: relative to {q.relative_to}" for q in study.quantities)
     blocks: list[RenderableType] = [Text(f"errors of {relative}"), _grid([heads], widths, "bold")]
     for method in dict.fromkeys(row.method for row in study.rows):
@@ -52,28 +53,38 @@ def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
     return grid
 
 
-def _cells(row: Row, best: str) -> list[str]:
-    errors = [
+def error_texts(row: Row) -> list[str]:
+    """Return the error of each quantity as text; where no more is known, what it is at most."""
+    return [
         f"{row.errors[k][0]:.1e}" if row.trusted(k) else f"< {row.at_most(k):.0e}"
         for k in range(len(row.errors))
     ]
+
+
+def _cells(row: Row, best: str) -> list[str]:
     work = [f"{value:.0f}" for value in (row.steps, row.sums, row.rejections)]
     note = "no change" if row.same else best
-    return [f" {row.setting}", f"{row.median:.3g}", f"{row.spread:.1g}", *work, *errors, note]
+    return [row.setting, f"{row.median:.3g}", f"{row.spread:.1g}", *work, *error_texts(row), note]
 
 
-def sources(study: Study) -> list[str]:
-    """Where the true values are from, and how good they are; a line for each quantity."""
+def truths(study: Study) -> list[str]:
+    """Return a line for each quantity that says where its true value is from and how good it is; one more
+    where that does not tell settings apart, unless the study ends there and says so itself."""
     lines = []
     for quantity, truth in zip(study.quantities, study.truths, strict=False):
         own = f"; its own error at most {truth.error:.1e}" if truth.error else ""
         lines.append(f"error of {quantity.name}: against {truth.source}{own}")
-        if truth.error > USELESS and not quantity.random:
+        if not tells_apart(quantity, truth) and not study.require_reference:
             lines.append(
                 f"{quantity.name}: the reference itself is off by {truth.error:.1g} of the motion, so errors "
-                "say little: paths are chaotic, or hard to resolve. A shorter duration may do; or ask for a "
-                "quantity of many random starts (docs/accuracy.md)"
+                f"say little: {ADVICE}"
             )
+    return lines
+
+
+def notes(study: Study) -> list[str]:
+    """Return lines that stand below the table: the true values, and what words in the table mean."""
+    lines = truths(study)
     if any(len(rows) > 1 for rows in study.decades().values()):
         lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
     if not study.complete:

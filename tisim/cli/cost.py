@@ -25,7 +25,7 @@ from tisim.cli.options import (
     Target,
     Threads,
 )
-from tisim.console import err, out, print_stopping, progress_bar
+from tisim.console import err, out, print_stopping
 from tisim.errors import must
 from tisim.files import lock, ownership
 from tisim.files.resuming import resume_hint
@@ -34,6 +34,9 @@ from tisim.interrupt import Interrupt
 if TYPE_CHECKING:
     from tisim.accuracy import Quantity, Row, Study
     from tisim.scene.scene import Scene
+
+QUICK_LIMIT = 20.0
+"""With --quick a setting that runs longer is stopped, s: what takes so long is no match for the others."""
 
 
 def cost(
@@ -66,8 +69,23 @@ def cost(
         str | None, typer.Option(metavar="N,N,...", help="Numbers of random starts to try: 8,32,128.")
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A look: stop a decade above what the scene asks for, time once.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="A look: stop a decade above what the scene asks for, time once, and give up where the "
+            "reference does not tell settings apart.",
+        ),
     ] = False,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Go on with --quick whatever the reference is good for.")
+    ] = False,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            help=f"Stop a setting that runs longer; {QUICK_LIMIT:g} with --quick, else none by default.",
+        ),
+    ] = None,
     budget: Annotated[
         float, typer.Option(metavar="MINUTES", help="Leave out what would run longer; compiling is free.")
     ] = math.inf,
@@ -97,6 +115,8 @@ def cost(
         precisions=("f64", "f32") if single else ("f64",),
         starts=((4, 16, 64) if quick else (8, 32, 128)) if starts is None else _whole_numbers(starts),
         budget=60 * budget,
+        limit=(QUICK_LIMIT if quick else math.inf) if limit is None else limit,
+        require_reference=quick and not anyway,
     )
     quantity_index = study.index(quantity)
     out_folder = folder or Path("out") / f"{name}-cost"
@@ -112,7 +132,7 @@ def cost(
         if study.truths and study.rows:
             out().print(table.table(study))
             paths = [*storage.write(study, out_folder), save(study, out_folder / storage.PICTURE)]
-            out().print("\n".join([*table.sources(study), *map(str, paths)]))
+            out().print("\n".join([*table.notes(study), *map(str, paths)]))
     if not finished:
         err().print(f"stopped; {out_folder / storage.HDF5} has what is done. {resume_hint(fresh, overwrite)}")
         raise typer.Exit(130)
@@ -176,18 +196,22 @@ def _whole_numbers(text: str) -> tuple[int, ...]:
 
 
 def _measure(study: Study, out_folder: Path) -> bool:
-    """Run behind a bar, with rows on the disk as they come; return False when Ctrl-C has stopped it."""
+    """Run, with progress told and rows on the disk as they come; return False when Ctrl-C has stopped it."""
     from tisim.accuracy import storage
+    from tisim.cli.cost_progress import CostProgress
 
-    with progress_bar("", "{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
-        task = bar.add_task("", total=1.0)
+    with CostProgress(study) as progress, Interrupt(print_stopping) as ctrl_c:
 
-        def progress(fraction: float, step: str) -> None:
-            bar.update(task, completed=fraction, description=step[:48])
+        def report(fraction: float, what: str) -> None:
+            progress.running(fraction, what)
             ctrl_c.check()
 
+        def keep() -> None:
+            storage.write(study, out_folder)
+            progress.finished()
+
         try:
-            study.run(progress, lambda: storage.write(study, out_folder))
+            study.run(report, keep)
         except KeyboardInterrupt:
             if ctrl_c.forced:
                 raise
