@@ -136,7 +136,7 @@ def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch
 
 def test_a_reference_that_tells_nothing_apart_ends_a_study_that_needs_one(verlet_only, monkeypatch):
     """Before any setting is run; its truth is kept."""
-    monkeypatch.setattr(reference, "USELESS", 1e-12)
+    monkeypatch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
     cost_study = Study(closed(), **FEW, require_reference=True)
     refusal = r"^displacement must be known by the reference to 1e-12 of the motion; received .* are chaotic"
     for _ in range(2):

@@ -63,7 +63,7 @@ def rows(folder):
 def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, monkeypatch):
     command = ("cost", swing, "--no-f32", "--quick", "--error")
     with monkeypatch.context() as patch:
-        patch.setattr(reference, "USELESS", 1e-12)
+        patch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
         code, out, err = tisim(*command, "1e-3")
         assert (code, out) == (1, "")
         assert "displacement must be known by the reference to 1e-12 of the motion; received" in err

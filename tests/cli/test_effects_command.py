@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from tests.own_files import LAW
 from tisim.engine import reference
 
 
@@ -59,6 +60,14 @@ def test_one_of_them_says_all_that_is_known_of_it(tisim):
     assert reference.find("impact").toml in out
     assert "\nsoftening " in out, "those of the room of this name"
     assert "needs: impact" in tisim("effects", "friction")[1]
+
+
+def test_one_of_a_plugin_is_listed_with_its_family(tisim, own_file):
+    own_file("own_laws.py", LAW)
+    code, out, err = tisim("effects", "effects", "--plugin", "own_laws.py")
+    assert (code, err) == (0, "")
+    assert [line for line in out.splitlines() if line.startswith("pull ")]
+    assert "own_laws.Pull" in tisim("effects", "pull", "--plugin", "own_laws.py")[1]
 
 
 def test_an_unknown_one_is_wrong_input(tisim):

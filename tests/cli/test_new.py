@@ -68,10 +68,10 @@ def test_a_problem(tisim, own_file):
 
 KEPT = ("there.py", "test_tested.py", "settled.toml")
 WRONG = [
-    (["law", "soft_law"], f"WHAT must be one of {', '.join(new.COMMANDS)}; received 'law'"),
+    (["law", "soft_law"], f"WHAT must be one of {', '.join(new.USES)}; received 'law'"),
     (
         ["efect", "x"],
-        f"WHAT must be one of {', '.join(new.COMMANDS)}; received 'efect'; did you mean 'effect'?",
+        f"WHAT must be one of {', '.join(new.USES)}; received 'efect'; did you mean 'effect'?",
     ),
     (["effect", "x", "--kind", "trio"], "--kind must be one of pair, external; received 'trio'"),
     (["source", "x", "--kind", "pair"], "--kind must be given for an effect only; received 'pair'"),

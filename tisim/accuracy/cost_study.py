@@ -11,7 +11,7 @@ from tisim import version
 from tisim.accuracy.quantity import Quantity, usual
 from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row, decades, tied
-from tisim.accuracy.runner import Progress, Run
+from tisim.accuracy.runner import Progress, StudyRunner
 from tisim.backend import runtime
 from tisim.errors import RunError, must
 from tisim.scene.scene import Scene
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Study:
-    """Settings of a scene, what they cost and how accurate they are.
+    """A study measures what settings of a scene cost in time, and how accurate they are.
 
     quantities : what errors are of; by default ``quantity.usual``.
     coarser, finer : decades of error on either side of what the scene asks for.
@@ -76,11 +76,11 @@ class Study:
         self.complete = False
 
     def sweep_settings(self) -> dict[str, Any]:
-        """Which settings are measured."""
+        """Return what says which settings are measured; a study is complete for these only."""
         return {"levels": self.levels, "precisions": self.precisions}
 
     def identity(self) -> dict[str, Any]:
-        """What must agree for rows of an earlier study to be of use."""
+        """Return what must agree for rows of an earlier study to be of use."""
         return {
             "tisim": version.__version__,
             "scene": self.scene.digest(),
@@ -103,13 +103,16 @@ class Study:
         with runtime.turn:
             before = runtime.current()
             try:
-                Run(self, progress or (lambda fraction, what: None), finished or (lambda: None)).all()
+                StudyRunner(self, progress or (lambda fraction, what: None), finished or (lambda: None)).run()
             finally:
                 runtime.init(before.device, before.precision, before.threads)
 
     def cheapest(self, error: float, quantity: str | None = None) -> Row:
-        """The cheapest setting whose error is at most this; of those that timings do not tell apart, the one
-        of the least work. RunError, with the least error there is, where none is so accurate."""
+        """Return the cheapest setting whose error of a quantity (the first, unless named) is at most this; of
+        those that timings do not tell apart, the one of the least work.
+
+        RunError, with the least error there is, where none is so accurate.
+        """
         k = self.index(quantity)
         if best := tied(self.rows, error, k):
             return best[0]
@@ -126,24 +129,24 @@ class Study:
         )
 
     def decades(self, quantity: str | None = None) -> dict[float, list[Row]]:
-        """For each power of ten of the error the settings that take the least time, as far as timings tell;
-        the one of the least work first."""
+        """Return for each power of ten of the error the settings that take the least time, as far as timings
+        tell; the one of the least work first."""
         return decades(self.rows, self.index(quantity))
 
     def index(self, quantity: str | None) -> int:
-        """The place of a quantity among all, by its name; of the first where none is given."""
+        """Return the place of a quantity among all of the study, by its name; 0 where none is given."""
         names = [q.name for q in self.quantities]
         must(quantity is None or quantity in names, "quantity", f"one of {', '.join(names)}", quantity)
         return names.index(quantity) if quantity is not None else 0
 
     def table(self) -> RenderableType:
-        """Every setting with its time, work and errors, for rich."""
+        """Return a table of every setting with its time, work and errors, which rich prints."""
         from tisim.accuracy.table import table
 
         return table(self)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write cost.csv and cost.h5 (see storage.py) into a folder, made if missing; returns their paths."""
+        """Write cost.csv and cost.h5 (see storage.py) into a folder, made if missing; return their paths."""
         from tisim.accuracy.storage import write
 
         return write(self, Path(folder))
@@ -155,12 +158,12 @@ class Study:
         return save(self, Path(path))
 
     def line(self, method: str) -> list[Row]:
-        """The rows of a method, in the order of its settings."""
+        """Return the rows of a method, in the order of its settings."""
         return [row for row in self.rows if row.method == method]
 
 
 def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) -> Study:
-    """What accuracy costs in time for a scene: a ``Study`` with its settings, run to its end."""
+    """Return a ``Study`` of a scene, with these settings, that has been run to its end."""
     cost_study = Study(scene, quantities, **settings)
     cost_study.run()
     return cost_study

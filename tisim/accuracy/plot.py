@@ -19,12 +19,13 @@ from tisim.plotting.style import empty, letters, plain
 METHOD_COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee", "#444444", "#ee8866")
 """The methods are drawn in P. Tol's bright set of colours, and one of his light one."""
 MARKERS = "osD^vP<>X"
+"""The methods are drawn with these marks, one after the other."""
 LEGEND_WIDTH = 80
 """A line of the legend has so many characters at most, which a panel has room for."""
 
 
 def save(study: Study, path: Path) -> Path:
-    """The picture as a PNG file, in place of any before. RunError on a full disk."""
+    """Write the picture of a study as a PNG file, in place of any before. RunError on a full disk."""
     image = io.BytesIO()
     picture(study).savefig(image, dpi=150, format="png")
     replace_file(path, image.getvalue())
@@ -32,7 +33,7 @@ def save(study: Study, path: Path) -> Path:
 
 
 def picture(study: Study) -> Figure:
-    """A panel for each quantity: wall seconds across, error up, both logarithmic.
+    """Draw a panel for each quantity: wall seconds across, error up, both logarithmic.
 
     An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
     larger. Rings are the cheapest setting for each power of ten of the error, dotted ones others that timings
@@ -99,7 +100,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
 
 
 def _label(study: Study, method: str) -> str:
-    """A method, and how many of its settings have failed and why."""
+    """Return the name of a method, with how many of its settings have failed and why."""
     rows = study.line(method)
     failed = [row.failed for row in rows if row.failed]
     if not failed:

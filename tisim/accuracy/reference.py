@@ -21,7 +21,7 @@ from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.scene import Scene
 
-USELESS = 0.1
+LARGEST_REFERENCE_ERROR = 0.1
 """A reference whose own error, over the size of the motion, is above this does not tell settings apart."""
 ADVICE = (
     "paths are chaotic, or hard to resolve. A shorter duration may do; or ask for a quantity of many random "
@@ -34,8 +34,10 @@ TIGHTER = 2.0
 
 @dataclass(frozen=True)
 class Truth:
-    """The true value of a quantity; ``source`` says where it is from. size : what errors are relative to, in
-    the unit of the quantity."""
+    """The true value of a quantity, as well as it is known.
+
+    source : where it is from, for people. size : what errors are relative to, in the unit of the quantity.
+    """
 
     estimate: QuantityEstimate
     source: str
@@ -43,13 +45,13 @@ class Truth:
 
     @property
     def error(self) -> float:
-        """Bound of its own relative error."""
+        """A bound of the relative error of the true value itself."""
         return self.estimate.uncertainty / self.size
 
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """A run that a truth is made of: a method, and the decades of error that it is turned by."""
+    """A run that a truth is made of: with a method that is turned by so many decades of error."""
 
     method: SettingSweep
     decades: float
@@ -67,7 +69,8 @@ class ReferenceRun:
 
 
 def attempts(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun]:
-    """The reference, itself a decade short, and another stepper at both, where there is one.
+    """Return the runs of the reference, of itself a decade short, and of another stepper at both, where there
+    is one.
 
     level : that of the finest settings of the methods. InputError when none of them converges.
     """
@@ -82,7 +85,7 @@ def attempts(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun
 
 
 def closed_form(quantity: Quantity, result: Result, largest: float = 0.0) -> Truth:
-    """The truth for the scene of a result. largest : |value| on the way."""
+    """Return the truth, in closed form, for the scene of a result. largest : |value| on the way."""
     assert quantity.exact is not None
     return _truth(
         quantity, QuantityEstimate(np.ravel(np.asarray(quantity.exact(result)))), "its closed form", largest
@@ -95,7 +98,7 @@ def compared(
     references: Sequence[ReferenceRun],
     largest: float = 0.0,
 ) -> Truth:
-    """The truth from the runs of a reference and its checks. largest : |value| on the way."""
+    """Return the truth from the runs of a reference and its checks. largest : |value| on the way."""
     best, short, *other = (estimate(quantity, results) for results in runs)
     off = _distance(best, short)
     if other:
@@ -113,11 +116,11 @@ def tells_apart(quantity: Quantity, truth: Truth) -> bool:
     They do not where the reference itself is off by a good part of the size of the motion. What is left open
     by a number of random starts is no fault of the reference: more starts are a setting like others.
     """
-    return quantity.random or truth.error <= USELESS
+    return quantity.random or truth.error <= LARGEST_REFERENCE_ERROR
 
 
 def _truth(quantity: Quantity, estimated: QuantityEstimate, source: str, largest: float) -> Truth:
-    """InputError where there is nothing that an error could be relative to."""
+    """Return a truth; InputError where there is nothing that an error could be relative to."""
     size = float(np.linalg.norm(estimated.value))
     if quantity.returns:
         size = max(size, largest)

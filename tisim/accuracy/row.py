@@ -14,19 +14,21 @@ import numpy as np
 
 TRUSTED = 3.0
 """An error is known when it is at least so many times what it may be off by."""
-ONCE, ALWAYS, CLOCK_RESOLUTION = 0.15, 0.05, 1e-3
-"""Seconds are never known better than to these parts of themselves, if taken once and if more often; nor than
-to so many s."""
-ALIKE = 1e-11
-"""Difference of two errors that rounding makes: laws that are no further apart have done the same."""
+TIMED_ONCE, TIMED_OFTEN = 0.15, 0.05
+"""A time is known to this part of itself at best: where it was taken once, and more often than once."""
+CLOCK_RESOLUTION = 1e-3
+"""A time is known to so much at best, s."""
+ROUNDING = 1e-11
+"""Rounding makes a difference of two relative errors as large as this; such laws have done the same."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """What a setting costs, and how accurate it is.
+    """A row of a study says what a setting costs and how accurate it is.
 
-    method : the line that it is on. setting : as text. python : stepper, and laws that were exchanged, as
-    Python. options : of ``tisim run``, as a shell takes them. starts : random starts in all that follows.
+    method : the name of its sweep, a line in the picture. setting : its description.
+    python : stepper, and laws that were exchanged, as Python. options : those of ``tisim run`` that make the
+    setting, as a shell takes them. starts : the number of random starts that all that follows is of.
     seconds : wall seconds of each repeat. steps, sums, rejections : steps, sums of forces and rejected steps
     of a particle, the mean over particles and starts.
     errors : for each quantity the error, and how far that may be off; both relative.
@@ -51,7 +53,7 @@ class Row:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What it is, whatever came out."""
+        """The method and the setting, by which a row is found again."""
         return self.method, self.setting
 
     @property
@@ -66,8 +68,11 @@ class Row:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The least and the most wall time that it may take, s: as measured, or as well as a clock tells."""
-        uncertainty = max(CLOCK_RESOLUTION, (ALWAYS if len(self.seconds) > 1 else ONCE) * self.median)
+        """The least and the most wall time that the setting may take, s: as measured, but no closer than a
+        clock tells."""
+        uncertainty = max(
+            CLOCK_RESOLUTION, (TIMED_OFTEN if len(self.seconds) > 1 else TIMED_ONCE) * self.median
+        )
         return min(*self.seconds, self.median - uncertainty), max(*self.seconds, self.median + uncertainty)
 
     @property
@@ -76,23 +81,25 @@ class Row:
         return max(self.seconds) if self.failed and self.seconds else math.inf
 
     def same_errors(self, other: Row) -> bool:
-        """Whether another row has the same errors, but for rounding."""
+        """Return whether another row has the same errors, but for rounding."""
         if other is self or not (self.errors and other.errors):
             return False
-        return all(abs(a[0] - b[0]) <= ALIKE for a, b in zip(self.errors, other.errors, strict=True))
+        return all(abs(a[0] - b[0]) <= ROUNDING for a, b in zip(self.errors, other.errors, strict=True))
 
     def at_most(self, quantity: int = 0) -> float:
-        """The error and what it may be off by; infinite when the run has failed."""
+        """Return the relative error of a quantity and what it may be off by, in sum; infinite when the run
+        has failed."""
         return sum(self.errors[quantity]) if self.errors else math.inf
 
     def trusted(self, quantity: int = 0) -> bool:
-        """Whether the error is large enough, beside what it may be off by, to be known."""
+        """Return whether the error of a quantity is large enough, beside what it may be off by, to be
+        known."""
         return bool(self.errors) and self.errors[quantity][0] >= TRUSTED * self.errors[quantity][1]
 
 
 def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
-    """The rows that take least time, as far as timings tell, among those whose error is at most this; the one
-    to choose first, that is of the least work."""
+    """Return the rows that take least time, as far as timings tell, among those whose error of a quantity is
+    at most this; the one to choose, which takes the least work, is the first."""
     good = [row for row in rows if row.at_most(quantity) <= error and not row.same]
     if not good:
         return []
@@ -104,7 +111,7 @@ def tied(rows: Iterable[Row], error: float, quantity: int = 0) -> list[Row]:
 
 
 def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
-    """``tied`` for each power of ten of the error, down to the least that was met; the largest first."""
+    """Return ``tied`` for each power of ten of the error, from the largest down to the least that was met."""
     reached = [row.at_most(quantity) for row in rows if 0 < row.at_most(quantity) < math.inf]
     if not reached:
         return {}

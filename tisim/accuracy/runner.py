@@ -35,15 +35,20 @@ REFERENCE_STARTS = 4
 wide."""
 
 
-class Run:
-    """One go at a study."""
+class StudyRunner:
+    """Measures what is not known yet of a study, and puts it there.
+
+    progress : called with the fraction that is done and what is being run. finished : called when a row, or
+    the truth, has become known.
+    """
 
     def __init__(self, study: Study, progress: Progress, finished: Callable[[], object]) -> None:
         self.study, self.progress, self.finished = study, progress, finished
         self.simulations, self.spent = SimulationCache(), 0.0
         self.done, self.planned, self.what = 0.0, 1.0, "the scene as it is"
 
-    def all(self) -> None:
+    def run(self) -> None:
+        """Run the scene as it is, then the reference, then every setting that has no row."""
         study = self.study
         where = runtime.current()
         runtime.init(where.device, "f64", where.threads)
@@ -86,7 +91,8 @@ class Run:
         return [ensembles(study.scene, study.starts), *sweeps] if study.random else sweeps
 
     def _cost(self, method: SettingSweep, k: int) -> float:
-        """Guess of the seconds that a setting takes, all repeats, from another of its method if known."""
+        """Return a guess of the seconds that all repeats of the k-th setting of a method take, from another
+        of the method where one is known."""
         weights, repeats = method.weights, self.study.repeats
         most = repeats * self.study.limit
         guesses = dict(zip((setting.description for setting in method.settings), weights, strict=True))
@@ -97,8 +103,8 @@ class Run:
         return min(repeats * self.base * method.settings[k].starts * weight, most)
 
     def _largest(self) -> list[float]:
-        """How large each quantity has been on the way, in steps that no observation has to wait for; 0 where
-        nobody asks."""
+        """Return how large each quantity has been on the way, in a run whose steps are so short that no
+        observation has to wait for one; 0 where no quantity asks."""
         largest = [0.0 for _ in self.study.quantities]
 
         def update_largest(result: Result) -> None:
@@ -112,7 +118,7 @@ class Run:
         return largest
 
     def _truths(self, base: Timed, sweeps: Sequence[SettingSweep], rest: float) -> None:
-        """The true values, where they are not known yet. rest : seconds planned for all that follows."""
+        """Find the true values, where they are not known yet. rest : seconds planned for all that follows."""
         study, self.planned = self.study, rest
         if study.truths:
             return
@@ -149,10 +155,10 @@ class Run:
         """RunError where the truth of a quantity does not tell settings apart, and it was asked to."""
         for quantity, truth in zip(self.study.quantities, self.study.truths, strict=True):
             if self.study.require_reference and not reference.tells_apart(quantity, truth):
+                rule = f"known by the reference to {reference.LARGEST_REFERENCE_ERROR:g} of the motion"
                 raise RunError(
-                    f"{quantity.name} must be known by the reference to {reference.USELESS:g} of the motion; "
-                    f"received {truth.error:.1g}: {reference.ADVICE}. To go on: --anyway, or a Study with "
-                    "require_reference=False"
+                    f"{quantity.name} must be {rule}; received {truth.error:.1g}: {reference.ADVICE}. "
+                    "To go on: --anyway, or a Study with require_reference=False"
                 )
 
     def _starts(self, scene: Scene, n: int, first: int = 0) -> list[Scene]:
@@ -195,7 +201,7 @@ class Run:
             trial.failed = str(error)
 
     def _compare_laws(self, sweeps: Sequence[SettingSweep]) -> None:
-        """Cheaper laws that make the same errors as the law they stand for are no laws of their own."""
+        """Mark the rows of cheaper laws that make the same errors as the law they stand for."""
         rows = {row.key: row for row in self.study.rows}
         stands_for = {(m.name, s.description): m.exact for m in sweeps for s in m.settings if m.exact}
         self.study.rows[:] = [
@@ -205,7 +211,7 @@ class Run:
         self.finished()
 
     def _left(self) -> float:
-        """Seconds of the budget, which compiling takes nothing of."""
+        """Return the seconds that the budget has left; compiling takes none of it."""
         return self.study.budget - self.spent
 
     def _run(

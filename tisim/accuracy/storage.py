@@ -39,15 +39,15 @@ _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "reje
 
 
 def write(study: Study, folder: Path) -> list[Path]:
-    """Write cost.csv and cost.h5, in place of any before; returns their paths. RunError on a full disk."""
+    """Write cost.csv and cost.h5, in place of any before; return their paths. RunError on a full disk."""
     ensure_writable(folder)
-    replace_file(folder / COST_CSV, table(study).encode())
+    replace_file(folder / COST_CSV, as_csv(study).encode())
     _write_rows(study, folder / HDF5)
     return [folder / COST_CSV, folder / HDF5]
 
 
-def table(study: Study) -> str:
-    """All rows as CSV, all digits."""
+def as_csv(study: Study) -> str:
+    """Return all rows of a study as CSV, with all digits."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     names = [q.name for q in study.quantities]
@@ -102,7 +102,7 @@ def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
 
 
 def resumes(folder: Path, fresh: bool | None, overwrite: bool) -> bool:
-    """Whether a study goes on with what is in the folder; see ``resuming.resumes``."""
+    """Return whether a study goes on with what is in the folder; see ``resuming.resumes``."""
     begun = regular_file.exists(folder / HDF5)
     return resuming.resumes(folder, "measurement", begun, "measured costs" * begun, fresh, overwrite)
 
@@ -134,7 +134,7 @@ def resume(study: Study, folder: Path) -> None:
 
 
 def rows(path: Path) -> list[Row]:
-    """What a study has measured, of a cost.h5. InputError when the file is none, cut short or damaged."""
+    """Return the rows in a cost.h5. InputError when the file is none of a study, cut short or damaged."""
     with checksum.open_file(path, "cost", COST_FORMAT) as file:
         return _rows(file["rows"])
 

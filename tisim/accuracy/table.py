@@ -17,8 +17,9 @@ from tisim.console import TERMINAL_WIDTH
 
 
 def table(study: Study) -> RenderableType:
-    """Every setting by method, with its median time, work and errors; for what error it is the cheapest, in
-    brackets where timings do not tell it from the one that is chosen; below, what has failed and why."""
+    """Return every setting by method, with its median time, work and errors; for what error it is the
+    cheapest, in brackets where timings do not tell it from the one that is chosen; below, what has failed and
+    why."""
     names = [quantity.name.replace(" ", "\n") for quantity in study.quantities]
     heads = ["", "time\n(s)", "spread\n(s)", "steps", "forces", "re-\njected", *names, "best\nfor"]
     best: dict[tuple[str, str], str] = {}
@@ -42,7 +43,7 @@ def table(study: Study) -> RenderableType:
 
 
 def _grid(lines: list[list[str]], widths: list[int], style: str = "") -> Table:
-    """Columns of these widths; what does not fit into the first goes on below."""
+    """Return lines in columns of these widths; what does not fit into the first column goes on below."""
     grid = Table.grid(padding=(0, 1, 0, 0))
     for k, width in enumerate(widths):
         grid.add_column(
@@ -95,7 +96,10 @@ def notes(study: Study) -> list[str]:
 
 
 def recipe(row: Row, words: Sequence[str], quantity: int = 0) -> str:
-    """How to run a setting: as Python in a scene, and as a command. words : of ``tisim run``, all of them."""
+    """Return how to run a setting: as Python in a scene, and as a command.
+
+    words : all those of ``tisim run``. quantity : the place of the one whose error is told.
+    """
     starts = f", over {row.starts} random starts" if row.starts > 1 else ""
     return (
         f"{row.method}: {row.setting}{starts}: {row.median:.3g} s, error {row.at_most(quantity):.1e}\n"

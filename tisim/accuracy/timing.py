@@ -21,22 +21,22 @@ from tisim.scene.scene import Scene
 
 ResultCallback = Callable[[Result], None]
 OBSERVATIONS = 127
-"""A run is observed so many times on its way. A prime number: of a motion of any whole number of periods, but
-for multiples of it, no two observations are at the same part of the period."""
+"""A run is observed so many times on its way. The number is prime: of a motion of any whole number of
+periods, but for multiples of it, no two observations are at the same part of the period."""
 ROOM = 40
 """So many trees of fields must be free before a simulation is made, which takes two to some ten."""
 
 
 @dataclass(frozen=True)
 class Timed:
-    """Results of a run of one or more starts, and the wall seconds of all, without set-up and compilation."""
+    """The results of a run of one or more starts, and its wall seconds without set-up and compilation."""
 
     results: list[Result]
     seconds: float
 
     @property
     def work(self) -> tuple[float, float, float]:
-        """Steps, sums of forces and rejections, per particle and start."""
+        """The number of steps, of sums of forces and of rejected steps, per particle and start."""
         steps, sums, rejections = 0.0, 0.0, 0.0
         for result in self.results:
             n, stepper = len(result.start["mass"]), result.scene.stepper
@@ -78,7 +78,7 @@ class SimulationCache:
         self.warm: weakref.WeakSet[Simulation] = weakref.WeakSet()
 
     def compiled(self, scene: Scene, worlds: int) -> Simulation:
-        """The simulation that is compiled for a scene of this structure and size."""
+        """Return the simulation that is compiled for a scene of this structure and size."""
         key = scene.structure(), worlds, scene.capacity()
         simulation = self.cached.pop(key, None)
         if simulation is None:
@@ -94,7 +94,7 @@ class SimulationCache:
         progress: Progress | None = None,
         on_result: ResultCallback | None = None,
     ) -> Timed:
-        """RunError, with the reason, when one of them fails.
+        """Run scenes of one structure at once, compiled before; RunError, with the reason, when one fails.
 
         progress : called about four times a second, first when all is compiled and the run begins.
         on_result : called with the first scene's result about ``OBSERVATIONS`` times, evenly in its simulated
@@ -127,7 +127,7 @@ class SimulationCache:
 
 
 class OutOfTime(Exception):
-    """A run was stopped because it took too long."""
+    """Raised where a run is stopped because it takes too long."""
 
 
 class Limit:

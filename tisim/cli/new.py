@@ -15,7 +15,7 @@ from tisim.files import regular_file
 
 TEMPLATES = Path(__file__).with_name("templates")
 SCENE_COMMAND = "tisim run {0}.toml --plugin {0}.py"
-COMMANDS = {
+USES = {
     "effect": SCENE_COMMAND,
     "operator": SCENE_COMMAND,
     "source": SCENE_COMMAND,
@@ -24,10 +24,10 @@ COMMANDS = {
     "problem": "tisim optimize {}.py",
 }
 """What can be written, and the command that uses each."""
-EFFECTS = ("pair", "external")
-"""Sorts of effects: of forces between two particles, and on each by itself."""
+FORCES = ("pair", "external")
+"""Kinds of effects that are written: forces between two particles, and on each by itself."""
 
-What = Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(COMMANDS)}.")]
+What = Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(USES)}.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the file NAME.py, such as soft_shell.")]
 Sort = Annotated[
     str | None,
@@ -41,16 +41,16 @@ def new(what: What, name: Name, kind: Sort = None) -> None:
     Beside an effect, operator, source or stepper stands NAME.toml, a scene with it. Files that are there
     already stay as they are.
     """
-    rule = f"one of {', '.join(COMMANDS)}"
-    if what not in COMMANDS:
-        raise InputError(f"WHAT must be {rule}; received {abbreviated(what)}{did_you_mean(what, COMMANDS)}")
+    rule = f"one of {', '.join(USES)}"
+    if what not in USES:
+        raise InputError(f"WHAT must be {rule}; received {abbreviated(what)}{did_you_mean(what, USES)}")
     must(kind is None or what == "effect", "--kind", "given for an effect only", kind)
-    must(kind is None or kind in EFFECTS, "--kind", f"one of {', '.join(EFFECTS)}", kind)
+    must(kind is None or kind in FORCES, "--kind", f"one of {', '.join(FORCES)}", kind)
     must(name.isidentifier() and name == name.lower() and not keyword.iskeyword(name), "name",
          "a name of Python in lower case", name)  # fmt: skip
-    template = (kind or EFFECTS[0]) if what == "effect" else what
+    template = (kind or FORCES[0]) if what == "effect" else what
     files = {Path(f"{name}.py"): f"{template}.txt", Path(f"test_{name}.py"): f"test_{template}.txt"}
-    if COMMANDS[what] == SCENE_COMMAND:
+    if USES[what] == SCENE_COMMAND:
         files[Path(f"{name}.toml")] = f"scene_{template}.txt"
     for path in files:
         must(not regular_file.exists(path), "file to write", "one that is not there yet", str(path))
@@ -59,7 +59,7 @@ def new(what: What, name: Name, kind: Sort = None) -> None:
     for path, text in files.items():
         _write(path, Template((TEMPLATES / text).read_text(encoding="utf-8")).substitute(fields))
         print(path)
-    print(f"to try it: {COMMANDS[what].format(name)}; python -m pytest test_{name}.py")
+    print(f"to try it: {USES[what].format(name)}; python -m pytest test_{name}.py")
 
 
 def _check_name(what: str, name: str) -> None:
@@ -67,7 +67,7 @@ def _check_name(what: str, name: str) -> None:
     from tisim.engine import reference
 
     must(find_spec(name) is None, "name", "one that no other module has", name)
-    of_scene = COMMANDS[what] == SCENE_COMMAND
+    of_scene = USES[what] == SCENE_COMMAND
     must(not of_scene or name not in reference.names(), "name", "one that no other part of scenes has", name)
 
 

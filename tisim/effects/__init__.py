@@ -1,4 +1,8 @@
-"""Laws of force and of impact, one file each, by family."""
+"""Laws of force and of impact, one file each, by family.
+
+``tisim effects effects`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+source, parameters and units.
+"""
 
 import lazy_loader
 

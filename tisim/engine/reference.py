@@ -135,8 +135,8 @@ def groups() -> dict[str, list[Entry]]:
     groups: dict[str, list[Entry]] = {name: [] for name in FAMILIES}
     for entry in entries():
         groups[entry.family].append(entry)
-        top, *rooms, _ = entry.kind.__module__.split(".")
-        for room in rooms[1:] if top == "tisim" else ():
+        top, *path = entry.kind.__module__.split(".")
+        for room in path[1:-1] if top == "tisim" else ():
             groups.setdefault(room, []).append(entry)
     return groups
 

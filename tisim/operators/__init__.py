@@ -1,4 +1,8 @@
-"""Changes of state between steps, one file each."""
+"""Changes of state between steps, one file each.
+
+``tisim effects operators`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+source, parameters and units.
+"""
 
 import lazy_loader
 

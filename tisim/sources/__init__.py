@@ -1,4 +1,8 @@
-"""External fields of place and time, one file each."""
+"""External fields of place and time, one file each.
+
+``tisim effects sources`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+source, parameters and units.
+"""
 
 import lazy_loader
 

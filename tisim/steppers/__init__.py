@@ -1,4 +1,8 @@
-"""How time advances: the order of a step, and how long it is."""
+"""How time advances: the order of a step, and how long it is.
+
+``tisim effects steppers`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+source, parameters and units.
+"""
 
 import lazy_loader
 
