@@ -275,6 +275,9 @@ def test_what_has_failed_is_in_the_legend():
         "at times; 1 of 2 failed: a quantity is not finite",
     ]
     assert labels[3] == "cheapest for a power of ten of the error"
+    labels, (low, high) = pictured(failed)
+    assert labels == ["never; failed: a quantity is not finite"]
+    assert 0 < low < high
 
 
 def test_a_picture_of_large_errors_is_not_blank():

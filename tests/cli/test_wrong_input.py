@@ -17,6 +17,7 @@ CASES = ", ".join(sorted(every()))
 
 WRONG = [
     (["run", "nosuch"], f"case must be one of {CASES}, or a scene file ending in"),
+    (["run", "blats"], "NAME.py with a CASE; received 'blats'; did you mean 'blast'?\n"),
     (["run", "none.toml"], "scene file must exist; received 'none.toml'"),
     (["run", "FLOW", "--size", "small"], "--size must be given for a case only; received 'small'"),
     (["run", "FLOW", "--set", "hardness"], "--set must be key=value; received 'hardness'"),
@@ -52,6 +53,7 @@ WRONG = [
     (["cache"], "FILE must be given (The search.h5 of a search); received nothing\n"),
     (["run", "FLOW", "FLOW"], "arguments must be CASE_OR_FILE and no more; received also 'flow.toml'\n"),
     (["cases", "all", "of"], "arguments must be none; received also 'all', 'of'\n"),
+    (["plot", "a\0b"], "FILE must be a path that this system can have; received 'a\\x00b'\n"),
     (["run", "FLOW", "--seed"], "--seed must be given with a value; received nothing\n"),
     (["run", "FLOW", "--fresh=3"], "--fresh must be given without a value; received '--fresh=3'\n"),
     (["run", "FLOW", "--seed", "1.5"], "--seed must be a whole number; received '1.5'\n"),

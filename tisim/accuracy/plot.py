@@ -77,7 +77,8 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     _ring(axis, list(others.values()), k, ":", "as cheap, as far as timings tell, with more work")
     axis.set_xscale("log")
     axis.set_yscale("log")
-    low, high = axis.get_ylim()
+    # Where nothing could be measured there is nothing to fit the axis to.
+    low, high = axis.get_ylim() if any(row.errors for row in study.rows) else (1e-3, 1.0)
     own = study.truths[k].error if k < len(study.truths) else 0.0
     if own > 0:
         low = min(low, own / 4)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from tisim.errors import must
+from tisim.errors import InputError, abbreviated, did_you_mean, must
 from tisim.files import python_file
 from tisim.scene import plugins
 
@@ -32,7 +32,9 @@ def case(target: str, alternatives: str = OWN_FILE) -> Case:
 
     if not is_python_file(target):
         known = every()
-        must(target in known, "case", f"one of {', '.join(known)}, {alternatives}", target)
+        if target not in known:
+            rule, nearest = f"one of {', '.join(known)}, {alternatives}", did_you_mean(target, known)
+            raise InputError(f"case must be {rule}; received {abbreviated(target)}{nearest}")
         return known[target]
     module = plugins.load(target)
     must(hasattr(module, "CASE"), target, "a file with a CASE", _module_names(module))

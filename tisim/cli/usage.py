@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import typer
@@ -17,8 +18,8 @@ _exceptions: Any = sys.modules[typer.BadParameter.__module__]
 """The module of typer's exceptions: its own, or that of click, by the version of typer."""
 UsageError: Any = _exceptions.UsageError
 """Exception that typer raises for words that no command knows, and to show the help where there are none."""
-NUMBERS = {int: "a whole number", float: "a number"}
-"""What a word must be to be a value of these types; any word is text or a path."""
+RULES = {int: "a whole number", float: "a number", Path: "a path that this system can have"}
+"""What a word must be to be a value of these types; any word is text."""
 
 
 class Command(TyperCommand):
@@ -75,11 +76,17 @@ def _fault(command: Any, ctx: Any, words: Sequence[str], error: Any) -> str:
         return f"{_argument(error.param)} must be given{text}; received nothing"
     values, surplus, _ = command.make_parser(ctx).parse_args(list(words))
     if isinstance(error, _exceptions.BadParameter):
-        name, rule = max(_names(error.param), key=len), _rule(command, error.param.name)
-        return f"{name} must be {rule}; received {abbreviated(values[error.param.name])}"
-    arguments = [one for one in command.params if one.param_type_name == "argument"]
+        parameter = error.param
+        name = _argument(parameter) if _is_argument(parameter) else max(_names(parameter), key=len)
+        rule = _rule(command, parameter.name)
+        return f"{name} must be {rule}; received {abbreviated(values[parameter.name])}"
+    arguments = list(filter(_is_argument, command.params))
     rule = f"{' '.join(map(_argument, arguments))} and no more" if arguments else "none"
     return f"arguments must be {rule}; received also {', '.join(map(abbreviated, surplus))}"
+
+
+def _is_argument(parameter: Any) -> bool:
+    return parameter.param_type_name == "argument"
 
 
 def _argument(parameter: Any) -> str:
@@ -93,10 +100,10 @@ def _names(parameter: Any) -> list[str]:
 
 
 def _rule(command: Any, name: str) -> str:
-    """Return what a word must be to be the value of the option of this name."""
+    """Return what a word must be to be the value of a parameter of the command."""
     annotation = get_type_hints(inspect.unwrap(command.callback), include_extras=True)[name]
     kind, *declared = get_args(annotation)
-    rule = next(rule for number, rule in NUMBERS.items() if number in (kind, *get_args(kind)))
+    rule = next(rule for known, rule in RULES.items() if known in (kind, *get_args(kind)))
     for info in declared:
         if isinstance(info, ParameterInfo) and info.min is not None:
             rule += f", at least {info.min:g}"

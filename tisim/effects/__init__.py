@@ -1,6 +1,6 @@
 """Laws of force and of impact, one file each, by family.
 
-``tisim effects effects`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+``tisim effects effects`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
 source, parameters and units.
 """
 

@@ -1,6 +1,6 @@
 """Changes of state between steps, one file each.
 
-``tisim effects operators`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+``tisim effects operators`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
 source, parameters and units.
 """
 

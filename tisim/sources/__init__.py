@@ -1,6 +1,6 @@
 """External fields of place and time, one file each.
 
-``tisim effects sources`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+``tisim effects sources`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
 source, parameters and units.
 """
 

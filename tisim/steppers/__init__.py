@@ -1,6 +1,6 @@
 """How time advances: the order of a step, and how long it is.
 
-``tisim effects steppers`` in a shell lists them, a line each. ``tisim effects NAME`` says all of one: its law,
+``tisim effects steppers`` lists them in a shell, a line each. ``tisim effects NAME`` says all of one: law,
 source, parameters and units.
 """
 
