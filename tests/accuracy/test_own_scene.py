@@ -6,10 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from tests.accuracy.scenes import RATE, SPEED, only, oscillator, place
+from tests.accuracy.scenes import RATE, SPEED, STEP, only, oscillator, place
 from tisim import RunError
 from tisim.accuracy import Quantity, Study, reference, storage, study
 from tisim.accuracy.quantity import displacement
+from tisim.accuracy.runner import StudyRunner
 from tisim.accuracy.table import notes
 from tisim.accuracy.timing import OBSERVATIONS, SimulationCache
 from tisim.backend import runtime
@@ -132,6 +133,33 @@ def test_a_setting_over_the_limit_is_a_row_that_says_so(verlet_only, monkeypatch
         assert (len(again.rows), again.complete) == (known, known == 3)
     again.run()
     assert sorted(len(row.errors) for row in again.rows) == [1, 1, 1]
+
+
+def test_a_reference_that_takes_longer_than_the_budget_is_stopped(verlet_only, monkeypatch):
+    """Also where it was thought to take less."""
+    now, late = time.monotonic, [0.0]
+
+    def slowly(self, scenes, progress, on_result=None, run=SimulationCache.run):
+        if scenes[0].stepper.control.dt < STEP / 5:
+            progress(0.0)
+            late[0] += 1e4
+            progress(0.5)
+        return run(self, scenes, progress, on_result)
+
+    monkeypatch.setattr(time, "monotonic", lambda: now() + late[0])
+    monkeypatch.setattr(SimulationCache, "run", slowly)
+    with pytest.raises(RunError, match=r"^the reference: .*: takes more running than the budget has$"):
+        study(closed(), **FEW, budget=1e3)
+
+
+def test_what_does_not_fit_the_budget_is_not_begun_in_a_later_repeat(verlet_only, monkeypatch):
+    def cost(self, method, k, cost=StudyRunner._cost):
+        return 1e9 if method.settings[k].description == "dt=0.001" else cost(self, method, k)
+
+    monkeypatch.setattr(StudyRunner, "_cost", cost)
+    cost_study = study(closed(), **{**FEW, "repeats": 2}, budget=1e6)
+    assert [row.setting for row in cost_study.rows] == ["dt=0.01", "dt=0.00316"]
+    assert not cost_study.complete
 
 
 def test_a_reference_that_tells_nothing_apart_ends_a_study_that_needs_one(verlet_only, monkeypatch):

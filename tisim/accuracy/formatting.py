@@ -1,4 +1,4 @@
-"""Settings as text: as Python, and as options of ``tisim run``."""
+"""Settings of a scene are written as text: as Python, and as options of ``tisim run``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tisim.scene.scene import Scene
 
 
 def non_default_settings(part: Component) -> dict[str, Any]:
-    """The settings of a part that are not at their defaults, by name."""
+    """Return the settings of a part that are not at their defaults, by name."""
     return {
         name: getattr(part, name)
         for name, info in type(part).model_fields.items()
@@ -21,7 +21,7 @@ def non_default_settings(part: Component) -> dict[str, Any]:
 
 
 def expression(part: Component) -> str:
-    """A part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
+    """Return a part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
     arguments = (
         f"{name}={expression(value) if isinstance(value, Component) else repr(value)}"
         for name, value in non_default_settings(part).items()
@@ -30,7 +30,7 @@ def expression(part: Component) -> str:
 
 
 def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
-    """Command-line arguments that make ``tisim run`` run ``changed`` where it would have run ``scene``."""
+    """Return options with which ``tisim run`` runs ``changed`` where it would have run ``scene``."""
     old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
     arguments = [argument for name in old if name not in new for argument in ("--without", name)]
     settings = list(_differences(scene.stepper, changed.stepper, "stepper"))
@@ -42,12 +42,12 @@ def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
 
 
 def shell_line(arguments: list[str]) -> str:
-    """Command-line arguments as one line that a shell takes."""
+    """Return command-line arguments as one line that a shell takes."""
     return shlex.join(arguments)
 
 
 def _differences(old: Component | None, new: Component, path: str) -> Iterator[tuple[str, str]]:
-    """Dotted key and TOML of all that is new; a part of another kind as a whole."""
+    """Yield dotted key and TOML of each setting that differs; a part of another kind as a whole."""
     if type(old) is not type(new):
         yield path, serialization.inline(_table(new, named=path != f"effects.{new.kind()}"))
         return

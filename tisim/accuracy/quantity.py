@@ -35,7 +35,7 @@ class Quantity:
     returns: bool = False
 
     def size(self, result: Result) -> float:
-        """|value| of a result, in its own unit."""
+        """Return the |value| of a result, in its own unit."""
         return float(np.linalg.norm(np.ravel(np.asarray(self.value(result)))))
 
     @property
@@ -46,19 +46,19 @@ class Quantity:
 
 @dataclass(frozen=True)
 class QuantityEstimate:
-    """A value, and how far it may be off: half the width of its 95 % interval, or a bound; 0 if exact."""
+    """An estimate is a value, and how far it may be off: half its 95 % interval, or a bound; 0 if exact."""
 
     value: np.ndarray
     uncertainty: float = 0.0
 
     def error(self, truth: QuantityEstimate, size: float) -> tuple[float, float]:
-        """Distance from the truth relative to ``size``, and how far that may be off."""
+        """Return the distance from the truth relative to ``size``, and how far that may be off."""
         off = float(np.linalg.norm(self.value - truth.value))
         return off / size, float(np.hypot(self.uncertainty, truth.uncertainty)) / size
 
 
 def estimate(quantity: Quantity, results: Sequence[Result]) -> QuantityEstimate:
-    """The estimate from one result, or from the mean over those of random starts."""
+    """Return the estimate from one result, or from the mean over those of random starts."""
     values = np.array([np.ravel(np.asarray(quantity.value(result))) for result in results])
     if not quantity.random:
         return QuantityEstimate(values[0])
@@ -66,33 +66,36 @@ def estimate(quantity: Quantity, results: Sequence[Result]) -> QuantityEstimate:
 
 
 def mean(values: np.ndarray) -> QuantityEstimate:
-    """Mean over the first axis and its interval by Student's t; values of shape (n, components), n > 1."""
+    """Return the mean over the first axis, with its interval by Student's t.
+
+    values : of shape (n, components), n > 1.
+    """
     return QuantityEstimate(values.mean(axis=0), float(np.linalg.norm(half_width(values))))
 
 
 def displacement(result: Result) -> np.ndarray:
-    """The displacement of every particle since the start, in the order of their ids, m, shape (n, 3)."""
+    """Return the displacement of every particle since the start, by their ids, m, shape (n, 3)."""
     order = np.argsort(result.state["id"])
     return result.state["position"][order] - result.start["position"]
 
 
 def velocity(result: Result) -> np.ndarray:
-    """The velocity of every particle at the end, in the order of their ids, m/s, shape (n, 3)."""
+    """Return the velocity of every particle at the end, in the order of their ids, m/s, shape (n, 3)."""
     return result.state["velocity"][np.argsort(result.state["id"])]
 
 
 def kinetic_energy(result: Result) -> float:
-    """The kinetic energy of all particles at the end, without rotation, J."""
+    """Return the kinetic energy of all particles at the end, without rotation, J."""
     return 0.5 * float((result.state["mass"] * (result.state["velocity"] ** 2).sum(axis=1)).sum())
 
 
 def mean_square(result: Result) -> float:
-    """The mean square displacement of the particles since the start, m^2."""
+    """Return the mean square displacement of the particles since the start, m^2."""
     return float((displacement(result) ** 2).sum(axis=1).mean())
 
 
 def usual(scene: Scene) -> tuple[Quantity, ...]:
-    """What is compared unless something else is asked for: where particles have moved to.
+    """Return what is compared unless something else is asked for: where particles have moved to.
 
     Impacts and operators may remove particles, and after some impacts no path can be followed: there it is
     the mean kinetic energy over random starts. InputError where there is nothing random. Of paths that are

@@ -1,4 +1,4 @@
-"""Every way to run a scene that trades accuracy for time: found from what its parts say of themselves."""
+"""A study measures every way to run a scene that trades accuracy for time; the parts of a scene say which."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tisim.steppers.base import Stepper
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to run a scene: the scene with it, its description, precision, and number of random starts."""
+    """A setting is one way to run a scene: the scene with it, what it is, its precision and random starts."""
 
     scene: Scene
     description: str
@@ -29,11 +29,12 @@ class Setting:
 
 @dataclass(frozen=True)
 class SettingSweep:
-    """A line in the picture: settings of one kind, the cheapest first.
+    """A sweep is a line in the picture: the settings of one method, the cheapest first.
 
-    weights : guesses of how their times go. accuracy_parameter : the one that is turned, of the part at
-    ``path``; None for a list of laws or of numbers of starts. exact : method and setting that such laws
-    differ from in the law only; None for all else.
+    weights : guesses of their times, relative to each other.
+    accuracy_parameter : the one that is turned, of the part at ``path``; None for a list of laws or of
+    numbers of starts.
+    exact : method and setting that such laws differ from in the law only; None for all else.
     """
 
     name: str
@@ -46,19 +47,19 @@ class SettingSweep:
 
     @property
     def converges(self) -> bool:
-        """Whether the error of the stepper vanishes along this line."""
+        """Whether the error of the stepper vanishes along the sweep."""
         parameter = self.accuracy_parameter
         return parameter is not None and parameter.converges and self.path.startswith("stepper")
 
     def at(self, decades: float) -> Scene:
-        """The scene with the accuracy parameter turned to an error so many decades larger than at its
-        base."""
+        """Return the scene with the accuracy parameter turned to an error so many decades larger than that of
+        ``base``."""
         assert self.accuracy_parameter is not None
         return turned(self.base, self.path, self.accuracy_parameter, decades)
 
 
 def parts(scene: Scene) -> Iterator[tuple[str, Component]]:
-    """Every part of a scene with its dotted place, as in its TOML file."""
+    """Yield every part of a scene with its dotted place, as in its TOML file."""
     for effect in scene.effects:
         yield from _within(f"effects.{effect.label}", effect)
     for name in ("particles", "domain", "stepper"):
@@ -73,7 +74,7 @@ def _within(path: str, part: Component) -> Iterator[tuple[str, Component]]:
 
 
 def exchanged(scene: Scene, path: str, part: Component) -> Scene:
-    """A copy of a scene with another part in this place."""
+    """Return a copy of a scene with another part in the place with this dotted name."""
     first, *rest = path.split(".")
     if first == "effects":
         own = next(effect for effect in scene.effects if effect.label == rest[0])
@@ -90,12 +91,12 @@ def _put(part: Any, path: Sequence[str], new: Component) -> Any:
 
 
 def turned(scene: Scene, path: str, accuracy_parameter: AccuracyParameter, decades: float) -> Scene:
-    """A copy with an accuracy parameter of the part at ``path`` turned; InputError where the part refuses."""
+    """Return a copy with an accuracy parameter of the part at ``path`` turned; InputError if it refuses."""
     return exchanged(scene, path, accuracy_parameter.turned(dict(parts(scene))[path], decades))
 
 
 def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
-    """A copy whose steps are at most this long (s). Settings of a step control in s are lengths of steps."""
+    """Return a copy whose steps are at most this long (s): settings of a control in s are such lengths."""
     control = scene.stepper.control
     lengths = [name for name, info in type(control).model_fields.items() if unit_of(info) == "s"]
     shorter = {name: min(getattr(control, name), longest) for name in lengths}
@@ -103,8 +104,8 @@ def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
 
 
 def finest(scene: Scene, decades: float) -> Scene:
-    """A copy with every accuracy parameter of its effects turned, so that they cannot hide the error of the
-    stepper."""
+    """Return a copy with every accuracy parameter of its effects turned, so that they cannot hide the error
+    of the stepper."""
     for path, part in list(parts(scene)):
         for accuracy_parameter in part.accuracy_parameters:
             if accuracy_parameter.converges and not path.startswith("stepper"):
@@ -115,7 +116,7 @@ def finest(scene: Scene, decades: float) -> Scene:
 def methods(
     scene: Scene, dt: float, extent: float, levels: Sequence[float], precisions: Sequence[str], starts: int
 ) -> list[SettingSweep]:
-    """All methods for a scene with steps of about dt (s) and particles up to ``extent`` (m) apart.
+    """Return all methods for a scene with steps of about dt (s) and particles up to ``extent`` (m) apart.
 
     levels : decades of error, relative to what the scene asks for, that accuracy parameters are turned to.
     The first method is the scene's own stepper. starts : random starts of each run.
@@ -153,7 +154,7 @@ def methods(
 
 
 def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
-    """The scene as it is, from more and more random starts."""
+    """Return the sweep of the scene as it is, from more and more random starts."""
     settings = tuple(Setting(scene, f"{n} starts", starts=n) for n in sizes)
     return SettingSweep("random starts", settings, tuple(n / sizes[0] for n in sizes), scene)
 
@@ -169,7 +170,7 @@ def rivals(stepper: Stepper, effects: Sequence[Effect], dt: float) -> tuple[Step
 
 
 def _steppers(scene: Scene, dt: float) -> list[Stepper]:
-    """Steppers that suit the scene, other than its own."""
+    """Return the steppers that suit the scene, other than its own."""
     serialization.load(steppers)
     kinds = {_kind(scene.stepper)}
     suitable = []
@@ -183,7 +184,7 @@ def _steppers(scene: Scene, dt: float) -> list[Stepper]:
 
 
 def _kind(stepper: Stepper) -> tuple[Any, ...]:
-    """What makes it another method, whatever its step control is set to."""
+    """Return what makes a stepper another method, whatever its step control is set to."""
     return type(stepper), type(stepper.control), stepper.structure(), tuple(stepper.values())
 
 
@@ -200,7 +201,7 @@ def _turning(
         try:
             changed = turned(scene, path, accuracy_parameter, decades)
         except InputError:
-            continue  # The part cannot be set so: a shortest step above the longest, for one.
+            continue  # The part cannot be set so, such as to a shortest step above the longest.
         part = dict(parts(changed))[path]
         description = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
         settings.append(Setting(changed, description, precision, starts))
