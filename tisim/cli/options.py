@@ -26,13 +26,14 @@ def nameable(path: Path | None) -> Path | None:
     return path
 
 
-def _load_plugins(paths: list[str] | None) -> list[str] | None:
+def _load_plugins(paths: list[str] | None) -> list[str]:
     """Load plugins before anything else is done: what is read later may be made of what they define."""
     from tisim.scene import plugins
 
     for path in paths or ():
         plugins.load(path)
-    return paths
+    # Some versions of typer ask for the length of what they get back.
+    return paths or []
 
 
 Plugins = Annotated[
