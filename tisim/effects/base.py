@@ -174,7 +174,7 @@ class Pairwise(Effect):
 
         A pair is looked for by its larger particle, so it is the reach of that one that counts, whatever the
         smaller one would return. Small worlds look at all pairs, where one too short does no harm:
-        ``assert_reach`` of tisim/testing.py tells.
+        ``assert_reach`` of tisim/testing tells.
         """
         return 0.0
 
