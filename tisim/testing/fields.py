@@ -1,6 +1,6 @@
 """Whether effects declare the fields that they read or write."""
 
-from collections.abc import Iterator
+import itertools
 from typing import Any
 
 from tisim.backend.taichi import ti
@@ -10,7 +10,7 @@ from tisim.interactions.contact_history import memory_fields
 from tisim.interactions.force_sum import FORCE, TORQUE, turning
 from tisim.scene.scene import Scene
 from tisim.testing.uncompiled import allocated, offered
-from tisim.worlds.bound import Bound
+from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.fields import CORE
 from tisim.worlds.state import State
 
@@ -25,7 +25,7 @@ def assert_fields(scene: Scene) -> None:
     """
     with allocated(scene) as made:
         for effect in made.assembly.effects:
-            view = _Declared(made.s, effect)
+            view = _Declared(made.s, _known(effect, made.assembly.effects))
             try:
                 _Hooks(view, effect).compile(0)
             except Exception as error:
@@ -37,31 +37,28 @@ def assert_fields(scene: Scene) -> None:
                 ) from error
 
 
-def _known(effect: Bound[Effect]) -> Iterator[Bound[Effect]]:
-    """An effect, and all that it or one of these has taken hold of."""
-    waiting, seen = [effect], set()
-    while waiting:
-        one = waiting.pop()
-        if id(one) in seen or not isinstance(one, Bound):
-            continue
-        seen.add(id(one))
-        yield one
-        for value in vars(one).values():
-            waiting += [value] if isinstance(value, Bound) else value if isinstance(value, tuple) else []
+def _known(effect: Bound[Effect], peers: Peers) -> list[Bound[Effect]]:
+    """An effect, and all those that it, or one of these, requires or has taken hold of."""
+    found = [effect]
+    for one in found:
+        held = [value if isinstance(value, tuple) else (value,) for value in vars(one).values()]
+        known = {id(value) for value in (*peers.of(*one.data.requires), *itertools.chain.from_iterable(held))}
+        found += [other for other in peers if id(other) in known and other not in found]
+    return found
 
 
 @ti.data_oriented
 class _Declared:
-    """A state as one effect may see it: with the particle fields that are there whenever the effect is."""
+    """A state as an effect may see it: with the particle fields that it and those it knows declare."""
 
-    def __init__(self, s: State, effect: Bound[Effect]) -> None:
+    def __init__(self, s: State, effects: list[Bound[Effect]]) -> None:
         self.s = s
         self.refused: list[str] = []
-        found = [one.data for one in _known(effect) if isinstance(one.data, Effect)]
+        found = [effect.data for effect in effects]
         fields = [field for data in found for field in data.required_fields()]
         fields += [field for data in found if isinstance(data, PairForce) for field in memory_fields(data)]
         self.declared = {field if isinstance(field, str) else field.name for field in fields}
-        if turning([effect.data]):
+        if turning(found):
             self.declared.add("spin")
         self.hidden = (
             {field.name for field in s.fields}

@@ -76,7 +76,7 @@ class _Distances:
         self.factor.from_numpy(np.array(self.factors))
 
     def sizes(self) -> np.ndarray:
-        """Sizes of what a particle does to another, indexed by the other, itself and the distance."""
+        """Sizes of what is done to a particle by another at a distance, with these three indices."""
         self.measure()
         return self.size.to_numpy()
 
