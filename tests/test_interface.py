@@ -39,7 +39,9 @@ def test_a_family_has_all_of_its_parts(family):
     assert missing <= {"Pairwise", "Uniform"}
 
 
-@pytest.mark.parametrize("name", ["", *(f".{family}" for family in FAMILIES), ".accuracy", ".analysis"])
+@pytest.mark.parametrize(
+    "name", ["", *(f".{family}" for family in FAMILIES), ".accuracy", ".analysis", ".testing"]
+)
 def test_every_name_is_there(name):
     package = importlib.import_module(f"tisim{name}")
     listed = Path(package.__file__).with_suffix(".pyi").read_text(encoding="utf-8")

@@ -197,7 +197,7 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
         snapshot(axis, frame.arrays, square)
         axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"))
     # Here there is room.
-    directions(figure.axes[-1], square, NO_GRAVITY, share=0.18)
+    directions(figure.axes[-1], square, NO_GRAVITY, share=0.12)
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
     for (name, history), colour in zip(histories.items(), colours, strict=False):

@@ -105,7 +105,7 @@ def details(design: Mapping[str, float], result: Result) -> dict[str, float]:
 def caught(result: Result) -> Figure:
     """The channel from the side and as the flow sees it: fibres, and where particles began and ended."""
     figure = empty(10.4, 6.6)
-    side, front = figure.subplots(2, 1, sharex=True)
+    side, front = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 4.0))
     state, start = result.state, result.start
     stopped = state["captured_by"] >= 0
     magnets = next(e for e in result.scene.effects if isinstance(e, MagneticCylinders))
@@ -120,7 +120,9 @@ def caught(result: Result) -> Figure:
         for arrays, which, colour, name in shown:
             z, y = arrays["position"][which][:, 2], arrays["position"][which][:, k]
             axis.plot(z / MILLI, y / MILLI, "o", ms=3, color=colour, label=name)
-        axis.set(ylabel=f"{'xy'[k]} (mm)", aspect="equal")
+        axis.set_ylabel(f"{'xy'[k]} (mm)")
+        # Of one width both, whatever their heights, so that z is in one place.
+        axis.set_aspect("equal", "datalim")
         plain(axis)
     side.set_title(f"from the side, the flow upwards: {stopped.mean():.0%} caught")
     side.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.02))

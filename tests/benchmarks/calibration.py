@@ -20,7 +20,7 @@ from matplotlib import colormaps
 from tests.steppers.calibrated import CHAOTIC, CONTROLS, KNOWN, collocation, ratios, trapezoid
 from tests.steppers.test_calibration import BAND
 from tisim.backend import runtime
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import StageControl
 
 Found = dict[str, dict[str, np.ndarray]]
@@ -48,15 +48,17 @@ def draw(found: Found, path: Path) -> None:
             line = {"color": "black", "ls": "--"} if scene == CHAOTIC else {"color": colour}
             panel.loglog(asked, values, marker="o", ms=3, lw=1.2, label=scene, **line)
         if "run" in control:
-            panel.axhspan(*BAND, color="0.9", zorder=0)
+            panel.axhspan(*BAND, color="0.9", zorder=0, label=f"within a factor of {BAND[1]:g}")
         panel.axhline(1.0, color="0.4", lw=0.8)
         panel.invert_xaxis()
-        panel.set_title(control, fontsize=10, loc="left")
+        panel.set_title(control)
         panel.set_xlabel("error asked for")
         plain(panel)
     for panel in panels[::2]:
         panel.set_ylabel("error at the end / error asked for")
-    handles, labels = panels[0].get_legend_handles_labels()
+    letters(panels)
+    # Of the last, which has the band.
+    handles, labels = panels[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", fontsize=8, frameon=False)
     figure.savefig(path, dpi=100)
 

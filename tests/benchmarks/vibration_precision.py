@@ -32,7 +32,7 @@ from scipy.integrate import solve_ivp
 from cases.vibration import scene as vibration
 from tisim import Simulation
 from tisim.backend import runtime
-from tisim.plotting.style import empty, plain
+from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import Collocation, ErrorControl, StageControl, Stepper, Trapezoid
 
 RATIO, DURATION = 0.8, 0.005
@@ -195,6 +195,7 @@ def draw(found: list[Point], path: Path) -> None:
     figure.legend(loc="outside lower center", fontsize=8, ncols=4, frameon=False)
     for axis in axes:
         plain(axis)
+    letters(axes)
     figure.savefig(path, dpi=100)
 
 

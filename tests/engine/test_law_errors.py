@@ -28,10 +28,16 @@ class NotCalled(Force):
     def force(self, s, w, i, t):
         return -self.k * s.position[w, i]
 
+
+class Undeclared(Force):
+    @ti.func
+    def force(self, s, w, i, t):
+        return s.charge[w, i] * s.velocity[w, i]
 """
 SAID = {
-    "UnknownName": r"laws\.py, line 11, in force, must be what Taichi can compile; received .*'kk'",
-    "NotCalled": r"laws\.py, line 19, in force, must be what Taichi can compile; received .*bad operand",
+    "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be what Taichi can compile; .*'kk'",
+    "NotCalled": r"laws\.py, line 19, in NotCalled\.force, must be what Taichi can compile; .*bad operand",
+    "Undeclared": r"laws\.py, line 25, in Undeclared\.force, must be .*'charge' must be declared in",
 }
 
 
@@ -50,7 +56,9 @@ def test_on_the_command_line(own_file, capsys):
     with pytest.raises(SystemExit) as end:
         main(["run", "wrong.toml", "--plugin", "laws.py"])
     assert end.value.code == 2
-    assert "line 11, in force, must be what Taichi can compile" in " ".join(capsys.readouterr().err.split())
+    assert "line 11, in UnknownName.force, must be what Taichi can compile" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 def test_a_method_of_the_contract_must_be_for_kernels(own_file):

@@ -25,26 +25,6 @@ class Census(Operator):
         s.censuses[w] += 1
 
 
-class Stepping(Operator):
-    """Moves particles by itself, as Brownian displacement does."""
-
-    fields = (Field("leap", "m", 3, "keep"),)
-
-    @ti.func
-    def particle(self, s, w, i, t, dt):
-        s.position[w, i] += s.leap[w, i]
-
-
-class Growing(Operator):
-    """Radii grow, each at a rate of its own."""
-
-    fields = ("radius", Field("growth", "m/s", 1, "keep"))
-
-    @ti.func
-    def particle(self, s, w, i, t, dt):
-        s.radius[w, i] += s.growth[w, i] * dt
-
-
 class Poison(Operator):
     """Makes one component of one particle NaN after some steps."""
 
@@ -66,60 +46,6 @@ def test_a_field_that_could_not_be_merged_is_refused(wrong):
 def test_an_operator_sees_every_world_once_a_step():
     result = run(scene([[0, 0, 0]], [[0, 0, 0]], (Census(),), dt=0.1, steps=10))
     assert result.work["censuses"] == 10
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", [SoftShell, pytest.param(SoftShellOfAll, marks=pytest.mark.slow)])
-def test_lists_follow_particles_that_operators_move(kind):
-    """A grain that only an operator moves crosses a lattice of 125 others and pushes them."""
-    grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    position = np.concatenate([[[-2.0, 2.0, 2.5]], grid])
-    leap = np.zeros_like(position)
-    leap[0, 0] = 0.05
-    wanted = scene(
-        position,
-        np.zeros_like(position),
-        (kind(stiffness=1.0, width=0.3), Stepping()),
-        radius=0.2,
-        mass=1.0,
-        dt=1e-3,
-        steps=160,
-        quantities={"leap": leap},
-    )
-    velocity = np.zeros_like(position)
-    for _ in range(160):
-        position = position + 1e-3 * velocity + leap
-        d = position[None] - position[:, None]
-        distance = np.linalg.norm(d, axis=2) + np.eye(126)
-        push = -np.maximum(0.3 - (distance - 0.4), 0.0) * (1 - np.eye(126)) / distance
-        velocity = velocity + 1e-3 * (push[..., None] * d).sum(axis=1)
-    # The twin kicks once a step, the engine half before and half after: equal to first order in dt.
-    np.testing.assert_allclose(run(wanted).state["velocity"], velocity, rtol=0, atol=0.02 * velocity.max())
-    assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
-
-
-@pytest.mark.slow
-def test_lists_follow_particles_that_grow(rng):
-    """Grains at rest, out of each other's reach, that grow until they push each other apart."""
-    grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    position, growth = grid + rng.uniform(-0.1, 0.1, grid.shape), rng.uniform(0.5, 2.0, len(grid))
-    listed, everyone = (
-        run(
-            scene(
-                position,
-                0 * position,
-                (kind(stiffness=1.0, width=0.02), Growing()),
-                radius=0.04,
-                mass=1.0,
-                dt=1e-3,
-                steps=300,
-                quantities={"growth": growth},
-            )
-        )
-        for kind in (SoftShell, SoftShellOfAll)
-    )
-    assert np.abs(everyone.state["velocity"]).max() > 1e-3
-    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
 
 
 @pytest.mark.long

@@ -17,7 +17,12 @@ def test_panels_have_letters_before_their_titles():
 
 @pytest.mark.parametrize(
     ("limits", "label", "tick"),
-    [((0, 2e-3), "time (ms)", "1"), ((-3e-6, 1e-6), "time (µs)", "1000"), ((0, 50), "time (s)", "0.001")],
+    [
+        ((0, 2e-3), "time (ms)", "1"),
+        ((-3e-6, 1e-6), "time (µs)", "1000"),
+        ((0, 50), "time (s)", "0.001"),
+        ((0, 2e-17), "time (10⁻¹⁸ s)", "1e+15"),
+    ],
 )
 def test_an_axis_says_its_quantity_and_a_unit_that_suits_it(limits, label, tick):
     axis = empty(4, 3).subplots()

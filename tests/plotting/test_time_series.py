@@ -75,6 +75,23 @@ def test_a_number_of_particles_that_changes_has_a_panel():
     assert (number.get_title("left"), figure.get_suptitle()) == ("(c)", "")
 
 
+@pytest.mark.parametrize(("speeds", "scale"), [((0.0, 1e-3, 1.0), "log"), ((0.0, 0.9, 1.0), "linear")])
+def test_energies_that_span_decades_are_on_a_logarithmic_axis(speeds, scale):
+    """Also where the start is at rest; and frames at the sides have whole dots."""
+
+    class Seen(list):
+        times = np.arange(3.0)
+        scene = SimpleNamespace(domain=Open())
+
+    def frame(speed):
+        arrays = {"position": np.zeros((1, 3)), "velocity": np.array([[speed, 0, 0]]), "mass": np.ones(1)}
+        return SimpleNamespace(arrays=arrays)
+
+    energy, *_ = quantities(Seen(map(frame, speeds))).axes
+    assert energy.get_yscale() == scale
+    assert not energy.lines[0].get_clip_on()
+
+
 def test_where_grains_reenter_the_velocity_is_drawn(tmp_path):
     box = Box(low=(-0.02,) * 3, high=(0.02,) * 3)
     tisim.run(scene(**MOVING, domain=box), record=Recording(tmp_path / "t.h5", frames=4))

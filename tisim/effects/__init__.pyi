@@ -57,7 +57,7 @@ from .impact.friction import Friction as Friction
 from .impact.heating import DeformationWork as DeformationWork
 from .impact.heating import Heating as Heating
 from .impact.impact import Impact as Impact
-from .impact.impact import ImpactLaw as ImpactLaw
+from .impact.law import ImpactLaw as ImpactLaw
 from .impact.reaction import Reaction as Reaction
 from .impact.softening import Softening as Softening
 from .magnetic.body_force import MagneticBodyForce as MagneticBodyForce

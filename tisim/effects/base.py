@@ -173,7 +173,8 @@ class Pairwise(Effect):
         """Return the widest gap (m) between surfaces at which it acts between i and a particle no larger.
 
         A pair is looked for by its larger particle, so it is the reach of that one that counts, whatever the
-        smaller one would return. Worlds of at most 48 particles look at all pairs: test it with hundreds.
+        smaller one would return. Small worlds look at all pairs, where one too short does no harm:
+        ``assert_reach`` of tisim/testing tells.
         """
         return 0.0
 

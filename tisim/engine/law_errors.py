@@ -6,6 +6,7 @@ fault.
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,6 +32,15 @@ def in_a_line() -> Iterator[None]:
         if not places or PACKAGE in Path(file).parents:
             raise
         what = " ".join(said.strip().splitlines()[-1].split())
-        raise InputError(
-            f"{file}, line {line}, in {function}, must be what Taichi can compile; received {what}"
-        ) from error
+        where = f"{file}, line {line}, in {_owner(file, int(line))}{function},"
+        raise InputError(f"{where} must be what Taichi can compile; received {what}") from error
+
+
+def _owner(file: str, line: int) -> str:
+    """The class that a line of a file stands in, and a dot; nothing outside of one."""
+    found = [
+        node.name
+        for node in ast.walk(ast.parse(Path(file).read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef) and node.lineno <= line <= (node.end_lineno or line)
+    ]
+    return f"{found[-1]}." if found else ""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,20 +12,17 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine import law_errors
-from tisim.engine.assembly import Assembly, declared, needed_fields
+from tisim.engine.allocation import allocate, parts
 from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
 from tisim.errors import must
+from tisim.neighbours import pair_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.bound import connected
-from tisim.worlds.fields import resolve_fields
-from tisim.worlds.parameter_table import ParameterTable
 from tisim.worlds.program import Nest, Program
-from tisim.worlds.state import State
 from tisim.worlds.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
@@ -49,13 +45,8 @@ class Simulation:
         began = time.perf_counter()
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
-        capacity = capacity or scene.capacity()
-        # Fields and lists of a particle come to some hundred bytes; refused here, not in the compiler.
-        needed, there = 300 * worlds * capacity, runtime.memory()
-        rule = f"within the {there / 1e9:.0f} GB of this machine"
-        must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
         must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
-        self.trees = self._make(scene, worlds, capacity, schedule)
+        self.trees = self._make(scene, worlds, capacity or scene.capacity(), schedule)
         self.scenes: list[Scene] = []
         self.edits: list[list[str]] = []
         self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
@@ -64,7 +55,8 @@ class Simulation:
     def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
         """Place all fields, which are returned, and compile the kernels of a step."""
         with collected() as trees:
-            self._place(scene, worlds, capacity)
+            made = allocate(scene, worlds, capacity)
+        self.s, self.table, self.assembly = made.s, made.table, made.assembly
         self.schedule = schedule or self._choose(capacity)
         self.program = Program(self.s, self.assembly.step, self.schedule)
         self.first = Program(self.s, self.assembly.first, self.schedule)
@@ -74,20 +66,6 @@ class Simulation:
             if self.first.items:
                 self.first.compile()
         return trees
-
-    def _place(self, scene: Scene, worlds: int, capacity: int) -> None:
-        asked = (scene.effects, scene.stepper)
-        fields = resolve_fields(needed_fields(*asked))
-        names = (declared(*asked, what) for what in ("counters", "world_quantities", "flags"))
-        self.s = State(worlds, capacity, fields, *names)
-        parts = self._parts(scene)
-        self.table = ParameterTable(parts, worlds, self.runtime.real)
-        *effects, domain, stepper, control = (self.table.bind(part) for part in parts)
-        self.assembly = Assembly(self.s, connected(effects), stepper, domain, control)
-
-    @staticmethod
-    def _parts(scene: Scene) -> list[Any]:
-        return [*scene.acting(), scene.domain, scene.stepper, scene.stepper.control]
 
     def _choose(self, capacity: int) -> str:
         if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):
@@ -119,10 +97,10 @@ class Simulation:
         starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
         for scene, start in zip(scenes, starts, strict=True):
             check_start(self.s.fields, scene, start)
-        self.table.write([self._parts(scene) for scene in scenes])
+        self.table.write([parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.edits = [[] for _ in scenes]
-        self.s.fill({"pause_time": np.inf, "goal": NEVER})
+        self.s.fill({"pause_time": np.inf, "goal": NEVER, "listed_above": pair_list.SMALL_WORLD})
         self.begin()
         self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
@@ -142,8 +120,9 @@ class Simulation:
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
         self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
-        # What worlds wait for is asked of them by others, and stays.
-        cleared = dict.fromkeys((name for name in self.s.columns if name not in ("pause_time", "goal")), 0)
+        # What worlds wait for, and how they look for pairs, is asked of them by others, and stays.
+        asked = ("pause_time", "goal", "listed_above")
+        cleared = dict.fromkeys((name for name in self.s.columns if name not in asked), 0)
         self.s.fill({**cleared, **world_columns(self.scenes, self.starts, self.worlds)})
         self.forget_lists()
         if self.first.items:

@@ -21,7 +21,7 @@ class BinParticles(Phase):
 
     @ti.func
     def when(self, w):
-        return self.n.stale[w] > 0 and self.n.s.count[w] > self.n.small
+        return self.n.stale[w] > 0 and self.n.s.count[w] > self.n.s.listed_above[w]
 
     @ti.func
     def run(self, w, _k):
@@ -86,7 +86,7 @@ class SearchCells(PerParticle):
     @ti.func
     def run(self, w, i):
         n, s = self.n, self.s
-        if s.count[w] > n.small:
+        if s.count[w] > s.listed_above[w]:
             # Copies: the compiler cannot know that writing a list does not change what it reads.
             r, radius, dims, skin = s.position[w, i], s.radius[w, i], n.dims[w], n.skin[w]
             side = n.domain.side(w)

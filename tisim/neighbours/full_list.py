@@ -56,7 +56,7 @@ class FullNeighbourList:
     def others(self, w, i):
         """How many candidates ``owner`` offers particle i."""
         n = self.s.count[w]
-        if n > self.neighbour_list.small and self.larger_count[w, i] >= 0:
+        if n > self.s.listed_above[w] and self.larger_count[w, i] >= 0:
             n = self.larger_count[w, i]
         return n
 
@@ -64,7 +64,7 @@ class FullNeighbourList:
     def owner(self, w, i, k):
         """The k-th particle that may be a neighbour and own the pair; i itself where there is none."""
         j = k
-        if self.s.count[w] > self.neighbour_list.small and self.larger_count[w, i] >= 0:
+        if self.s.count[w] > self.s.listed_above[w] and self.larger_count[w, i] >= 0:
             j = self.larger_index[w, i, k]
         elif k == i or not self.neighbour_list.owns(w, k, i):
             j = i
@@ -82,7 +82,7 @@ class WhenListIsDue(PerParticle):
 
     @ti.func
     def when(self, w):
-        return self.m.neighbour_list.stale[w] > 0 and self.s.count[w] > self.m.neighbour_list.small
+        return self.m.neighbour_list.stale[w] > 0 and self.s.count[w] > self.s.listed_above[w]
 
 
 class ClearReverseList(WhenListIsDue):

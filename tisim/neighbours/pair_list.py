@@ -18,7 +18,7 @@ from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
 SMALL_WORLD = 48
-"""Worlds of at most this many particles look at all pairs."""
+"""Worlds of at most this many particles look at all pairs: what ``listed_above`` of the state is at first."""
 MOST_NEIGHBOURS = 24
 """The neighbours that a particle can list; one with more of them looks at all particles."""
 HORIZON = 0.15
@@ -39,7 +39,7 @@ class NeighbourList:
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
-        self.small, self.room, self.ahead = SMALL_WORLD, MOST_NEIGHBOURS, STEPS_OF_SKIN
+        self.room, self.ahead = MOST_NEIGHBOURS, STEPS_OF_SKIN
         builder = ti.FieldsBuilder()
         self.cell_start, self.cell_of, self.order, self.neighbour_count = (ti.field(ti.i32) for _ in range(4))
         self.neighbour_index = ti.field(ti.i32)
@@ -86,7 +86,7 @@ class NeighbourList:
     def size(self, w, i):
         """How many candidates ``candidate`` offers particle i."""
         n = self.s.count[w]
-        if n > self.small and self.neighbour_count[w, i] >= 0:
+        if n > self.s.listed_above[w] and self.neighbour_count[w, i] >= 0:
             n = self.neighbour_count[w, i]
         return n
 
@@ -94,7 +94,7 @@ class NeighbourList:
     def candidate(self, w, i, k):
         """The k-th particle that may be a neighbour owned by i; i itself where there is none."""
         j = k
-        if self.s.count[w] > self.small and self.neighbour_count[w, i] >= 0:
+        if self.s.count[w] > self.s.listed_above[w] and self.neighbour_count[w, i] >= 0:
             j = self.neighbour_index[w, i, k]
         elif not self.owns(w, i, k):
             j = i
@@ -121,7 +121,7 @@ class NeighbourList:
     @ti.func
     def sure(self, w):
         """Return that gap (m) where only near pairs are offered; 0, for no limit, where all pairs are."""
-        return ti.select(self.s.count[w] > self.small, self.horizon(w), 0.0)
+        return ti.select(self.s.count[w] > self.s.listed_above[w], self.horizon(w), 0.0)
 
     @ti.func
     def moved(self, w):

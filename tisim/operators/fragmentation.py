@@ -8,7 +8,8 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import Impact, ImpactLaw
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.law import ImpactLaw
 from tisim.operators.base import Operator, parameter
 from tisim.worlds.bound import Peers
 from tisim.worlds.fields import Field

@@ -67,12 +67,14 @@ def si(value: float, unit: str) -> str:
 
 
 def quantity(axis: Axis, name: str, unit: str) -> None:
-    """Label an axis with a quantity and its unit, with the prefix that suits its limits: "time (ms)"."""
-    power = _power(float(np.abs(axis.get_view_interval()).max()))
+    """Label an axis with a quantity and its unit, with the prefix that suits its limits: "time (ms)"; with a
+    power of ten where there is no prefix: "kinetic energy (10⁻²⁴ J)"."""
+    power = _thousands(float(np.abs(axis.get_view_interval()).max()))
+    factor = PREFIXES[power] if power in PREFIXES else superscripts(f"10^{power} ")
     axis.set_major_formatter(
         FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}".replace("-", "\N{MINUS SIGN}"))
     )
-    axis.set_label_text(f"{name} ({PREFIXES[power]}{unit})")
+    axis.set_label_text(f"{name} ({factor}{unit})")
 
 
 def superscripts(text: str) -> str:
@@ -88,6 +90,9 @@ def scale_of(values: np.ndarray) -> str:
 
 def _power(value: float) -> int:
     """Power of ten of the prefix of a value."""
-    if value == 0:
-        return 0
-    return 3 * int(np.clip(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3), -4, 3))
+    return int(np.clip(_thousands(value), min(PREFIXES), max(PREFIXES)))
+
+
+def _thousands(value: float) -> int:
+    """The power of a thousand, as one of ten, that leaves a value at least 1 and below 1000."""
+    return 3 * int(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3)) if value else 0

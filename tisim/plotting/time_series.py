@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from tisim.errors import must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import start_and_end
-from tisim.plotting.style import empty, legend_above, letters, plain, quantity
+from tisim.plotting.style import empty, legend_above, letters, plain, quantity, scale_of
 
 AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
 """The colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
@@ -72,10 +72,14 @@ def quantities(frames: Frames) -> Figure:
     changes = bool(np.ptp(series.number))
     figure = empty(7.2, 7.6 if changes else 5.6, pad=0.08)
     energy, centre, *more = axes = figure.subplots(3 if changes else 2, 1, sharex=True)
-    # A dot for each frame where the eye can tell them apart.
-    dots = {"marker": "o", "markersize": 3} if len(series.time) <= 60 else {}
+    # A dot for each frame where the eye can tell them apart; those at the sides are whole.
+    dots = {"marker": "o", "markersize": 3, "clip_on": False} if len(series.time) <= 60 else {}
     energy.plot(series.time, series.kinetic_energy, color=AXIS_COLOURS[0], **dots)
-    energy.set_ylim(0, 1.08 * series.kinetic_energy.max() or 1.0)
+    if scale_of(series.kinetic_energy[series.kinetic_energy > 0]) == "log":
+        # A start at rest has no place on it.
+        energy.set_yscale("log", nonpositive="mask")
+    else:
+        energy.set_ylim(0, 1.08 * series.kinetic_energy.max() or 1.0)
     quantity(energy.yaxis, "kinetic energy", "J")
     jumps = frames.scene.domain.joined()
     for k, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):

@@ -5,7 +5,7 @@ which the compiler can vectorise over particles.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -76,10 +76,13 @@ class State:
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)
         # No part of what a run is: a world waits at the first end of a step at or after ``pause_time`` (s),
-        # at ``goal`` steps, and for the next launches at ``step_limit`` steps.
+        # at ``goal`` steps, and for the next launches at ``step_limit`` steps. With more particles than
+        # ``listed_above`` it looks for pairs in cells.
         self.pause_time, self.paused = ti.field(ti.f64), ti.field(ti.i32)
         self.goal, self.step_limit = ti.field(ti.i64), ti.field(ti.i64)
-        builder.dense(ti.i, worlds).place(self.pause_time, self.paused, self.goal, self.step_limit)
+        self.listed_above = ti.field(ti.i32)
+        for column in (self.pause_time, self.paused, self.goal, self.step_limit, self.listed_above):
+            builder.dense(ti.i, worlds).place(column)
         for name in MOTION:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
             column = ti.field(ti.f64)
@@ -87,7 +90,7 @@ class State:
             setattr(self, name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
-        own = ("seed", "most", "pause_time", "paused", "goal", "step_limit")
+        own = ("seed", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
         self.columns = (*quantities, *integers, *MOTION, *self.counters, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
@@ -102,9 +105,9 @@ class State:
         self.means = self._by_merge_rule("mean")
         self.sums = self._by_merge_rule("sum")
 
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
+    def __getattr__(self, name: str) -> Any:
+        what = "the fields, counters or world_quantities of an effect that reads it"
+        raise AttributeError(f"{name!r} must be declared in {what}")
 
     def _place(self, builder: Any, field: Field) -> Any:
         dtype = ti.i32 if field.integer else ti.f64 if field.double else self.real

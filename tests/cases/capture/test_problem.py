@@ -125,7 +125,13 @@ def test_picture_shows_the_fibres_and_what_they_caught():
     caught_by = np.full(120, -1)
     caught_by[:30] = np.arange(30) % 8
     result = outcome_of(scene, caught_by)
-    side, front = filters.caught(result).axes
+    # Such a high picture would be narrower, were it as large as it can be.
+    result.start["position"][-1, 0] = 4e-3
+    figure = filters.caught(result)
+    side, front = figure.axes
+    figure.draw_without_rendering()
+    assert side.bbox.intervalx == pytest.approx(front.bbox.intervalx), "z is in one place in both"
+    assert side.get_xlim() == front.get_xlim()
     stopped = caught_by >= 0
     assert "25% caught" in side.get_title(loc="left")
     bodies = effect(scene, MagneticCylinders).cylinders

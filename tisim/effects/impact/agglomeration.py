@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.impact.impact import Impact, ImpactLaw
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.law import ImpactLaw
 
 
 class Agglomeration(ImpactLaw):

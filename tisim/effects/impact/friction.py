@@ -6,7 +6,8 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
-from tisim.effects.impact.impact import Impact, ImpactLaw
+from tisim.effects.impact.impact import Impact
+from tisim.effects.impact.law import ImpactLaw
 
 
 class Friction(ImpactLaw):

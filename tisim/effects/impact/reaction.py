@@ -7,7 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import ImpactLaw
+from tisim.effects.impact.law import ImpactLaw
 from tisim.worlds.fields import Field
 
 

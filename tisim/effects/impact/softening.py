@@ -9,7 +9,7 @@ from scipy.constants import R
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.heating import Heating
-from tisim.effects.impact.impact import ImpactLaw
+from tisim.effects.impact.law import ImpactLaw
 
 LARGEST_EXPONENT = 50.0
 """Hardness is then 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a solid."""

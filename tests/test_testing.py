@@ -1,0 +1,248 @@
+"""All laws, operators and steppers of the package keep to their contracts; what does not is named."""
+
+import numpy as np
+import pytest
+
+from tests import extremes
+from tests.scenes import compiled, fixed, flow, scene
+from tests.throwaway import SoftShell
+from tisim import InputError, Scene
+from tisim.backend.taichi import ti
+from tisim.effects import Force, Lorentz, PairForce, Tether
+from tisim.engine.explain import known_effects
+from tisim.interactions.force_sum import FORCE
+from tisim.operators import Capture, Operator
+from tisim.sources import MagneticCylinders, MagneticField, MagneticSpheres
+from tisim.steppers import (
+    Boris,
+    Brownian,
+    Collocation,
+    DriftLimit,
+    ErrorControl,
+    FixedStep,
+    IterationControl,
+    StageControl,
+    Step,
+    Stepper,
+    Trapezoid,
+    Verlet,
+)
+from tisim.steppers.common import BeginStep
+from tisim.steppers.verlet import Advance
+from tisim.testing import assert_fields, assert_lists, assert_reach
+from tisim.worlds.fields import Field
+from tisim.worlds.program import PerParticle
+
+SHELL = SoftShell(stiffness=1.0, width=0.3)
+
+
+class Change(Operator):
+    """Moves each particle by its own ``leap``, and lets it grow, in every step."""
+
+    fields = ("radius", Field("leap", "m", 3, "keep"), Field("growth", "m/s", 1, "keep"))
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        s.position[w, i] += s.leap[w, i]
+        s.radius[w, i] += s.growth[w, i] * dt
+
+
+LAWS = (SHELL, Tether(stiffness=(0.0, 0.0, 0.0)), Change())
+
+
+def crossing(stepper, effects=LAWS, velocity=0.0, pull=0.0, leap=0.0, growth=0.0, **quantities):
+    """Three particles cross a lattice of 27 others, which they meet one after the other on their way: at a
+    velocity (m/s), by a spring (N/m) that pulls them 4 m on, or in leaps (m). Or the others grow (m/s)."""
+    lattice = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    bullets = np.array([[-1.0, 0.2, 0.1], [-1.3, 1.1, 0.2], [-1.1, 1.9, 1.8]])
+    position, ahead, others = np.concatenate([bullets, lattice]), np.zeros((30, 3)), np.arange(30) > 2
+    ahead[:3, 0] = 1.0
+    if effects[:3] == LAWS:
+        effects = (SHELL, Tether(stiffness=(pull,) * 3), *effects[2:])
+        quantities |= {"anchor": position + 4.0 * ahead, "leap": leap * ahead, "growth": growth * others}
+    return scene(
+        position,
+        velocity * ahead,
+        effects,
+        radius=np.where(others, 0.1, 0.15),
+        mass=1.0,
+        stepper=stepper,
+        duration=1.2,
+        quantities=quantities,
+    )
+
+
+WAYS = ({"velocity": 3.0, "pull": 1.0}, {"leap": 0.05}, {"growth": 0.3})
+LIMITS = {"first": 0.01, "longest": 0.02}
+FLUID = {"temperature": 0.0, "viscosity": 0.3, "control": DriftLimit(longest=0.02, shortest=1e-4, drift=0.5)}
+CHARGED = {"effects": (*LAWS, MagneticField(constant=(0.0, 0.0, 0.5)), Lorentz()), "charge": np.ones(30)}
+STEPPERS = {
+    "verlet": (Verlet(control=FixedStep(dt=0.02)), {}),
+    "boris": (Boris(control=FixedStep(dt=0.02)), CHARGED),
+    "trapezoid": (Trapezoid(control=ErrorControl(error=1e-3, tolerance=1e-10, **LIMITS)), {}),
+    "trapezoid, iterations": (Trapezoid(control=IterationControl(tolerance=1e-10, **LIMITS)), {}),
+    "collocation": (Collocation(control=StageControl(error=1e-4, **LIMITS)), {}),
+    "brownian": (Brownian(**FLUID), {}),
+    "brownian, coupled": (Brownian(**FLUID, hydrodynamics="rotne-prager"), {}),
+    "brownian, fast noise": (Brownian(**FLUID, hydrodynamics="oseen", noise="fast"), {}),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "verlet" else pytest.mark.slow) for name in STEPPERS]
+)
+def test_a_stepper_says_how_far_particles_have_moved(name):
+    """By itself, and by what operators do."""
+    stepper, more = STEPPERS[name]
+    scenes = [crossing(stepper, **way, **more) for way in WAYS]
+    simulation = compiled(scenes[0], worlds=2)
+    for made in scenes:
+        assert_lists(made, simulation)
+
+
+def test_every_stepper_is_tried():
+    tried = {type(stepper) for stepper, _ in STEPPERS.values()}
+    own = {kind for kind in Stepper.known().values() if kind.__module__.startswith("tisim.")}
+    assert tried == own
+
+
+@pytest.mark.slow
+def test_lists_follow_what_is_captured():
+    sphere = {"centre": (2.5, 1.5, 1.5), "magnetisation": (0.0, 0.0, 1e3), "radius": 0.8}
+    effects = (*LAWS, MagneticSpheres(spheres=(sphere,)), Capture())
+    assert_lists(crossing(fixed(0.02), effects, **WAYS[0]))
+
+
+@pytest.mark.slow
+def test_lists_follow_what_bonds_breaks_and_cools():
+    assert_lists(flow(grains=60, stepper=fixed(4e-6), duration=4e-4))
+
+
+class Silent(Stepper):
+    """Moves particles, and does not say how far."""
+
+    control: FixedStep = FixedStep(dt=0.02)
+
+    def fields(self, turning, independent):
+        return (FORCE,)
+
+    def step(self, context):
+        return Step(
+            (
+                BeginStep(context),
+                Drift(context.s),
+                Advance(context),
+                *context.update_lists,
+                *context.sum_forces,
+            )
+        )
+
+
+class Drift(PerParticle):
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        dt = ti.cast(s.dt[w], s.real)
+        s.velocity[w, i] += dt / s.mass[w, i] * s.force[w, i]
+        s.position[w, i] += dt * s.velocity[w, i]
+
+
+@pytest.mark.long
+def test_a_stepper_that_does_not_say_so_is_told():
+    with pytest.raises(AssertionError, match=r"^position at the end must be with lists what it"):
+        assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
+
+
+def test_steps_must_not_depend_on_the_pairs_that_are_looked_at():
+    with pytest.raises(
+        InputError, match="step control must be one that does not look at pairs; received 'app"
+    ):
+        assert_lists(crossing(Verlet(), **WAYS[0]))
+
+
+class TooFar(SoftShell):
+    """Acts twice as far as it says."""
+
+    @ti.func
+    def reach(self, s, w, i):
+        return 0.5 * self.width(w)
+
+
+class TooFarIfUnequal(PairForce):
+    """Acts within three of the larger radii: beyond its reach, where the other is smaller."""
+
+    short_ranged = True
+
+    @ti.func
+    def reach(self, s, w, i):
+        return s.radius[w, i]
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        near = distance < 3.0 * ti.max(s.radius[w, i], s.radius[w, j])
+        return ti.select(near, -1.0, 0.0) * separation
+
+
+def two(*effects, **quantities):
+    """Two particles of 1 m, 3 m apart, for a step."""
+    return scene([[0, 0, 0], [3, 0, 0]], [[0, 0, 0]] * 2, effects, radius=1.0, quantities=quantities)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (TooFar(stiffness=1.0, width=1.0), "of radii 1 and 1 m, at 1 of that distance"),
+        (TooFarIfUnequal(), "on particle 0 by 1, of radii 1 and 0.5 m, at 1 of that distance"),
+    ],
+)
+def test_a_force_beyond_its_reach_is_told(law, said):
+    with pytest.raises(AssertionError, match=f"^{law.kind()} must be 0 between particles farther .*{said}"):
+        assert_reach(two(law))
+
+
+def joined(kinds):
+    """A scene of several effects, with what they need."""
+    every = [extremes.scenes()[f"effects.{kind.kind()}"] for kind in kinds]
+    effects = {name: values for data in every for name, values in data["effects"].items()}
+    carried = {name: values for data in every for name, values in data["particles"]["quantities"].items()}
+    particles = {**every[0]["particles"], "quantities": carried}
+    return Scene.from_dict({**every[0], "effects": effects, "particles": particles})
+
+
+SHORT = [kind for kind in known_effects() if getattr(kind, "short_ranged", False)]
+
+
+@pytest.mark.long
+def test_every_law_is_zero_beyond_its_reach():
+    """All in one scene; only friction has nothing to do there before particles have slid."""
+    most = assert_reach(joined(SHORT))
+    assert most.keys() == {kind.kind() for kind in SHORT}
+    assert {name for name, size in most.items() if size == 0} <= {"contact_friction"}
+
+
+class ChargeOfOthers(Force):
+    """Reads the charge, which it does not declare."""
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return s.charge[w, i] * s.velocity[w, i]
+
+
+def test_a_field_that_only_others_declare_is_told():
+    effects = (MagneticField(), Lorentz(), ChargeOfOthers())
+    with pytest.raises(
+        AssertionError, match=r"^charge_of_others.fields must name 'charge', which it reads or writes"
+    ):
+        assert_fields(two(*effects, charge=[1.0, 1.0]))
+
+
+# Capture excludes impacts. No law of its own, and a series that takes long to compile, has the cylinder.
+TOGETHER = [kind for kind in known_effects() if kind not in (Capture, MagneticCylinders)]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kinds", [TOGETHER, [Capture]], ids=["all that go together", "capture"])
+def test_effects_declare_the_fields_that_they_read(kinds):
+    assert_fields(joined(kinds))

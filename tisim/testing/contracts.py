@@ -1,0 +1,13 @@
+"""All that a scene can be held to at once."""
+
+from tisim.scene.scene import Scene
+from tisim.testing.fields import assert_fields
+from tisim.testing.lists import assert_lists
+from tisim.testing.reach import assert_reach
+
+
+def assert_contracts(scene: Scene) -> None:
+    """Assert that ``assert_fields``, ``assert_reach`` and ``assert_lists`` hold of a scene."""
+    assert_fields(scene)
+    assert_reach(scene)
+    assert_lists(scene)

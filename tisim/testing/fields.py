@@ -1,0 +1,117 @@
+"""Whether effects declare the fields that they read or write."""
+
+import itertools
+from typing import Any
+
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects.base import Effect, PairForce
+from tisim.interactions.contact_history import memory_fields
+from tisim.interactions.force_sum import FORCE, TORQUE, turning
+from tisim.scene.scene import Scene
+from tisim.testing.uncompiled import allocated, offered
+from tisim.worlds.bound import Bound, Peers
+from tisim.worlds.fields import CORE
+from tisim.worlds.state import State
+
+
+@in_taichi_thread
+def assert_fields(scene: Scene) -> None:
+    """Assert that every effect of a scene declares the particle fields that it reads or writes.
+
+    A field that another effect happens to declare would be there in this scene, and missing in the next.
+    Fields of the effects that it requires, or takes hold of in ``connect``, are there whenever it is, and so
+    are ``force`` and ``torque`` for one that asks first whether there are any.
+    """
+    with allocated(scene) as made:
+        for effect in made.assembly.effects:
+            view = _Declared(made.s, _known(effect, made.assembly.effects))
+            try:
+                _Hooks(view, effect).compile(0)
+            except Exception as error:
+                if not view.refused:
+                    raise
+                raise AssertionError(
+                    f"{effect.data.label}.fields must name {view.refused[-1]!r}, which it reads or writes; "
+                    f"received {', '.join(sorted(view.declared)) or 'none'}"
+                ) from error
+
+
+def _known(effect: Bound[Effect], peers: Peers) -> list[Bound[Effect]]:
+    """An effect, and all those that it, or one of these, requires or has taken hold of."""
+    found = [effect]
+    for one in found:
+        held = [value if isinstance(value, tuple) else (value,) for value in vars(one).values()]
+        known = {id(value) for value in (*peers.of(*one.data.requires), *itertools.chain.from_iterable(held))}
+        found += [other for other in peers if id(other) in known and other not in found]
+    return found
+
+
+@ti.data_oriented
+class _Declared:
+    """A state as an effect may see it: with the particle fields that it and those it knows declare."""
+
+    def __init__(self, s: State, effects: list[Bound[Effect]]) -> None:
+        self.s = s
+        self.refused: list[str] = []
+        found = [effect.data for effect in effects]
+        fields = [field for data in found for field in data.required_fields()]
+        fields += [field for data in found if isinstance(data, PairForce) for field in memory_fields(data)]
+        self.declared = {field if isinstance(field, str) else field.name for field in fields}
+        if turning(found):
+            self.declared.add("spin")
+        self.hidden = (
+            {field.name for field in s.fields}
+            - {field.name for field in (*CORE, FORCE, TORQUE)}
+            - self.declared
+        )
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self.hidden:
+            self.refused.append(name)
+            raise AttributeError(name)
+        return getattr(self.s, name)
+
+
+@ti.data_oriented
+class _Hooks:
+    """All that an effect does to particles, compiled and never run."""
+
+    def __init__(self, view: _Declared, effect: Bound[Effect]) -> None:
+        self.s = view
+        self.single = offered(effect, "force", "torque", "velocity_jacobian")
+        self.reach = offered(effect, "reach")
+        self.pair = offered(effect, "pair_force", "pair_torque", "influence")
+        self.touching, self.remember = offered(effect, "touching"), offered(effect, "remember")
+        self.response = offered(effect, "response")
+        self.event = offered(effect, "contact", "resolve")
+        self.particle, self.world = offered(effect, "particle"), offered(effect, "world")
+
+    @ti.kernel
+    def compile(self, worlds: ti.i32):
+        for w in range(worlds):
+            self.call(w, 0, 1)
+
+    @ti.func
+    def call(self, w, i, j):
+        s = self.s
+        t, dt = s.time[w], ti.cast(s.dt[w], s.real)
+        apart, distance = s.position[w, j] - s.position[w, i], s.radius[w, i]
+        for hook in ti.static(self.single):
+            hook(s, w, i, t)
+        for hook in ti.static(self.reach):
+            hook(s, w, i)
+        for hook in ti.static(self.pair):
+            hook(s, w, i, j, apart, distance, t)
+        for hook in ti.static(self.touching):
+            hook(s, w, i, j, apart, distance)
+        for hook in ti.static(self.remember):
+            hook(s, w, i, j, apart, distance, apart, dt)
+        for hook in ti.static(self.response):
+            hook(s, w, i, apart, t)
+        for hook in ti.static(self.event):
+            hook(s, w, i, j, apart)
+        for hook in ti.static(self.particle):
+            hook(s, w, i, t, dt)
+        for hook in ti.static(self.world):
+            hook(s, w)

@@ -1,0 +1,103 @@
+"""Whether short-ranged laws are 0 beyond their reach."""
+
+from typing import Any
+
+import numpy as np
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects.base import DerivedQuantity, Pairwise
+from tisim.engine.allocation import parts
+from tisim.engine.loading import check_start, laid_out, world_columns
+from tisim.scene.scene import Scene
+from tisim.testing.uncompiled import allocated, offered
+from tisim.worlds.bound import Bound
+from tisim.worlds.state import State
+
+WITHIN = 0.9
+FARTHER = (1.001, 1.1, 2.0, 10.0, 100.0)
+"""Distances of two centres at which a law is tried, over that of its reach."""
+SHARES = np.array([1.0, 1 / 2, 1 / 3])
+"""Radii that a law is tried with, one particle after another, over those of the scene."""
+
+
+@in_taichi_thread
+def assert_reach(scene: Scene) -> dict[str, float]:
+    """Assert that each short-ranged law does nothing to two particles that are farther apart than its reach.
+
+    It is tried with the radii of the scene, and with others, equal and unequal, along the line between each
+    two particles; derived quantities are taken to be 1. Returns for each such law, by its name, the size of
+    the most that it does nearer than that (N or N m, or of the quantity which it sets): where this is 0, the
+    scene shows nothing of it.
+    """
+    most: dict[str, float] = {}
+    start = scene.particles.arrays(scene.domain, scene.seed)
+    shares = SHARES[np.arange(len(start["radius"])) % len(SHARES)]
+    with allocated(scene) as made:
+        s = made.s
+        check_start(s.fields, scene, start)
+        made.table.write([parts(scene)])
+        s.fill({f.name: laid_out(f, [start], 1, s.capacity) for f in s.fields})
+        s.fill(world_columns([scene], [start], 1))
+        s.fill({effect.data.quantity: 1.0 for effect in made.assembly.effects.of(DerivedQuantity)})
+        for effect in made.assembly.effects.of(Pairwise):
+            if effect.data.short_ranged:
+                tried, label = _Distances(s, effect), effect.data.label
+                for radius in (start["radius"], start["radius"] * shares):
+                    s.write("radius", np.resize(radius, (1, s.capacity)))
+                    sizes = tried.sizes()
+                    most[label] = max(most.get(label, 0.0), float(sizes[..., 0].max()))
+                    for i, j, k in np.argwhere(sizes[..., 1:] != 0)[:1]:
+                        raise AssertionError(
+                            f"{label} must be 0 between particles farther apart than its reach; received "
+                            f"{sizes[i, j, k + 1]:g} on particle {i} by {j}, of radii {radius[i]:g} and "
+                            f"{radius[j]:g} m, at {tried.factors[k + 1]:.3g} of that distance"
+                        )
+    return most
+
+
+@ti.data_oriented
+class _Distances:
+    """How much a short-ranged law would do to each pair of the first world, at some distances."""
+
+    def __init__(self, s: State, effect: Bound[Any]) -> None:
+        names = ("pair_force", "pair_torque", "influence")
+        self.s, self.effect, self.laws = s, effect, offered(effect, *names)
+        # Where the distance is that of the reach, a law may find it just within by rounding.
+        at = 1.0 + 1e3 * float(np.finfo(np.float64 if s.real == ti.f64 else np.float32).eps)
+        self.factors = (WITHIN, at, *FARTHER)
+        self.number = len(self.factors)
+        # In memory: a loop over constants would compile the law for each of them.
+        self.factor, self.size, builder = ti.field(ti.f64), ti.field(s.real), ti.FieldsBuilder()
+        builder.dense(ti.i, len(self.factors)).place(self.factor)
+        builder.dense(ti.ijk, (s.capacity, s.capacity, len(self.factors))).place(self.size)
+        Tree(builder)
+        self.factor.from_numpy(np.array(self.factors))
+
+    def sizes(self) -> np.ndarray:
+        """Sizes of what is done to a particle by another at a distance, with these three indices."""
+        self.measure()
+        return self.size.to_numpy()
+
+    @ti.kernel
+    def measure(self):
+        for i, j in ti.ndrange(self.s.count[0], self.s.count[0]):
+            if i != j:
+                self.pair(i, j)
+
+    @ti.func
+    def pair(self, i, j):
+        s = self.s
+        a, b = s.radius[0, i], s.radius[0, j]
+        owner = ti.select(a > b or (a == b and i < j), i, j)
+        limit = a + b + ti.max(self.effect.reach(s, 0, owner), 0.0)
+        apart = s.position[0, j] - s.position[0, i]
+        for k in range(self.number):
+            distance = limit * ti.cast(self.factor[k], s.real)
+            total = 0.0 * a
+            for law in ti.static(self.laws):
+                done = law(s, 0, i, j, distance / apart.norm() * apart, distance, s.time[0])
+                # Not its length: in f32 the square of a small force is nothing.
+                total += ti.abs(done).max()
+            self.size[i, j, k] = total
