@@ -46,15 +46,15 @@ class Design:
 
     genes : the value of each gene, by name, in its unit. values : of each objective, by name, in its unit:
     the mean over random starts, the fresh ones where there are any. intervals : half-widths of their 95 %
-    confidence intervals. starts : how many there were. settled : whether the last of them changed the mean by
-    less than the tolerance that was asked for.
+    confidence intervals. starts : how many there were. converged : whether the last of them changed the mean
+    by less than the tolerance that was asked for.
     """
 
     genes: dict[str, float]
     values: dict[str, float]
     intervals: dict[str, float]
     starts: int
-    settled: bool
+    converged: bool
 
 
 @dataclass(repr=False)
@@ -84,8 +84,8 @@ class Outcome:
     stopped: Stopped = ""
 
     def __repr__(self) -> str:
-        found = f"{len(self.hall)} designs from {self.evaluations + self.hits} runs"
-        return f"<search of {self.problem.name}: {found}, stopped by {self.stopped or 'nothing yet'}>"
+        counts = f"{len(self.hall)} designs from {self.evaluations + self.hits} runs"
+        return f"<search of {self.problem.name}: {counts}, stopped by {self.stopped or 'nothing yet'}>"
 
     @property
     def name(self) -> str:
@@ -113,7 +113,7 @@ class Outcome:
             values=dict(zip(names, means, strict=True)),
             intervals={name: e.half_width for name, e in zip(names, estimates, strict=True)},
             starts=estimates[0].starts,
-            settled=estimates[0].settled,
+            converged=estimates[0].converged,
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -66,7 +66,7 @@ class _Search:
         )
         self.hall = Hall(settings.hall_of_fame)
         self.ranked: list[Individual] = []
-        self.waited = 0
+        self.stagnation = 0
         self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
         self.began = time.monotonic()
 
@@ -105,7 +105,7 @@ class _Search:
             self._race(population, generation)
             if not self.ensemble.exhausted:  # or the generation is not whole, and the last
                 self.method.tell(population, self.hall.strings)
-            self.waited = 0 if better else self.waited + 1
+            self.stagnation = 0 if better else self.stagnation + 1
             self.outcome.logbook.record(
                 gen=generation,
                 designs=fresh,
@@ -160,7 +160,7 @@ class _Search:
             (goal,) = self.problem.costs([settings.target])
             if self.hall.strings[0].fitness.values[0] <= goal:
                 return "target"
-        if settings.patience is not None and self.waited >= settings.patience:
+        if settings.patience is not None and self.stagnation >= settings.patience:
             return "patience"
         if self.ensemble.exhausted or self.ensemble.requested >= self.ensemble.budget:
             return "evaluations"

@@ -43,7 +43,7 @@ SEARCH_FILES = (SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", *B
 """The files that a search writes into its folder."""
 
 
-def going_on(
+def resume_or_clear(
     folder: Path, fresh: bool | None, overwrite: bool,
     what: str = "search", file: str = SEARCH_FILE, beside: Sequence[str] = BESIDE,
 ) -> bool:  # fmt: skip
@@ -67,10 +67,10 @@ def going_on(
 
 def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> bool:
     """Whether the file in the folder has the search wished; InputError when it is of another, by identity."""
-    known = searches(cache)
-    if known and search_name(wished) not in known:
-        refuse(folder, "search", json.loads(next(iter(known.values()))["identity"]), wished)
-    return bool(known)
+    stored_searches = searches(cache)
+    if stored_searches and search_name(wished) not in stored_searches:
+        refuse(folder, "search", json.loads(next(iter(stored_searches.values()))["identity"]), wished)
+    return bool(stored_searches)
 
 
 def refuse(folder: Path, what: str, old: Mapping[str, Any], wished: Mapping[str, Any]) -> NoReturn:

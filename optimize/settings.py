@@ -84,15 +84,20 @@ def search_name(identity: Mapping[str, Any]) -> str:
     return f"searches/{identity['problem']}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
 
 
-def followed(usual: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of a case without the options that follow those given, by dotted name, in their place.
+def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a case without those options whose defaults depend on an option that changes.
 
     Where a case has 24 strings and 8 parents, 12 strings shall have as many parents as go with 12.
+    usual : settings of the case. changes : settings in place of them, by dotted name.
     """
-    method = find(given.get("method", usual.get("method", "genetic")))
-    chosen = [names for option, names in method.followers.items() if f"options.{option}" in given]
-    replaced = {name for names in chosen for name in names}
-    options = {name: value for name, value in usual.get("options", {}).items() if name not in replaced}
+    method = find(changes.get("method", usual.get("method", "genetic")))
+    dropped = {
+        name
+        for option, names in method.dependent_options.items()
+        if f"options.{option}" in changes
+        for name in names
+    }
+    options = {name: value for name, value in usual.get("options", {}).items() if name not in dropped}
     return {**usual, "options": options}
 
 

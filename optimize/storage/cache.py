@@ -115,12 +115,12 @@ class Cache:
 
     def attributes(self) -> dict[str, Mapping[str, Any]]:
         """The attributes of all tables by name, stored or waiting for the next fold."""
-        stored: dict[str, Mapping[str, Any]] = {}
+        attributes: dict[str, Mapping[str, Any]] = {}
         with locked(self._lock, exclusive=False):
             if file_status(self.path) is not None:
                 with hdf5_store.open_evaluations(self.path) as file:
-                    stored = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
-        return stored | {name: table.attrs for name, table in self._pending.items()}
+                    attributes = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
+        return attributes | {name: table.attrs for name, table in self._pending.items()}
 
     def tables(self) -> list[str]:
         """Names of all tables, stored or waiting for the next fold."""
@@ -186,8 +186,8 @@ def cache_files(path: str | Path) -> tuple[Path, Path, Path]:
 
 def file_version(path: Path) -> tuple[int, ...] | None:
     """What tells one state of the HDF5 file from another; None where there is none."""
-    there = file_status(path)
-    return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
+    status = file_status(path)
+    return None if status is None else (status.st_ino, status.st_mtime_ns, status.st_size)
 
 
 def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
@@ -205,8 +205,8 @@ def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
 def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
     """As ``cache_files``, of a cache that is there already. InputError if there is no such file."""
     file, journal, lock = cache_files(path)
-    there = file_status(file) or file_status(journal)
-    must(there is not None, "cache file", "an existing file", str(path))
+    status = file_status(file) or file_status(journal)
+    must(status is not None, "cache file", "an existing file", str(path))
     return file, journal, lock
 
 

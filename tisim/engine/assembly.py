@@ -30,19 +30,19 @@ from tisim.worlds.state import State
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
     """What a scene of these needs beyond the core -> the part that needs it, in order."""
-    needed: list[tuple[str | Field, str]] = []
+    requirements: list[tuple[str | Field, str]] = []
     if any(isinstance(effect, Force | PairForce) for effect in effects):
-        needed.append((FORCE, "forces"))
+        requirements.append((FORCE, "forces"))
     if turning(effects):
-        needed += [(TORQUE, "torques"), ("spin", "torques")]
+        requirements += [(TORQUE, "torques"), ("spin", "torques")]
     for effect in effects:
-        needed += [(need, effect.label) for need in effect.required_fields()]
+        requirements += [(need, effect.label) for need in effect.required_fields()]
         if isinstance(effect, PairForce):
-            needed += [(field, effect.label) for field in memory_fields(effect)]
-    wanted = stepper.fields(turning(effects), stepper.independent(effects))
-    needed += [(need, stepper.kind()) for need in wanted]
+            requirements += [(field, effect.label) for field in memory_fields(effect)]
+    stepper_fields = stepper.fields(turning(effects), stepper.independent(effects))
+    requirements += [(need, stepper.kind()) for need in stepper_fields]
     users: dict[str | Field, list[str]] = {}
-    for need, who in needed:
+    for need, who in requirements:
         users.setdefault(need, []).append(who)
     return {need: ", ".join(dict.fromkeys(names)) for need, names in users.items()}
 
@@ -74,8 +74,8 @@ class Assembly:
         events, operators = effects.of(PairEvent), effects.of(Operator)
         short_ranged = tuple(e for e in effects.of(PairForce, SelfConsistentQuantity) if e.data.short_ranged)
         surveyed = bool(events) or control.data.watches_pairs
-        listed = surveyed or bool(short_ranged)
-        self.neighbour_list = near = NeighbourList(s, domain, short_ranged) if listed else None
+        short_ranged_sums = surveyed or bool(short_ranged)
+        self.neighbour_list = near = NeighbourList(s, domain, short_ranged) if short_ranged_sums else None
         self.full_list = FullNeighbourList(near) if near and short_ranged else None
         contacts = ContactList(s, domain, events) if surveyed else None
         self.derived_solvers = tuple(

@@ -93,12 +93,12 @@ class Replay:
         if len(part) == 0:
             return
         good["cut"][part] = cut[part]
-        met = self._after(good, part, 1)
+        end = self._after(good, part, 1)
         good["cut"][part] = 0.0
-        again = self._after(met, part, 1)
-        fine = part[sound(met)[part] & ~sound(again)[part]]
+        next_end = self._after(end, part, 1)
+        fine = part[sound(end)[part] & ~sound(next_end)[part]]
         for name, values in good.items():
-            values[fine] = met[name][fine]
+            values[fine] = end[name][fine]
 
     def _rewound(self) -> Image:
         if self.base is None:
@@ -113,6 +113,6 @@ class Replay:
         image["status"][worlds] = WorldStatus.RUNNING
         image["goal"] = image["steps"] + steps
         self.simulation.put(image)
-        while self.simulation.going_on():
+        while self.simulation.is_running():
             self.simulation.program.advance(steps)
         return self.simulation.s.image()

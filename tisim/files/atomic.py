@@ -48,11 +48,11 @@ def _open_for_reading(path: Path) -> int:
         pass
     try:
         return open_descriptor(path, os.O_RDONLY | os.O_CREAT)
-    except InputError as refused:
+    except InputError as error:
         try:
             return os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
         except OSError:
-            raise refused from None
+            raise error from None
 
 
 def _wait_for_lock(handle: int, path: Path, kind: int, timeout: float) -> None:

@@ -55,8 +55,8 @@ class Recording:
     every: float | None = None
 
     def __post_init__(self) -> None:
-        given = "both" if self.every is not None else "neither"
-        must((self.frames is None) != (self.every is None), "recording", "given frames or every", given)
+        received = "both" if self.every is not None else "neither"
+        must((self.frames is None) != (self.every is None), "recording", "given frames or every", received)
         must(self.frames is None or self.frames >= 1, "frames", "at least 1", self.frames)
         sound = self.every is None or 0 < self.every < np.inf
         must(sound, "every", "above 0 s, and finite", self.every)

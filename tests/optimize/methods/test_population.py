@@ -6,7 +6,7 @@ import pytest
 from cases import case as catalogue
 from optimize.methods.base import every, find
 from optimize.methods.breeding_settings import Breeding
-from optimize.settings import Settings, followed, proposed
+from optimize.settings import Settings, proposed, without_dependent_options
 from tests.optimize.fake_runs import fake_problem
 from tisim import InputError
 from tisim.cli.scene_arguments import with_changes
@@ -40,7 +40,11 @@ def generations(settings):
 def settings_of(usual, method, given):
     """As the command line makes them: --method, --population or --set, on a case."""
     wishes = {f"options.{name}": value for name, value in given.items()}
-    return Settings(**with_changes(followed(proposed(fake_problem(GENES), usual, method), wishes), wishes))
+    return Settings(
+        **with_changes(
+            without_dependent_options(proposed(fake_problem(GENES), usual, method), wishes), wishes
+        )
+    )
 
 
 def test_the_table_is_of_the_cases_there_are():

@@ -11,13 +11,14 @@ from cases import case as catalogue
 from optimize.evaluation.runs import start_seed
 from optimize.problem.objective import Objective
 from optimize.report import comparison
-from optimize.report.comparison import FRESH, compare, settings_of
+from optimize.report.comparison import FRESH, compare, plan, settings_of
 from optimize.storage.cache import Cache
 from tests.optimize.drift_case import CASE
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tests.optimize.test_several import OBJECTIVES
 from tisim import InputError
 from tisim.cli.main import main
+from tisim.files import ownership
 
 BASE = {
     "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,
@@ -30,9 +31,9 @@ def noisy(design, seed):
 
 
 def compared(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache=None, problem=None):
-    arguments = (BASE, methods, evaluations, repeats, fresh)
+    searches = plan(problem or fake_problem(6), BASE, methods, evaluations, repeats, fresh)
     cache = FakeCache() if cache is None else cache
-    return list(compare(problem or fake_problem(6), *arguments, evaluator or FakeEvaluator(noisy), cache))
+    return list(compare(searches, evaluator or FakeEvaluator(noisy), cache))
 
 
 def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
@@ -106,16 +107,28 @@ def test_what_cannot_be_compared_is_refused():
     for arguments, message in (
         ({"methods": ["genetic", "genetic"]}, "methods must be one or more, all different"),
         ({"methods": []}, "methods must be one or more"),
-        ({"methods": ["genetic"], "repeats": 0}, "repeats must be within"),
-        ({"methods": ["genetic"], "fresh": 1}, "fresh starts must be at least 2; received 1"),
-        ({"methods": ["genetic"], "evaluations": 0}, "evaluations must be at least 1"),
+        ({"repeats": 0}, "repeats must be within"),
+        ({"fresh": 1}, "fresh starts must be at least 2; received 1"),
+        ({"evaluations": 0}, "evaluations must be at least 1"),
         ({"methods": ["genetic", "simplex"]}, "method must be one of .*; received 'simplex'"),
-        ({"methods": ["random"], "problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
+        ({"problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
     ):
-        evaluator = FakeEvaluator(noisy)
+        usual = {"methods": ["random"], "evaluations": 9, "repeats": 1, "fresh": 4, "problem": fake_problem()}
         with pytest.raises(InputError, match=message):
-            compared(**arguments, evaluator=evaluator)
-        assert evaluator.ran == []
+            plan(**{**usual, "base": BASE, **arguments})
+
+
+@pytest.mark.parametrize("wrong", [("--methods", "simplex"), ("--repeats", "0"), ("--executor", "nobody")])
+def test_a_comparison_that_cannot_be_leaves_the_files_of_before(tmp_path, monkeypatch, capsys, wrong):
+    monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
+    ownership.claim(tmp_path, comparison.COMPARISON_FILES)
+    with Cache(tmp_path / "compare.h5") as cache:
+        cache.put_table("other", {})
+    content = (tmp_path / "compare.h5").read_bytes()
+    with pytest.raises(SystemExit) as exit_:
+        main(["compare", "drift", "--out", str(tmp_path), "--overwrite", *wrong])
+    assert (exit_.value.code, "must be" in capsys.readouterr().err) == (2, True)
+    assert (tmp_path / "compare.h5").read_bytes() == content
 
 
 @pytest.mark.long

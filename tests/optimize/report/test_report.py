@@ -53,7 +53,7 @@ def test_csv_holds_all_digits(outcome, tmp_path):
             "b_f/b_0",
             "n_f",
             "starts",
-            "settled",
+            "converged",
         ]
     )
     assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
@@ -93,7 +93,7 @@ def printed(outcome, width=80):
 def test_terminal_table_shows_the_best_designs(outcome):
     rows = printed(outcome)
     assert [row[:6].split(" ")[0] for row in rows] == [
-        *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "settle",
+        *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "conver",
     ]  # fmt: skip
     assert rows[0].split() == ["rank", *"123456"]
     assert rows[5].split() == ["Pi", *(f"{string.estimates[0].mean:.4g}" for string in outcome.hall)]
@@ -130,14 +130,14 @@ def test_symbols_of_the_table_are_explained_under_it(outcome):
         console.print(report.notes(outcome))
         return [line.split(": ")[0] for line in console.export_text().splitlines() if ": " in line]
 
-    assert headings(outcome) == ["95 % +-", "starts", "settled"]
+    assert headings(outcome) == ["95 % +-", "starts", "converged"]
     assert headings(agglomerations(2)) == [
         "Pi",
         "b_f / b_0",
         "n_f",
         "95 % +-",
         "starts",
-        "settled",
+        "converged",
         "fresh starts",
     ]
     assert headings(agglomerations(0)) == []

@@ -8,7 +8,7 @@ import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from optimize.search_folder import SEARCH_FILES, going_on
+from optimize.search_folder import SEARCH_FILES, resume_or_clear
 from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
@@ -81,7 +81,7 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
                 interrupted.append(scenes)
                 assert optimize()[0] == 0
                 with pytest.raises(InputError, match="without a command that is still at work there"):
-                    going_on(tmp_path / "s", None, overwrite=True)
+                    resume_or_clear(tmp_path / "s", None, overwrite=True)
             return super().evaluate(scenes, progress)
 
     monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", Joined)

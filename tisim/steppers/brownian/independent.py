@@ -57,7 +57,7 @@ class IndependentBrownianSteps(PerParticle):
         self.registers.load(w, i)
         interval, end = s.own_interval[w, i], s.intervals[w] + s.launch_intervals[w]
         elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
-        taken, going, short = 0, self.able(w, i), 0
+        attempts, going, short = 0, self.able(w, i), 0
         attempt_limit, cut = s.attempt_limit[w], s.cut[w]
         while going > 0 and interval < end:
             kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
@@ -69,9 +69,9 @@ class IndependentBrownianSteps(PerParticle):
                 if going > 0:
                     kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
                     elapsed, carry, steps, going, over = self.interval(
-                        w, i, interval, kick, elapsed, carry, before, attempt_limit - taken
+                        w, i, interval, kick, elapsed, carry, before, attempt_limit - attempts
                     )
-                    taken += steps - before
+                    attempts += steps - before
                     before = steps
                     if over == 0:
                         short, going = going, 0
@@ -87,7 +87,7 @@ class IndependentBrownianSteps(PerParticle):
         s.own_steps[w, i] = before
         if short > 0:
             ti.atomic_add(s.underway[w], 1)
-        ti.atomic_add(s.particle_steps[w], taken)
+        ti.atomic_add(s.particle_steps[w], attempts)
 
     @ti.func
     def number(self, interval):
@@ -110,14 +110,14 @@ class IndependentBrownianSteps(PerParticle):
         begin = beginning(self.s, self.control, w, interval)
         length = duration(self.s, self.control, w, interval, begin)
         elapsed, carry = start, rounding
-        taken, going, g = before, 1, kick
-        while elapsed < length and going > 0 and taken - before < most:
+        steps, going, g = before, 1, kick
+        while elapsed < length and going > 0 and steps - before < most:
             # An operator may have changed the radius in the last step.
             mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
                 self.force_sum.single_particle(w, i, begin + elapsed)
             pushed = self.fluid.pushed(w, i, mobility)
-            dt, left = ti.cast(self.control.longest(w), ti.f64), length - elapsed
+            dt, remaining = ti.cast(self.control.longest(w), ti.f64), length - elapsed
             if not self.control.easy(self.own, w, i, pushed):
                 rate = self.control.rate(self.own, w, i, pushed)
                 dt = self.control.step(w, rate)
@@ -129,16 +129,16 @@ class IndependentBrownianSteps(PerParticle):
                 step = dt - carry
                 total = elapsed + step
                 carry = (total - elapsed) - step
-                if dt * (1.0 + LITTLE) >= left:
-                    dt, total = left, length
-                if taken > 0:
-                    g = self.fluid.normals(w, i, self.number(interval) + taken)
+                if dt * (1.0 + LITTLE) >= remaining:
+                    dt, total = remaining, length
+                if steps > 0:
+                    g = self.fluid.normals(w, i, self.number(interval) + steps)
                 self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
                 if self.s.own_fault[w, i] == 0:
                     elapsed = total
-                    taken += 1
+                    steps += 1
                 going = self.able(w, i)
-        return elapsed, carry, taken, going, ti.select(elapsed < length, 0, 1)
+        return elapsed, carry, steps, going, ti.select(elapsed < length, 0, 1)
 
     @ti.func
     def move(self, w, i, mobility, pushed, t, dt, g):
