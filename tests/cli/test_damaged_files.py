@@ -65,7 +65,7 @@ RANDOM = 12
 def damages(path, whole):
     """Damage the file in one way after another: yields what was done, and whether that must be told."""
     rng = np.random.default_rng(3)
-    random = {f"random {k}": lambda p: p.write_bytes(damage.damaged(whole, rng)) for k in range(RANDOM)}
+    random = {f"random {k}": lambda p: p.write_bytes(damage.with_mishap(whole, rng)) for k in range(RANDOM)}
     for name, hurt in (DAMAGE | random).items():
         if path.is_dir() and not path.is_symlink():
             path.rmdir()

@@ -29,7 +29,7 @@ def test_no_damage_goes_unnoticed(tmp_path, name):
     content, whole = path.read_bytes(), kind.read(path)
     refused = 0
     for _ in range(40):
-        path.write_bytes(damage.damaged(content, rng))
+        path.write_bytes(damage.with_mishap(content, rng))
         what, why = damage.verdict(kind, path, whole)
         assert what == "", (what, why)
         refused += why != whole
@@ -41,7 +41,7 @@ def test_no_damage_goes_unnoticed(tmp_path, name):
 def test_hundreds_of_damaged_files(tmp_path, name):
     reader = damage.Reader()
     try:
-        counts = damage._counted(name, np.random.default_rng(4), 200, tmp_path / "files", reader)
+        counts = damage._count(name, np.random.default_rng(4), 200, tmp_path / "files", reader)
     finally:
         reader.end()
     assert counts.clean, counts
@@ -57,7 +57,7 @@ def test_a_kind_whose_undamaged_file_is_refused_is_not_counted(tmp_path):
         return "", "file must be another; received this one"
 
     with pytest.raises(AssertionError, match=r"the undamaged result\.h5 is not read: file must be another"):
-        damage._counted("result.h5", np.random.default_rng(0), 3, tmp_path / "files", reader)
+        damage._count("result.h5", np.random.default_rng(0), 3, tmp_path / "files", reader)
 
 
 def test_every_lost_page_of_a_result_is_found(tmp_path):

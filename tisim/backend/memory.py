@@ -87,7 +87,7 @@ def collected() -> Iterator[list[Tree]]:
         _collecting.pop()
 
 
-def trees_made() -> int:
+def tree_count() -> int:
     """Trees that have been made in this process."""
     return _tree_counts.total()
 
