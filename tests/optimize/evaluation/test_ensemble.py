@@ -105,13 +105,13 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
     assert failed.mean == math.inf
     assert not failed.ok
     assert failed.reason == f"start 2 (seed {third}): {reason}"
-    stored = [record for record in run.runs.cache.records() if not record.ok]
-    assert [(record.reason, record.seed, math.isnan(record.fitness)) for record in stored] == [
+    failures = [record for record in run.runs.cache.records() if not record.ok]
+    assert [(record.reason, record.seed, math.isnan(record.fitness)) for record in failures] == [
         (reason, third, True)
     ]
     again = FakeEvaluator(function)
     assert repr(ensemble(tmp_path, again, block=6).estimate(DESIGNS)[1]) == repr((failed,))
-    assert again.ran == []
+    assert again.digests == []
 
 
 def test_infeasible_design_fails_alone(tmp_path):
@@ -131,12 +131,12 @@ def test_nothing_is_evaluated_twice(tmp_path):
     run = ensemble(tmp_path, evaluator)
     first = run.estimate([*DESIGNS, DESIGNS[0]])
     assert first[3] == first[0]
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == run.requested
+    assert len(evaluator.digests) == len(set(evaluator.digests)) == run.requested
     assert run.runs.hits == 0
     other = FakeEvaluator()
     again = ensemble(tmp_path, other)
     assert again.estimate([*DESIGNS, DESIGNS[0]]) == first
-    assert (other.ran, again.runs.evaluations, again.runs.hits) == ([], 0, run.requested)
+    assert (other.digests, again.runs.evaluations, again.runs.hits) == ([], 0, run.requested)
 
 
 @pytest.mark.parametrize("change", ["precision", "problem", "version"])
@@ -152,12 +152,14 @@ def test_what_changes_a_fitness_is_not_reused(tmp_path, change):
 
 
 def test_progress_rises_to_one(tmp_path):
-    seen = []
-    ensemble(tmp_path, FakeEvaluator(), block=2, min_starts=2, tolerance=1e-4).estimate(DESIGNS, seen.append)
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
-    assert len(set(seen)) > 10
-    assert max(seen[:-1]) <= 1.0 + 1e-12
+    fractions = []
+    ensemble(tmp_path, FakeEvaluator(), block=2, min_starts=2, tolerance=1e-4).estimate(
+        DESIGNS, fractions.append
+    )
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert len(set(fractions)) > 10
+    assert max(fractions[:-1]) <= 1.0 + 1e-12
 
 
 def test_finished_evaluations_are_stored_before_the_rest_runs(tmp_path):

@@ -79,11 +79,11 @@ OPTIONS = {
     ("kind", "name"), [(kind, name) for kind, names in OPERATORS.items() for name in names]
 )
 def test_deap_operators_breed_within_the_box(kind, name):
-    chosen = {kind: GeneticOperator(name=name, options=OPTIONS.get(name, {}))}
-    settings = Breeding(breeding="deap", offspring=12, mutation_probability=1.0, **chosen)
+    operators = {kind: GeneticOperator(name=name, options=OPTIONS.get(name, {}))}
+    settings = Breeding(breeding="deap", offspring=12, mutation_probability=1.0, **operators)
     breeder = Breeder(GENES, settings, seed=1)
     population = rated(breeder.first())
-    seen = set()
+    offspring = set()
     for generation in range(6):
         if generation == 3:
             breeder.recentre(min(population, key=lambda string: string.fitness.values[0]))
@@ -92,9 +92,9 @@ def test_deap_operators_breed_within_the_box(kind, name):
             assert isinstance(string, Individual)
             assert not string.fitness.valid
             assert np.all((breeder.box.low <= string) & (string <= breeder.box.high))
-            seen.add(tuple(string))
+            offspring.add(tuple(string))
         rated(population)
-    assert len(seen) > 40, "offspring differ"
+    assert len(offspring) > 40, "offspring differ"
 
 
 def test_callers_random_state_is_untouched():

@@ -46,17 +46,19 @@ def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
     fresh = [start_seed(FRESH, k) for k in range(8)]
     searched = {start_seed(seed, k) for seed in range(3) for k in range(13)}
     assert not searched & set(fresh)
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == sum(f.evaluations for f in results) + 9 * 8
-    seen = {}
-    for record in cache.known.values():
+    assert (
+        len(evaluator.digests) == len(set(evaluator.digests)) == sum(f.evaluations for f in results) + 9 * 8
+    )
+    by_design = {}
+    for record in cache.records_by_key.values():
         if record.seed in fresh:
-            seen.setdefault(tuple(record.design.values()), []).append(record.fitness)
-    assert sorted(np.mean(values) for values in seen.values()) == pytest.approx(
+            by_design.setdefault(tuple(record.design.values()), []).append(record.fitness)
+    assert sorted(np.mean(values) for values in by_design.values()) == pytest.approx(
         sorted(f.fresh.mean for f in results), rel=1e-12
     )
     again = FakeEvaluator(noisy)
     assert compared(["random", "genetic", "cma-es"], evaluator=again, cache=cache) == results
-    assert again.ran == []
+    assert again.digests == []
 
 
 def rows(problem, results):
@@ -67,9 +69,9 @@ def rows(problem, results):
 
 def test_table_ranks_by_the_median_from_fresh_starts():
     results = compared(["random", "genetic"], repeats=5)
-    printed = rows(fake_problem(6), results)
-    heading = next(line for line in printed if line[0] == "method")
-    lines = [line for line in printed if line[0] in ("random", "genetic")]
+    lines_of_table = rows(fake_problem(6), results)
+    heading = next(line for line in lines_of_table if line[0] == "method")
+    lines = [line for line in lines_of_table if line[0] in ("random", "genetic")]
     medians = {}
     for name, searches, _, *numbers in lines:
         mine = [f for f in results if f.method == name]
@@ -82,7 +84,7 @@ def test_table_ranks_by_the_median_from_fresh_starts():
     assert medians["genetic"] < medians["random"]
     assert [line[0] for line in lines] == ["genetic", "random"]
     assert "median" in heading
-    assert printed[0] == ["fitness"], "the objective, above"
+    assert lines_of_table[0] == ["fitness"], "the objective, above"
     large = fake_problem(6, objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
     turned = compared(["random", "genetic"], repeats=5, problem=large)
     assert [line[0] for line in rows(large, turned) if line[0] in medians] == ["genetic", "random"]
@@ -156,13 +158,13 @@ def test_command(tmp_path, monkeypatch, capsys):
             main([*command, "--set", "search.ensemble.max_starts=4", "--fresh-starts", "4", *more])
         assert exit_.value.code == code
         assert message in " ".join(capsys.readouterr().err.split())
-    shown = len(Cache(store))
+    runs_after = len(Cache(store))
     with monkeypatch.context() as patch:
         patch.setattr(comparison, "compare", lambda *arguments: iter(()))
         patch.setattr(comparison, "table", lambda *arguments: "")
         with pytest.raises(SystemExit):
             main([*command, "--overwrite"])
-    assert (shown >= runs, len(Cache(store))) == (True, 0)
+    assert (runs_after >= runs, len(Cache(store))) == (True, 0)
     with pytest.raises(SystemExit) as exit_:
         main(["compare", "drift", "--methods", "simplex"])
     assert exit_.value.code == 2
