@@ -45,7 +45,7 @@ def runner() -> Callable[[Call], str]:
         tries: Iterable[Values] = (numbers,)
         if isinstance(numbers, int):
             random = Random(numbers)
-            tries = islice(iter(lambda: extremes.drawn(name, random), None), DRAWS)
+            tries = islice(iter(lambda: extremes.draw_values(name, random), None), DRAWS)
         outcomes = (_run_values(compiled[name], name, values) for values in tries)
         return next((end for end in outcomes if end != REFUSED), REFUSED)
 
