@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 
 import h5py
@@ -12,7 +13,8 @@ from tests.files.test_growing_hdf5 import STILL, frame, same
 from tests.soak import damage
 from tisim import InputError, Recording
 from tisim.accuracy import storage
-from tisim.files import checksum
+from tisim.files import checksum, framing
+from tisim.files.superblock import SIGNATURE
 from tisim.io import checkpoint, h5md
 from tisim.io.export import export
 from tisim.io.reader import frames, world_count
@@ -191,6 +193,15 @@ class _Loaded:
         @staticmethod
         def check():
             pass
+
+
+@pytest.mark.parametrize(
+    "trailer", [{"size": 9, "data": 5, "crc": 1}, {"size": 9, "data": ["ab"], "crc": 1}, []]
+)
+def test_a_frame_that_is_no_checksum_is_none(trailer):
+    image = SIGNATURE + b"x"
+    assert checksum.verified(image + framing.frame(json.dumps(trailer).encode())) is None
+    assert checksum.verified(checksum.with_checksum(image)) == image
 
 
 def test_a_link_to_a_trajectory_is_read(tmp_path):

@@ -10,14 +10,16 @@ import pytest
 
 import tisim
 from optimize.storage import hdf5_store
+from optimize.storage.cache import Cache
 from tests.accuracy.scenes import oscillator
 from tests.scenes import compiled, flow, scene
 from tisim import InputError, Recording, Result, Scene, Status
 from tisim.accuracy import Study, storage
 from tisim.accuracy.row import Row
 from tisim.effects import Contact, ContactFriction
+from tisim.io import checkpoint, run_folder
 from tisim.io import read as reading
-from tisim.io import run_folder
+from tisim.io.reader import world_count
 from tisim.io.run_folder import RunFolder
 
 FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
@@ -186,6 +188,13 @@ def test_what_cannot_be_read(tmp_path, name, content, message):
         (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):
         tisim.read(tmp_path / name)
+
+
+@pytest.mark.parametrize(("name", "received"), [("a\0.h5", "a NUL"), ("x" * 300, "that is too long")])
+@pytest.mark.parametrize("reader", [tisim.read, world_count, checkpoint.snapshot, Cache])
+def test_a_name_that_no_file_can_have_is_refused(reader, name, received):
+    with pytest.raises(InputError, match=f"must be a regular file .*; received a name (with )?{received}$"):
+        reader(name)
 
 
 def test_the_format_of_a_search_is_the_one_known():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import time
 import tomllib
 from collections.abc import Callable, Iterator
@@ -192,7 +191,7 @@ class _RetryingFile:
 @contextmanager
 def _open_file(path: Path) -> Iterator[_RetryingFile]:
     """Yield the file, once the checksum of its superblock or of all of it has been verified."""
-    rule, real = "a trajectory.h5 or result.h5 of a run", Path(os.path.realpath(path))
+    rule, real = "a trajectory.h5 or result.h5 of a run", regular_file.target(path)
     head = regular_file.content(real, SIZE)
     must(head is not None and head.startswith(SIGNATURE), "file", rule, str(path))
     if not is_valid(head or b""):
