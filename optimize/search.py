@@ -1,4 +1,4 @@
-"""The search: generations of a method, their log, stopping rules, and what is left in the cache file.
+"""A search runs generations of a method until a stopping rule ends it, and keeps all in its cache file.
 
 A search is a function of its problem, settings and evaluator settings. Resuming is therefore running it again
 on the same cache file: every finished evaluation comes from there, the rest follows as if never stopped.
@@ -23,7 +23,7 @@ from optimize.storage.cache import Cache
 
 
 class _OutOfTime(Exception):
-    """The wall-clock budget is spent in the middle of a generation."""
+    """The wall-clock budget has been spent in the middle of a generation."""
 
 
 def search(
@@ -84,7 +84,7 @@ class _Search:
         return self.outcome
 
     def _confirm(self) -> None:
-        """Run the best designs again from fresh starts, and rank them by that."""
+        """Run the best designs again from fresh starts, and rank them by their means over those."""
         if not self.settings.ensemble.confirm or not self.hall.strings or self._out_of_time():
             return
         last = len(self.outcome.logbook) - 1
@@ -123,7 +123,7 @@ class _Search:
                 return
 
     def _estimate(self, population: list[Individual], generation: int) -> int:
-        """Estimate the strings whose fitness is not known, as far as the budget goes; how many they were."""
+        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were."""
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
         new_estimates = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
@@ -135,7 +135,7 @@ class _Search:
         return sum(string.fitness.valid for string in fresh)
 
     def _race(self, population: list[Individual], generation: int) -> None:
-        """Spend more starts on the hall's designs, and rank it by what is known then."""
+        """Spend more starts on the designs of the hall of fame, and rank it by their new estimates."""
         if not self.settings.ensemble.race:
             return
         racing = self.hall.strings

@@ -65,9 +65,9 @@ def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, 
     and numbers of runs may be others. evaluator : the settings of the evaluator."""
     for attributes in searches(cache).values():
         old = json.loads(attributes["identity"])
-        wished = {**identity(problem, Settings(), evaluator), "search": old["search"]}
-        if canonical(old) != canonical(wished):
-            refuse(folder, "comparison", old, wished)
+        requested = {**identity(problem, Settings(), evaluator), "search": old["search"]}
+        if canonical(old) != canonical(requested):
+            refuse(folder, "comparison", old, requested)
 
 
 def settings_of(
