@@ -66,10 +66,10 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=100)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument(
-        "--worn", type=int, default=memory.MAX_TREES_PER_START, help="trees after which Taichi starts anew"
+        "--trees", type=int, default=memory.MAX_TREES_PER_START, help="trees after which Taichi starts anew"
     )
     options = parser.parse_args()
-    memory.MAX_TREES_PER_START = options.worn
+    memory.MAX_TREES_PER_START = options.trees
     runtime.init(threads=options.threads)
     print(f"{runtime.backend()}\n{'scenes':>8}{'s each':>9}{'MB':>8}{'trees':>8}{'starts':>8}")
     for count, seconds, size in soak(options.scenes, options.every):

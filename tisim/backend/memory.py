@@ -92,7 +92,7 @@ def tree_count() -> int:
     return _tree_counts.total()
 
 
-def worn() -> bool:
+def needs_restart() -> bool:
     """Whether so many trees have been made that Taichi should be started anew."""
     return _tree_counts[runtime.generation()] >= MAX_TREES_PER_START
 

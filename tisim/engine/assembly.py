@@ -92,8 +92,8 @@ class Assembly:
             independent=stepper.data.independent([effect.data for effect in effects]),
             update_lists=lists,
             update_history=self._history(),
-            sum_forces=self._summed(SumForces),
-            sum_trial_forces=self._summed(SumTrialForces),
+            sum_forces=self._sum_phases(SumForces),
+            sum_trial_forces=self._sum_phases(SumTrialForces),
             force_sum=self._sum(SumForces),
         )
         self.failure_attribution = FailureAttribution(context.force_sum)
@@ -110,7 +110,7 @@ class Assembly:
             if near and contacts and control.data.watches_pairs:
                 step += [*lists, FindContactsAgain(near, contacts, control)]
             if context.sum_forces:
-                step += [*lists, *self._summed(SumForcesAgain)]
+                step += [*lists, *self._sum_phases(SumForcesAgain)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
         pairs = "impacts, step control"
@@ -140,7 +140,7 @@ class Assembly:
                 updates.append(UpdateContactHistory(self.s, self.domain, effect, self.full_list))
         return tuple(updates)
 
-    def _summed(self, kind: type[SumForces]) -> tuple[Item, ...]:
+    def _sum_phases(self, kind: type[SumForces]) -> tuple[Item, ...]:
         """Set derived quantities, then sum the forces."""
         items: list[Item] = []
         for part in self.derived_solvers:

@@ -96,7 +96,7 @@ class Batches:
         """A compiled simulation for scenes of one structure, which is nobody else's meanwhile."""
         capacity = max(scene.capacity() for scene in scenes)
         worlds = max(1, min(len(scenes), self.limit, SLOTS // capacity))
-        simulation = self._kept(scenes[0].structure(), worlds, capacity)
+        simulation = self._reusable(scenes[0].structure(), worlds, capacity)
         if simulation is None:
             _renew()
             capacity = rounded(capacity)
@@ -111,7 +111,7 @@ class Batches:
             for each in old:
                 each.close()
 
-    def _kept(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
+    def _reusable(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
         """The smallest kept simulation that serves, taken out of those kept; None where there is none."""
         most = max(SPARE, WASTE * worlds * capacity)
         with _lock:
@@ -155,7 +155,7 @@ def rounded(number: int) -> int:
 
 def _renew() -> None:
     """Start Taichi anew where it has grown, and nothing would be lost but simulations that are kept idle."""
-    if memory.worn():
+    if memory.needs_restart():
         _give_up()
         memory.renew()
 

@@ -37,7 +37,7 @@ def open_descriptor(path: Path, flags: int) -> int:
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC, 0o644)
     except OSError as error:
-        raise _translated(path, error) or error from None
+        raise _refusal(path, error) or error from None
     info = os.fstat(descriptor)
     fault = _irregular_kind(info)
     if fault is None and flags & _WRITING and info.st_nlink > 1:
@@ -59,7 +59,7 @@ def file_status(path: Path) -> os.stat_result | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise _translated(path, error) or error from None
+        raise _refusal(path, error) or error from None
     fault = _irregular_kind(info)
     if fault is not None:
         raise _not_regular(path, fault)
@@ -97,7 +97,7 @@ def _stat_following_links(path: Path) -> os.stat_result | None:
         return None
     except OSError as error:
         if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
-            raise _translated(path, error) or error from None
+            raise _refusal(path, error) or error from None
         why = error.strerror or error
         raise InputError(f"{path} must be in a folder that may be entered; received {why}") from None
 
@@ -126,7 +126,7 @@ def _irregular_kind(info: os.stat_result) -> str | None:
     return kinds.get(stat.S_IFMT(info.st_mode), "something else")
 
 
-def _translated(path: Path, error: OSError) -> InputError | None:
+def _refusal(path: Path, error: OSError) -> InputError | None:
     received = _REFUSALS.get(error.errno or 0)
     return None if received is None else _not_regular(path, received)
 

@@ -144,7 +144,7 @@ def world_count(path: str | Path) -> int:
 
 
 @contextmanager
-def undamaged() -> Iterator[None]:
+def refuse_damage() -> Iterator[None]:
     """Turn the errors of HDF5 at a damaged file into an InputError."""
     try:
         yield
@@ -171,7 +171,7 @@ class _RetryingFile:
         """
         for attempts_left in reversed(range(FILE_READ_ATTEMPTS)):
             try:
-                with undamaged():
+                with refuse_damage():
                     self._file = self._file or h5py.File(self._source, "r")
                     return extract(self._file)
             except InputError:

@@ -66,7 +66,7 @@ _work = cf.ThreadPoolExecutor(1)
 _evaluator: list[BatchEvaluator] = []
 
 
-def packed(scenes: Sequence[Scene]) -> bytes:
+def pack_scenes(scenes: Sequence[Scene]) -> bytes:
     """Scenes as they are sent: a worker imports the files that define their parts before it reads them."""
     try:
         return pickle.dumps(scenes)
@@ -106,7 +106,7 @@ def _run_pickled(question: bytes, share: int) -> Answer:
 
 
 def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
-    scenes = _unpacked(pickled, worker_settings)
+    scenes = _unpack_scenes(pickled, worker_settings)
     before = runtime.generation()
     runtime.init(worker_settings.device, worker_settings.precision, worker_settings.threads or share)
     if not _evaluator or runtime.generation() != before:
@@ -116,7 +116,7 @@ def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
     return Answer(made_by, [results[index] for index in range(len(scenes))])
 
 
-def _unpacked(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[Scene]:
+def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[Scene]:
     """InputError, in a line, when what they are made of cannot be imported here."""
     try:
         for file in worker_settings.files:

@@ -120,20 +120,20 @@ def test_effects_of_the_users_own_act_in_workers(away, own_file):
 
 def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
     law = python_file.load(own_file("own_law.py", LAW))
-    pickled = working.packed([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
+    pickled = working.pack_scenes([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
     here = WorkerSettings()
     python_file.unload("own_law")
     with pytest.raises(
         InputError, match=r"^worker \(process .* must be able to import .* --plugin\); received No"
     ):
-        working._unpacked(pickled, WorkerSettings())
+        working._unpack_scenes(pickled, WorkerSettings())
     (file,) = here.files
     broken = replace(here, files=(replace(file, text=b"import no_such_module"),))
     with pytest.raises(
         InputError, match=r"^worker \(process .*own_law.py must be .* line 1: ModuleNotFoundError"
     ):
-        working._unpacked(pickled, broken)
-    (scene,) = working._unpacked(pickled, here)
+        working._unpack_scenes(pickled, broken)
+    (scene,) = working._unpack_scenes(pickled, here)
     assert scene.effects[0].strength == 1e-9
 
 
@@ -142,7 +142,7 @@ def test_scenes_that_cannot_be_sent_are_told_in_a_line():
         pass
 
     with pytest.raises(InputError, match="scene must be made of classes that a worker can import; received"):
-        working.packed([Hidden(**dict(SCENES[0]))])
+        working.pack_scenes([Hidden(**dict(SCENES[0]))])
 
 
 @pytest.mark.long

@@ -26,9 +26,9 @@ AHEAD = 8
 
 
 @ti.func
-def stepped(s, fluid: ti.template(), w, i, mobility, pushed, t, dt, g):  # type: ignore[valid-type]
+def euler_step(s, fluid: ti.template(), w, i, mobility, push_velocity, t, dt, g):  # type: ignore[valid-type]
     """Velocity of drift, u + F/(6 pi eta R), and where a step leads: by dt times that + sqrt(2 D dt) g."""
-    velocity = fluid.flow(w, i, t) + pushed
+    velocity = fluid.flow(w, i, t) + push_velocity
     width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
     return velocity, s.position[w, i] + (dt * velocity + width * g)
 
@@ -116,10 +116,10 @@ class IndependentBrownianSteps(PerParticle):
             mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
                 self.force_sum.single_particle(w, i, begin + elapsed)
-            pushed = self.fluid.pushed(w, i, mobility)
+            push_velocity = self.fluid.push_velocity(w, i, mobility)
             dt, remaining = ti.cast(self.control.longest(w), ti.f64), length - elapsed
-            if not self.control.easy(self.own, w, i, pushed):
-                rate = self.control.rate(self.own, w, i, pushed)
+            if not self.control.easy(self.own, w, i, push_velocity):
+                rate = self.control.rate(self.own, w, i, push_velocity)
                 dt = self.control.step(w, rate)
                 if self.control.hopeless(w, rate):
                     self.stop(w, i, fault(rate))
@@ -133,7 +133,7 @@ class IndependentBrownianSteps(PerParticle):
                     dt, total = remaining, length
                 if steps > 0:
                     g = self.fluid.normals(w, i, self.number(interval) + steps)
-                self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
+                self.move(w, i, mobility, push_velocity, begin + elapsed, dt, g)
                 if self.s.own_fault[w, i] == 0:
                     elapsed = total
                     steps += 1
@@ -141,10 +141,12 @@ class IndependentBrownianSteps(PerParticle):
         return elapsed, carry, steps, going, ti.select(elapsed < length, 0, 1)
 
     @ti.func
-    def move(self, w, i, mobility, pushed, t, dt, g):
+    def move(self, w, i, mobility, push_velocity, t, dt, g):
         """A step, and what operators do to it."""
         s, step = self.own, ti.cast(dt, self.s.real)
-        s.velocity[w, i], s.position[w, i] = stepped(s, self.fluid, w, i, mobility, pushed, t, step, g)
+        s.velocity[w, i], s.position[w, i] = euler_step(
+            s, self.fluid, w, i, mobility, push_velocity, t, step, g
+        )
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]

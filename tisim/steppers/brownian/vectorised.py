@@ -8,7 +8,7 @@ the same.
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import TILE
-from tisim.steppers.brownian.independent import IndependentBrownianSteps, stepped
+from tisim.steppers.brownian.independent import IndependentBrownianSteps, euler_step
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import beginning
 from tisim.steppers.registers import Registers
@@ -75,12 +75,14 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                 if ti.static(self.forced):
                     self.lane_force_sum.single_particle(w, i, begin)
                 mobility = self.lane_fluid.mobility(w, i)
-                pushed = self.lane_fluid.pushed(w, i, mobility)
+                push_velocity = self.lane_fluid.push_velocity(w, i, mobility)
                 g = self.lane_fluid.normals(w, i, number)
-                v, r = stepped(self.lane_state, self.lane_fluid, w, i, mobility, pushed, begin, step, g)
+                v, r = euler_step(
+                    self.lane_state, self.lane_fluid, w, i, mobility, push_velocity, begin, step, g
+                )
                 for k in ti.static(range(3)):
                     place[k][lane], drift[k][lane], force[k][lane] = r[k], v[k], f[k]
-                fine = self.able(w, i) > 0 and self.control.easy(s, w, i, pushed)
+                fine = self.able(w, i) > 0 and self.control.easy(s, w, i, push_velocity)
                 fine = fine and r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
                 halted += ti.select(fine, 0, 1)
             if halted == 0:

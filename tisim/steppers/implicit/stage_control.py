@@ -5,7 +5,7 @@ from __future__ import annotations
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
-from tisim.steppers.implicit.excursion import Per, compared
+from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
 
@@ -63,7 +63,7 @@ class StageControl(ImplicitControl):
     @ti.func
     def scale(self, s, w, i, moved, dt):
         """What the error of a particle that has moved so far in a step of dt (s) is compared with. m."""
-        return compared(self, s, w, i, moved, dt)
+        return error_scale(self, s, w, i, moved, dt)
 
     @ti.func
     def solved(self, w, error):

@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.errors import must
-from tisim.steppers.implicit.excursion import Per, compared
+from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
 
 LEAST_SAFETY = 0.01
@@ -180,7 +180,7 @@ class ErrorControl(IterationControl):
 
     @ti.func
     def scale(self, s, w, i, moved, dt):
-        return compared(self, s, w, i, moved, dt)
+        return error_scale(self, s, w, i, moved, dt)
 
     @ti.func
     def accepts(self, w, error):
