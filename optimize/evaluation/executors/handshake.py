@@ -58,11 +58,11 @@ def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
     must(not differ, who, f"of {_listing(ours, differ)}, as the search is", _listing(theirs, differ))
 
 
-def stranger(sent: object, who: str) -> InputError:
+def stranger(answer: object, who: str) -> InputError:
     """The error for a worker that cannot even say what it is: it has sent something else."""
     ours = program()
     rule = f"one that knows what the search is made of ({_listing(ours, ours)})"
-    return InputError(f"{who} must be {rule}; received {shorten(repr(sent), 200)}")
+    return InputError(f"{who} must be {rule}; received {shorten(repr(answer), 200)}")
 
 
 def _listing(program: Mapping[str, str], names: Iterable[str]) -> str:

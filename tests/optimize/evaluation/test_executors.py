@@ -301,10 +301,10 @@ class Doomed:
     workers = 2
 
     def __init__(self):
-        self.sent = []
+        self.units = []
 
     def submit(self, scenes, worker_settings):
-        self.sent.append(tuple(scene.seed for scene in scenes))
+        self.units.append(tuple(scene.seed for scene in scenes))
         future = cf.Future()
         future.set_result([])
         return future
@@ -320,7 +320,7 @@ def test_workers_that_die_of_everything_end_the_search():
     doomed = Doomed()
     with pytest.raises(RunError, match=r"killed; it was the worker number 3 to be lost with the same work"):
         list(Remote(doomed, WorkerSettings()).evaluate(SCENES))
-    assert max(doomed.sent.count(unit) for unit in doomed.sent) == 3
+    assert max(doomed.units.count(unit) for unit in doomed.units) == 3
 
 
 def test_units_of_work():
