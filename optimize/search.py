@@ -46,6 +46,8 @@ def search(
 
 
 class _Search:
+    """A search under way: its method, its hall of fame, its budget and its outcome so far."""
+
     def __init__(
         self,
         problem: Problem,

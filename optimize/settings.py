@@ -54,7 +54,8 @@ class Settings(Checked):
         kind = find(data.get("method", "genetic")).Options
         options = data.get("options", {})
         if not isinstance(options, kind):
-            must(isinstance(options, Mapping), "search.options", "settings of the method, by name", options)
+            named = isinstance(options, Mapping) and all(isinstance(name, str) for name in options)
+            must(named, "search.options", "settings of the method, by name", options)
             options = kind(**options)
         return {**data, "options": options}
 

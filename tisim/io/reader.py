@@ -155,13 +155,13 @@ def refuse_damage() -> Iterator[None]:
 
 
 class _RetryingFile:
-    """The HDF5 file is read through ``source``, again where it looks damaged."""
+    """It reads an HDF5 file through ``source``, and reads it again where it looks damaged."""
 
     def __init__(self, source: io.IOBase) -> None:
         self._source = source
         self._file: h5py.File | None = None
 
-    # HDF5 calls Reading, in which no signal may be raised: it would be lost.
+    # HDF5 calls ``source``, in which no signal may be raised: HDF5 would swallow it.
     @defer_signals()
     def read(self, extract: Callable[[h5py.File], T]) -> T:
         """Return what ``extract`` takes from the file; InputError where that is damaged.

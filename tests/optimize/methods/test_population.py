@@ -112,6 +112,14 @@ def test_parents_alone_leave_the_population_of_the_case():
     assert (settings.options.population, settings.options.parents) == (24, 4)
 
 
+@pytest.mark.parametrize("options", [[8], None, "population", {1: 8}])
+def test_options_are_given_by_name(options):
+    with pytest.raises(
+        InputError, match=r"search\.options must be settings of the method, by name; received"
+    ):
+        Settings(options=options)
+
+
 def test_what_is_no_number_is_told_as_such():
     for wrong in ("many", [8], None, 2.5):
         with pytest.raises(InputError, match=r"search\.options\.population must be a whole number; received"):
