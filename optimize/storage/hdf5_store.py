@@ -24,7 +24,7 @@ from optimize.storage.record import Record, canonical
 from tisim import InputError
 from tisim.errors import must
 from tisim.files import regular_file
-from tisim.files.checksum import verified_image, with_checksum
+from tisim.files.checksum import verified, with_checksum
 
 EVALUATIONS_FORMAT = "tisim evaluations 1"
 EVALUATIONS = "evaluations"
@@ -63,7 +63,7 @@ def open_evaluations(path: Path) -> Iterator[h5py.File]:
     content = regular_file.content(path)
     if content is None:
         raise InputError(f"{rule} nothing")
-    image = verified_image(content)
+    image = verified(content)
     if image is None:
         raise InputError(
             f"{rule} {len(content)} bytes that are damaged, cut short or another program's "

@@ -16,7 +16,7 @@ import h5py
 from optimize.storage import hdf5_store
 from tisim.errors import must
 from tisim.files.atomic import locked, replace_file
-from tisim.files.checksum import verified_image
+from tisim.files.checksum import verified
 from tisim.files.regular_file import content, file_status
 
 TIME_LIMIT = 300.0
@@ -29,7 +29,7 @@ def repair(path: Path, lock: Path) -> None:
     Nothing happens when the file is whole, or nothing can be read. InputError when FILE.damaged is there.
     """
     old = content(path)
-    if old is None or verified_image(old) is not None:
+    if old is None or verified(old) is not None:
         return
     salvaged = _salvage(old)
     if salvaged is None:
@@ -48,7 +48,7 @@ def _salvage(old: bytes) -> bytes | None:
         process = subprocess.run(command, input=old, capture_output=True, timeout=TIME_LIMIT, check=False)
     except subprocess.TimeoutExpired:
         return None
-    return process.stdout if process.returncode == 0 and verified_image(process.stdout) is not None else None
+    return process.stdout if process.returncode == 0 and verified(process.stdout) is not None else None
 
 
 def _rebuild(old: bytes) -> bytes:

@@ -96,14 +96,14 @@ def test_the_scenes_own_method_is_first_and_in_other_precisions_too():
 def test_only_what_suits_a_scene_is_tried():
     """No magnetic field: no Boris. A force of velocity: no Verlet. No force: nothing implicit."""
 
-    def stepper_names(scene):
+    def tried(scene):
         return {type(method.base.stepper).__name__ for method in methods_of(scene).values()}
 
-    assert {"Verlet", "Trapezoid"} <= stepper_names(oscillator())
-    assert "Boris" not in stepper_names(oscillator())
-    assert {"Boris", "Trapezoid"} <= stepper_names(charged(accurate(1e-3), 1.0))
-    assert "Verlet" not in stepper_names(charged(accurate(1e-3), 1.0))
-    assert stepper_names(drift()) == {"Verlet"}
+    assert {"Verlet", "Trapezoid"} <= tried(oscillator())
+    assert "Boris" not in tried(oscillator())
+    assert {"Boris", "Trapezoid"} <= tried(charged(accurate(1e-3), 1.0))
+    assert "Verlet" not in tried(charged(accurate(1e-3), 1.0))
+    assert tried(drift()) == {"Verlet"}
 
 
 def test_settings_of_what_is_tried_are_rounded():
@@ -321,8 +321,8 @@ def test_the_table_fits_80_columns_and_cuts_no_number():
 def test_a_reference_that_tells_nothing_apart_is_said_to():
     """Its own error is of the size of the motion, as where paths are chaotic."""
     quantity = Quantity("positions", lambda result: result.state["position"])
-    for error, warns in ((1e-3, False), (1.3, True)):
+    for error, said in ((1e-3, False), (1.3, True)):
         truth = SimpleNamespace(error=error, source="a finer run")
         study = SimpleNamespace(quantities=[quantity], truths=[truth], decades=dict, complete=True, rows=[])
         text = " ".join(sources(study))
-        assert ("the reference itself is off by 1 of the motion" in text) == warns
+        assert ("the reference itself is off by 1 of the motion" in text) == said

@@ -80,8 +80,8 @@ def test_scene_files_that_are_none(tisim, impacts, tmp_path):
 def test_checkpoint_seconds_that_are_none(tisim, impacts, monkeypatch, seconds):
     monkeypatch.setenv("TISIM_CHECKPOINT_SECONDS", seconds)
     code, out, err = tisim("run", impacts)
-    message = f"TISIM_CHECKPOINT_SECONDS must be a number of seconds, at least 0; received {seconds!r}\n"
-    assert (code, out, err) == (2, "", message)
+    said = f"TISIM_CHECKPOINT_SECONDS must be a number of seconds, at least 0; received {seconds!r}\n"
+    assert (code, out, err) == (2, "", said)
 
 
 @pytest.mark.parametrize(
@@ -91,6 +91,6 @@ def test_a_backend_that_is_none(code):
     """Told in a line by the command, as importing the package has gone well."""
     environment = {**os.environ, "TISIM_BACKEND": "os"}
     command = [sys.executable, "-c", code]
-    completed = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    message = "TISIM_BACKEND must be taichi or quadrants; received 'os'\n"
-    assert (completed.returncode, completed.stdout, completed.stderr) == (2, "", message)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    said = "TISIM_BACKEND must be taichi or quadrants; received 'os'\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)

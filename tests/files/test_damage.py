@@ -171,7 +171,7 @@ def test_files_of_versions_without_checksums_are_told_from_those_of_others(tmp_p
     """As they were: a result without its checksum; trajectories of HDF5's first and third superblock."""
     path = tmp_path / "t.h5"
     if name == "result.h5":
-        path.write_bytes(checksum.verified_image(damage._result(tmp_path).read_bytes()))
+        path.write_bytes(checksum.verified(damage._result(tmp_path).read_bytes()))
     else:
         with h5py.File(path, "w", libver="earliest" if "older" in name else LIBVER) as file:
             h5md.write_metadata(file, "0.1.0")
@@ -200,8 +200,8 @@ class _Loaded:
 )
 def test_a_frame_that_is_no_checksum_is_none(trailer):
     image = SIGNATURE + b"x"
-    assert checksum.verified_image(image + framing.frame(json.dumps(trailer).encode())) is None
-    assert checksum.verified_image(checksum.with_checksum(image)) == image
+    assert checksum.verified(image + framing.frame(json.dumps(trailer).encode())) is None
+    assert checksum.verified(checksum.with_checksum(image)) == image
 
 
 def test_a_link_to_a_trajectory_is_read(tmp_path):

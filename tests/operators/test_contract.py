@@ -76,7 +76,7 @@ def test_lists_follow_particles_that_operators_move(kind):
     position = np.concatenate([[[-2.0, 2.0, 2.5]], grid])
     leap = np.zeros_like(position)
     leap[0, 0] = 0.05
-    setup = scene(
+    wanted = scene(
         position,
         np.zeros_like(position),
         (kind(stiffness=1.0, width=0.3), Stepping()),
@@ -94,7 +94,7 @@ def test_lists_follow_particles_that_operators_move(kind):
         push = -np.maximum(0.3 - (distance - 0.4), 0.0) * (1 - np.eye(126)) / distance
         velocity = velocity + 1e-3 * (push[..., None] * d).sum(axis=1)
     # The twin kicks once a step, the engine half before and half after: equal to first order in dt.
-    np.testing.assert_allclose(run(setup).state["velocity"], velocity, rtol=0, atol=0.02 * velocity.max())
+    np.testing.assert_allclose(run(wanted).state["velocity"], velocity, rtol=0, atol=0.02 * velocity.max())
     assert np.linalg.norm(velocity[1:], axis=1).max() > 1e-4
 
 
@@ -103,7 +103,7 @@ def test_lists_follow_particles_that_grow(rng):
     """Grains at rest, out of each other's reach, that grow until they push each other apart."""
     grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
     position, growth = grid + rng.uniform(-0.1, 0.1, grid.shape), rng.uniform(0.5, 2.0, len(grid))
-    by_list, over_all = (
+    listed, everyone = (
         run(
             scene(
                 position,
@@ -118,8 +118,8 @@ def test_lists_follow_particles_that_grow(rng):
         )
         for kind in (SoftShell, SoftShellOfAll)
     )
-    assert np.abs(over_all.state["velocity"]).max() > 1e-3
-    np.testing.assert_allclose(by_list.state["velocity"], over_all.state["velocity"], rtol=0, atol=1e-12)
+    assert np.abs(everyone.state["velocity"]).max() > 1e-3
+    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-12)
 
 
 @pytest.mark.long
@@ -129,7 +129,7 @@ def test_lists_follow_particles_that_grow(rng):
 )
 def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images, rng):
     """More particles than look at all pairs; the bad one belongs to no cell."""
-    setup = scene(
+    wanted = scene(
         rng.uniform(0, 1, (300, 3)),
         rng.normal(size=(300, 3)),
         (SoftShell(stiffness=1.0, width=0.05), Poison(axis=axis)),
@@ -138,8 +138,8 @@ def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images,
         steps=40,
         domain=Box(low=(0, 0, 0), high=(1, 1, 1), images=images),
     )
-    simulation = Simulation(setup, schedule=schedule)
-    simulation.load([setup])
+    simulation = Simulation(wanted, schedule=schedule)
+    simulation.load([wanted])
     simulation.run()
     (result,) = simulation.results()
     simulation.close()
@@ -151,7 +151,7 @@ def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images,
 @pytest.mark.slow
 def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
     """Two grains bond in the last step, one just outside the other's side of the box."""
-    setup = scene(
+    wanted = scene(
         [[0.9993, 0.5, 0.5], [0.0011, 0.5, 0.5]],
         [[10.0, 0, 0], [-10.0, 0, 0]],
         (Impact(hardness=1.0), Agglomeration()),
@@ -160,7 +160,7 @@ def test_what_has_merged_at_a_face_is_inside_and_can_start_again():
         steps=1,
         domain=Box(low=(0, 0, 0), high=(1, 1, 1)),
     )
-    state = run(setup).state
+    state = run(wanted).state
     assert len(state["mass"]) == 1
     assert ((state["position"] >= 0) & (state["position"] < 1)).all()
 
@@ -181,7 +181,7 @@ def test_lists_follow_what_operators_do_to_the_world(rng):
     results = []
     position, velocity = rng.uniform(0.0, 1.0, (200, 3)), rng.normal(size=(200, 3))
     for kind in (SoftShell, SoftShellOfAll):
-        setup = scene(
+        made = scene(
             position,
             velocity,
             (kind(stiffness=1.0, width=0.05), Teleport()),
@@ -190,10 +190,10 @@ def test_lists_follow_what_operators_do_to_the_world(rng):
             steps=45,
             domain=Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0)),
         )
-        results.append(run(setup))
-    by_list, over_all = (by_id(result) for result in results)
-    assert ((by_list["position"] >= 0) & (by_list["position"] < 1)).all()
-    np.testing.assert_allclose(by_list["position"], over_all["position"], rtol=0, atol=1e-9)
+        results.append(run(made))
+    listed, everyone = (by_id(result) for result in results)
+    assert ((listed["position"] >= 0) & (listed["position"] < 1)).all()
+    np.testing.assert_allclose(listed["position"], everyone["position"], rtol=0, atol=1e-9)
 
 
 class Leave(Operator):
@@ -208,12 +208,12 @@ class Leave(Operator):
 @pytest.mark.long
 def test_step_control_sees_the_pairs_that_a_removal_leaves():
     """Gap 0.8 m at 1 m/s: 0.5 s, the longest step, and then the 0.3 s that are left until surfaces meet."""
-    setup = scene(
+    wanted = scene(
         [[0, 0, 0], [1, 0, 0], [0, 9, 0]], [[1, 0, 0], [0, 0, 0], [0, 0, 0]], (Leave(),),
         radius=0.1, dt=1, steps=2,
     ).model_copy(update={"stepper": Verlet(control=ApproachTime(longest=0.5))})  # fmt: skip
-    simulation = Simulation(setup)
-    simulation.load([setup])
+    simulation = Simulation(wanted)
+    simulation.load([wanted])
     simulation.run(steps=2)
     (result,) = simulation.results()
     assert len(result.state["mass"]) == 2

@@ -30,19 +30,19 @@ from tisim.worlds.state import State
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
     """What a scene of these needs beyond the core -> the part that needs it, in order."""
-    requirements: list[tuple[str | Field, str]] = []
+    needed: list[tuple[str | Field, str]] = []
     if any(isinstance(effect, Force | PairForce) for effect in effects):
-        requirements.append((FORCE, "forces"))
+        needed.append((FORCE, "forces"))
     if turning(effects):
-        requirements += [(TORQUE, "torques"), ("spin", "torques")]
+        needed += [(TORQUE, "torques"), ("spin", "torques")]
     for effect in effects:
-        requirements += [(need, effect.label) for need in effect.required_fields()]
+        needed += [(need, effect.label) for need in effect.required_fields()]
         if isinstance(effect, PairForce):
-            requirements += [(field, effect.label) for field in memory_fields(effect)]
-    stepper_fields = stepper.fields(turning(effects), stepper.independent(effects))
-    requirements += [(need, stepper.kind()) for need in stepper_fields]
+            needed += [(field, effect.label) for field in memory_fields(effect)]
+    wanted = stepper.fields(turning(effects), stepper.independent(effects))
+    needed += [(need, stepper.kind()) for need in wanted]
     users: dict[str | Field, list[str]] = {}
-    for need, who in requirements:
+    for need, who in needed:
         users.setdefault(need, []).append(who)
     return {need: ", ".join(dict.fromkeys(names)) for need, names in users.items()}
 
@@ -74,8 +74,8 @@ class Assembly:
         events, operators = effects.of(PairEvent), effects.of(Operator)
         short_ranged = tuple(e for e in effects.of(PairForce, SelfConsistentQuantity) if e.data.short_ranged)
         surveyed = bool(events) or control.data.watches_pairs
-        short_ranged_sums = surveyed or bool(short_ranged)
-        self.neighbour_list = near = NeighbourList(s, domain, short_ranged) if short_ranged_sums else None
+        listed = surveyed or bool(short_ranged)
+        self.neighbour_list = near = NeighbourList(s, domain, short_ranged) if listed else None
         self.full_list = FullNeighbourList(near) if near and short_ranged else None
         contacts = ContactList(s, domain, events) if surveyed else None
         self.derived_solvers = tuple(
@@ -92,8 +92,8 @@ class Assembly:
             independent=stepper.data.independent([effect.data for effect in effects]),
             update_lists=lists,
             update_history=self._history(),
-            sum_forces=self._sum_phases(SumForces),
-            sum_trial_forces=self._sum_phases(SumTrialForces),
+            sum_forces=self._summed(SumForces),
+            sum_trial_forces=self._summed(SumTrialForces),
             force_sum=self._sum(SumForces),
         )
         self.failure_attribution = FailureAttribution(context.force_sum)
@@ -110,7 +110,7 @@ class Assembly:
             if near and contacts and control.data.watches_pairs:
                 step += [*lists, FindContactsAgain(near, contacts, control)]
             if context.sum_forces:
-                step += [*lists, *self._sum_phases(SumForcesAgain)]
+                step += [*lists, *self._summed(SumForcesAgain)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
         pairs = "impacts, step control"
@@ -140,7 +140,7 @@ class Assembly:
                 updates.append(UpdateContactHistory(self.s, self.domain, effect, self.full_list))
         return tuple(updates)
 
-    def _sum_phases(self, kind: type[SumForces]) -> tuple[Item, ...]:
+    def _summed(self, kind: type[SumForces]) -> tuple[Item, ...]:
         """Set derived quantities, then sum the forces."""
         items: list[Item] = []
         for part in self.derived_solvers:

@@ -25,12 +25,12 @@ def in_a_line() -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        message = str(error)
-        places = PLACE.findall(message)
+        said = str(error)
+        places = PLACE.findall(said)
         file, line, function = places[-1] if places else ("", "", "")
         if not places or PACKAGE in Path(file).parents:
             raise
-        fault = " ".join(message.strip().splitlines()[-1].split())
+        what = " ".join(said.strip().splitlines()[-1].split())
         raise InputError(
-            f"{file}, line {line}, in {function}, must be what Taichi can compile; received {fault}"
+            f"{file}, line {line}, in {function}, must be what Taichi can compile; received {what}"
         ) from error

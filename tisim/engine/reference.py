@@ -64,8 +64,8 @@ class Family:
         plugins.load_parts()
         serialization.load(packing)
         narrower = tuple(one.base for one in FAMILIES.values() if one.base in self.base.__subclasses__())
-        kinds = sorted(self.base.known().items())
-        return {name: kind for name, kind in kinds if not issubclass(kind, narrower)}
+        known = sorted(self.base.known().items())
+        return {name: kind for name, kind in known if not issubclass(kind, narrower)}
 
 
 FAMILIES = {
@@ -127,15 +127,15 @@ def entries() -> list[Entry]:
 
 def find(name: str) -> Entry:
     """The entry of a part by name; InputError listing the known ones where there is none."""
-    entries = {kind: (cls, family) for family, of in FAMILIES.items() for kind, cls in of.kinds().items()}
-    must(name in entries, "effect", f"one of {', '.join(sorted(entries))}", name)
-    return describe(*entries[name])
+    known = {kind: (cls, family) for family, of in FAMILIES.items() for kind, cls in of.kinds().items()}
+    must(name in known, "effect", f"one of {', '.join(sorted(known))}", name)
+    return describe(*known[name])
 
 
 def describe(kind: type[Component], family: str) -> Entry:
     """The entry of a part."""
     effect = kind if issubclass(kind, Effect) else Effect
-    field_names = {need if isinstance(need, str) else need.name for need in effect.fields}
+    wanted = {need if isinstance(need, str) else need.name for need in effect.fields}
     declared = resolve_fields(effect.fields)
     place = FAMILIES[family].place.replace("NAME", kind.kind())
     return Entry(
@@ -146,7 +146,7 @@ def describe(kind: type[Component], family: str) -> Entry:
         body=_body(kind),
         source=source(kind),
         settings=settings(kind),
-        fields=tuple((field.name, field.unit) for field in declared if field.name in field_names),
+        fields=tuple((field.name, field.unit) for field in declared if field.name in wanted),
         needs=tuple(_needs(kind)),
         gives=(*effect.counters, *effect.world_quantities),
         toml=template.toml(kind, place, named="NAME" not in FAMILIES[family].place) if place else "",
@@ -173,14 +173,14 @@ def _needs(kind: type[Component]) -> Iterator[str]:
 
 
 def _suiting(control: Any) -> list[str]:
-    kinds = FAMILIES["step_controls"].kinds()
-    return [name for name, kind in kinds.items() if issubclass(kind, control)]
+    known = FAMILIES["step_controls"].kinds()
+    return [name for name, kind in known.items() if issubclass(kind, control)]
 
 
 def settings(kind: type[Checked]) -> tuple[Declaration, ...]:
     """Its parameters and options, in order, but for the name of an effect, which is that of its table."""
-    infos = template.fields(kind) if issubclass(kind, Component) else kind.model_fields
-    return tuple(_setting(name, info) for name, info in infos.items())
+    shown = template.fields(kind) if issubclass(kind, Component) else kind.model_fields
+    return tuple(_setting(name, info) for name, info in shown.items())
 
 
 def _setting(name: str, info: FieldInfo) -> Declaration:
@@ -230,8 +230,8 @@ def _body(kind: type) -> str:
 
 def source(kind: type) -> str:
     """What the docstring names as source; else the first work that its module cites in brackets."""
-    if text := _docstring(kind)[1]:
-        return text
+    if found := _docstring(kind)[1]:
+        return found
     module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
     cited = re.search(r"\(([A-Z]\d\d[^()]*(?:\([^)]*\)[^()]*)*)\)", module)
     return cited.group(1) if cited else ""
@@ -239,5 +239,5 @@ def source(kind: type) -> str:
 
 def _docstring(kind: type) -> tuple[str, str]:
     """The docstring of a class itself: what stands before its source, and the source."""
-    text, _, citation = inspect.cleandoc(kind.__doc__ or "").partition("Source: ")
-    return text.strip(), " ".join(citation.split()).removesuffix(".")
+    text, _, named = inspect.cleandoc(kind.__doc__ or "").partition("Source: ")
+    return text.strip(), " ".join(named.split()).removesuffix(".")

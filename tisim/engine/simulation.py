@@ -51,11 +51,9 @@ class Simulation:
         self.structure = scene.structure()
         capacity = capacity or scene.capacity()
         # Fields and lists of a particle come to some hundred bytes; refused here, not in the compiler.
-        memory, available = 300 * worlds * capacity, runtime.memory()
-        rule = f"within the {available / 1e9:.0f} GB of this machine"
-        must(
-            memory <= available, f"memory for {worlds} x {capacity} particles", rule, f"{memory / 1e9:.0f} GB"
-        )
+        needed, there = 300 * worlds * capacity, runtime.memory()
+        rule = f"within the {there / 1e9:.0f} GB of this machine"
+        must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
         must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
         self.trees = self._make(scene, worlds, capacity, schedule)
         self.scenes: list[Scene] = []
@@ -78,9 +76,9 @@ class Simulation:
         return trees
 
     def _place(self, scene: Scene, worlds: int, capacity: int) -> None:
-        laws = (scene.effects, scene.stepper)
-        fields = resolve_fields(needed_fields(*laws))
-        names = (declared(*laws, attribute) for attribute in ("counters", "world_quantities", "flags"))
+        asked = (scene.effects, scene.stepper)
+        fields = resolve_fields(needed_fields(*asked))
+        names = (declared(*asked, what) for what in ("counters", "world_quantities", "flags"))
         self.s = State(worlds, capacity, fields, *names)
         parts = self._parts(scene)
         self.table = ParameterTable(parts, worlds, self.runtime.real)

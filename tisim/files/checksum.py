@@ -56,7 +56,7 @@ def read_image(path: Path, what: str, rule: str) -> bytes:
     content = regular_file.content(regular_file.target(path))
     if content is None:
         raise InputError(f"{what} must be an existing file; received {str(path)!r}")
-    image = verified_image(content)
+    image = verified(content)
     if image is None:
         without_checksum = MAGIC not in content and content.startswith(SIGNATURE) and b"tisim" in content
         why = f", without one: it was cut short or damaged, or {OLDER_VERSION}" if without_checksum else ""
@@ -71,7 +71,7 @@ def with_checksum(image: bytes, data: Iterable[tuple[int, int]] = ()) -> bytes:
     return image + frame(json.dumps(trailer).encode())
 
 
-def verified_image(content: bytes) -> bytes | None:
+def verified(content: bytes) -> bytes | None:
     """Return the HDF5 file without its checksum; None where that is missing or damaged, or does not fit."""
     start = max(content.rfind(MAGIC), 0)
     payloads = scan(content[start:]).payloads

@@ -65,11 +65,11 @@ class ContactHistory:
 
     @ti.func
     def read(self, s, w, i, slot):
-        memory = ti.Vector.zero(s.real, self.size)
+        known = ti.Vector.zero(s.real, self.size)
         if slot >= 0:
             for c in ti.static(range(self.size)):
-                memory[c] = self.past[w, i, slot * self.size + c]
-        return memory
+                known[c] = self.past[w, i, slot * self.size + c]
+        return known
 
     @ti.func
     def recall(self, s, w, i, j):
@@ -93,22 +93,22 @@ class UpdateContactHistory(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        new_contacts, slot_mask = self.update_pairs(w, i, False)
+        met, known = self.update_pairs(w, i, False)
         for k in range(PARTNERS):
-            if not (slot_mask >> k) & 1:
+            if not (known >> k) & 1:
                 self.history.partners[w, i, k] = NO_PARTNER
-        if new_contacts > 0:
+        if met > 0:
             self.update_pairs(w, i, True)
 
     @ti.func
     def update_pairs(self, w, i, new: ti.template()):  # type: ignore[valid-type]
         """Go through the pairs that i keeps; returns how many are new to it, and the slots of the others."""
-        new_contacts, slot_mask = 0, 0
+        met, known = 0, 0
         for k in range(self.full_list.size(w, i)):
             slot = self.update_pair(w, i, self.full_list.candidate(w, i, k), new)
-            new_contacts += ti.select(slot == UNKNOWN, 1, 0)
-            slot_mask |= ti.select(slot >= 0, 1 << ti.max(slot, 0), 0)
-        return new_contacts, slot_mask
+            met += ti.select(slot == UNKNOWN, 1, 0)
+            known |= ti.select(slot >= 0, 1 << ti.max(slot, 0), 0)
+        return met, known
 
     @ti.func
     def update_pair(self, w, i, j, new: ti.template()):  # type: ignore[valid-type]

@@ -19,12 +19,12 @@ def _magnitude(value):
 
 
 @ti.func
-def _pack(number):
+def _packed(number):
     return ti.Vector([number])
 
 
 @ti.func
-def _unpack(vector):
+def _unpacked(vector):
     return vector[0]
 
 
@@ -46,7 +46,7 @@ class DerivedSolver:
             )
         self.value, self.components = getattr(s, effect.quantity), declared[0]
         vector = self.components == 3
-        self.pack, self.unpack = (_same, _same) if vector else (_pack, _unpack)
+        self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)
         self.size = _length if vector else _magnitude
 
     def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
@@ -57,7 +57,7 @@ class DerivedSolver:
     @ti.func
     def set(self, s, w, i, t):
         """Set that of particle i, as it is in s."""
-        nothing = self.unpack(ti.Vector.zero(self.s.real, self.components))
+        nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
 

@@ -68,9 +68,9 @@ class SumForces(PairSum):
 
     @ti.func
     def finish(self, w, i, total, t):
-        applied = ti.select(self.moves(w, i), total, 0.0)
-        self.write(w, i, applied)
-        self.check(w, i, applied)
+        taken = ti.select(self.moves(w, i), total, 0.0)
+        self.write(w, i, taken)
+        self.check(w, i, taken)
 
     @ti.func
     def single_particle(self, w, i, t):

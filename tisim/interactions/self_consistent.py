@@ -70,7 +70,7 @@ class BeginSweeps(PerParticle):
             for change in ti.static(a.changes):
                 change[w] = 0.0
         if not (a.size(a.value[w, i]) < ti.math.inf):
-            a.value[w, i] = a.unpack(ti.Vector.zero(self.s.real, a.components))
+            a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
 
 
 class BeginSweepsAgain(BeginSweeps):
@@ -105,12 +105,12 @@ class JacobiSweep(PairSum):
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        return self.solver.pack(effect.influence(self.s, w, i, j, separation, distance, t))
+        return self.solver.packed(effect.influence(self.s, w, i, j, separation, distance, t))
 
     @ti.func
     def finish(self, w, i, total, t):
         a, part = self.solver, self.effect.relaxation(w)
-        new = self.effect.response(self.s, w, i, a.unpack(total), t)
+        new = self.effect.response(self.s, w, i, a.unpacked(total), t)
         a.next[w, i] = (1.0 - part) * a.value[w, i] + part * new
         size = a.size(new)
         if size > a.largest[w]:
