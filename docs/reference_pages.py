@@ -84,8 +84,8 @@ def _items(paragraph: str) -> Iterator[str]:
     lines = re.sub(r"\n\s*(?![A-Z]|[\w, ]+ : )", " ", paragraph)
     lines = re.sub(r"(?<=\.) (?=[a-z_]\w*(?:, [a-z_]\w*)* : )", "\n", lines)
     for line in lines.splitlines():
-        named = re.match(r"[\w, ]+ : ", line.strip())
-        yield from ("", f"{'- ' if named else ''}{plain(line.strip())}")
+        is_item = re.match(r"[\w, ]+ : ", line.strip())
+        yield from ("", f"{'- ' if is_item else ''}{plain(line.strip())}")
 
 
 def plain(line: str) -> str:
@@ -112,8 +112,8 @@ def signature(_app: Any, _what: str, _name: str, value: Any, *_: Any) -> tuple[s
 
 def _call(settings: tuple[Declaration, ...]) -> str:
     """The arguments that make a part: what must be given, then what has a default."""
-    needed = [one.name for one in settings if not one.default]
-    return f"({', '.join([*needed, *(f'{one.name}={one.default}' for one in settings if one.default)])})"
+    required = [one.name for one in settings if not one.default]
+    return f"({', '.join([*required, *(f'{one.name}={one.default}' for one in settings if one.default)])})"
 
 
 def _heading(text: str, line: str) -> list[str]:
@@ -166,9 +166,9 @@ def _facts(entry: Entry) -> Iterator[str]:
         "Source": entry.source, "Needs": "; ".join(entry.needs), "Particle fields": fields,
         "Counts and measures": ", ".join(entry.gives),
     }  # fmt: skip
-    for what, text in facts.items():
+    for label, text in facts.items():
         if text:
-            yield from (f"{what}: {plain(text)}.", "")
+            yield from (f"{label}: {plain(text)}.", "")
     for work in entry.publications():
         yield from (plain(work), "")
 
@@ -195,7 +195,7 @@ def _toml(entry: Entry) -> Iterator[str]:
 def _api(parts: dict[type, Entry]) -> Iterator[str]:
     """Every public name: a part links to its section, anything else stands here."""
     yield from _heading("Public names", "=")
-    seen: set[int] = set()
+    ids: set[int] = set()
     for package in PACKAGES:
         module = importlib.import_module(package)
         yield from _heading(package, "-")
@@ -205,8 +205,8 @@ def _api(parts: dict[type, Entry]) -> Iterator[str]:
             value = getattr(module, name)
             if value in parts if isinstance(value, type) else False:
                 links.append(f":ref:`{name} <{parts[value].name}>`")
-            elif not inspect.ismodule(value) and id(value) not in seen:
-                seen.add(id(value))
+            elif not inspect.ismodule(value) and id(value) not in ids:
+                ids.add(id(value))
                 yield from _autodoc(package, name, value)
         if links:
             yield from (f"Parts: {', '.join(links)}.", "")

@@ -1,4 +1,4 @@
-"""Where a search is, and what it found."""
+"""Progress says where a search is; an outcome holds what it has found."""
 
 from __future__ import annotations
 
@@ -24,10 +24,12 @@ Stopped = Literal["", "generations", "target", "patience", "evaluations", "wall 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a search is. fraction : of this generation, 0..1. best : value of each objective, the best that
-    any design of the hall has; empty until one is known. designs : in the hall. best_design : of one
-    objective; None until one is known. evaluations, hits : run, and found in the cache. elapsed_s : wall
-    seconds since the search began."""
+    """Progress says where a search is.
+
+    fraction : of this generation, 0..1. best : value of each objective, the best that any design of the hall
+    has; empty until one is known. designs : in the hall. best_design : of one objective; None until one is
+    known. evaluations, hits : run, and found in the cache. elapsed_s : wall seconds since the search began.
+    """
 
     generation: int
     generations: int
@@ -42,24 +44,24 @@ class Progress:
 
 @dataclass(frozen=True)
 class Design:
-    """A design that a search has found.
+    """A design is one that a search has found, in physical units.
 
     genes : the value of each gene, by name, in its unit. values : of each objective, by name, in its unit:
     the mean over random starts, the fresh ones where there are any. intervals : half-widths of their 95 %
-    confidence intervals. starts : how many there were. settled : whether the last of them changed the mean by
-    less than the tolerance that was asked for.
+    confidence intervals. starts : how many there were. converged : whether the last of them changed the mean
+    by less than the tolerance that was asked for.
     """
 
     genes: dict[str, float]
     values: dict[str, float]
     intervals: dict[str, float]
     starts: int
-    settled: bool
+    converged: bool
 
 
 @dataclass(repr=False)
 class Outcome:
-    """What a search found.
+    """An outcome holds what a search has found.
 
     hall : the best different designs, best first (by fresh starts once they are confirmed; empty if none
     succeeded); of several objectives the front. Failed designs never enter. estimates : those
@@ -84,24 +86,24 @@ class Outcome:
     stopped: Stopped = ""
 
     def __repr__(self) -> str:
-        found = f"{len(self.hall)} designs from {self.evaluations + self.hits} runs"
-        return f"<search of {self.problem.name}: {found}, stopped by {self.stopped or 'nothing yet'}>"
+        counts = f"{len(self.hall)} designs from {self.evaluations + self.hits} runs"
+        return f"<search of {self.problem.name}: {counts}, stopped by {self.stopped or 'nothing yet'}>"
 
     @property
     def name(self) -> str:
-        """The name of its group in the cache file."""
+        """Return the name of its group in the cache file."""
         return search_name(self.identity)
 
     @property
     def best(self) -> Individual | None:
-        """The best design; of several objectives the one of the front that is nearest to the best of each."""
+        """Return the best design; of several objectives the compromise, the nearest to the best of each."""
         if self.hall and self.problem.several:
             return compromise(self.hall)
         return self.hall[0] if self.hall else None
 
     @property
     def designs(self) -> list[Design]:
-        """The hall of fame by name and in physical units, in its order."""
+        """Return the hall of fame by name and in physical units, in its order."""
         return [self._design(string) for string in self.hall]
 
     def _design(self, string: Individual) -> Design:
@@ -113,11 +115,11 @@ class Outcome:
             values=dict(zip(names, means, strict=True)),
             intervals={name: e.half_width for name, e in zip(names, estimates, strict=True)},
             starts=estimates[0].starts,
-            settled=estimates[0].settled,
+            converged=estimates[0].converged,
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, such as json writes: units, designs, logbook by column, counts and settings."""
+        """Return plain data, such as json writes: units, designs, logbook by column, counts and settings."""
         units = {gene.name: gene.unit for gene in self.problem.genome.genes}
         units |= {objective.name: objective.unit for objective in self.problem.objectives}
         return {
@@ -133,7 +135,7 @@ class Outcome:
         }
 
     def to_frame(self) -> DataFrame:
-        """The hall of fame as a pandas data frame, a row for each design, with the columns of best.csv.
+        """Return the hall of fame as a pandas data frame: a row for each design, the columns of best.csv.
 
         InputError where pandas is not installed.
         """
@@ -145,5 +147,5 @@ class Outcome:
 
     @property
     def interrupted(self) -> bool:
-        """Stopped by Ctrl-C; search again with the same settings and file to go on."""
+        """Return whether Ctrl-C stopped it; search again with the same settings and file to resume."""
         return self.stopped == "interrupted"

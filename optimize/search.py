@@ -1,4 +1,4 @@
-"""The search: generations of a method, their log, stopping rules, and what is left in the cache file.
+"""A search runs generations of a method until a stopping rule ends it, and keeps all in its cache file.
 
 A search is a function of its problem, settings and evaluator settings. Resuming is therefore running it again
 on the same cache file: every finished evaluation comes from there, the rest follows as if never stopped.
@@ -23,7 +23,7 @@ from optimize.storage.cache import Cache
 
 
 class _OutOfTime(Exception):
-    """The wall-clock budget is spent in the middle of a generation."""
+    """The wall-clock budget has been spent in the middle of a generation."""
 
 
 def search(
@@ -46,6 +46,8 @@ def search(
 
 
 class _Search:
+    """A search under way: its method, its hall of fame, its budget and its outcome so far."""
+
     def __init__(
         self,
         problem: Problem,
@@ -66,7 +68,7 @@ class _Search:
         )
         self.hall = Hall(settings.hall_of_fame)
         self.ranked: list[Individual] = []
-        self.waited = 0
+        self.stagnation = 0
         self.outcome = Outcome(problem, settings, identity(problem, settings, evaluator.settings))
         self.began = time.monotonic()
 
@@ -84,7 +86,7 @@ class _Search:
         return self.outcome
 
     def _confirm(self) -> None:
-        """Run the best designs again from fresh starts, and rank them by that."""
+        """Run the best designs again from fresh starts, and rank them by their means over those."""
         if not self.settings.ensemble.confirm or not self.hall.strings or self._out_of_time():
             return
         last = len(self.outcome.logbook) - 1
@@ -105,7 +107,7 @@ class _Search:
             self._race(population, generation)
             if not self.ensemble.exhausted:  # or the generation is not whole, and the last
                 self.method.tell(population, self.hall.strings)
-            self.waited = 0 if better else self.waited + 1
+            self.stagnation = 0 if better else self.stagnation + 1
             self.outcome.logbook.record(
                 gen=generation,
                 designs=fresh,
@@ -123,7 +125,7 @@ class _Search:
                 return
 
     def _estimate(self, population: list[Individual], generation: int) -> int:
-        """Estimate the strings whose fitness is not known, as far as the budget goes; how many they were."""
+        """Estimate strings of unknown fitness, as far as the budget goes; return how many these were."""
         fresh = [string for string in population if not string.fitness.valid]
         designs = [self.problem.genome.decode(string) for string in fresh]
         new_estimates = self.ensemble.estimate(designs, lambda fraction: self._report(generation, fraction))
@@ -135,7 +137,7 @@ class _Search:
         return sum(string.fitness.valid for string in fresh)
 
     def _race(self, population: list[Individual], generation: int) -> None:
-        """Spend more starts on the hall's designs, and rank it by what is known then."""
+        """Spend more starts on the designs of the hall of fame, and rank it by their new estimates."""
         if not self.settings.ensemble.race:
             return
         racing = self.hall.strings
@@ -160,7 +162,7 @@ class _Search:
             (goal,) = self.problem.costs([settings.target])
             if self.hall.strings[0].fitness.values[0] <= goal:
                 return "target"
-        if settings.patience is not None and self.waited >= settings.patience:
+        if settings.patience is not None and self.stagnation >= settings.patience:
             return "patience"
         if self.ensemble.exhausted or self.ensemble.requested >= self.ensemble.budget:
             return "evaluations"

@@ -29,7 +29,8 @@ from tisim.files.regular_file import file_status
 from tisim.files.resuming import resumes
 
 SEARCH_FILE = "search.h5"
-BESIDE = (
+"""Name of the cache file of a search."""
+RESULT_FILES = (
     "best.csv",
     "convergence.png",
     "convergence.pdf",
@@ -39,60 +40,66 @@ BESIDE = (
     "best_cloud.png",
     "best_run.csv",
 )
-SEARCH_FILES = (SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", *BESIDE, lock.LOCK)
-"""The files that a search writes into its folder."""
+"""Names of the files that a search writes at its end."""
+SEARCH_FILES = (SEARCH_FILE, f"{SEARCH_FILE}.journal", f"{SEARCH_FILE}.lock", *RESULT_FILES, lock.LOCK)
+"""Names of all files that a search writes into its folder."""
 
 
-def going_on(
+def resume_or_clear(
     folder: Path, fresh: bool | None, overwrite: bool,
-    what: str = "search", file: str = SEARCH_FILE, beside: Sequence[str] = BESIDE,
+    command: str = "search", file: str = SEARCH_FILE, result_files: Sequence[str] = RESULT_FILES,
 ) -> bool:  # fmt: skip
-    """Whether a search goes on with what is in the folder (``resuming.resumes``); if not, that is removed.
+    """Return whether a command resumes what is in its folder (``resuming.resumes``); if not, remove that.
 
-    what, file, beside : of another command that keeps evaluations what it is, its cache file, and its other
-    files. InputError where it may do neither; also when one is at work there that would be removed.
+    command : "search", or the name of another one that keeps evaluations. file : its cache file.
+    result_files : its other files. InputError where it may do neither, or where one is still at work there
+    whose files would be removed.
     """
-    journal, guard = f"{file}.journal", f"{file}.lock"
-    begun = any(file_status(folder / name) is not None for name in (file, journal))
-    goes_on = resumes(folder, what, begun, f"what a {what} has found" * begun, fresh, overwrite)
-    ownership.check(folder, (file, journal, guard, *beside, lock.LOCK), overwrite)
-    if begun and not goes_on:
+    journal, lock_file = f"{file}.journal", f"{file}.lock"
+    resumable = any(file_status(folder / name) is not None for name in (file, journal))
+    results = f"what a {command} has found" if resumable else ""
+    resume = resumes(folder, command, resumable, results, fresh, overwrite)
+    ownership.check(folder, (file, journal, lock_file, *result_files, lock.LOCK), overwrite)
+    if resumable and not resume:
         # The lock file stays: without it two processes could lock two different files.
-        with lock.acquire(folder), locked(folder / guard, exclusive=True) as handle:
-            for name in (file, journal, *beside):
+        with lock.acquire(folder), locked(folder / lock_file, exclusive=True) as handle:
+            for name in (file, journal, *result_files):
                 (folder / name).unlink(missing_ok=True)
             os.ftruncate(handle, 0)
-    return goes_on
+    return resume
 
 
-def check(folder: Path, cache: Cache, wished: Mapping[str, Any]) -> bool:
-    """Whether the file in the folder has the search wished; InputError when it is of another, by identity."""
-    known = searches(cache)
-    if known and search_name(wished) not in known:
-        refuse(folder, "search", json.loads(next(iter(known.values()))["identity"]), wished)
-    return bool(known)
+def check(folder: Path, cache: Cache, requested: Mapping[str, Any]) -> bool:
+    """Return whether the cache file has the search of this identity; InputError when it has another."""
+    stored_searches = searches(cache)
+    if stored_searches and search_name(requested) not in stored_searches:
+        refuse(folder, "search", json.loads(next(iter(stored_searches.values()))["identity"]), requested)
+    return bool(stored_searches)
 
 
-def refuse(folder: Path, what: str, old: Mapping[str, Any], wished: Mapping[str, Any]) -> NoReturn:
-    """InputError that says in what the search (or ``what`` else) in the folder differs from that wished."""
+def refuse(folder: Path, command: str, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> NoReturn:
+    """Raise the InputError that says in what the identities of the stored and the requested search differ.
+
+    command : "search", or what else the folder is of.
+    """
     must(
-        old.get("format") == IDENTITY_FORMAT,
+        stored.get("format") == IDENTITY_FORMAT,
         "output folder",
-        f"of a {what} of this version of the program (or give --out or --overwrite)",
+        f"of a {command} of this version of the program (or give --out or --overwrite)",
         str(folder),
     )
-    there = _leaves(old)
-    here = _leaves(json.loads(canonical(wished)))
-    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    differ = ", ".join(f"{name} = {there.get(name)} and not {here.get(name)}" for name in names)
+    old = _leaves(stored)
+    new = _leaves(json.loads(canonical(requested)))
+    names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+    differences = ", ".join(f"{name} = {old.get(name)} and not {new.get(name)}" for name in names)
     raise InputError(
-        f"output folder must be without another {what} (or give --out or --overwrite); "
-        f"received {str(folder)!r}, where one has {differ}"
+        f"output folder must be without another {command} (or give --out or --overwrite); "
+        f"received {str(folder)!r}, where one has {differences}"
     )
 
 
 def _leaves(settings: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """Nested settings by their dotted names."""
+    """Return nested settings by their dotted names."""
     leaves: dict[str, Any] = {}
     for name, value in settings.items():
         inside = isinstance(value, Mapping)

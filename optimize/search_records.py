@@ -1,4 +1,4 @@
-"""What a search leaves of itself in its cache file: settings, versions, logbook and best designs."""
+"""A search leaves its settings, versions, logbook and best designs as tables in its cache file."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from tisim.io.run_folder import versions
 
 
 def store(cache: Cache, outcome: Outcome) -> None:
-    """Put what is known of a search into the file; on return it is on the disk."""
-    about = {
+    """Put the tables of a search into the file; on return they are on the disk."""
+    attributes = {
         "identity": canonical(outcome.identity).decode(),
         "settings": outcome.settings.model_dump_json(),
         "versions": json.dumps({**versions(), "deap": deap.__version__}),
         "stopped": outcome.stopped,
     }
-    cache.put_table(outcome.name, {}, about)
+    cache.put_table(outcome.name, {}, attributes)
     cache.put_table(f"{outcome.name}/hall_of_fame", best_columns(outcome.problem, outcome.hall))
     cache.put_table(f"{outcome.name}/logbook", logbook_columns(outcome.problem, outcome.logbook))
     cache.fold()
 
 
 def searches(cache: Cache) -> dict[str, Mapping[str, Any]]:
-    """Name and attributes of each search in the file."""
+    """Return the attributes of each search in the file, by its name."""
     tables = cache.attributes()
     return {name: attributes for name, attributes in tables.items() if "identity" in attributes}

@@ -1,4 +1,4 @@
-"""A search with all around it: its folder, its display, Ctrl-C, and the files it leaves."""
+"""A session runs a search in a folder: it locks it, shows progress, hears Ctrl-C, and writes the results."""
 
 from __future__ import annotations
 
@@ -49,23 +49,28 @@ def run(
     ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
     until a search in this process is over. InputError for settings that cannot be, before anything runs.
     """
-    wished = Settings(**proposed(problem, settings, settings.get("method")))
-    fit(problem, wished)
-    here = executor == "batch"
+    search_settings = Settings(**proposed(problem, settings, settings.get("method")))
+    fit(problem, search_settings)
+    in_this_process = executor == "batch"
     with ExitStack() as stack:
-        if here:
+        if in_this_process:
             stack.enter_context(runtime.turn)
-        running = runtime.current()
-        threads = running.threads if here else 0
+        current = runtime.current()
+        threads = current.threads if in_this_process else 0
         evaluator = stack.enter_context(
-            closing(evaluator_named(executor, running.device, running.precision, threads))
+            closing(evaluator_named(executor, current.device, current.precision, threads))
         )
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))
-            return session(problem, wished, evaluator, Path(out), say, bar, print_stopping)
+            return session(problem, search_settings, evaluator, Path(out), say, bar, print_stopping)
         with tempfile.TemporaryDirectory() as folder, Cache(Path(folder) / SEARCH_FILE) as cache:
-            return _shown(
-                problem, wished, evaluator, cache, err() if verbose else Console(quiet=True), print_stopping
+            return _search_with_display(
+                problem,
+                search_settings,
+                evaluator,
+                cache,
+                err() if verbose else Console(quiet=True),
+                print_stopping,
             )
 
 
@@ -92,7 +97,7 @@ def session(
             if check(folder, cache, identity(problem, settings, evaluator.settings)):
                 line = f"going on with {folder / SEARCH_FILE}, which has {len(cache)} runs"
                 bar.print(line, highlight=False)
-            outcome = _shown(problem, settings, evaluator, cache, bar, stopping)
+            outcome = _search_with_display(problem, settings, evaluator, cache, bar, stopping)
         paths = [folder / SEARCH_FILE]
         if outcome.best is not None:
             say.print(report.best_table(outcome))
@@ -104,7 +109,7 @@ def session(
     return outcome
 
 
-def _shown(
+def _search_with_display(
     problem: Problem,
     settings: Settings,
     evaluator: Evaluator,
@@ -112,11 +117,11 @@ def _shown(
     bar: Console,
     stopping: Callable[[], None],
 ) -> Outcome:
-    """The search behind its bar, until it ends or Ctrl-C stops it."""
+    """Run the search behind its progress bar, until it ends or Ctrl-C stops it."""
     with Interrupt(stopping) as ctrl_c, Display(problem, settings.generations, bar) as display:
 
-        def step(where: Progress) -> None:
-            display.step(where)
+        def step(progress: Progress) -> None:
+            display.step(progress)
             ctrl_c.check()
 
         return search(problem, evaluator, cache, settings, on_generation=display.generation, on_progress=step)

@@ -1,4 +1,4 @@
-"""The settings of a search, what they make it, and the name that gives it."""
+"""Settings decide a search; with its problem they give it an identity, and that a name in the cache file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tisim.components.component import Checked
 from tisim.errors import must
 
 IDENTITY_FORMAT = 2
-"""The version of the identity below; raised when a search of before cannot be gone on with."""
+"""The version of the identity below; it is raised when a search of before cannot be resumed any more."""
 
 
 class Settings(Checked):
-    """All that decides a search, and when it stops.
+    """Settings are all that decides a search, and when it stops.
 
     seed : of the search and of its random starts. method : by name, see optimize.methods.base; options : its
     own settings. generations : after generation 0, the random start. ensemble : averaging over starts.
@@ -45,7 +45,7 @@ class Settings(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.generations=30``."""
+        """Return the word for it in commands, as in ``--set search.generations=30``."""
         return "search"
 
     @model_validator(mode="before")
@@ -54,7 +54,8 @@ class Settings(Checked):
         kind = find(data.get("method", "genetic")).Options
         options = data.get("options", {})
         if not isinstance(options, kind):
-            must(isinstance(options, Mapping), "search.options", "settings of the method, by name", options)
+            named = isinstance(options, Mapping) and all(isinstance(name, str) for name in options)
+            must(named, "search.options", "settings of the method, by name", options)
             options = kind(**options)
         return {**data, "options": options}
 
@@ -64,7 +65,7 @@ _AFTERWARDS = {"confirm"}
 
 
 def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any]) -> dict[str, Any]:
-    """All that decides the course of a search. When it stops, and what is run again at its end, does not.
+    """Return all that decides the course of a search: not when it stops, nor what is run again at its end.
 
     evaluator : the settings of the evaluator.
     """
@@ -80,24 +81,29 @@ def identity(problem: Problem, settings: Settings, evaluator: Mapping[str, Any])
 
 
 def search_name(identity: Mapping[str, Any]) -> str:
-    """Group of a search in its cache file."""
+    """Return the name of the group of a search in its cache file."""
     return f"searches/{identity['problem']}-{hashlib.sha256(canonical(identity)).hexdigest()[:12]}"
 
 
-def followed(usual: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of a case without the options that follow those given, by dotted name, in their place.
+def without_dependent_options(usual: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a case without those options whose defaults depend on an option that changes.
 
     Where a case has 24 strings and 8 parents, 12 strings shall have as many parents as go with 12.
+    usual : settings of the case. changes : settings in place of them, by dotted name.
     """
-    method = find(given.get("method", usual.get("method", "genetic")))
-    chosen = [names for option, names in method.followers.items() if f"options.{option}" in given]
-    replaced = {name for names in chosen for name in names}
-    options = {name: value for name, value in usual.get("options", {}).items() if name not in replaced}
+    method = find(changes.get("method", usual.get("method", "genetic")))
+    dropped = {
+        name
+        for option, names in method.dependent_options.items()
+        if f"options.{option}" in changes
+        for name in names
+    }
+    options = {name: value for name, value in usual.get("options", {}).items() if name not in dropped}
     return {**usual, "options": options}
 
 
 def fit(problem: Problem, settings: Settings) -> None:
-    """InputError when the method, or a rule of the settings, cannot be for the problem's objectives."""
+    """Raise InputError when the method, or a stopping rule, cannot be for the problem's objectives."""
     if problem.several:
         able = [name for name, method in every().items() if method.several]
         must(settings.method in able, "method", f"for several objectives: {', '.join(able)}", settings.method)
@@ -105,8 +111,8 @@ def fit(problem: Problem, settings: Settings) -> None:
 
 
 def proposed(problem: Problem, base: Mapping[str, Any], method: str | None) -> dict[str, Any]:
-    """Settings of a case with another method, whose options are then its own defaults - but for a method
-    that takes all options of the case's, as restart those of genetic.
+    """Return the settings of a case with another method, whose options are then its own defaults; a method
+    that takes all options of the case's method, as restart those of genetic, keeps them.
 
     base : of the case. method : by name; None for the case's, or what its objectives need.
     """

@@ -14,7 +14,7 @@ from optimize.problem.problem import Problem
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
     """Z04 tables 1 to 3 in one: rank, every gene in its unit, each objective with the half-width of its 95 %
-    confidence interval, the derived columns of the problem, starts, whether their mean has settled; the same
+    confidence interval, the derived columns of the problem, starts, whether their mean converged; the same
     from fresh starts where the designs have been confirmed. Heading -> values, best first; of several
     objectives the front along the first, the best of that first.
     """
@@ -26,7 +26,7 @@ def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list
         columns[gene.label] = [design[gene.name] for design in designs]
     columns |= _objectives(problem, estimates, "")
     columns["starts"] = [of_all[0].starts for of_all in estimates]
-    columns["settled"] = ["yes" if of_all[0].settled else "no" for of_all in estimates]
+    columns["converged"] = ["yes" if of_all[0].converged else "no" for of_all in estimates]
     confirmed = [string.confirmed for string in hall if string.confirmed]
     if confirmed:
         columns |= _objectives(problem, confirmed, ", fresh starts")

@@ -84,10 +84,10 @@ def elsewhere(tmp_path_factory):
     """Results of test_schedules.crowd in another process: with one thread, and in single precision."""
     file = tmp_path_factory.mktemp("elsewhere") / "results.npz"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
-    assert done.returncode == 0, done.stderr
-    with np.load(file) as stored:
-        return dict(stored)
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
+    assert completed.returncode == 0, completed.stderr
+    with np.load(file) as arrays:
+        return dict(arrays)
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def single():
         )
         command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]
         root = Path(__file__).parents[1]
-        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
-        return json.loads(done.stdout.splitlines()[-1])
+        completed = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
+        return json.loads(completed.stdout.splitlines()[-1])
 
     return call

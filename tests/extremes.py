@@ -119,13 +119,13 @@ FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 def scenes() -> dict[str, dict[str, Any]]:
     """Plain data by name: a scene of each effect, source and operator, and those of each stepper."""
     serialization.load(steppers)
-    found = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
+    scenes_by_name = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
     for name in sorted(CONTROLLED):
-        needed = FLUID if name == "brownian" else {}
+        fluid = FLUID if name == "brownian" else {}
         for k, (control, options, effects) in enumerate(CONTROLLED[name]):
-            stepper = {"kind": name, **needed, **options, "control": control}
-            found[f"stepper.{name}.{k}"] = _scene(_effects(effects), stepper)
-    return found
+            stepper = {"kind": name, **fluid, **options, "control": control}
+            scenes_by_name[f"stepper.{name}.{k}"] = _scene(_effects(effects), stepper)
+    return scenes_by_name
 
 
 def _company(kind: type[Effect]) -> dict[str, Any]:
@@ -141,11 +141,11 @@ def _company(kind: type[Effect]) -> dict[str, Any]:
     return _effects((*felt, kind))
 
 
-def _effects(wanted: tuple[type[Effect], ...]) -> dict[str, Any]:
+def _effects(kinds: tuple[type[Effect], ...]) -> dict[str, Any]:
     table: dict[str, Any] = {}
-    for kind in wanted:
+    for kind in kinds:
         table |= {name: {**values, **COMMON.get(name, {})} for name, values in with_needed(kind).items()}
-    if Agglomeration in wanted:
+    if Agglomeration in kinds:
         table["impact"]["hardness"] = 1.0
     return table
 
@@ -166,11 +166,11 @@ def _scene(effects: dict[str, Any], stepper: dict[str, Any] | None = None) -> di
         "stepper": stepper or {"kind": "verlet", "control": {"kind": "fixed_step", "dt": DT}},
         "effects": effects,
     }
-    made = Scene.from_dict(data)
-    needed = {
-        need if isinstance(need, str) else need.name for need in needed_fields(made.effects, made.stepper)
+    scene = Scene.from_dict(data)
+    names = {
+        need if isinstance(need, str) else need.name for need in needed_fields(scene.effects, scene.stepper)
     }
-    quantities = {name: [value] * 3 for name, value in QUANTITIES.items() if name in needed}
+    quantities = {name: [value] * 3 for name, value in QUANTITIES.items() if name in names}
     data["particles"]["quantities"] = quantities
     return Scene.from_dict(data).to_dict()
 
@@ -190,25 +190,25 @@ def places(data: Any, path: Place = ()) -> Iterator[Place]:
 
 def own(name: str) -> list[Place]:
     """The places of a scene that are of its kind, of its first particle, or its duration."""
-    what, kind, *_ = name.split(".")
+    family, kind, *_ = name.split(".")
     return [
         place
         for place in places(scenes()[name])
         if place[0] == "duration"
         or (place[0] == "particles" and place[3 if place[1] == "quantities" else 2] == 0)
-        or (place[0] == what and (what == "stepper" or place[1] == kind))
+        or (place[0] == family and (family == "stepper" or place[1] == kind))
     ]
 
 
 def changed(data: dict[str, Any], values: dict[Place, Any]) -> dict[str, Any]:
     """A copy with other numbers at some places."""
-    made = copy.deepcopy(data)
+    copied = copy.deepcopy(data)
     for (*path, last), value in values.items():
-        inner: Any = made
+        inner: Any = copied
         for key in path:
             inner = inner[key]
         inner[last] = value
-    return made
+    return copied
 
 
 def one_by_one(name: str) -> Iterator[dict[Place, float]]:
@@ -218,7 +218,9 @@ def one_by_one(name: str) -> Iterator[dict[Place, float]]:
             yield {place: value}
 
 
-def drawn(name: str, random: Random) -> dict[Place, float]:
+def draw_values(name: str, random: Random) -> dict[Place, float]:
     """One to four numbers of a scene at random, each at an extreme."""
-    found = list(places(scenes()[name]))
-    return {place: random.choice(VALUES) for place in random.sample(found, random.choice((1, 1, 2, 3, 4)))}
+    all_places = list(places(scenes()[name]))
+    return {
+        place: random.choice(VALUES) for place in random.sample(all_places, random.choice((1, 1, 2, 3, 4)))
+    }

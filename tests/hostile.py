@@ -67,10 +67,10 @@ def value(random: Random) -> Any:
 def _places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Every place in plain data but the whole of it; the first few of long lists, and none very deep."""
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    found = []
+    paths = []
     for key, inner in list(items)[: 8 if len(path) < 8 else 0]:
-        found += [(*path, key), *_places(inner, (*path, key))]
-    return found
+        paths += [(*path, key), *_places(inner, (*path, key))]
+    return paths
 
 
 def _mutate(data: dict[str, Any], random: Random) -> None:
@@ -110,8 +110,8 @@ def valid() -> tuple[dict[str, Any], ...]:
     from cases.case import every
 
     base = scene([[0, 0, 0], [1, 0, 0]], [[0, 0, 0]] * 2, quantities={"temperature": 300.0})
-    found = [flow(grains=3).to_dict(), base.to_dict()]
-    found += [case.scene(size, 1).to_dict() for case in every().values() for size in list(case.sizes)[:2]]
+    tables_ = [flow(grains=3).to_dict(), base.to_dict()]
+    tables_ += [case.scene(size, 1).to_dict() for case in every().values() for size in list(case.sizes)[:2]]
     box = {"kind": "box", "low": [-1.0] * 3, "high": [1.0] * 3}
     cylinder = RandomAroundCylinder(radius=0.5, length=3.0, thickness=0.4)
     starts = (
@@ -122,20 +122,20 @@ def valid() -> tuple[dict[str, Any], ...]:
         Cloud(number=5, radius=0.1, density=1.0),
     )
     for start in starts:
-        found.append({**base.to_dict(), "domain": box, "particles": serialization.to_dict(start)})
+        tables_.append({**base.to_dict(), "domain": box, "particles": serialization.to_dict(start)})
     controls = {"brownian": DriftLimit(longest=1e-9), "boris": FixedStep(dt=1e-9)}
-    for name, kind in _known(Stepper).items():
-        needed = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
+    for name, kind in _kinds(Stepper).items():
+        fluid = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
         control = {"control": controls[name]} if name in controls else {}
-        found.append({**base.to_dict(), "stepper": serialization.to_dict(kind(**needed, **control))})
-    return (*found, *({**base.to_dict(), "effects": with_needed(kind)} for kind in known_effects()))
+        tables_.append({**base.to_dict(), "stepper": serialization.to_dict(kind(**fluid, **control))})
+    return (*tables_, *({**base.to_dict(), "effects": with_needed(kind)} for kind in known_effects()))
 
 
 def with_needed(kind: type[Effect]) -> dict[str, Any]:
     """Plain data of an effect, after those that it needs."""
     partners: dict[str, Any] = {}
     for contract in kind.requires:
-        partners |= with_needed(next(known for known in known_effects() if issubclass(known, contract)))
+        partners |= with_needed(next(other for other in known_effects() if issubclass(other, contract)))
     if kind.requires_source:
         partners |= with_needed(MagneticField)
     rows = {name: [_required(row)] for name, row in kind.lists()}
@@ -152,7 +152,7 @@ def _required(kind: type[Component]) -> dict[str, Any]:
     }
 
 
-def _known(contract: type[Stepper]) -> dict[str, type[Stepper]]:
+def _kinds(contract: type[Stepper]) -> dict[str, type[Stepper]]:
     serialization.load(steppers)
     return {name: kind for name, kind in contract.known().items() if kind.__module__.startswith("tisim.")}
 

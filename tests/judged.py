@@ -79,11 +79,13 @@ def check_result(result: Result) -> None:
     is not finite.
     """
     begun = result.status.ok or result.time > 0
-    told = {name: values for name, values in result.state.items() if begun or name in result.start}
-    for name, values in {**told, **result.measures, "time": result.time}.items():
+    reported = {name: values for name, values in result.state.items() if begun or name in result.start}
+    for name, values in {**reported, **result.measures, "time": result.time}.items():
         assert np.isfinite(values).all(), f"{name} is not finite, and the status is {result.status}"
     if result.status.ok or result.status.reason == REASONS[WorldStatus.RUNNING]:
         return
     assert re.fullmatch(r"found at t = \S+ s: .+; kept t = \S+ s", result.status.reason), result.status.reason
-    named = "particle" in result.status.reason or "effects." in result.status.reason
-    assert named or any(REASONS[code] in result.status.reason for code in OF_THE_WORLD), result.status.reason
+    names_culprit = "particle" in result.status.reason or "effects." in result.status.reason
+    assert names_culprit or any(REASONS[code] in result.status.reason for code in OF_THE_WORLD), (
+        result.status.reason
+    )

@@ -51,13 +51,13 @@ def room(module: str) -> int:
 
 def imports(folder: Path) -> tuple[Imports, Imports]:
     """What each module imports of the others: with itself, and when its functions are called."""
-    known = modules(folder)
-    early: Imports = {name: set() for name in known}
-    late: Imports = {name: set() for name in known}
-    for name, file in known.items():
+    module_files = modules(folder)
+    early: Imports = {name: set() for name in module_files}
+    late: Imports = {name: set() for name in module_files}
+    for name, file in module_files.items():
         for node, later in _statements(ast.parse(file.read_text(encoding="utf-8")), False):
-            found = {one for one in _named(node, known) if one != name}
-            (late if later else early)[name] |= found
+            imported = {one for one in _named(node, module_files) if one != name}
+            (late if later else early)[name] |= imported
     return early, late
 
 
@@ -71,13 +71,13 @@ def _statements(node: ast.AST, later: bool) -> Iterator[tuple[ast.AST, bool]]:
             yield from _statements(child, later or isinstance(child, ast.FunctionDef | ast.Lambda))
 
 
-def _named(node: ast.AST, known: dict[str, Path]) -> Iterator[str]:
+def _named(node: ast.AST, module_files: dict[str, Path]) -> Iterator[str]:
     if isinstance(node, ast.ImportFrom) and node.module:
         for alias in node.names:
             whole = f"{node.module}.{alias.name}"
-            yield from [name for name in (whole, node.module) if name in known][:1]
+            yield from [name for name in (whole, node.module) if name in module_files][:1]
     elif isinstance(node, ast.Import):
-        yield from (alias.name for alias in node.names if alias.name in known)
+        yield from (alias.name for alias in node.names if alias.name in module_files)
 
 
 def floors(early: Imports) -> list[str]:

@@ -146,8 +146,8 @@ def energy(state, heat_capacity=HEAT_CAPACITY):
     kinetic = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
     heat = heat_capacity * (state["mass"] * state["temperature"]).sum()
     spent = sum(state[name].sum() for name in ("cooling_loss", "fracture_energy") if name in state)
-    given = sum(state[name].sum() for name in ("reaction_heat", "deformation_work") if name in state)
-    return kinetic + heat + spent - given
+    supplied = sum(state[name].sum() for name in ("reaction_heat", "deformation_work") if name in state)
+    return kinetic + heat + spent - supplied
 
 
 def check_sums(result):

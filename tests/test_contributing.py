@@ -28,5 +28,5 @@ def test_an_example_passes_its_test(name, own_file):
     assert tests
     for test in tests:
         test()
-    made = [entry for entry in reference.entries() if entry.kind.__module__ == name.removesuffix(".py")]
-    assert [entry.name for entry in made] == [name.removesuffix(".py")] * (name != "bend.py")
+    entries = [entry for entry in reference.entries() if entry.kind.__module__ == name.removesuffix(".py")]
+    assert [entry.name for entry in entries] == [name.removesuffix(".py")] * (name != "bend.py")

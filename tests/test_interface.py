@@ -58,8 +58,8 @@ def test_an_unknown_name_is_an_attribute_error():
 
 def test_importing_tisim_loads_nothing_heavy():
     code = f"import tisim, json, sys; print(json.dumps([m for m in {HEAVY} if m in sys.modules]))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout) == []
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(completed.stdout) == []
 
 
 def test_names_of_families_are_those_of_the_top_level():

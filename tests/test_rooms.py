@@ -11,9 +11,9 @@ from tests import rooms
 EARLY, LATE = rooms.imports(Path(__file__).parents[1])
 
 
-def above(found):
+def above(imports):
     """(module, what it imports) where that stands above it."""
-    pairs = {(module, other) for module, others in found.items() for other in others}
+    pairs = {(module, other) for module, others in imports.items() for other in others}
     return {(module, other) for module, other in pairs if rooms.room(other) > rooms.room(module)}
 
 

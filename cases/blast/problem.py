@@ -80,12 +80,12 @@ def problem(size: str = "default", variant: str = "ellipsoid", goal: np.ndarray 
 
 def details(design: Mapping[str, float], result: Result, target: np.ndarray) -> dict[str, float]:
     """Half axes wanted and reached, and the angle of the field to the long axis that was wanted."""
-    reached = moments(result.state)
+    result_moments = moments(result.state)
     axis = np.linalg.eigh(target)[1][:, -1]
     flux = field(design)
     values: dict[str, float] = {}
     for k, (a, b) in enumerate(
-        zip(principal_half_axes(target), principal_half_axes(reached), strict=True), start=1
+        zip(principal_half_axes(target), principal_half_axes(result_moments), strict=True), start=1
     ):
         values[f"half axis {k} wanted, m"], values[f"half axis {k} reached, m"] = float(a), float(b)
     cosine = abs(flux @ axis) / np.linalg.norm(flux)

@@ -115,9 +115,9 @@ def caught(result: Result) -> Figure:
             box = Rectangle((low[0], low[1]), body.length / MILLI, 2 * body.radius / MILLI)
             box.set(facecolor="0.85", edgecolor="0.4", lw=0.7)
             axis.add_patch(box)
-        shown = ((start, ~stopped, "0.6", "passed by"), (start, stopped, "#dd8899", "caught"),
+        groups = ((start, ~stopped, "0.6", "passed by"), (start, stopped, "#dd8899", "caught"),
                  (state, stopped, "#882255", "where it was caught"))  # fmt: skip
-        for arrays, which, colour, name in shown:
+        for arrays, which, colour, name in groups:
             z, y = arrays["position"][which][:, 2], arrays["position"][which][:, k]
             axis.plot(z / MILLI, y / MILLI, "o", ms=3, color=colour, label=name)
         axis.set_ylabel(f"{'xy'[k]} (mm)")

@@ -61,8 +61,8 @@ def curve(axis: Axes, times: np.ndarray, label: str, **style: Any) -> None:
     """Captured fraction in time, the mean over repeats."""
     when = np.sort(times[np.isfinite(times)])
     share = np.arange(1, len(when) + 1) / times.size
-    shown = share <= CURVE_SHARE
-    axis.plot(when[shown], share[shown], label=label, lw=1.4, **style)
+    in_range = share <= CURVE_SHARE
+    axis.plot(when[in_range], share[in_range], label=label, lw=1.4, **style)
 
 
 def of_size(axis: Axes, times_of: Times, nanometres: int) -> None:

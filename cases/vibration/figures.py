@@ -79,8 +79,8 @@ def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[st
         legend_above(axis)
         reach = min(reach, 3.0 * max(fast, parameters["omega"]))
     axis.set_xlim(-reach, reach)
-    shown = lines[np.abs(omega) <= reach]
-    axis.set_ylim(FLOOR * shown.max(), 3 * shown.max())
+    visible_lines = lines[np.abs(omega) <= reach]
+    axis.set_ylim(FLOOR * visible_lines.max(), 3 * visible_lines.max())
     axis.set_xlabel("angular frequency (1/s), anticlockwise > 0")
     axis.set_ylabel("amplitude (m)")
     plain(axis)

@@ -1,4 +1,4 @@
-"""Fitness of designs averaged over random starts until the running mean settles (Z04 Eq. 8.1).
+"""Fitness of designs averaged over random starts until the running mean converges (Z04 Eq. 8.1).
 
 Designs that compete for the first place can be given more starts.
 """
@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from pydantic import Field, model_validator
 
-from optimize.evaluation.estimate import FitnessEstimate, settled_after
+from optimize.evaluation.estimate import FitnessEstimate, converged_after
 from optimize.evaluation.runs import Evaluator, Runs, Sample
 from optimize.problem.problem import Problem
 from optimize.storage.cache import Cache
@@ -98,18 +98,24 @@ class Ensemble:
         samples = [self._sample(design) for design in designs]
         different = list(dict.fromkeys(samples))
         size = max(settings.block, settings.min_starts)
-        first, shown = 0, 0.0
+        first, largest_fraction = 0, 0.0
         while running := [sample for sample in different if sample.open]:
             last = min(first + size, settings.max_starts)
             afforded = self._afforded(running, last - first)
-            done = sum(1.0 if not sample.open else first / settings.max_starts for sample in different)
+            finished_designs = sum(
+                1.0 if not sample.open else first / settings.max_starts for sample in different
+            )
             share = len(afforded) * (last - first) / settings.max_starts
 
-            def report(fraction: float, done: float = done, share: float = share) -> None:
-                nonlocal shown
-                shown = max(shown, (done + share * fraction) / len(different))
+            def report(
+                fraction: float, finished_designs: float = finished_designs, share: float = share
+            ) -> None:
+                nonlocal largest_fraction
+                largest_fraction = max(
+                    largest_fraction, (finished_designs + share * fraction) / len(different)
+                )
                 if progress is not None:
-                    progress(shown)
+                    progress(largest_fraction)
 
             for sample in running[len(afforded) :]:
                 sample.open = False
@@ -118,9 +124,9 @@ class Ensemble:
                 if sample.reason:
                     sample.open = False
                     continue
-                settled = settled_after(sample.costs, settings.tolerance, settings.min_starts)
-                sample.used, sample.settled = settled or len(sample.costs), settled is not None
-                sample.open = settled is None and last < settings.max_starts
+                converged = converged_after(sample.costs, settings.tolerance, settings.min_starts)
+                sample.used, sample.converged = converged or len(sample.costs), converged is not None
+                sample.open = converged is None and last < settings.max_starts
             first, size = last, settings.block
         if progress is not None:
             progress(1.0)
@@ -168,7 +174,7 @@ class Ensemble:
         starts = range(first, first + self.settings.confirm)
         self.runs.add([(sample, starts) for sample in samples], progress or (lambda fraction: None))
         for sample in samples:
-            sample.used, sample.settled = len(sample.costs), True
+            sample.used, sample.converged = len(sample.costs), True
         return [self._summary(sample) for sample in samples]
 
     def _sample(self, design: Design) -> Sample:
@@ -190,7 +196,7 @@ class Ensemble:
             failed = FitnessEstimate(math.inf, math.nan, math.nan, len(sample.costs), False, sample.reason)
             return (failed,) * self.objectives
         columns = zip(*sample.costs[: sample.used], strict=True)
-        return tuple(FitnessEstimate.of(column, sample.settled) for column in columns)
+        return tuple(FitnessEstimate.of(column, sample.converged) for column in columns)
 
 
 def _beats(one: Sample, other: Sample) -> bool:

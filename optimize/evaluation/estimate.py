@@ -1,4 +1,4 @@
-"""Fitness averaged over random starts, and when the average has settled (Z04 Eq. 8.1)."""
+"""Fitness averaged over random starts, and when the average has converged (Z04 Eq. 8.1)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class FitnessEstimate:
 
     mean : of the first `starts` starts, +inf if the design failed. std : sample standard deviation.
     half_width : of the 95 % confidence interval of the mean (Student t; the stopping rule's own effect on
-    coverage is not corrected for). settled : Eq. 8.1 was met. reason : "" or why the design failed.
+    coverage is not corrected for). converged : Eq. 8.1 was met. reason : "" or why the design failed.
     std and half_width are NaN for fewer than two starts and for failed designs.
     """
 
@@ -26,7 +26,7 @@ class FitnessEstimate:
     std: float
     half_width: float
     starts: int
-    settled: bool
+    converged: bool
     reason: str = ""
 
     @property
@@ -34,20 +34,20 @@ class FitnessEstimate:
         return not self.reason
 
     @classmethod
-    def of(cls, values: Sequence[float], settled: bool) -> FitnessEstimate:
+    def of(cls, values: Sequence[float], converged: bool) -> FitnessEstimate:
         """From the fitness of each start; at least one."""
         n = len(values)
-        mean = float(np.cumsum(values)[-1] / n)  # summed as in settled_after, to the last bit
+        mean = float(np.cumsum(values)[-1] / n)  # summed as in converged_after, to the last bit
         std = float(np.std(values, ddof=1)) if n > 1 else math.nan
         unsure = float(half_width(values)) if n > 1 else math.nan
-        return cls(mean, std, unsure, n, settled)
+        return cls(mean, std, unsure, n, converged)
 
 
-def settled_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:
+def converged_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:
     """The least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04 Eq. 8.1).
 
     values : shape (starts,) or (starts, objectives); of several objectives each must meet it at once.
-    Two equal means count as settled, also when both are zero. None if there is no such n in values.
+    Two equal means count as converged, also when both are zero. None if there is no such n in values.
     """
     numbers = np.asarray(values, dtype=float)
     columns = numbers.reshape(len(numbers), -1)

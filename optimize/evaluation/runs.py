@@ -55,14 +55,14 @@ class Sample:
     """The starts of one design so far.
 
     costs : of each start, (starts, objectives). used : how many of them, from the first, its estimate
-    stands on. settled : see FitnessEstimate. reason : "" or why the design failed. open : more starts are to
-    come.
+    stands on. converged : see FitnessEstimate. reason : "" or why the design failed. open : whether more
+    starts are to come.
     """
 
     design: Mapping[str, float]
     costs: list[tuple[float, ...]] = field(default_factory=list)
     used: int = 0
-    settled: bool = False
+    converged: bool = False
     reason: str = ""
     open: bool = True
 

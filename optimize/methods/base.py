@@ -26,8 +26,8 @@ class SearchMethod(ABC):
        and of what it was told: to resume a search is to run it again from the start with the same cache.
 
     name : as in ``--method NAME``; several : whether it can search for several objectives at once.
-    Options : its settings, as in ``--set search.options.KEY=VALUE``. followers : by option, the others that
-    follow it where they are not given: a case's own values of those go with its own value of this one.
+    Options : its settings, as in ``--set search.options.KEY=VALUE``. dependent_options : by option, those
+    whose defaults depend on it: a case's own values of those go with its own value of this one.
     width : mean width of the part of the unit cube that it draws from now. moved : the last ``tell`` has put
     that part elsewhere.
     """
@@ -35,7 +35,7 @@ class SearchMethod(ABC):
     name: ClassVar[str]
     several: ClassVar[bool] = False
     Options: ClassVar[type[Checked]]
-    followers: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     width: float = 1.0
     moved: bool = False
 

@@ -43,8 +43,8 @@ class Breeder:
         """Z04 step 1: a population of random strings."""
         return self._fresh(self.settings.population)
 
-    def following(self, population: Sequence[Individual]) -> list[Individual]:
-        """Z04 steps 3 to 6: the best parents (their fitness still valid), their offspring, fresh strings."""
+    def next_generation(self, population: Sequence[Individual]) -> list[Individual]:
+        """Return the best strings (with a valid fitness), their offspring and fresh ones (Z04 3 to 6)."""
         best = tools.selBest(population, self.settings.parents)
         offspring = self._offspring(population, self.settings.bred)
         fresh = self._fresh(self.settings.population - len(best) - len(offspring))

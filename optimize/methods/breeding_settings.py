@@ -46,15 +46,15 @@ class GeneticOperator(Checked):
         arity = {"sel": 2, "cx": 2, "mut": 1}[prefix]
         free = list(signature.parameters)[arity:]
         must(set(self.options) <= set(free), f"options of {self.name}", f"among {free}", sorted(self.options))
-        needed = [
+        required = [
             n
             for n in free
             if signature.parameters[n].default is inspect.Parameter.empty and n not in ("low", "up")
         ]
         must(
-            set(needed) <= set(self.options),
+            set(required) <= set(self.options),
             f"options of {self.name}",
-            f"complete: {needed}",
+            f"complete: {required}",
             sorted(self.options),
         )
         return function

@@ -16,21 +16,21 @@ class Genetic(SearchMethod):
 
     name = "genetic"
     Options = Breeding
-    followers: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    dependent_options: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "population": ("parents", "offspring"), "parents": ("offspring",), "offspring": ("parents",),
     }  # fmt: skip
 
     def __init__(self, genes: int, objectives: int, options: Breeding, seed: int) -> None:
         self.options, self.breeder = options, Breeder(genes, options, seed)
         self.generation = 0
-        self.following: list[Individual] = []
+        self.next_strings: list[Individual] = []
 
     @property
     def width(self) -> float:  # type: ignore[override]
         return float(self.breeder.box.width.mean())
 
     def ask(self) -> list[Individual]:
-        return self.following or self.breeder.first()
+        return self.next_strings or self.breeder.first()
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         every = self.options.recentre_every
@@ -38,4 +38,4 @@ class Genetic(SearchMethod):
         if self.moved:
             self.breeder.recentre(hall[0])
         self.generation += 1
-        self.following = self.breeder.following(population)
+        self.next_strings = self.breeder.next_generation(population)

@@ -73,8 +73,8 @@ class Nsga2(SearchMethod):
         options = self.options
         mutation = 1 / self.genes if options.mutation is None else options.mutation
         with self.random:
-            chosen = tools.selTournamentDCD(self.parents, options.population)
-            children = [copy.deepcopy(list(string)) for string in chosen]
+            parents = tools.selTournamentDCD(self.parents, options.population)
+            children = [copy.deepcopy(list(string)) for string in parents]
             for one, two in zip(children[::2], children[1::2], strict=True):
                 if random.random() < options.crossover:
                     tools.cxSimulatedBinaryBounded(one, two, options.eta, 0.0, 1.0)

@@ -39,19 +39,19 @@ class Restart(Genetic):
     def __init__(self, genes: int, objectives: int, options: RestartOptions, seed: int) -> None:
         super().__init__(genes, objectives, options, seed)
         self.best: tuple[float, ...] = ()
-        self.waited = 0
+        self.stagnation = 0
 
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
         if hall:
             better = not self.best or hall[0].fitness.values < self.best
-            self.best, self.waited = hall[0].fitness.values, 0 if better else self.waited + 1
-        self.moved = self.waited >= self.options.stalled
+            self.best, self.stagnation = hall[0].fitness.values, 0 if better else self.stagnation + 1
+        self.moved = self.stagnation >= self.options.stalled
         if not self.moved:
-            self.following = self.breeder.following(population)
+            self.next_strings = self.breeder.next_generation(population)
             return
-        self.waited = 0
+        self.stagnation = 0
         if self.width * self.options.recentre_factor < self.options.smallest:
             self.breeder.box = SearchBox.full(len(hall[0]))
         else:
             self.breeder.recentre(hall[0])
-        self.following = [hall[0], *self.breeder.first()[1:]]
+        self.next_strings = [hall[0], *self.breeder.first()[1:]]

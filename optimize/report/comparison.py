@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from optimize.evaluation.runs import Evaluator
 from optimize.outcome import Outcome, Progress
 from optimize.problem.problem import Problem
 from optimize.search import search
-from optimize.search_folder import refuse
+from optimize.search_folder import refuse, resume_or_clear
 from optimize.search_records import searches
 from optimize.settings import Settings, fit, identity, proposed
 from optimize.storage.cache import Cache
@@ -27,7 +28,7 @@ from optimize.storage.record import canonical
 from tisim import RunError
 from tisim.console import plain_table
 from tisim.errors import must
-from tisim.files import lock
+from tisim.files import lock, ownership
 
 COMPARISON_FILE, CSV = "compare.h5", "compare.csv"
 COMPARISON_FILES = (COMPARISON_FILE, f"{COMPARISON_FILE}.journal", f"{COMPARISON_FILE}.lock", CSV, lock.LOCK)
@@ -50,68 +51,99 @@ class MethodResult:
     fresh: FitnessEstimate
 
 
+@contextmanager
+def claim(folder: Path, fresh: bool | None, overwrite: bool) -> Iterator[bool]:
+    """Hold the folder of a comparison, and yield whether one that is there is resumed; else it is removed."""
+    resume = resume_or_clear(folder, fresh, overwrite, "comparison", COMPARISON_FILE, (CSV,))
+    ownership.claim(folder, COMPARISON_FILES, overwrite)
+    with lock.acquire(folder, exclusive=False):
+        yield resume
+
+
 def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, Any]) -> None:
     """InputError when the file in the folder is of a comparison on another problem; methods, their settings
     and numbers of runs may be others. evaluator : the settings of the evaluator."""
     for attributes in searches(cache).values():
         old = json.loads(attributes["identity"])
-        wished = {**identity(problem, Settings(), evaluator), "search": old["search"]}
-        if canonical(old) != canonical(wished):
-            refuse(folder, "comparison", old, wished)
+        requested = {**identity(problem, Settings(), evaluator), "search": old["search"]}
+        if canonical(old) != canonical(requested):
+            refuse(folder, "comparison", old, requested)
 
 
 def settings_of(
     problem: Problem, base: Mapping[str, Any], method: str, evaluations: int, repeat: int
 ) -> Settings:
     """The settings of one search: the case's with another method, stopped by the number of runs alone."""
-    chosen = proposed(problem, base, method)
+    search_table = proposed(problem, base, method)
     for rule in ("target", "patience", "wall_clock_s"):
-        chosen.pop(rule, None)
-    ensemble = {**chosen.get("ensemble", {}), "confirm": 0}
+        search_table.pop(rule, None)
+    ensemble = {**search_table.get("ensemble", {}), "confirm": 0}
     # every generation asks for a run or more, unless a method has nothing new to propose: then it ends, too
     stop = {"generations": evaluations, "max_evaluations": evaluations}
-    settings = Settings(**{**chosen, "ensemble": ensemble, "seed": repeat, **stop})
+    settings = Settings(**{**search_table, "ensemble": ensemble, "seed": repeat, **stop})
     fit(problem, settings)
     return settings
 
 
-def compare(
+@dataclass(frozen=True)
+class Plan:
+    """The searches of a comparison: method, repeat and settings of each, in the order in which they run.
+
+    fresh : number of starts from which each best design is run again, the same for all and used by no search:
+    selection flatters, and the more so the fewer starts a method spends on a design.
+    """
+
+    problem: Problem
+    searches: tuple[tuple[str, int, Settings], ...]
+    fresh: int
+
+
+def plan(
     problem: Problem,
     base: Mapping[str, Any],
     methods: Sequence[str],
     evaluations: int,
     repeats: int,
     fresh: int,
-    evaluator: Evaluator,
-    cache: Cache,
-    on_progress: Callable[[Progress], None] | None = None,
-) -> Iterator[MethodResult]:
-    """Yield what each search has found; repeat k of every method has the same random starts.
+) -> Plan:
+    """Return the plan of a comparison; repeat k of every method has the same random starts.
 
-    base : settings of a search, as of a case. fresh : starts from which each best design is run again, the
-    same for all and used by no search: selection flatters, and the more so the fewer starts a method spends
-    on a design. All is cached: stopped and begun again, it goes on. InputError for several objectives or
-    unknown methods before anything runs; KeyboardInterrupt when a search was stopped.
+    base : settings of a search, as of a case. evaluations : number of runs of each search. InputError for
+    several objectives, unknown methods and numbers that cannot be.
     """
     must(not problem.several, "problem of a comparison", "one with one objective", problem.name)
     must(len(set(methods)) == len(methods) > 0, "methods", "one or more, all different", list(methods))
     must(evaluations >= 1, "evaluations", "at least 1", evaluations)
     must(1 <= repeats <= FRESH, "repeats", f"within 1..{FRESH}", repeats)
     must(fresh >= 2, "fresh starts", "at least 2", fresh)
-    planned = [(m, k, settings_of(problem, base, m, evaluations, k)) for k in range(repeats) for m in methods]
-    again = EnsembleSettings(min_starts=fresh, max_starts=fresh, block=fresh)
-    anew = Ensemble(problem, evaluator, cache, again, FRESH)
-    for method, repeat, settings in planned:
-        outcome = search(problem, evaluator, cache, settings, on_progress=on_progress)
+    planned = tuple(
+        (method, k, settings_of(problem, base, method, evaluations, k))
+        for k in range(repeats)
+        for method in methods
+    )
+    return Plan(problem, planned, fresh)
+
+
+def compare(
+    plan: Plan, evaluator: Evaluator, cache: Cache, on_progress: Callable[[Progress], None] | None = None
+) -> Iterator[MethodResult]:
+    """Yield what each search of a plan has found.
+
+    All is cached: stopped and begun again, it goes on. KeyboardInterrupt when a search was stopped.
+    """
+    once = EnsembleSettings(min_starts=plan.fresh, max_starts=plan.fresh, block=plan.fresh)
+    fresh_ensemble = Ensemble(plan.problem, evaluator, cache, once, FRESH)
+    for method, repeat, settings in plan.searches:
+        outcome = search(plan.problem, evaluator, cache, settings, on_progress=on_progress)
         if outcome.interrupted:
             raise KeyboardInterrupt
-        yield _result(method, repeat, outcome, anew)
+        yield _result(method, repeat, outcome, fresh_ensemble)
 
 
-def _result(method: str, repeat: int, outcome: Outcome, anew: Ensemble) -> MethodResult:
+def _result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble) -> MethodResult:
     if outcome.best is None:
         raise RunError(f"{method}, repeat {repeat}: no design has run to its end")
-    (estimates,) = anew.estimate([outcome.problem.genome.decode(outcome.best)])
+    (estimates,) = fresh_ensemble.estimate([outcome.problem.genome.decode(outcome.best)])
     assert estimates is not None  # this ensemble has no budget
     (claimed,) = outcome.best.estimates
     return MethodResult(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0])

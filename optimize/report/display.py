@@ -36,16 +36,16 @@ class Display:
 
     def step(self, where: Progress) -> None:
         """Some more evaluations are done."""
-        done = where.generation + where.fraction
-        self.bar.update(self.task, completed=done, generation=where.generation)
+        completed = where.generation + where.fraction
+        self.bar.update(self.task, completed=completed, generation=where.generation)
 
     def generation(self, where: Progress) -> None:
         """A generation is done."""
         self.step(where)
         best = self._best(where)
         self.bar.update(self.task, best=best.split("  ")[0])
-        ran = f"{where.evaluations} runs" + (f", {where.hits} from the file" if where.hits else "")
-        line = f"generation {where.generation:3d}  {best}  ({ran})"
+        runs = f"{where.evaluations} runs" + (f", {where.hits} from the file" if where.hits else "")
+        line = f"generation {where.generation:3d}  {best}  ({runs})"
         self.console.print(line, highlight=False, markup=False)
         if where.best_design is not None and where.best_design != self.best:
             self.best = where.best_design

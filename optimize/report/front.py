@@ -72,9 +72,9 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
     fresh = "run again: " if outcome.hall[0].confirmed else ""
     _bars(axis, outcome, front, (x, y), _FRONT_COLOUR, f"front, {fresh}{_starts(front)}")
     means, _ = _values(outcome, front)
-    chosen = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
+    compromise = next(k for k, string in enumerate(outcome.hall) if string is outcome.best)
     axis.plot(
-        *means[chosen, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN_COLOUR, mew=1.5, zorder=5, ls="",
+        *means[compromise, [x, y]], "o", ms=10, mfc="none", mec=_CHOSEN_COLOUR, mew=1.5, zorder=5, ls="",
         label="nearest to the best of each",
     )  # fmt: skip
     everything, _ = _values(outcome, [*many, *few, *front])

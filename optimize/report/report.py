@@ -29,12 +29,12 @@ def best_table(outcome: Outcome) -> RenderableType:
     """
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
-    shown = _spread(len(outcome.hall), places)
-    headings, *rows = ((heading, *(_text(values[k]) for k in shown)) for heading, values in columns.items())
+    indices = _spread(len(outcome.hall), places)
+    headings, *rows = ((heading, *(_text(values[k]) for k in indices)) for heading, values in columns.items())
     designs = max(1, (TERMINAL_WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
     title = outcome.problem.title or outcome.problem.name
     part = (
-        f"; {len(shown)} of the {len(outcome.hall)} designs of its front" if outcome.problem.several else ""
+        f"; {len(indices)} of the {len(outcome.hall)} designs of its front" if outcome.problem.several else ""
     )
     blocks: list[RenderableType] = [Text(title + part, "italic")]
     for first in range(1, max(2, len(headings)), designs):
@@ -56,7 +56,7 @@ def notes(outcome: Outcome) -> RenderableType:
     common = {
         "95 % +-": "half of the 95 % confidence interval of the mean",
         "starts": "random starts that the mean is over",
-        "settled": f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it",
+        "converged": f"yes where the last start changed the mean by less than {ensemble.tolerance:g} of it",
     }
     fresh = {"fresh starts": f"the mean over {ensemble.confirm} starts that the search has not seen"}
     meanings = {**problem.meanings, **common, **(fresh if outcome.hall[0].confirmed else {})}

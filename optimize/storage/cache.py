@@ -1,4 +1,4 @@
-"""Every finished evaluation, on the disk at once, shared by runs and processes, never lost to a kill.
+"""The cache keeps every finished evaluation on the disk at once, shared by processes, never lost to a kill.
 
 FILE          HDF5: one row per evaluation, and tables (settings, logbooks, reports). Whole at every instant,
               because it is only ever replaced by a complete new one.
@@ -25,11 +25,12 @@ from tisim.files.framing import Scan
 from tisim.files.ownership import ensure_writable
 from tisim.files.regular_file import file_status, is_folder
 
-FOLD_BYTES = 8 << 20  # of journal; above this, replaying it costs more than rewriting the HDF5 file
+FOLD_BYTES = 8 << 20
+"""Length of a journal, bytes, above which replaying it costs more than rewriting the HDF5 file."""
 
 
 class Cache:
-    """The evaluations in a file, kept in memory and in step with other processes that use the same file.
+    """A cache holds the evaluations of a file in memory, in step with other processes that use the file.
 
     path : the HDF5 file; made on the first fold if there is none. Its folder is made if missing.
     Raises InputError if path is cut short, damaged, not a cache's file or none that may be opened: nothing is
@@ -45,8 +46,9 @@ class Cache:
         self._version: tuple[int, ...] | None = None
         self._end = self._frames = 0
         if file_status(self.path) is not None:
+            # A file that is no cache's is refused before a lock file is left beside it.
             with hdf5_store.open_evaluations(self.path):
-                pass  # before a lock file is left beside a file that is not ours
+                pass
         if not is_folder(self.path.parent):
             ensure_writable(self.path.parent)
         self.refresh()
@@ -61,11 +63,11 @@ class Cache:
         return len(self._records)
 
     def records(self) -> list[Record]:
-        """All evaluations in the file, oldest first."""
+        """Return all evaluations in the file, oldest first."""
         return list(self._records.values())
 
     def get(self, key: str) -> Record | None:
-        """The evaluation of that key, as of the last refresh, put or fold."""
+        """Return the evaluation of that key, as of the last refresh, put or fold; None if there is none."""
         return self._records.get(key)
 
     def refresh(self) -> None:
@@ -74,7 +76,7 @@ class Cache:
             self._refresh()
 
     def put(self, record: Record) -> Record:
-        """Store an evaluation; on return it is on the disk. Returns the one that counts: its key's first.
+        """Store an evaluation, which on return is on the disk; return the one that counts, its key's first.
 
         RunError if the disk is full; everything stored before is then intact.
         """
@@ -106,7 +108,7 @@ class Cache:
         self._pending[name] = Hdf5Table(dict(columns), dict(attrs or {}))
 
     def table(self, name: str) -> Hdf5Table:
-        """A stored table. InputError if there is none of that name."""
+        """Return a table, stored or waiting for the next fold. InputError if there is none of that name."""
         if name in self._pending:
             return self._pending[name]
         must(name in self.tables(), "table name", f"one of {self.tables()}", name)
@@ -114,16 +116,16 @@ class Cache:
             return hdf5_store.read_table(file, name)
 
     def attributes(self) -> dict[str, Mapping[str, Any]]:
-        """The attributes of all tables by name, stored or waiting for the next fold."""
-        stored: dict[str, Mapping[str, Any]] = {}
+        """Return the attributes of all tables by name, stored or waiting for the next fold."""
+        attributes: dict[str, Mapping[str, Any]] = {}
         with locked(self._lock, exclusive=False):
             if file_status(self.path) is not None:
                 with hdf5_store.open_evaluations(self.path) as file:
-                    stored = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
-        return stored | {name: table.attrs for name, table in self._pending.items()}
+                    attributes = {name: hdf5_store.attributes(file[name]) for name in hdf5_store.tables(file)}
+        return attributes | {name: table.attrs for name, table in self._pending.items()}
 
     def tables(self) -> list[str]:
-        """Names of all tables, stored or waiting for the next fold."""
+        """Return the names of all tables, stored or waiting for the next fold."""
         return sorted(self.attributes())
 
     def fold(self) -> None:
@@ -178,20 +180,20 @@ class Cache:
 
 
 def cache_files(path: str | Path) -> tuple[Path, Path, Path]:
-    """The HDF5 file, its journal and its lock."""
+    """Return the paths of the HDF5 file, its journal and its lock."""
     path = Path(path)
     must(bool(path.name), "cache file", "a file", str(path))
     return path, path.with_name(f"{path.name}.journal"), path.with_name(f"{path.name}.lock")
 
 
 def file_version(path: Path) -> tuple[int, ...] | None:
-    """What tells one state of the HDF5 file from another; None where there is none."""
-    there = file_status(path)
-    return None if there is None else (there.st_ino, there.st_mtime_ns, there.st_size)
+    """Return numbers that tell one state of the HDF5 file from another; None where there is no file."""
+    status = file_status(path)
+    return None if status is None else (status.st_ino, status.st_mtime_ns, status.st_size)
 
 
 def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
-    """The evaluations in a stretch of journal, and a description of each thing in it that is none."""
+    """Return the evaluations in a part of a journal, and a description of each thing in it that is none."""
     records = []
     damaged = [f"journal, byte {offset}: not a whole record" for offset in scanned.damaged]
     for number, payload in enumerate(scanned.payloads):
@@ -203,13 +205,13 @@ def journal_records(scanned: Scan) -> tuple[list[Record], list[str]]:
 
 
 def existing_files(path: str | Path) -> tuple[Path, Path, Path]:
-    """As ``cache_files``, of a cache that is there already. InputError if there is no such file."""
+    """Return the ``cache_files`` of a cache that is there already. InputError if there is no such file."""
     file, journal, lock = cache_files(path)
-    there = file_status(file) or file_status(journal)
-    must(there is not None, "cache file", "an existing file", str(path))
+    status = file_status(file) or file_status(journal)
+    must(status is not None, "cache file", "an existing file", str(path))
     return file, journal, lock
 
 
 def existing(path: str | Path) -> Cache:
-    """The cache of a file that is there already. InputError if there is no such file."""
+    """Return the cache of a file that is there already. InputError if there is no such file."""
     return Cache(existing_files(path)[0])

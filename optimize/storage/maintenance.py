@@ -1,4 +1,4 @@
-"""Whether a cache file is whole, and what can be kept of it: a search's file checked, or made small."""
+"""A cache file, such as that of a search, is checked record by record, or made small again."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from tisim.files.atomic import locked
 
 @dataclass(frozen=True)
 class VerifyReport:
-    """What verify found. rows, journal : whole records in the HDF5 file and in the journal.
+    """A report says what ``verify`` has found in a cache file.
 
+    rows, journal : numbers of whole records in the HDF5 file and in the journal.
     damaged : every row, table or stretch of journal that is not what was written, or has been cut off.
     torn : bytes of an unfinished record at the journal's end (a killed writer; harmless).
     duplicates : records stored more than once (a kill during a fold; harmless).
@@ -31,12 +32,12 @@ class VerifyReport:
 
     @property
     def ok(self) -> bool:
-        """Nothing damaged and nothing in conflict."""
+        """Return whether nothing is damaged and nothing in conflict."""
         return not self.damaged and not self.conflicts
 
 
 def verify(path: str | Path) -> VerifyReport:
-    """Check every row, table and journal frame of an existing cache file; changes nothing.
+    """Check every row, table and journal frame of an existing cache file, and change nothing.
 
     InputError if the file does not exist, is cut short or is not a cache's.
     """
@@ -48,22 +49,22 @@ def verify(path: str | Path) -> VerifyReport:
         if version is not None:
             with hdf5_store.open_evaluations(path) as file:
                 rows, damaged = hdf5_store.read_rows(file)
-                bad = hdf5_store.damaged_tables(file)
-                damaged += [f"table {name}: its checksum does not fit" for name in bad]
+                names = hdf5_store.damaged_tables(file)
+                damaged += [f"table {name}: its checksum does not fit" for name in names]
         scanned, mark = Journal(journal).read(), Mark.read(lock)
-    frames, none = journal_records(scanned)
+    frames, not_records = journal_records(scanned)
     loss = None if mark is None else mark.loss(version, scanned)
-    damaged += [*none, *([loss] if loss else [])]
-    first: dict[str, Record] = {}
+    damaged += [*not_records, *([loss] if loss else [])]
+    by_key: dict[str, Record] = {}
     for record in (*rows, *frames):
-        first.setdefault(record.key, record)
-    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(first[r.key].values)}
+        by_key.setdefault(record.key, record)
+    conflicts = {r.key for r in (*rows, *frames) if repr(r.values) != repr(by_key[r.key].values)}
     return VerifyReport(
         rows=len(rows),
         journal=len(frames),
         damaged=damaged,
         torn=scanned.torn,
-        duplicates=len(rows) + len(frames) - len(first),
+        duplicates=len(rows) + len(frames) - len(by_key),
         conflicts=sorted(conflicts),
     )
 

@@ -1,4 +1,4 @@
-"""One finished evaluation, and the key it is found by."""
+"""A record is one finished evaluation; the cache finds it by a key."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-REASON_LENGTH = 500  # HDF5 rows have one length per column; a stack trace in one row would widen them all
+REASON_LENGTH = 500
+"""Largest number of characters of a reason. A column has one length: a stack trace would widen all rows."""
 
 
 def canonical(value: Any) -> bytes:
-    """ASCII JSON with sorted keys: equal values, equal bytes. NumPy scalars become Python numbers."""
+    """Return ASCII JSON with sorted keys: equal values, equal bytes. NumPy scalars become Python numbers."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), default=lambda scalar: scalar.item())
     return text.encode("ascii")
 
@@ -23,15 +24,18 @@ def canonical(value: Any) -> bytes:
 def evaluation_key(
     scene_digest: str, settings: Mapping[str, Any], problem: str, version: int, code: str = ""
 ) -> str:
-    """SHA-256 (hex) of all that decides a fitness: the scene's digest (physics, parameters, seed), the
-    evaluator's settings (precision, device kind) and the objective (the problem's name, version and code)."""
+    """Return the SHA-256 (hex) of all that decides a fitness.
+
+    That is the scene's digest (physics, parameters, seed), the evaluator's settings (precision, device kind)
+    and the objective (the problem's name, version and code).
+    """
     objective = [problem, version, *([code] if code else [])]
     return hashlib.sha256(canonical([scene_digest, dict(settings), *objective])).hexdigest()
 
 
 @dataclass(frozen=True)
 class Record:
-    """One evaluation of one design from one random start.
+    """A record is the evaluation of one design from one random start.
 
     key : see evaluation_key; problem : its name.
     fitness : the first objective, NaN if the evaluation failed; others : the other ones, where there are
@@ -61,11 +65,11 @@ class Record:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All objectives, as they are (not with the sign of a cost)."""
+        """Return the values of all objectives, as they are (not with the sign of a cost)."""
         return (self.fitness, *self.others)
 
     def payload(self) -> bytes:
-        """The record as canonical JSON; NaN is written as null, which every JSON reader knows."""
+        """Return the record as canonical JSON; NaN is written as null, which every JSON reader knows."""
         fields = dict(vars(self))
         fields["fitness"] = self.fitness if math.isfinite(self.fitness) else None
         if not fields.pop("others"):
@@ -74,7 +78,7 @@ class Record:
 
     @classmethod
     def parse(cls, payload: bytes) -> Record:
-        """The record that payload() wrote. ValueError if it is none."""
+        """Return the record that ``payload`` has written. ValueError if it is none."""
         _Form.model_validate_json(payload)
         fields = json.loads(payload)
         if fields["fitness"] is None:
@@ -84,7 +88,7 @@ class Record:
 
 
 class _Form(BaseModel):
-    """A record as its payload has it."""
+    """The form holds a record as its payload has it."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
     key: str

@@ -71,8 +71,8 @@ def test_a_closed_form_is_claimed_only_where_it_holds():
         ({"anchor": arrays["position"] + 1e-3}, False),
     ):
         values = {**arrays, **change}
-        given = {name: values.pop(name) for name in ("position", "velocity", "radius", "mass")}
-        start = Particles(**given, quantities=values)
+        core = {name: values.pop(name) for name in ("position", "velocity", "radius", "mass")}
+        start = Particles(**core, quantities=values)
         assert closed_forms(rest.model_copy(update={"particles": start})) == [holds, holds], change
     around = Box(low=(-1.0,) * 3, high=(1.0,) * 3)
     assert closed_forms(rest.model_copy(update={"domain": around})) == [False, False]

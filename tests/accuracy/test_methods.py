@@ -39,7 +39,7 @@ class Sharp(Stepper):
     """A stepper of high order that nobody has told the study of."""
 
     control: Pace
-    wanted: ClassVar[bool] = False
+    is_alternative: ClassVar[bool] = False
 
     @property
     def order(self):
@@ -47,7 +47,7 @@ class Sharp(Stepper):
 
     @classmethod
     def alternatives(cls, effects, dt):
-        return (cls(control=Pace(dt=dt, error=1e-6)),) if cls.wanted else ()
+        return (cls(control=Pace(dt=dt, error=1e-6)),) if cls.is_alternative else ()
 
 
 class Patchy(Trap):
@@ -62,7 +62,7 @@ def methods_of(scene, precisions=("f64",)):
 
 
 def test_a_new_stepper_and_its_control_say_themselves_what_to_turn(monkeypatch):
-    monkeypatch.setattr(Sharp, "wanted", True)
+    monkeypatch.setattr(Sharp, "is_alternative", True)
     line = methods_of(oscillator())["Sharp, Pace: error"]
     assert [s.scene.stepper.control.error for s in line.settings] == [1e-4, 1e-5, 1e-6]
     assert [s.scene.stepper.control.dt for s in line.settings] == [0.1] * 3
@@ -203,7 +203,7 @@ def test_wrong_settings_are_refused_before_anything_runs(settings, message):
 
 
 def test_a_reference_that_another_stepper_contradicts_is_not_believed(monkeypatch):
-    monkeypatch.setattr(Sharp, "wanted", True)
+    monkeypatch.setattr(Sharp, "is_alternative", True)
     references = attempts(list(methods_of(oscillator()).values()), 0.0)
     number = Quantity("number", lambda result: result)
 
@@ -226,8 +226,8 @@ def test_what_an_error_may_be_off_by_counts_in_the_choice():
     assert [r.method for r in tied(rows, 1e-3)] == ["sure"]
     assert [r.method for r in tied(rows, 2e-3)] == ["unsure"]
     assert tied(rows, 1e-7) == []
-    chosen = {error: best.method for error, (best,) in decades(rows).items()}
-    assert chosen == {1e-2: "unsure", 1e-3: "sure", 1e-4: "slow", 1e-5: "slow", 1e-6: "slow"}
+    names_by_error = {error: best.method for error, (best,) in decades(rows).items()}
+    assert names_by_error == {1e-2: "unsure", 1e-3: "sure", 1e-4: "slow", 1e-5: "slow", 1e-6: "slow"}
     assert [r.trusted() for r in rows] == [True, False, True]
 
 
@@ -254,8 +254,8 @@ def test_a_law_that_changes_nothing_is_not_chosen():
     for error, same in ((1e-5 + 1e-15, True), (1e-5 + 1e-10, False)):
         cut = row("cut-off", 1.0, error)
         assert cut.same_errors(law) == same
-        chosen = tied([law, replace(cut, same=cut.same_errors(law))], 1e-4)
-        assert [r.method for r in chosen] == ["all pairs" if same else "cut-off"]
+        setting = tied([law, replace(cut, same=cut.same_errors(law))], 1e-4)
+        assert [r.method for r in setting] == ["all pairs" if same else "cut-off"]
     assert not law.same_errors(law)
     assert not law.same_errors(Row("failed", "", "", "", "f64", 1, failed="not finite"))
 

@@ -77,17 +77,17 @@ def test_observations_see_the_size_of_a_motion(monkeypatch, stepper, periods):
 
 def test_other_threads_wait_while_a_study_starts_taichi_anew(verlet_only):
     def free():
-        got = runtime.turn.acquire(blocking=False)
-        if got:
+        acquired = runtime.turn.acquire(blocking=False)
+        if acquired:
             runtime.turn.release()
-        return got
+        return acquired
 
-    seen = []
+    outcomes = []
     with ThreadPoolExecutor(1) as other:
         cost_study = Study(closed(), (RETURNING,), **{**FEW, "coarser": 0})
-        cost_study.run(progress=lambda fraction, what: seen.append(other.submit(free).result()))
-        assert seen
-        assert not any(seen)
+        cost_study.run(progress=lambda fraction, what: outcomes.append(other.submit(free).result()))
+        assert outcomes
+        assert not any(outcomes)
         assert other.submit(free).result()
 
 

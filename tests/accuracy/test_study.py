@@ -112,8 +112,8 @@ def test_steppers_that_make_the_same_error_do_not_vouch_for_each_other(monkeypat
         w, t = 3.0, result.time
         return np.array([[np.sin(w * t), np.cos(w * t) - 1.0, 0.0]]) / w
 
-    known = type(KNOWN)("known", displacement, exact)
-    cost_study = Study(circle, (known, UNKNOWN), precisions=("f64",), repeats=1, coarser=1)
+    known_quantity = type(KNOWN)("known", displacement, exact)
+    cost_study = Study(circle, (known_quantity, UNKNOWN), precisions=("f64",), repeats=1, coarser=1)
     cost_study.run()
     off = np.linalg.norm(cost_study.truths[1].estimate.value - cost_study.truths[0].estimate.value)
     off /= np.linalg.norm(cost_study.truths[0].estimate.value)
@@ -152,8 +152,10 @@ def test_words_and_python_of_a_row_make_its_scene(measured):
         arguments = shlex.split(row.options)
         assert arguments[::2] == ["--set"] * (len(arguments) // 2)
         assert measured.scene.replace(scene_arguments.assignments(arguments[1::2])).stepper == stepper
-        asked = row.setting.split(", ")[0].split("=")
-        assert getattr(stepper.control, asked[0]) == pytest.approx(float(asked[1]), rel=5e-3)
+        parameter_value = row.setting.split(", ")[0].split("=")
+        assert getattr(stepper.control, parameter_value[0]) == pytest.approx(
+            float(parameter_value[1]), rel=5e-3
+        )
 
 
 def test_files_are_read_back(measured, tmp_path, monkeypatch):
@@ -204,7 +206,7 @@ def test_a_setting_that_fails_is_a_row_that_says_why(verlet_only, monkeypatch):
     assert [len(row.seconds) for row in cost_study.rows] == [0, 3, 3, 3]
     assert cost_study.complete
     assert cost_study.cheapest(1.0) in cost_study.rows[1:]
-    assert "not finite" in printed(cost_study)
+    assert "not finite" in printed_table(cost_study)
 
 
 def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
@@ -224,7 +226,7 @@ def test_what_is_measured_when_it_is_stopped_stays(verlet_only, monkeypatch):
     assert not cost_study.complete
 
 
-def printed(cost_study):
+def printed_table(cost_study):
     console = Console(width=120, file=io.StringIO())
     console.print(cost_study.table())
     return console.file.getvalue()

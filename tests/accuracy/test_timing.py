@@ -33,15 +33,15 @@ class Waiting:
 def test_a_world_is_observed_each_time_once_and_waits_for_what_is_to_come():
     """In one case of 20, n times a part of the duration is rounded to less than n such parts."""
     for duration in np.random.default_rng(0).uniform(0.0, 10.0, 200):
-        seen, world = [], Waiting(duration)
-        observer = ResultObserver(duration, lambda result, seen=seen: seen.append(result.time))
+        times, world = [], Waiting(duration)
+        observer = ResultObserver(duration, lambda result, times=times: times.append(result.time))
         observer.observe(world)
         while world.time < duration:
             assert observer.pause(world)[0] > world.time
             world.time = min(observer.pause(world)[0], duration)
             observer.observe(world)
-        assert len(seen) == OBSERVATIONS + 1
-        np.testing.assert_allclose(np.diff(seen), duration / OBSERVATIONS, rtol=1e-12)
+        assert len(times) == OBSERVATIONS + 1
+        np.testing.assert_allclose(np.diff(times), duration / OBSERVATIONS, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", CONTROLS)

@@ -36,10 +36,10 @@ def begin(script=SCRIPT):
 
 def warned(process):
     """What it says on standard error, once it has ended well."""
-    out, said = process.communicate(timeout=300)
+    out, warnings = process.communicate(timeout=300)
     assert "True" in out.split()
     assert process.returncode == 0
-    return said
+    return warnings
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def left(age):
+def leave_lock(age):
     """A lock of this age, s."""
     kernel_cache.lock().touch()
     then = time.time() - age
@@ -59,10 +59,10 @@ def left(age):
 
 def test_a_lock_that_was_left_behind_is_removed_and_one_that_is_held_is_not(folder):
     kernel_cache.unlock()
-    left(age=kernel_cache.STALE / 2)
+    leave_lock(age=kernel_cache.STALE / 2)
     kernel_cache.unlock()
     assert kernel_cache.lock().exists()
-    left(age=2 * kernel_cache.STALE)
+    leave_lock(age=2 * kernel_cache.STALE)
     kernel_cache.unlock()
     assert not kernel_cache.lock().exists()
 
@@ -71,15 +71,15 @@ def test_a_lock_that_was_left_behind_is_removed_and_one_that_is_held_is_not(fold
 def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
     """The lock is where the compiler looks for it: it warns of one that is held, not of one left behind."""
 
-    left(age=0.0)
+    leave_lock(age=0.0)
     assert kernel_cache.lock().name in warned(begin())
-    left(age=2 * kernel_cache.STALE)
+    leave_lock(age=2 * kernel_cache.STALE)
     assert warned(begin()) == ""
     kernels = [path for path in folder.rglob("*") if path.suffix in (".tic", ".qdc")]
     assert len(kernels) > 5
     # Now there is something to read: who starts while another process writes waits, however long that takes.
     with kernel_cache.alone():
-        left(age=0.0)
+        leave_lock(age=0.0)
         waits = begin(QUEUES + SCRIPT)
         assert waits.stdout.readline() == "ready\n"
         assert waits.stdout.readline() == f"queues {kernel_cache.QUEUE}\n"

@@ -103,12 +103,12 @@ print(runtime.generation() - before)
 def test_simulation_of_an_earlier_start_says_so():
     """Not a segmentation fault; it can be closed, and what is made anew works, also where a start has failed,
     and when it is Taichi's growth that has it started anew."""
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", STALE], capture_output=True, text=True, timeout=3600, check=False
     )
     refusal = "a Simulation must be used with the settings it was made under; start it anew"
-    assert done.stdout.splitlines() == [*[refusal] * 8, "made anew", "closed", "3"], done.stderr
-    assert done.returncode == 0
+    assert completed.stdout.splitlines() == [*[refusal] * 8, "made anew", "closed", "3"], completed.stderr
+    assert completed.returncode == 0
 
 
 def test_absent_device_is_refused():
@@ -119,14 +119,14 @@ def test_absent_device_is_refused():
         "try: print(runtime.init(device='cuda').device)\n"
         "except errors.InputError as fault: print(fault)"
     )
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=3600, check=False
     )
-    line = done.stdout.strip().splitlines()[0]
+    line = completed.stdout.strip().splitlines()[0]
     assert line == "cuda" or line.startswith("device must be present on this machine; received 'cuda'"), (
-        done.stderr
+        completed.stderr
     )
-    assert done.returncode == 0
+    assert completed.returncode == 0
 
 
 def moving(speed, effects=()):
@@ -276,7 +276,7 @@ print(runtime.generation(), *sizes)
 @pytest.mark.slow
 def test_memory_does_not_grow_with_scenes_of_changing_structure():
     """Forty of them, nearly all compiled, and Taichi started anew after every fifth."""
-    done = subprocess.run([sys.executable, "-c", GROWTH], capture_output=True, text=True, check=True)
-    starts, *sizes = (float(word) for word in done.stdout.split())
+    completed = subprocess.run([sys.executable, "-c", GROWTH], capture_output=True, text=True, check=True)
+    starts, *sizes = (float(word) for word in completed.stdout.split())
     assert starts >= 5
     assert max(sizes[4:]) < sizes[2] + 40.0, sizes

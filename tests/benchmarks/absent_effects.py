@@ -86,8 +86,8 @@ def measure(scene: str, absent: bool, full: bool = False) -> dict:
     scenes, others = SCENES[scene]
     names = [f"tisim.{name}" for name in others] if absent else []
     source = WORKER.format(root=str(ROOT), absent=names, full=full, scenes=scenes)
-    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
-    return json.loads(done.stdout.splitlines()[-1])
+    completed = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
+    return json.loads(completed.stdout.splitlines()[-1])
 
 
 def main() -> None:

@@ -96,18 +96,18 @@ def main() -> None:
     designs = [DESIGNS[k % len(DESIGNS)] for k in range(args.worlds)]
     scenes = [scene(d, k // len(DESIGNS), args.grains) for k, d in enumerate(designs)]
     starts = [s.particles.arrays(s.domain, s.seed) for s in scenes]
-    given = [parameters(*pair) for pair in zip(designs, starts, strict=True)]
+    laws = [parameters(*pair) for pair in zip(designs, starts, strict=True)]
     batch, single = Simulation(scenes[0], args.worlds), Simulation(scenes[0], 1)
     for simulation, some in ((batch, scenes), (single, scenes[:1])):
         simulation.load(some)
         simulation.run(steps=1)
-    peer.simulate(starts[:1], given[:1], 1e-6)
+    peer.simulate(starts[:1], laws[:1], 1e-6)
 
     ours, theirs, one_by_one = [], [], []
     for _ in range(args.repeats):
         seconds, results = tisim_run(batch, scenes)
         ours.append(seconds)
-        seconds, (finals, counts) = timed(peer.simulate, starts, given, DURATION)
+        seconds, (finals, counts) = timed(peer.simulate, starts, laws, DURATION)
         theirs.append(seconds)
         one_by_one.append(np.sum([tisim_run(single, [s])[0] for s in scenes], axis=0))
 
@@ -135,7 +135,7 @@ def main() -> None:
     gaps = [apart(r, f) for r, f, s in zip(results, finals, same, strict=True) if s]
     print(f"worlds of equal counts to the end: {sum(same)} of {args.worlds}; particle by particle"
           f" they differ by {np.median(gaps) if gaps else np.nan:.1e} (median), relative")  # fmt: skip
-    short, _ = peer.simulate(starts[:1], given[:1], DURATION, steps=20)
+    short, _ = peer.simulate(starts[:1], laws[:1], DURATION, steps=20)
     single.load(scenes[:1])
     single.run(steps=20)
     print(f"one world, 20 steps: {apart(single.results()[0], short[0]):.1e}")

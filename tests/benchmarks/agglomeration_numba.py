@@ -71,7 +71,7 @@ def enter(lists, b, i, j, since, k):
 def survey(g, lists, n, half, horizon, small):
     """Time to the next contact (s) and the number of present ones, listed longest overdue first."""
     r, v, b, start, cell, member = g.r, g.v, g.b, lists.start, lists.cell, lists.member
-    soonest, found = np.inf, 0
+    soonest, count = np.inf, 0
     if n <= small:
         for i in range(n):
             for j in range(i + 1, n):
@@ -79,9 +79,9 @@ def survey(g, lists, n, half, horizon, small):
                 if time > 0.0:
                     soonest = min(soonest, time)
                 else:
-                    enter(lists, b, i, j, np.float32(-time), found)
-                    found += 1
-        return soonest, found
+                    enter(lists, b, i, j, np.float32(-time), count)
+                    count += 1
+        return soonest, count
     dims = int(min(np.cbrt(len(start) - 1.0) + 0.5, max(1.0, 2.0 * half / (2.0 * b[:n].max() + horizon))))
     start[: dims**3 + 1] = 0
     for i in range(n):
@@ -108,9 +108,9 @@ def survey(g, lists, n, half, horizon, small):
                         if time > 0.0:
                             soonest = min(soonest, time)
                         else:
-                            enter(lists, b, i, j, np.float32(-time), found)
-                            found += 1
-    return soonest, found
+                            enter(lists, b, i, j, np.float32(-time), count)
+                            count += 1
+    return soonest, count
 
 
 @njit(**OPTIONS)
@@ -126,9 +126,9 @@ def drift(g, n, dt, law, settings):
                 g.r[k, i] += 2.0 * half
         a = STEFAN_BOLTZMANN * settings.emissivity * dt * 4.0 * np.pi * g.b[i] ** 2
         a /= g.m[i] * law.heat_capacity
-        known, t = g.T[i] + a * settings.surroundings**4, max(g.T[i], settings.surroundings)
+        energy, t = g.T[i] + a * settings.surroundings**4, max(g.T[i], settings.surroundings)
         for _ in range(60):
-            change = (t + a * t**4 - known) / (1.0 + 4.0 * a * t**3)
+            change = (t + a * t**4 - energy) / (1.0 + 4.0 * a * t**3)
             t -= change
             if abs(change) <= 1e-9 * t:
                 break
@@ -148,11 +148,11 @@ def world(law, settings, g, n, counts):
     time, moved = 0.0, False
     while True:
         horizon = settings.reach * 2.0 * half / np.cbrt(float(n))
-        soonest, found = survey(g, lists, n, half, horizon, settings.small)
-        if found > len(due):
+        soonest, count = survey(g, lists, n, half, horizon, settings.small)
+        if count > len(due):
             return -1
         before = counts[2]
-        for c in range(found if moved else 0):
+        for c in range(count if moved else 0):
             i, j = lists.first[c], lists.second[c]
             if g.m[i] > 0.0 and g.m[j] > 0.0 and meet(g.r, g.v, g.b, i, j, np.inf) <= 0.0:
                 collide(law, settings.threshold, g, i, j, counts)
@@ -171,9 +171,9 @@ def world(law, settings, g, n, counts):
                 fastest = max(fastest, np.sqrt(x * x + y * y + z * z))
             soonest = min(soonest, horizon / (2.0 * fastest + 1e-300))
         dt = max(settings.shortest, min(soonest, settings.longest))
-        left = settings.duration - time
+        remaining = settings.duration - time
         # A remainder that only rounding has left is not worth a step.
-        time, dt = (settings.duration, left) if left <= dt * (1.0 + 1e-6) else (time + dt, dt)
+        time, dt = (settings.duration, remaining) if remaining <= dt * (1.0 + 1e-6) else (time + dt, dt)
         counts[0] += 1
         counts[1] += n
         drift(g, n, dt, law, settings)

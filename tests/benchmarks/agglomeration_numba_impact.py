@@ -62,9 +62,9 @@ def losses(law, e, reduced, vn, vt, small):
     tangential = reduced * vt
     if e > 0.0:
         tangential = min(tangential, law.friction * reduced * vn * (1.0 + e))
-    given = law.reaction * (1.0 - e) * np.pi * small**2 + reduced * vn**2 * (1.0 - e**2) / 3.0
-    lost = 0.5 * reduced * ((1.0 - e**2) * vn**2 + vt**2 - (vt - tangential / reduced) ** 2)
-    return tangential, given, lost
+    heat = law.reaction * (1.0 - e) * np.pi * small**2 + reduced * vn**2 * (1.0 - e**2) / 3.0
+    kinetic = 0.5 * reduced * ((1.0 - e**2) * vn**2 + vt**2 - (vt - tangential / reduced) ** 2)
+    return tangential, heat, kinetic
 
 
 @njit(**OPTIONS)
@@ -81,26 +81,26 @@ def collide(law, threshold, g, i, j, counts):
     # |I_n| = reduced vn (1 + e) / dtau with dtau = 2 b (1 + e) / vn (4.10), in which e cancels.
     force, e = reduced * vn**2 / (2.0 * small), 0.0
     for _ in range(ITERATIONS):
-        _, given, lost = losses(law, e, reduced, vn, vt, small)
-        hard_i = hardness(law, g.T[i] + (given + lost * g.m[j] / total) / heat_i)
-        hard_j = hardness(law, g.T[j] + (given + lost * g.m[i] / total) / heat_j)
+        _, heat, kinetic = losses(law, e, reduced, vn, vt, small)
+        hard_i = hardness(law, g.T[i] + (heat + kinetic * g.m[j] / total) / heat_i)
+        hard_j = hardness(law, g.T[j] + (heat + kinetic * g.m[i] / total) / heat_j)
         # e = 1 - |I_n| / (2 a H) (3.1) with a = (1 - e) pi b^2 (4.12), so (1 - e)^2 = |I_n| / (2 pi b^2 H).
         new = 1.0 - min(1.0, np.sqrt(force / (2.0 * np.pi * small**2 * min(hard_i, hard_j))))
         change, e = abs(new - e), new
         if change <= SETTLED:
             break
 
-    tangential, given, lost = losses(law, e, reduced, vn, vt, small)
+    tangential, heat, kinetic = losses(law, e, reduced, vn, vt, small)
     impulse = reduced * vn * (1.0 + e) * n
     if vt > 0.0:
         impulse += tangential * slip / vt
     g.v[:, i] -= impulse / g.m[i]
     g.v[:, j] += impulse / g.m[j]
-    g.T[i] += (given + lost * g.m[j] / total) / heat_i
-    g.T[j] += (given + lost * g.m[i] / total) / heat_j
+    g.T[i] += (heat + kinetic * g.m[j] / total) / heat_i
+    g.T[j] += (heat + kinetic * g.m[i] / total) / heat_j
     counts[2] += 1
-    counts[4] += breaks(law, threshold, g, i, lost * g.m[j] / total)
-    counts[4] += breaks(law, threshold, g, j, lost * g.m[i] / total)
+    counts[4] += breaks(law, threshold, g, i, kinetic * g.m[j] / total)
+    counts[4] += breaks(law, threshold, g, j, kinetic * g.m[i] / total)
     if e == 0.0 and g.pieces[i] == 0 and g.pieces[j] == 0:
         share = g.m[j] / total
         g.r[:, i] += share * (g.r[:, j] - g.r[:, i])

@@ -26,9 +26,9 @@ WINDOW = 64
 """Steps of the numba program between two barriers, as many as ours at most."""
 
 
-def peer_control(made: Scene) -> tuple[tuple[float, ...], int, int]:
+def peer_control(setup: Scene) -> tuple[tuple[float, ...], int, int]:
     """What the numba program is given of the stepper of a scene."""
-    stepper, control = made.stepper, made.stepper.control
+    stepper, control = setup.stepper, setup.stepper.control
     names = ("tolerance", "order", "first", "longest", "shortest", "most", "least")
     return (
         (stepper.phi, *(getattr(control, name) for name in names)),
@@ -44,17 +44,17 @@ def spread(values: list[float]) -> str:
 
 def compare(number: int, duration: float, repeats: int) -> None:
     """One size."""
-    made = scene(number=number, duration=duration)
-    start = made.particles.arrays(made.domain, made.seed)
-    control, limit, steps = peer_control(made)
+    setup = scene(number=number, duration=duration)
+    start = setup.particles.arrays(setup.domain, setup.seed)
+    control, limit, steps = peer_control(setup)
     fixed = ((FLUX, 0.0, 0.0), (AIR, VISCOSITY), control, limit, steps)
-    simulation = Simulation(made)
-    simulation.load([made])
+    simulation = Simulation(setup)
+    simulation.load([setup])
     simulation.run(steps=1)
     peer.simulate(start, *fixed, 1e-3)
     ours, theirs = [], []
     for _ in range(repeats):
-        simulation.load([made])
+        simulation.load([setup])
         began = time.perf_counter()
         simulation.run()
         ours.append(time.perf_counter() - began)
@@ -62,17 +62,18 @@ def compare(number: int, duration: float, repeats: int) -> None:
         position, _, counts = peer.simulate(start, *fixed, duration)
         theirs.append(time.perf_counter() - began)
     (result,) = simulation.results()
-    work, done = result.work, counts.sum(axis=0)
-    what = f"{number} particles, {duration:g} s, schedule '{simulation.schedule}'"
-    print(f"{what}, {repeats} pairs of runs: median (range)")
+    work, peer_work = result.work, counts.sum(axis=0)
+    title = f"{number} particles, {duration:g} s, schedule '{simulation.schedule}'"
+    print(f"{title}, {repeats} pairs of runs: median (range)")
     print(f"  tisim  {spread([work['particle_steps'] / t / 1e6 for t in ours])} M particle-steps/s")
-    print(f"  numba  {spread([done[0] / t / 1e6 for t in theirs])}")
-    rates = [work["particle_steps"] / a / (done[0] / b) for a, b in zip(ours, theirs, strict=True)]
+    print(f"  numba  {spread([peer_work[0] / t / 1e6 for t in theirs])}")
+    rates = [work["particle_steps"] / a / (peer_work[0] / b) for a, b in zip(ours, theirs, strict=True)]
     print(f"  tisim / numba {spread(rates)}")
     moved = np.abs(result.state["position"] - start["position"]).max()
     gap = np.abs(result.state["position"] - position).max() / moved
     print(
-        f"  steps {work['particle_steps']}, {done[0]}; iterations {work['solver_iterations']}, {done[1]};"
+        f"  steps {work['particle_steps']}, {peer_work[0]};"
+        f" iterations {work['solver_iterations']}, {peer_work[1]};"
         f" positions differ by {gap:.1e} of the distance moved"
     )
 

@@ -95,7 +95,7 @@ def stretch(r, v, f, own_dt, counts, begins, mass, charge, radius, b, air, contr
     """Every particle through windows that begin so; adds its steps and iterations to ``counters``."""
     density, viscosity = air
     phi, tolerance, order, first, longest, shortest, most, least = control
-    wanted = tolerance ** (1.0 / (order * limit))
+    target = tolerance ** (1.0 / (order * limit))
     for i in numba.prange(len(mass)):
         m, q, size = mass[i], charge[i], radius[i]
         ri = (r[i, 0], r[i, 1], r[i, 2])
@@ -126,10 +126,10 @@ def stretch(r, v, f, own_dt, counts, begins, mass, charge, radius, b, air, contr
                     vk = new
                     solved = change <= tolerance
                     if solved or k >= limit or not change < np.inf:
-                        reached = change ** (1.0 / (order * k))
+                        actual = change ** (1.0 / (order * k))
                         factor = least
-                        if wanted >= least * reached:
-                            factor = min(most, wanted / max(reached, wanted / most))
+                        if target >= least * actual:
+                            factor = min(most, target / max(actual, target / most))
                         going, accepted = False, solved
                         if not solved:
                             factor = min(factor, 0.8)
@@ -173,6 +173,6 @@ def simulate(start: dict[str, Any], b: Any, air: Any, control: Any, limit: int, 
     longest = control[4]
     begins = np.append(np.arange(0.0, duration / longest - 1e-6) * longest, duration)
     for k in range(0, len(begins) - 1, steps):
-        given = (start["mass"], start["charge"], start["radius"], b, air, control, limit)
-        stretch(r, v, f, own_dt, counts, begins[k : k + steps + 1], *given)
+        laws = (start["mass"], start["charge"], start["radius"], b, air, control, limit)
+        stretch(r, v, f, own_dt, counts, begins[k : k + steps + 1], *laws)
     return r, v, counts

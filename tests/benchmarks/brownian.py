@@ -49,10 +49,10 @@ def ours(
     """A run that returns its wall seconds, and where it has got to."""
     scenes = []
     for w, place in enumerate(places):
-        made = colloids(
+        setup = colloids(
             place, dt=DT, steps=steps, seed=w, quantities={"anchor": np.zeros_like(place)}, **options
         )
-        scenes.append(made.model_copy(update={"effects": (TRAP,)}))
+        scenes.append(setup.model_copy(update={"effects": (TRAP,)}))
     simulation = Simulation(scenes[0], worlds=len(scenes))
 
     def run() -> float:
@@ -67,15 +67,15 @@ def theirs(
     places: np.ndarray, call: Callable[[np.ndarray], None]
 ) -> tuple[Callable[[], float], Callable[[], np.ndarray]]:
     """The same for a function that changes an array of places."""
-    kept = [places]
+    end = [places]
 
     def run() -> float:
-        kept[0] = places.copy()
+        end[0] = places.copy()
         began = time.perf_counter()
-        call(kept[0])
+        call(end[0])
         return time.perf_counter() - began
 
-    return run, lambda: kept[0]
+    return run, lambda: end[0]
 
 
 def compare(title: str, programs: dict, particle_steps: int, repeats: int, variance: float) -> None:
@@ -89,12 +89,12 @@ def compare(title: str, programs: dict, particle_steps: int, repeats: int, varia
     first = None
     print(f"\n{title}")
     for name, (_, end) in programs.items():
-        reached = float(np.mean(end() ** 2)) / variance
+        ratio = float(np.mean(end() ** 2)) / variance
         rate = particle_steps / float(np.median(times[name]))
         first = first or rate
         spread = (max(times[name]) - min(times[name])) / float(np.median(times[name]))
         speed = f"{rate:10.3g} particle-steps/s (spread {spread:4.0%})"
-        print(f"  {name:30s} {speed}, tisim/this {first / rate:6.2f}, variance {reached:.3f}")
+        print(f"  {name:30s} {speed}, tisim/this {first / rate:6.2f}, variance {ratio:.3f}")
 
 
 def main() -> None:
@@ -103,11 +103,13 @@ def main() -> None:
     ask.add_argument("--repeats", type=int, default=5)
     ask.add_argument("--threads", type=int, default=runtime.cores())
     ask.add_argument("--small", action="store_true", help="a tenth of the steps")
-    given = ask.parse_args()
-    runtime.init(threads=given.threads)
-    numba.set_num_threads(given.threads)
-    less = 10 if given.small else 1
-    print(f"{runtime.backend()}, numba {numba.__version__}, numpy {np.__version__}, {given.threads} threads")
+    options = ask.parse_args()
+    runtime.init(threads=options.threads)
+    numba.set_num_threads(options.threads)
+    less = 10 if options.small else 1
+    print(
+        f"{runtime.backend()}, numba {numba.__version__}, numpy {np.__version__}, {options.threads} threads"
+    )
 
     for worlds, number, steps in ((WORLDS, NUMBER, 4000 // less), (1, 100_000, 100 // less)):
         places = start(worlds, number, 1.0)
@@ -126,7 +128,7 @@ def main() -> None:
             f"without interaction, {worlds} x {number}",
             programs,
             flat.shape[0] * steps,
-            given.repeats,
+            options.repeats,
             variance,
         )
 
@@ -141,7 +143,7 @@ def main() -> None:
         f"Rotne-Prager, {WORLDS} x {NUMBER}, exact",
         programs,
         places.size // 3 * steps,
-        given.repeats,
+        options.repeats,
         variance,
     )
     programs = {
@@ -155,7 +157,7 @@ def main() -> None:
         f"Rotne-Prager, {WORLDS} x {NUMBER}, fast",
         programs,
         places.size // 3 * steps,
-        given.repeats,
+        options.repeats,
         variance,
     )
 

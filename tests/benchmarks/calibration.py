@@ -23,30 +23,32 @@ from tisim.backend import runtime
 from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import StageControl
 
-Found = dict[str, dict[str, np.ndarray]]
+Ratios = dict[str, dict[str, np.ndarray]]
 BY_DEFAULT = collocation("run", StageControl().first)
 SINGLE_PRECISION = 10.0 ** -np.arange(2, 6)
 
 
-def table(found: Found) -> None:
+def table(ratios_by_control: Ratios) -> None:
     """Least and largest ratio of each scene, a column for each control."""
-    print("| scene | " + " | ".join(found) + " |")
-    print("|---" * (1 + len(found)) + "|")
+    print("| scene | " + " | ".join(ratios_by_control) + " |")
+    print("|---" * (1 + len(ratios_by_control)) + "|")
     for scene in KNOWN:
-        cells = [f"{values[scene].min():.1g} .. {values[scene].max():.1g}" for values in found.values()]
+        cells = [
+            f"{values[scene].min():.1g} .. {values[scene].max():.1g}" for values in ratios_by_control.values()
+        ]
         print(f"| {scene} | " + " | ".join(cells) + " |")
 
 
-def draw(found: Found, path: Path) -> None:
+def draw(ratios_by_control: Ratios, path: Path) -> None:
     """A panel for each control; the band that is stated for those that aim at the end."""
     figure = empty(11.0, 7.6)
     panels = figure.subplots(2, 2, sharey=True).ravel()
     colours = colormaps["tab20"].colors
-    for panel, (control, ratio) in zip(panels, found.items(), strict=True):
-        asked = CONTROLS[control][1]
+    for panel, (control, ratio) in zip(panels, ratios_by_control.items(), strict=True):
+        tolerances = CONTROLS[control][1]
         for colour, (scene, values) in zip(colours, ratio.items(), strict=False):
             line = {"color": "black", "ls": "--"} if scene == CHAOTIC else {"color": colour}
-            panel.loglog(asked, values, marker="o", ms=3, lw=1.2, label=scene, **line)
+            panel.loglog(tolerances, values, marker="o", ms=3, lw=1.2, label=scene, **line)
         if "run" in control:
             panel.axhspan(*BAND, color="0.9", zorder=0, label=f"within a factor of {BAND[1]:g}")
         panel.axhline(1.0, color="0.4", lw=0.8)
@@ -66,11 +68,11 @@ def draw(found: Found, path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
     parser.add_argument("--figure", type=Path, default=Path("docs/steppers_calibration.png"))
-    asked = parser.parse_args()
+    options = parser.parse_args()
     runtime.init(device="cpu", precision="f64")
-    found = {control: ratios(*settings) for control, settings in CONTROLS.items()}
-    table(found)
-    draw(found, asked.figure)
+    ratios_by_control = {control: ratios(*settings) for control, settings in CONTROLS.items()}
+    table(ratios_by_control)
+    draw(ratios_by_control, options.figure)
     errors = CONTROLS["Collocation, StageControl"][1]
     more = {"Collocation, by default": ratios(BY_DEFAULT, errors)}
     runtime.init(device="cpu", precision="f32")

@@ -51,28 +51,30 @@ def scenes(number: int, seed: int = 1) -> Iterator[Scene]:
 def soak(number: int, every: int) -> Iterator[tuple[int, float, float]]:
     """Run so many scenes; of each ``every`` of them the number so far, seconds for one, and memory in MB."""
     began = time.perf_counter()
-    for done, scene in enumerate(scenes(number), 1):
+    for count, scene in enumerate(scenes(number), 1):
         assert tisim.run(scene).status.ok
-        if done % every == 0:
-            yield done, (time.perf_counter() - began) / every, resident()
+        if count % every == 0:
+            yield count, (time.perf_counter() - began) / every, resident()
             began = time.perf_counter()
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--scenes", type=int, default=1000)
-    asked.add_argument("--every", type=int, default=100)
-    asked.add_argument("--threads", type=int, default=2)
-    asked.add_argument(
-        "--worn", type=int, default=memory.MAX_TREES_PER_START, help="trees after which Taichi starts anew"
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    given = asked.parse_args()
-    memory.MAX_TREES_PER_START = given.worn
-    runtime.init(threads=given.threads)
+    parser.add_argument("--scenes", type=int, default=1000)
+    parser.add_argument("--every", type=int, default=100)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument(
+        "--trees", type=int, default=memory.MAX_TREES_PER_START, help="trees after which Taichi starts anew"
+    )
+    options = parser.parse_args()
+    memory.MAX_TREES_PER_START = options.trees
+    runtime.init(threads=options.threads)
     print(f"{runtime.backend()}\n{'scenes':>8}{'s each':>9}{'MB':>8}{'trees':>8}{'starts':>8}")
-    for done, seconds, size in soak(given.scenes, given.every):
-        made, starts = memory.trees_made(), runtime.generation()
-        print(f"{done:8d}{seconds:9.2f}{size:8.0f}{made:8d}{starts:8d}", flush=True)
+    for count, seconds, size in soak(options.scenes, options.every):
+        number_of_trees, starts = memory.tree_count(), runtime.generation()
+        print(f"{count:8d}{seconds:9.2f}{size:8.0f}{number_of_trees:8d}{starts:8d}", flush=True)
 
 
 if __name__ == "__main__":

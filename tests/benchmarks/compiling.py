@@ -36,19 +36,19 @@ SCENES = {"two grains": "head_on(1.0, ())", "60 that collide, merge and break": 
 def seconds(scene: str, folder: str) -> list[float]:
     """Of the first run and the second, in a process of its own."""
     place = {f"{prefix}_OFFLINE_CACHE_FILE_PATH": folder for prefix in ("TI", "QD")}
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", SCRIPT.format(scene=scene)],
         env={**os.environ, **place}, cwd=ROOT, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    return [float(value) for value in json.loads(done.stdout.splitlines()[-1])]
+    return [float(value) for value in json.loads(completed.stdout.splitlines()[-1])]
 
 
 def main() -> None:
     print(f"{'':36s}{'cold':>8s}{'warm':>8s}{'kept':>8s}")
     for name, scene in SCENES.items():
         with tempfile.TemporaryDirectory() as folder:
-            (cold, _), (warm, kept) = seconds(scene, folder), seconds(scene, folder)
-        print(f"{name:36s}{cold:8.2f}{warm:8.2f}{kept:8.3f}")
+            (cold, _), (warm, second) = seconds(scene, folder), seconds(scene, folder)
+        print(f"{name:36s}{cold:8.2f}{warm:8.2f}{second:8.3f}")
 
 
 if __name__ == "__main__":

@@ -73,10 +73,10 @@ def measure(stepper: Stepper, sites: int) -> Result:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--sites", type=int, default=7)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     runtime.init()
     for name, stepper in STEPPERS.items():
-        result = measure(stepper, asked.sites)
+        result = measure(stepper, options.sites)
         sums = result.work.get("force_evaluations", result.work["steps"])
         of_energy, of_momentum = drift(result)
         print(

@@ -59,10 +59,10 @@ def bound(digits):
     return magnets
 
 
-def relative(found, expected):
+def relative(values, expected):
     """Largest and median of what is off, over what is expected: one vector or matrix for each point."""
-    axes = tuple(range(1, found.ndim))
-    off = np.sqrt(((found - expected) ** 2).sum(axes) / (expected**2).sum(axes))
+    axes = tuple(range(1, values.ndim))
+    off = np.sqrt(((values - expected) ** 2).sum(axes) / (expected**2).sum(axes))
     return f"  {off.max():9.1e} {np.median(off):8.1e}"
 
 
@@ -81,9 +81,9 @@ def compare(points, repeats):
     out = {}
     for name, digits in (("exact", None), ("4 digits", 4), ("3 digits", 3)):
         source = bound(digits)
-        for what, kernel in (("field", field), ("field and gradient", both)):
-            out[f"{name}, {what}"] = np.zeros((len(r), 4, 3))
-            runs[f"{name}, {what}"] = lambda k=kernel, s=source, o=out[f"{name}, {what}"]: k(s, r, o)
+        for label, kernel in (("field", field), ("field and gradient", both)):
+            out[f"{name}, {label}"] = np.zeros((len(r), 4, 3))
+            runs[f"{name}, {label}"] = lambda k=kernel, s=source, o=out[f"{name}, {label}"]: k(s, r, o)
     for run in runs.values():
         run()
     best = dict.fromkeys(runs, np.inf)
@@ -110,7 +110,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--repeats", type=int, default=7)
-    chosen = parser.parse_args()
+    options = parser.parse_args()
     runtime.init(device="cpu", threads=1)
     print(runtime.backend(), magpylib.__version__)
-    compare(chosen.points, chosen.repeats)
+    compare(options.points, options.repeats)

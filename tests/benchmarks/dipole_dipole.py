@@ -58,14 +58,14 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--steps", type=int, default=50, help="of each try")
-    asked = parser.parse_args()
-    settings = runtime.init(precision=asked.precision, threads=asked.threads).settings
-    numba.set_num_threads(asked.threads)
-    draw, n = np.random.default_rng(0), asked.number
+    options = parser.parse_args()
+    settings = runtime.init(precision=options.precision, threads=options.threads).settings
+    numba.set_num_threads(options.threads)
+    draw, n = np.random.default_rng(0), options.number
     side = int(np.ceil(n ** (1 / 3)))
     place = np.argwhere(np.ones((side,) * 3))[:n] + draw.uniform(-0.2, 0.2, (n, 3))
     moment = 1e3 * draw.normal(size=(n, 3))
-    made = Scene(
+    scene = Scene(
         particles=Particles(
             position=place,
             velocity=0 * place,
@@ -78,9 +78,9 @@ def main() -> None:
         stepper=Verlet(control=FixedStep(dt=1e-12)),
         duration=1.0,
     )
-    simulation = Simulation(made)
-    simulation.load([made])
-    real = np.float64 if asked.precision == "f64" else np.float32
+    simulation = Simulation(scene)
+    simulation.load([scene])
+    real = np.float64 if options.precision == "f64" else np.float32
     columns = [np.ascontiguousarray(column, real) for column in (*place.T, *moment.T)]
     out = [np.empty(n, real) for _ in range(3)]
 
@@ -93,15 +93,15 @@ def main() -> None:
     for way in ways.values():
         way(2)
     off = np.abs(simulation.s.read("force")[0] - np.stack(out, axis=1)).max() / np.abs(out).max()
-    for _ in range(asked.repeats):
+    for _ in range(options.repeats):
         for name, way in ways.items():
             began = time.perf_counter()
-            way(asked.steps)
-            times[name].append((time.perf_counter() - began) / asked.steps)
+            way(options.steps)
+            times[name].append((time.perf_counter() - began) / options.steps)
     ratio = np.median(np.array(times["numba"]) / np.array(times["tisim"]))
     print(f"{n} dipoles, {settings}; forces agree to {off:.1e}")
-    for name, taken in times.items():
-        print(f"{name}: {1e3 * np.median(taken):.3f} ms, {n * (n - 1) / np.median(taken):.3g} pairs/s")
+    for name, seconds in times.items():
+        print(f"{name}: {1e3 * np.median(seconds):.3f} ms, {n * (n - 1) / np.median(seconds):.3g} pairs/s")
     print(f"tisim is {ratio:.2f} times as fast as numba")
 
 

@@ -43,9 +43,9 @@ CHANGES = {
 
 def main(starts):
     seeds = [start_seed(FRESH, k) for k in range(starts)]
-    for variant, (found, changes) in CHANGES.items():
+    for variant, (best, changes) in CHANGES.items():
         filters = problem(variant=variant)
-        designs = [found, *({**found, **change} for change in changes.values())]
+        designs = [best, *({**best, **change} for change in changes.values())]
         results = run([filters.scene(design, seed) for design in designs for seed in seeds])
         part = np.reshape([captured(result) for result in results], (len(designs), starts))
         print(f"{variant}: {Mean.of(part[0])} captured, {starts} starts, 95 % confidence")

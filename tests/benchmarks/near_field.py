@@ -44,7 +44,7 @@ def start(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 def by_tisim(position: np.ndarray, charge: np.ndarray, schedule: str | None) -> Sums:
     """Verlet steps so short that nothing moves."""
-    made = Scene(
+    scene = Scene(
         particles=Particles(
             position=position,
             velocity=np.zeros_like(position),
@@ -57,8 +57,8 @@ def by_tisim(position: np.ndarray, charge: np.ndarray, schedule: str | None) -> 
         stepper=Verlet(control=FixedStep(dt=1e-12)),
         duration=1.0,
     )
-    simulation = Simulation(made, schedule=schedule)
-    simulation.load([made])
+    simulation = Simulation(scene, schedule=schedule)
+    simulation.load([scene])
     return simulation.program.advance, lambda: simulation.s.read("force")[0]
 
 
@@ -66,11 +66,11 @@ def by_numba(position: np.ndarray, charge: np.ndarray, real: type) -> Sums:
     """The loop over all pairs."""
     x, y, z = (np.ascontiguousarray(column, real) for column in position.T)
     out = [np.empty(len(x), real) for _ in range(3)]
-    given = (x, y, z, charge.astype(real), real(0.0), real(1.0), *out)
+    arguments = (x, y, z, charge.astype(real), real(0.0), real(1.0), *out)
 
     def advance(steps: int) -> None:
         for _ in range(steps):
-            peer.forces(*given)
+            peer.forces(*arguments)
 
     return advance, lambda: np.stack(out, axis=1)
 

@@ -43,8 +43,8 @@ def forces(x, y, z, q, a1, a2, fx, fy, fz):
 def widest() -> str:
     """The widest vector register with which the compiled loop takes roots."""
     assembly = "\n".join(forces.inspect_asm().values())
-    found = set(re.findall(r"v?r?sqrt\w*p[sd]\s.*%([xyz]mm)", assembly))
-    return max(found, default="none: not vectorised")
+    widths = set(re.findall(r"v?r?sqrt\w*p[sd]\s.*%([xyz]mm)", assembly))
+    return max(widths, default="none: not vectorised")
 
 
 @numba.njit(parallel=True, error_model="numpy")

@@ -58,10 +58,10 @@ def main() -> None:
     """Print the table."""
     cases = [(name, e) for name in RINGS for e in RESTITUTION]
     delays = (0.0, 1e-12)
-    found = outcome([ring(RINGS[name], e, delay) for name, e in cases for delay in delays])
+    outcomes = outcome([ring(RINGS[name], e, delay) for name, e in cases for delay in delays])
     print("arrangement          e     middle    momentum  energy  e^2     from one by one")
     for k, (name, e) in enumerate(cases):
-        tie, near = found[2 * k : 2 * k + 2]
+        tie, near = outcomes[2 * k : 2 * k + 2]
         energy = (tie**2).sum() / RINGS[name]
         momentum = np.linalg.norm(tie.sum(axis=0))
         limit = f"{np.abs(tie - near).max():.1e}" if RINGS[name] < 6 else "-"

@@ -105,9 +105,9 @@ class Point:
 
     def measure(self, truth: np.ndarray, start: np.ndarray) -> None:
         """Run once more."""
-        found, self.work, taken = self.run()
-        self.seconds.append(taken)
-        self.error = distance(found, truth) / distance(truth, start)
+        positions, self.work, seconds = self.run()
+        self.seconds.append(seconds)
+        self.error = distance(positions, truth) / distance(truth, start)
 
     def median(self) -> float:
         """Of the wall seconds."""
@@ -125,11 +125,11 @@ def scipy_point(method: str, near: Callable, name: str, start: np.ndarray, rtol:
 
     def run() -> tuple[np.ndarray, int, float]:
         began = time.perf_counter()
-        found = solve_ivp(
+        solution = solve_ivp(
             evaluate, (0.0, DURATION), y, method, t_eval=[DURATION], rtol=rtol, atol=rtol * 1e-2
         )
-        taken = time.perf_counter() - began
-        return found.y[: start.size, -1].reshape(3, -1), int(found.nfev), taken
+        seconds = time.perf_counter() - began
+        return solution.y[: start.size, -1].reshape(3, -1), int(solution.nfev), seconds
 
     return Point(f"{method}, {name}", f"rtol={rtol:.0e}", run)
 
@@ -148,44 +148,44 @@ def tisim_point(name: str, stepper: Stepper, setting: str) -> Point:
         simulation.load([scene])
         began = time.perf_counter()
         simulation.run()
-        taken = time.perf_counter() - began
+        seconds = time.perf_counter() - began
         (result,) = simulation.results()
         assert result.status.ok, result.status.reason
         places = result.state["position"][np.argsort(result.state["id"])].T
-        return places, result.work["force_evaluations"], taken
+        return places, result.work["force_evaluations"], seconds
 
     return Point(name, setting, run)
 
 
 def points(start: np.ndarray) -> list[Point]:
     """Every method over its settings."""
-    found = []
+    results = []
     for exponent in np.arange(2.0, 11.0):
         for method in ("DOP853", "RK45"):
             for name, near in SIDES.items():
-                found.append(scipy_point(method, near, name, start, 10.0**-exponent))
+                results.append(scipy_point(method, near, name, start, 10.0**-exponent))
     for stages in (3, 4, 5, 6):
         for error in (10.0 ** -np.arange(1.0, 10.0, 0.5)).tolist():
             stepper = Collocation(stages=stages, control=StageControl(error=error))
-            found.append(tisim_point(f"Collocation, {stages} stages", stepper, f"error={error:.1e}"))
+            results.append(tisim_point(f"Collocation, {stages} stages", stepper, f"error={error:.1e}"))
     for error in (10.0 ** -np.arange(1.0, 6.0, 0.5)).tolist():
         control = ErrorControl(error=error, tolerance=error / 10, first=1e-6, longest=1e-3)
-        found.append(tisim_point("Trapezoid", Trapezoid(control=control), f"error={error:.1e}"))
-    return found
+        results.append(tisim_point("Trapezoid", Trapezoid(control=control), f"error={error:.1e}"))
+    return results
 
 
-def fastest(found: list[Point], ours: bool, error: float) -> Point | None:
+def fastest(results: list[Point], ours: bool, error: float) -> Point | None:
     """The fastest with at most this error, among ours or the others."""
-    good = [p for p in found if (", n" in p.method.lower()) != ours and p.error <= error]
+    good = [p for p in results if (", n" in p.method.lower()) != ours and p.error <= error]
     return min(good, key=Point.median, default=None)
 
 
-def draw(found: list[Point], path: Path) -> None:
+def draw(results: list[Point], path: Path) -> None:
     """Error against time and against work, a line for each method."""
     figure = empty(11.0, 5.4)
     axes = figure.subplots(1, 2, sharey=True)
-    for k, method in enumerate(dict.fromkeys(p.method for p in found)):
-        line = [p for p in found if p.method == method and p.error < 0.3]
+    for k, method in enumerate(dict.fromkeys(p.method for p in results)):
+        line = [p for p in results if p.method == method and p.error < 0.3]
         style = {"ls": "--", "marker": "s"} if ", n" in method.lower() else {"ls": "-", "marker": "o"}
         for axis, size in zip(axes, (Point.median, lambda p: p.work), strict=True):
             axis.loglog([size(p) for p in line], [p.error for p in line], ms=3, color=COLOURS[k], **style)
@@ -204,9 +204,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("out/vibration_precision"))
-    asked = parser.parse_args()
-    runtime.init(threads=asked.threads)
-    numba.set_num_threads(asked.threads)
+    options = parser.parse_args()
+    runtime.init(threads=options.threads)
+    numba.set_num_threads(options.threads)
     arrays = vibration.scene(RATIO).particles.arrays(vibration.scene(RATIO).domain, 0)
     start = np.ascontiguousarray(arrays["position"].T)
     truth, _, _ = scipy_point("DOP853", by_numba, "reference", start, 1e-13).run()
@@ -219,13 +219,13 @@ def main() -> None:
         for _ in range(20):
             near(start)
         print(f"one sum of forces by {name}: {(time.perf_counter() - began) / 20 * 1e6:.0f} us")
-    found = points(start)
-    for _ in range(asked.repeats + 1):
-        for point in found:
+    results = points(start)
+    for _ in range(options.repeats + 1):
+        for point in results:
             # What is many times slower need not be known to the last digit.
             if not point.seconds or min(point.seconds) < SLOW:
                 point.measure(truth, start)
-    for point in found:
+    for point in results:
         # The first run of a numba function compiles it.
         point.seconds = point.seconds[1:] or point.seconds
         spread = max(point.seconds) - min(point.seconds)
@@ -234,19 +234,19 @@ def main() -> None:
             f"(spread {spread * 1e3:.2f})  {point.work:6d} sums of forces"
         )
     for decade in DECADES:
-        ours, theirs = fastest(found, True, 10.0**-decade), fastest(found, False, 10.0**-decade)
+        ours, theirs = fastest(results, True, 10.0**-decade), fastest(results, False, 10.0**-decade)
         if ours and theirs:
             print(
                 f"1e-{decade}: {ours.method} ({ours.setting}) {ours.median() * 1e3:.2f} ms; {theirs.method} "
                 f"({theirs.setting}) {theirs.median() * 1e3:.2f} ms, {theirs.median() / ours.median():.2f} "
                 f"times the time, {theirs.work / ours.work:.2f} times the sums"
             )
-    asked.out.mkdir(parents=True, exist_ok=True)
-    draw(found, asked.out / "work_precision.png")
-    with (asked.out / "work_precision.csv").open("w", newline="") as file:
+    options.out.mkdir(parents=True, exist_ok=True)
+    draw(results, options.out / "work_precision.png")
+    with (options.out / "work_precision.csv").open("w", newline="") as file:
         table = csv.writer(file)
         table.writerow(("method", "setting", "error", "seconds", "sums_of_forces"))
-        table.writerows((p.method, p.setting, p.error, p.median(), p.work) for p in found)
+        table.writerows((p.method, p.setting, p.error, p.median(), p.work) for p in results)
 
 
 if __name__ == "__main__":

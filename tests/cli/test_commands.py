@@ -23,8 +23,8 @@ def test_check_tells_right_from_wrong(tisim, monkeypatch):
         Check("two", 2.1, 2.0, 0.01),
         Check("three", float("nan"), 0.0, 1.0),
     ]
-    made = Case("toy", "A toy", "", {}, lambda size, seed: None, lambda: iter(checks))
-    monkeypatch.setattr(catalogue, "every", lambda: {"toy": made})
+    case = Case("toy", "A toy", "", {}, lambda size, seed: None, lambda: iter(checks))
+    monkeypatch.setattr(catalogue, "every", lambda: {"toy": case})
     code, out, err = tisim("check", "toy")
     assert code == 1
     assert [line.split()[-1] for line in out.splitlines()[1:]] == ["pass", "FAIL", "FAIL"]

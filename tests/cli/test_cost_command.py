@@ -96,10 +96,10 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, mon
     assert [line for line in again.splitlines() if line.startswith("  tisim run")] == [answer]
     code, _, err = tisim(*command, "1e-9")
     assert code == 1
-    told = " ".join(err.split())
-    assert "error of displacement must be at least" in told
-    assert "finer settings go further); received 1e-09" in told
-    assert "Traceback" not in told
+    message = " ".join(err.split())
+    assert "error of displacement must be at least" in message
+    assert "finer settings go further); received 1e-09" in message
+    assert "Traceback" not in message
     assert (folder / storage.HDF5).read_bytes() == before
     code, _, err = tisim(*command[:-1], "--set", "duration=1.0")
     assert code == 2
@@ -117,36 +117,40 @@ GIVEN = [
 ]
 
 
-@pytest.mark.parametrize("given", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
-def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, given):
+@pytest.mark.parametrize("words", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
+def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, words):
     """Whatever was given to tisim cost, and whatever the setting is: stepper, tolerance, law or precision."""
     monkeypatch.chdir(tmp_path)
     own_file("own_laws.py", LAW)
     target = "my swing's.toml"
     (tmp_path / target).write_text(oscillator().model_copy(update={"seed": 3}).to_toml())
-    measured, _, asked = parsed("cost", target, *given)
-    found = methods(measured, 0.1, 1.0, (1.0, 0.0), ("f64", "f32"), 1)
-    settings = [setting for method in found for setting in method.settings]
+    measured, _, asked_options = parsed("cost", target, *words)
+    tried_methods = methods(measured, 0.1, 1.0, (1.0, 0.0), ("f64", "f32"), 1)
+    settings = [setting for method in tried_methods for setting in method.settings]
     assert len(settings) > 8
     for setting in settings:
         changed = shell_line(options(measured, setting.scene, setting.precision))
         row = Row("", "", "", changed, setting.precision, 1, seconds=(1.0,), errors=((0.0, 0.0),))
-        printed = cost.answer(row, 0, measured, **asked).splitlines()[-1]
-        made, precision, again = parsed(*shlex.split(printed)[1:])
-        assert (made.digest(), precision) == (setting.scene.digest(), setting.precision)
+        printed = cost.answer(row, 0, measured, **asked_options).splitlines()[-1]
+        scene, precision, again = parsed(*shlex.split(printed)[1:])
+        assert (scene.digest(), precision) == (setting.scene.digest(), setting.precision)
         assert {name: again[name] for name in ("device", "threads", "plugins")} == {
-            name: asked[name] for name in ("device", "threads", "plugins")
+            name: asked_options[name] for name in ("device", "threads", "plugins")
         }
 
 
 def parsed(command, *words):
     """Of the words of a command the scene, the precision, and what the parser makes of those of a scene."""
-    found = get_command(app).commands[command].make_context(command, list(words)).params
+    parameters = get_command(app).commands[command].make_context(command, list(words)).params
     _, scene = scene_arguments.load_scene(
-        found["target"], found["size"], found["seed"], found["absent"] or (), found["changes"] or ()
+        parameters["target"],
+        parameters["size"],
+        parameters["seed"],
+        parameters["absent"] or (),
+        parameters["changes"] or (),
     )
-    asked = ("target", "size", "seed", "changes", "device", "threads", "plugins")
-    return scene, found.get("precision"), {name: found[name] for name in asked}
+    names = ("target", "size", "seed", "changes", "device", "threads", "plugins")
+    return scene, parameters.get("precision"), {name: parameters[name] for name in names}
 
 
 @pytest.mark.long

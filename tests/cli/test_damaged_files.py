@@ -65,7 +65,7 @@ RANDOM = 12
 def damages(path, whole):
     """Damage the file in one way after another: yields what was done, and whether that must be told."""
     rng = np.random.default_rng(3)
-    random = {f"random {k}": lambda p: p.write_bytes(damage.damaged(whole, rng)) for k in range(RANDOM)}
+    random = {f"random {k}": lambda p: p.write_bytes(damage.with_mishap(whole, rng)) for k in range(RANDOM)}
     for name, hurt in (DAMAGE | random).items():
         if path.is_dir() and not path.is_symlink():
             path.rmdir()
@@ -75,14 +75,14 @@ def damages(path, whole):
         yield name, name in DAMAGE
 
 
-def refused(answer, must, what):
+def is_refusal(answer, must, what):
     """Whether a command has refused; told in one line then, after its progress bar."""
     code, out, err = answer
     assert code == 2 if must else code in (0, 2), (what, answer)
     if code:
-        told = [line for line in err.strip().splitlines() if "% 0:00" not in line]
-        assert len(told) == 1, (what, err)
-        assert "must be" in told[0], (what, err)
+        lines = [line for line in err.strip().splitlines() if "% 0:00" not in line]
+        assert len(lines) == 1, (what, err)
+        assert "must be" in lines[0], (what, err)
         assert out == "", what
     return bool(code)
 
@@ -90,11 +90,11 @@ def refused(answer, must, what):
 @pytest.fixture
 def compiled_once(monkeypatch):
     """All runs of this process share one simulation."""
-    made = []
+    simulations = []
 
     def simulation(scene):
-        made[:] = made or [Simulation(scene)]
-        return made[0]
+        simulations[:] = simulations or [Simulation(scene)]
+        return simulations[0]
 
     monkeypatch.setattr("tisim.cli.run.Simulation", simulation)
 
@@ -106,23 +106,23 @@ def test_resume(tisim, toml, tmp_path, monkeypatch, press_ctrl_c, compiled_once,
     with monkeypatch.context() as patch:
         press_ctrl_c(patch, after=4)
         assert tisim(*command)[0] == 130
-    cut, kept = tmp_path / "cut", tmp_path / "kept"
-    whole = (cut / name).read_bytes()
-    shutil.copytree(cut, kept)
+    folder, backup = tmp_path / "cut", tmp_path / "kept"
+    whole = (folder / name).read_bytes()
+    shutil.copytree(folder, backup)
     gone_on = 0
-    for what, told in damages(cut / name, whole):
-        other = [path.name for path in kept.iterdir() if path.name != name]
-        if refused(tisim(*command, "--resume"), told, what):
-            left = {path.name for path in cut.iterdir()}
-            assert left == {path.name for path in kept.iterdir()}, what
-            assert all((cut / one).read_bytes() == (kept / one).read_bytes() for one in other), what
+    for mishap, must_be_told in damages(folder / name, whole):
+        other = [path.name for path in backup.iterdir() if path.name != name]
+        if is_refusal(tisim(*command, "--resume"), must_be_told, mishap):
+            names = {path.name for path in folder.iterdir()}
+            assert names == {path.name for path in backup.iterdir()}, mishap
+            assert all((folder / one).read_bytes() == (backup / one).read_bytes() for one in other), mishap
         else:
             gone_on += 1
-            shutil.rmtree(cut)
-            shutil.copytree(kept, cut)
+            shutil.rmtree(folder)
+            shutil.copytree(backup, folder)
     assert gone_on < RANDOM
-    shutil.rmtree(cut)
-    shutil.copytree(kept, cut)
+    shutil.rmtree(folder)
+    shutil.copytree(backup, folder)
     assert tisim(*command, "--resume")[0] == 0
 
 
@@ -134,8 +134,8 @@ def test_cost(tisim, tmp_path, monkeypatch):
     path.parent.mkdir()
     whole = damage._cost(path.parent).read_bytes()
     (path.parent / MARKER).write_text("cost.h5\ncost.csv\n")
-    for what, _ in damages(path, whole):
-        refused(tisim("cost", "swing.toml", "--out", "c"), must=True, what=what)
+    for mishap, _ in damages(path, whole):
+        is_refusal(tisim("cost", "swing.toml", "--out", "c"), must=True, what=mishap)
         assert {one.name for one in path.parent.iterdir()} == {MARKER, lock.LOCK, "cost.h5", "cost.csv"}
 
 
@@ -155,13 +155,15 @@ def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
     # Drawing is slow; what is drawn is read all the same.
     monkeypatch.setattr("tisim.plotting.movie.PillowWriter.grab_frame", lambda self, **more: None)
     monkeypatch.setattr("tisim.plotting.movie.PillowWriter.finish", lambda self: None)
-    monkeypatch.setattr("tisim.plotting.time_series.start_and_end", lambda *drawn: empty(2.0, 2.0))
+    monkeypatch.setattr("tisim.plotting.time_series.start_and_end", lambda *arguments: empty(2.0, 2.0))
     path = damage.KINDS[name].make(tmp_path)
     whole = path.read_bytes()
-    for what, told in damages(path, whole):
+    for mishap, must_be_told in damages(path, whole):
         words = [str(path) if word == "FILE" else word for word in command]
-        if refused(tisim(*words, "--" + ("to" if command[0] == "movie" else "out"), "m/x.gif"), told, what):
-            assert list(tmp_path.rglob("*.new*")) == [], what
+        if is_refusal(
+            tisim(*words, "--" + ("to" if command[0] == "movie" else "out"), "m/x.gif"), must_be_told, mishap
+        ):
+            assert list(tmp_path.rglob("*.new*")) == [], mishap
 
 
 @pytest.mark.parametrize("name", [MARKER, lock.LOCK])
@@ -170,6 +172,6 @@ def test_what_is_in_the_place_of_our_own(tisim, impacts, tmp_path, name):
     folder.mkdir()
     for make in (os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")):
         make(folder / name)
-        refused(tisim("run", impacts, "--out", "out"), must=True, what=make)
+        is_refusal(tisim("run", impacts, "--out", "out"), must=True, what=make)
         assert [path.name for path in folder.iterdir()] == [name]
         (folder / name).rmdir() if make is os.mkdir else (folder / name).unlink()

@@ -89,16 +89,16 @@ def test_optimize_ends_with_all_its_files_and_resumes(tisim, tmp_path, monkeypat
     assert 0.01 < float(side) < 0.1
     assert 0 < float(distance) < 2 * float(side)
     assert "generation   1  best R" in err
-    ran = len(Cache(tmp_path / "s/search.h5"))
+    evaluations = len(Cache(tmp_path / "s/search.h5"))
     assert tisim(*SEARCH)[0] == 0
-    assert len(Cache(tmp_path / "s/search.h5")) == ran
+    assert len(Cache(tmp_path / "s/search.h5")) == evaluations
     code, _, err = tisim(*SEARCH, "--fresh")
     assert code == 2
     assert "--overwrite" in err
     code, out, _ = tisim("cache", "s/search.h5")
     assert code == 0
-    assert out.split("\n")[1].split()[:2] == ["toy", str(ran)]
+    assert out.split("\n")[1].split()[:2] == ["toy", str(evaluations)]
     assert tisim("cache", "s/search.h5", "--verify")[0] == 0
-    assert tisim("cache", "s/search.h5", "--compact")[1].startswith(f"{ran} evaluations kept")
+    assert tisim("cache", "s/search.h5", "--compact")[1].startswith(f"{evaluations} evaluations kept")
     about = Cache(tmp_path / "s/search.h5").tables()
     assert any(name.endswith("hall_of_fame") for name in about)

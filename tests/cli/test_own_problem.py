@@ -25,9 +25,9 @@ def test_a_problem_is_searched_and_gone_on_with(tisim, own_file):
     heading, *rows = csv.reader(Path("s/best.csv").read_text().splitlines())
     assert heading[:3] == ["rank", "speed (m/s)", "R"]
     assert all(1 <= float(row[1]) <= 20 for row in rows)
-    made = runs()
+    stored_runs = runs()
     assert tisim(*SEARCH, *more, "--generations", "2")[0] == 0
-    assert made < runs()
+    assert stored_runs < runs()
 
 
 @pytest.mark.long
@@ -35,13 +35,13 @@ def test_another_objective_in_the_file_is_another_search(tisim, own_file):
     """Evaluations of the old one are not taken for those of the new one."""
     own_file("my_drift.py", PROBLEM)
     assert tisim(*SEARCH)[0] == 0
-    made = runs()
+    stored_runs = runs()
     own_file("my_drift.py", PROBLEM.replace(".mean()", ".max()"))
     code, _, err = tisim(*SEARCH)
     assert code == 2
     assert "problem_code = " in err
     assert tisim(*SEARCH, "--out", "t")[0] == 0
-    assert not made & runs("t/search.h5")
+    assert not stored_runs & runs("t/search.h5")
 
 
 @pytest.mark.long

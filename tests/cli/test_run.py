@@ -23,8 +23,8 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
         ".tisim",
         ".tisim.lock",
     }
-    written = Scene.from_toml(folder / "scene.toml")
-    assert (written.seed, written.particles.density) == (7, 2e3)
+    scene = Scene.from_toml(folder / "scene.toml")
+    assert (scene.seed, scene.particles.density) == (7, 2e3)
     before = {path: path.read_bytes() for path in folder.iterdir()}
     code, _, err = tisim("run", toml)
     assert (code, err.strip()) == (

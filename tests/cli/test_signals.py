@@ -19,7 +19,7 @@ ASKED = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 
 
 @pytest.fixture(autouse=True)
-def heard():
+def listener():
     """Signals are heard here, also where the tests run in the background or under nohup."""
     before = {number: signal.signal(number, signal.default_int_handler) for number, _ in ASKED}
     yield
@@ -29,25 +29,25 @@ def heard():
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
 def test_signal_is_told_at_once_and_raised_at_a_good_moment(number, code):
-    told = []
-    with Interrupt(lambda: told.append(1)) as asked:
-        asked.check()
+    calls = []
+    with Interrupt(lambda: calls.append(1)) as interrupt_:
+        interrupt_.check()
         os.kill(os.getpid(), number)
-        assert told == [1]
+        assert calls == [1]
         with pytest.raises(KeyboardInterrupt):
-            asked.check()
-    assert (asked.forced, interrupt.exit_code()) == (False, code)
+            interrupt_.check()
+    assert (interrupt_.forced, interrupt.exit_code()) == (False, code)
     assert signal.getsignal(number) is signal.default_int_handler
 
 
 def test_only_ctrl_c_forces():
     """Whoever ends a session may send SIGTERM and SIGHUP, and each of them to a process and to its group."""
-    with Interrupt(lambda: None) as asked:
+    with Interrupt(lambda: None) as handler:
         for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGHUP):
             os.kill(os.getpid(), number)
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
-    assert asked.forced
+    assert handler.forced
     assert interrupt.exit_code() == 130
 
 
@@ -55,10 +55,10 @@ def test_only_ctrl_c_forces():
 def test_signal_that_is_ignored_stays_so(number, code):
     """As SIGHUP under nohup."""
     signal.signal(number, signal.SIG_IGN)
-    with interrupt.handle_signals(interrupt.raise_interrupt), Interrupt(lambda: None) as asked:
+    with interrupt.handle_signals(interrupt.raise_interrupt), Interrupt(lambda: None) as handler:
         os.kill(os.getpid(), number)
-        asked.check()
-    assert not asked.pending
+        handler.check()
+    assert not handler.pending
     assert signal.getsignal(number) is signal.SIG_IGN
 
 
@@ -69,8 +69,8 @@ def test_run_saves_a_checkpoint(tisim, toml, tmp_path, monkeypatch, press_ctrl_c
     ended, _, err = tisim("run", toml, "--out", "cut")
     assert ended == code
     assert "To go on, give the same command again." in " ".join(err.split())
-    left = {path.name for path in (tmp_path / "cut").iterdir()}
-    assert left == {".tisim", ".tisim.lock", "checkpoint.h5"}
+    names = {path.name for path in (tmp_path / "cut").iterdir()}
+    assert names == {".tisim", ".tisim.lock", "checkpoint.h5"}
 
 
 @pytest.mark.long
@@ -103,11 +103,11 @@ def test_run_whose_terminal_is_closed_saves_a_checkpoint(toml, tmp_path):
         preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
     )  # fmt: skip
     os.close(theirs)
-    shown = b""
-    while b"left" not in shown:
+    output = b""
+    while b"left" not in output:
         with contextlib.suppress(OSError):
-            shown += os.read(ours, 1000)
-        assert process.poll() is None, shown
+            output += os.read(ours, 1000)
+        assert process.poll() is None, output
     os.close(ours)
     assert process.wait() == 129
     assert (tmp_path / "cut" / "checkpoint.h5").exists()

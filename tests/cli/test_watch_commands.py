@@ -18,8 +18,8 @@ from tisim.io.trajectory import Trajectory
 
 
 def every_frame(path):
-    with frames(path) as found:
-        return list(found)
+    with frames(path) as sequence:
+        return list(sequence)
 
 
 def test_run_plot_movie_and_export(tisim, toml, tmp_path):
@@ -77,9 +77,9 @@ def test_pictures_of_a_version_without_markers_are_replaced_whatever_comes_first
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": toy})
     folder = tmp_path / "out"
     folder.mkdir()
-    with Trajectory(Recording(folder / "trajectory.h5", frames=1), [STILL]) as made:
-        made.write(0, grown(0))
-        made.write(0, grown(1))
+    with Trajectory(Recording(folder / "trajectory.h5", frames=1), [STILL]) as trajectory:
+        trajectory.write(0, grown(0))
+        trajectory.write(0, grown(1))
     pictures = ("cloud.png", "courses.png", "sequence.png")
     for name in pictures:
         (folder / name).touch()
@@ -93,11 +93,11 @@ def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "search.h5").touch()
-    told = "folder must be that of a run; received that of a search, whose pictures are:"
-    assert tisim("plot", "s") == (2, "", f"{told} none yet\n")
+    message = "folder must be that of a run; received that of a search, whose pictures are:"
+    assert tisim("plot", "s") == (2, "", f"{message} none yet\n")
     for name in ("front.png", "convergence.png"):
         (tmp_path / "s" / name).touch()
-    assert tisim("plot", "s") == (2, "", f"{told} s/convergence.png, s/front.png\n")
+    assert tisim("plot", "s") == (2, "", f"{message} s/convergence.png, s/front.png\n")
     (tmp_path / "out" / "checkpoint.h5").touch()
     assert tisim("plot", "out") == (2, "", f"{rule} only the checkpoint of an unfinished run\n")
 
@@ -114,9 +114,9 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
     assert code == 2
     assert "--frames or --every must be given as before, to go on with trajectory.h5" in err
     assert tisim("run", toml, "--every", "5e-5", "--out", "cut")[0] == 0
-    whole, found = every_frame(tmp_path / "whole" / "trajectory.h5"), every_frame(cut)
+    whole, resumed = every_frame(tmp_path / "whole" / "trajectory.h5"), every_frame(cut)
     assert 0 < len(begun) < len(whole) == 21
-    for frame, other in zip(found, whole, strict=True):
+    for frame, other in zip(resumed, whole, strict=True):
         assert (frame.time, frame.step) == (other.time, other.step)
         for name, values in frame.arrays.items():
             np.testing.assert_array_equal(values, other.arrays[name])
@@ -138,8 +138,8 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     assert (code, out) == (1, "")
     assert "trajectory.h5 could not be written: File too large; frames before are intact" in err
     assert "checkpoint.h5 is written. To go on, make room and give the same command again" in err
-    left = {path.name for path in folder.iterdir()}
-    assert left == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
+    names = {path.name for path in folder.iterdir()}
+    assert names == {".tisim", ".tisim.lock", "checkpoint.h5", "trajectory.h5"}
     begun = every_frame(folder / "trajectory.h5")
     assert 2 < len(begun) < 21
 
@@ -148,9 +148,9 @@ def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     assert f"the run has come to t = {begun[-1].time:.6g} s of 0.001 s; what follows is missing" in err
 
     assert tisim("run", toml, "--every", "5e-5", "--resume")[0] == 0
-    found = every_frame(folder / "trajectory.h5")
-    assert [frame.step for frame in found] == list(range(0, 1001, 50))
-    for frame, other in zip(begun, found, strict=False):
+    recorded_frames = every_frame(folder / "trajectory.h5")
+    assert [frame.step for frame in recorded_frames] == list(range(0, 1001, 50))
+    for frame, other in zip(begun, recorded_frames, strict=False):
         np.testing.assert_array_equal(frame.arrays["position"], other.arrays["position"])
     assert "missing" not in tisim("plot", folder, "--out", "p")[2]
 
@@ -198,15 +198,15 @@ def test_a_run_without_frames_leaves_none_of_an_earlier_run(tisim, toml, tmp_pat
 
 def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkeypatch):
     """plot finds the case by the scene's name; figures writes figures and tables."""
-    seen = []
+    counts = []
 
     def figure():
-        made = Figure()
-        FigureCanvasAgg(made)
-        return made
+        figure_ = Figure()
+        FigureCanvasAgg(figure_)
+        return figure_
 
-    def pictures(found):
-        seen.append(len(found))
+    def pictures(sequence):
+        counts.append(len(sequence))
         return {"own.png": figure()}
 
     def figures(size, progress):
@@ -221,9 +221,9 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
     monkeypatch.setattr(catalogue, "every", lambda: {"toy": toy})
     assert tisim("run", toml, "--frames", 3)[0] == 0
     assert tisim("plot", "out/flow", "--out", "p")[0] == 0
-    drawn = {path.name for path in (tmp_path / "p").iterdir()}
-    assert drawn == {".tisim", "cloud.png", "time_series.png", "own.png"}
-    assert seen == [4]
+    names = {path.name for path in (tmp_path / "p").iterdir()}
+    assert names == {".tisim", "cloud.png", "time_series.png", "own.png"}
+    assert counts == [4]
     code, out, _ = tisim("figures", "toy", "--size", "small")
     assert (code, out.split()) == (0, ["out/toy-figures/many.png", "out/toy-figures/many.csv"])
     assert (tmp_path / "out/toy-figures/many.csv").read_text() == "size\nsmall\n"

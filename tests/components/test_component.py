@@ -23,7 +23,7 @@ class SampleSpring(Component):
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({}, "sample_spring.stiffness must be given (stiffness k of the spring, N/m); received nothing"),
         ({"stiffness": 0}, "sample_spring.stiffness must be greater than 0.0; received 0"),
@@ -50,9 +50,9 @@ class SampleSpring(Component):
         ({"stiffness": 1, "axis": (0, 1)}, "sample_spring.axis.2 must be given; received nothing"),
     ],
 )
-def test_messages_say_what_it_must_be_and_what_was_received(given, message):
+def test_messages_say_what_it_must_be_and_what_was_received(settings, message):
     with pytest.raises(InputError) as fault:
-        SampleSpring(**given)
+        SampleSpring(**settings)
     assert str(fault.value) == message
 
 

@@ -63,12 +63,12 @@ def test_a_start_outside_the_box_is_refused():
 def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
     """A joined box with images has contacts across its faces; Z04's control volume has not."""
     place, speed = [[-0.9995, 0, 0], [0.9995, 0, 0]], [[-1.0, 0, 0], [1.0, 0, 0]]
-    seen = []
+    impacts = []
     for images in (True, False):
         box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
         (result,) = run([scene(place, speed, (Impact(hardness=1e9),), domain=box)])
-        seen.append(result.work["impacts"])
-    assert seen == [1, 0]
+        impacts.append(result.work["impacts"])
+    assert impacts == [1, 0]
 
 
 @pytest.mark.slow
@@ -78,7 +78,7 @@ def test_two_leave_the_box_in_one_step_and_meet_inside_it():
     place = [[0.9, 0.5, 0.5], [0.95, 0.5, 0.5]]
     # After one second: 0.1 + 2 and 0.1005 + 1; the first is faster, and behind.
     speed = [[1.2, 0, 0], [0.1515, 0, 0]]
-    made = scene(
+    setup = scene(
         place,
         speed,
         (Impact(hardness=1e12), Heating(heat_capacity=HEAT_CAPACITY)),
@@ -87,7 +87,7 @@ def test_two_leave_the_box_in_one_step_and_meet_inside_it():
         duration=1.0,
         quantities={"temperature": 300.0},
     )
-    (result,) = run([made])
+    (result,) = run([setup])
     check_sums(result)
     assert result.work["impacts"] == 1
     np.testing.assert_allclose(by_id(result)["position"][:, 0], [0.1, 0.1015], atol=1e-12)
@@ -98,10 +98,12 @@ def test_two_leave_the_box_in_one_step_and_meet_inside_it():
 def test_a_step_that_loses_the_place_in_the_box_is_a_clear_failure(images):
     """1e12 boxes in a step leave three digits of the place; 1e14 leave one, and 1e300 none at all."""
     box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
-    far, *lost = run([drift([[0.1, 0.2, 0.3]], [[v, 0, 0]], domain=box) for v in (1e12, 1e14, -1e14, 1e300)])
+    far, *others = run(
+        [drift([[0.1, 0.2, 0.3]], [[v, 0, 0]], domain=box) for v in (1e12, 1e14, -1e14, 1e300)]
+    )
     assert far.status.ok
     np.testing.assert_allclose(far.state["position"], [[0.1, 0.2, 0.3]], atol=1e-3)
-    for result in lost:
+    for result in others:
         assert not result.status.ok
         assert "rounding loses the place in the box, at particle 0" in result.status.reason
         np.testing.assert_array_equal(result.state["position"], result.start["position"])

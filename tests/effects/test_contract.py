@@ -36,8 +36,8 @@ def test_forces_are_their_numpy_twin(rng):
                 dt=1e-3,
             )
         )
-    for made, result in zip(scenes, run(scenes), strict=True):
-        state, trap = result.state, made.effects[1]
+    for setup, result in zip(scenes, run(scenes), strict=True):
+        state, trap = result.state, setup.effects[1]
         r, q = state["position"], state["charge"]
         gap = r[None] - r[:, None]
         distance = np.linalg.norm(gap, axis=2) + np.eye(len(r))
@@ -106,10 +106,10 @@ def test_what_no_effect_needs_is_not_allocated():
         (Impact(hardness=1), Agglomeration()): set(),
     }
     for effects, more in extra.items():
-        made = Simulation(scene([[0, 0, 0]], [[0, 0, 0]], effects), worlds=3, capacity=7)
-        assert {f.name for f in made.s.fields} == core | more
-        assert ("kicks" in made.s.counters) == isinstance(effects[0], RandomKicks)
-        made.close()
+        simulation = Simulation(scene([[0, 0, 0]], [[0, 0, 0]], effects), worlds=3, capacity=7)
+        assert {f.name for f in simulation.s.fields} == core | more
+        assert ("kicks" in simulation.s.counters) == isinstance(effects[0], RandomKicks)
+        simulation.close()
     bare.close()
 
 
@@ -118,14 +118,14 @@ def test_other_designs_compile_nothing():
     first = scene([[1, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), dt=0.1, steps=3)
     second = scene([[2, 0, 0], [3, 0, 0]], np.zeros((2, 3)), (Trap(stiffness=7.0),), dt=0.2, steps=3)
     simulation = Simulation(first, worlds=2, capacity=2)
-    taken = []
-    for made in (first, second):
+    seconds = []
+    for setup in (first, second):
         began = time.process_time()
-        simulation.load([made])
+        simulation.load([setup])
         simulation.run()
-        taken.append(time.process_time() - began)
+        seconds.append(time.process_time() - began)
         assert simulation.results()[0].status.ok
-    assert taken[1] < taken[0] / 5
+    assert seconds[1] < seconds[0] / 5
     assert len(simulation.results()[0].state["mass"]) == 2
     simulation.close()
 
@@ -139,9 +139,9 @@ def test_a_scene_of_another_structure_is_refused():
 
 def test_a_scene_finds_them_by_name():
     """No registry: a class that exists can be written in a file."""
-    made = charges([[0, 0, 0]], [[0, 0, 0]], [1.0], {"stiffness": 2.0})
-    again = Scene.from_dict(made.to_dict())
-    assert again.digest() == made.digest()
+    setup = charges([[0, 0, 0]], [[0, 0, 0]], [1.0], {"stiffness": 2.0})
+    again = Scene.from_dict(setup.to_dict())
+    assert again.digest() == setup.digest()
     assert [type(e) for e in again.effects] == [Coulomb, Trap]
     assert again.stepper == fixed(1e-9)
 

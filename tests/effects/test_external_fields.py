@@ -29,9 +29,9 @@ def oscillating(kind, rng):
     return kind(constant=vector(rng), amplitude=vector(rng), omega=vector(rng, 3), phase=vector(rng))
 
 
-def lorentz_twin(made, state, t=0.0):
+def lorentz_twin(setup, state, t=0.0):
     b = e = np.zeros(3)
-    for source in made.effects:
+    for source in setup.effects:
         if isinstance(source, ElectricField):
             e = waves(source, t)
         if isinstance(source, MagneticField):
@@ -49,7 +49,7 @@ def lorentz_twin(made, state, t=0.0):
 )
 def test_lorentz_force(kinds, rng):
     """Both fields, oscillating, or one alone."""
-    made = [
+    scenes = [
         cloud(
             rng,
             (*(oscillating(kind, rng) for kind in kinds), Lorentz()),
@@ -57,13 +57,13 @@ def test_lorentz_force(kinds, rng):
         )
         for _ in range(WORLDS)
     ]
-    for one, state in zip(made, loads(made), strict=True):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         close(state["force"], lorentz_twin(one, state))
 
 
 def test_fields_oscillate_in_time(rng):
     """Heavy charges keep their velocity: the force after steps is that of the field then."""
-    made = [
+    scenes = [
         cloud(
             rng,
             (oscillating(ElectricField, rng), oscillating(MagneticField, rng), Lorentz()),
@@ -73,7 +73,7 @@ def test_fields_oscillate_in_time(rng):
         )
         for k in range(WORLDS)
     ]
-    for one, result in zip(made, simulate(made, worlds=WORLDS, capacity=16), strict=True):
+    for one, result in zip(scenes, simulate(scenes, worlds=WORLDS, capacity=16), strict=True):
         close(result.state["force"], lorentz_twin(one, result.state, result.time), 1e-7)
         assert result.time > 0.3
 
@@ -81,17 +81,17 @@ def test_fields_oscillate_in_time(rng):
 def test_no_oscillation_no_sine_is_the_same_field(rng):
     """A field of amplitude 0 in one world of a batch beside one that oscillates."""
     still = ElectricField(constant=vector(rng), omega=vector(rng), phase=vector(rng))
-    made = [
+    scenes = [
         cloud(rng, (field, Lorentz()), quantities={"charge": 1.0})
         for field in (still, oscillating(ElectricField, rng))
     ]
-    for one, state in zip(made, loads(made), strict=True):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         close(state["force"], lorentz_twin(one, state))
 
 
 def test_magnetic_body_force_is_the_gradient_of_gamma_b_squared(rng):
     """Against a central difference of gamma B.B, of two sources together."""
-    made = [
+    scenes = [
         cloud(
             rng,
             (
@@ -110,7 +110,7 @@ def test_magnetic_body_force_is_the_gradient_of_gamma_b_squared(rng):
         return law.gamma * (b * b).sum(axis=1)
 
     h = 1e-5
-    for one, state in zip(made, loads(made), strict=True):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         r = state["position"]
         expected = [(energy(one, r + h * axis) - energy(one, r - h * axis)) / (2 * h) for axis in np.eye(3)]
         close(state["force"], np.stack(expected, axis=1), 1e-8)
@@ -118,7 +118,7 @@ def test_magnetic_body_force_is_the_gradient_of_gamma_b_squared(rng):
 
 def test_the_velocity_jacobian_of_the_lorentz_force(rng):
     """Against a central difference of the force."""
-    made = [
+    scenes = [
         cloud(
             rng,
             (oscillating(ElectricField, rng), oscillating(MagneticField, rng), Lorentz()),
@@ -126,8 +126,8 @@ def test_the_velocity_jacobian_of_the_lorentz_force(rng):
         )
         for _ in range(WORLDS)
     ]
-    for claimed, found in zip(*jacobians(made, 1e-3), strict=True):
-        close(claimed, found, 1e-9)
+    for claimed, difference in zip(*jacobians(scenes, 1e-3), strict=True):
+        close(claimed, difference, 1e-9)
 
 
 def test_only_what_is_needed_is_allocated():
@@ -167,12 +167,12 @@ def test_what_is_wrong_is_named(message):
 
 
 def test_a_scene_in_a_file_finds_sources():
-    made = scene(
+    setup = scene(
         [[0, 0, 0]],
         [[1, 0, 0]],
         (MagneticField(constant=(0, 0, 1), amplitude=(1, 2, 3)), Lorentz()),
         quantities={"charge": 2.0},
     )
-    again = Scene.from_dict(made.to_dict())
-    assert again.digest() == made.digest()
+    again = Scene.from_dict(setup.to_dict())
+    assert again.digest() == setup.digest()
     assert [type(effect) for effect in again.effects] == [MagneticField, Lorentz]

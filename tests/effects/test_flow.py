@@ -16,7 +16,7 @@ FORMS = [("fibres", "packing", 4.0), pytest.param("spheres", "pores", 6.0, marks
 @pytest.mark.parametrize(("packed", "mean", "per_size"), FORMS)
 def test_drag_in_both_flows_together(packed, mean, per_size, rng):
     """B16 (7.3), (7.4): U = eps^3 nu^2 / (C (1 - eps)^2) (-grad p) / eta, nu = V / S."""
-    made = []
+    scenes = []
     for _ in range(WORLDS):
         darcy = DarcyFlow(
             pressure_gradient=vector(rng),
@@ -27,8 +27,8 @@ def test_drag_in_both_flows_together(packed, mean, per_size, rng):
             packed=packed,
             mean=mean,
         )
-        made.append(cloud(rng, (UniformFlow(velocity=vector(rng)), darcy, StokesDrag(viscosity=0.7))))
-    for one, state in zip(made, loads(made), strict=True):
+        scenes.append(cloud(rng, (UniformFlow(velocity=vector(rng)), darcy, StokesDrag(viscosity=0.7))))
+    for one, state in zip(scenes, loads(scenes), strict=True):
         flow, darcy, _ = one.effects
         eps, nu = darcy.porosity, darcy.diameter / per_size
         speed = eps**3 * nu**2 / (darcy.constant * (1 - eps) ** 2) / darcy.viscosity
@@ -47,7 +47,7 @@ def test_permeability_is_that_of_blake_kozeny_and_carman():
 def test_a_particle_takes_up_the_velocity_of_the_fluid():
     """v = v_f (1 - exp(-t/tau)), tau = m / (6 pi mu R), from rest."""
     tau, end = 2.0 / (6 * np.pi * 0.5 * 0.1), 3.0
-    made = scene(
+    setup = scene(
         [[0, 0, 0]],
         [[0, 0, 0]],
         (UniformFlow(velocity=(1, -2, 3)), StokesDrag(viscosity=0.5)),
@@ -56,7 +56,7 @@ def test_a_particle_takes_up_the_velocity_of_the_fluid():
         stepper=Trapezoid(control=ErrorControl(error=1e-8, tolerance=1e-10, first=1e-3, longest=0.1)),
         duration=end,
     )
-    (result,) = simulate([made], capacity=4)
+    (result,) = simulate([setup], capacity=4)
     assert result.status.ok
     expected = np.array([1, -2, 3]) * (1 - np.exp(-end / tau))
     close(result.state["velocity"][0], expected, 1e-6)

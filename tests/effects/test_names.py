@@ -36,8 +36,8 @@ def one(*effects, **more):
 def test_each_acts_with_its_own_parameters(rng):
     """The forces of two Mie pairs, one of them without a name, are the sum of their twins in NumPy."""
     for other in (CORE, Mie(epsilon=2.0)):
-        made = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
-        (result,) = simulate([made])
+        setup = crowd(rng, SHELL).model_copy(update={"effects": (other, SHELL)})
+        (result,) = simulate([setup])
         expected = twin(other, result.state) + twin(SHELL, result.state)
         alone = twin(SHELL, result.state)
         assert np.abs(expected - alone).max() > 0.1 * np.abs(alone).max()
@@ -47,30 +47,30 @@ def test_each_acts_with_its_own_parameters(rng):
 
 
 def test_files_name_them_by_their_tables():
-    made = one(CORE, Mie(epsilon=2.0), SHELL)
-    tables = made.to_dict()["effects"]
+    setup = one(CORE, Mie(epsilon=2.0), SHELL)
+    tables = setup.to_dict()["effects"]
     assert list(tables) == ["core", "mie", "shell"]
     assert [table.get("kind") for table in tables.values()] == ["mie", None, "mie"]
     assert not any("name" in table for table in tables.values())
-    again = Scene.from_dict(json.loads(json.dumps(made.to_dict())))
-    assert again == made
-    assert again.digest() == made.digest()
-    assert '[effects.core]\nkind = "mie"\n' in made.to_toml()
+    again = Scene.from_dict(json.loads(json.dumps(setup.to_dict())))
+    assert again == setup
+    assert again.digest() == setup.digest()
+    assert '[effects.core]\nkind = "mie"\n' in setup.to_toml()
 
 
 def test_settings_and_leaving_out_go_by_name():
-    made = one(CORE, SHELL)
-    changed = made.replace({"effects.core.epsilon": 5.0})
+    setup = one(CORE, SHELL)
+    changed = setup.replace({"effects.core.epsilon": 5.0})
     assert [effect.epsilon for effect in changed.effects] == [5.0, 0.3]
-    assert changed.digest() != made.digest()
-    assert made.without("core").effects == (SHELL,)
+    assert changed.digest() != setup.digest()
+    assert setup.without("core").effects == (SHELL,)
     with pytest.raises(InputError, match="effect to leave out must be one of core, shell; received 'mie'"):
-        made.without("mie")
+        setup.without("mie")
     with pytest.raises(InputError, match=r"^core\.epsilon must be greater than 0\.0; received -1$"):
-        made.replace({"effects.core.epsilon": -1})
+        setup.replace({"effects.core.epsilon": -1})
     rule = "effects.core.depth.x must be a setting of this scene; received 'depth'"
     with pytest.raises(InputError, match=f"^{re.escape(rule)}$"):
-        made.replace({"effects.core.depth.x": 1})
+        setup.replace({"effects.core.depth.x": 1})
 
 
 def test_a_name_is_part_of_the_digest_and_the_kind_is_no_name():
@@ -86,8 +86,8 @@ def test_two_oscillating_fields_add_up():
     """The force on a charge in both is that of the sum, with a frequency for each."""
     slow = ElectricField(name="slow", amplitude=(1.0, 0, 0), omega=(3.0, 0, 0))
     fast = ElectricField(name="fast", amplitude=(0, 2.0, 0), omega=(0, 50.0, 0), phase=(0, 0.3, 0))
-    made = one(slow, fast, Lorentz(), quantities={"charge": 1e-6}, dt=0.01, steps=7)
-    (result,) = simulate([made])
+    setup = one(slow, fast, Lorentz(), quantities={"charge": 1e-6}, dt=0.01, steps=7)
+    (result,) = simulate([setup])
     t = result.time
     expected = 1e-6 * np.array([np.sin(3 * t), 2 * np.sin(50 * t + 0.3), 0])
     np.testing.assert_allclose(result.state["force"][0], expected, rtol=1e-12)
@@ -96,10 +96,10 @@ def test_two_oscillating_fields_add_up():
 def test_what_touching_pairs_remember_is_kept_for_each_by_name():
     two = (Remembering(stiffness=1.0, width=1e-3), Remembering(name="other", stiffness=1.0, width=1e-3))
     users = needed_fields(two, Verlet())
-    kept = {
+    memories = {
         one.name: who for one, who in users.items() if not isinstance(one, str) and "_partners" in one.name
     }
-    assert kept == {"remembering_partners": "remembering", "other_partners": "other"}
+    assert memories == {"remembering_partners": "remembering", "other_partners": "other"}
 
 
 class Anchored(Gravity):
@@ -152,8 +152,8 @@ def test_what_makes_no_sense_twice_and_wrong_names_are_refused(message):
 def test_a_failure_says_which_of_them():
     control = IterationControl(first=1e-2, longest=1e-2, shortest=1e-2)
     traps = (Trap(stiffness=1.0), Trap(name="stiff", stiffness=1e7))
-    made = scene([[1, 0, 0]], [[0, 0, 0]], traps, mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
-    (result,) = simulate([made])
+    setup = scene([[1, 0, 0]], [[0, 0, 0]], traps, mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
+    (result,) = simulate([setup])
     assert "by effects.stiff, at particle 0" in result.status.reason
 
 
@@ -162,9 +162,9 @@ def test_explain_lists_them_by_name():
     from tisim.engine.explain import explain
 
     shells = SoftShell(stiffness=1.0, width=1e-3), SoftShell(name="outer", stiffness=0.1, width=2e-3)
-    found = explain(one(*shells))
-    assert [part.name for part in found.effects] == ["soft_shell", "outer"]
-    assert [dict((n, v) for n, v, *_ in part.parameters)["width"] for part in found.effects] == [
+    explanation = explain(one(*shells))
+    assert [part.name for part in explanation.effects] == ["soft_shell", "outer"]
+    assert [dict((n, v) for n, v, *_ in part.parameters)["width"] for part in explanation.effects] == [
         "0.001",
         "0.002",
     ]

@@ -20,37 +20,37 @@ def text(scene):
 
 def test_whole_flow_leaves_nothing_out():
     flow = agglomeration(BEST, 1, grains=60)
-    found = explain(flow)
-    assert [part.name for part in found.effects] == [effect.kind() for effect in flow.effects]
-    assert all(part.summary and part.source for part in found.effects)
-    names = {part.name for part in found.effects}
-    assert {part.name for part in found.absent_effects} == {k.kind() for k in known_effects()} - names
-    assert (found.particles, found.capacity) == (60, 60)
-    assert found.steps == pytest.approx(flow.duration / flow.stepper.control.longest)
+    explanation = explain(flow)
+    assert [part.name for part in explanation.effects] == [effect.kind() for effect in flow.effects]
+    assert all(part.summary and part.source for part in explanation.effects)
+    names = {part.name for part in explanation.effects}
+    assert {part.name for part in explanation.absent_effects} == {k.kind() for k in known_effects()} - names
+    assert (explanation.particles, explanation.capacity) == (60, 60)
+    assert explanation.steps == pytest.approx(flow.duration / flow.stepper.control.longest)
 
 
 def test_absent_effects_and_fields():
     whole = agglomeration(BEST, 1, grains=60)
-    found = explain(
+    explanation = explain(
         whole.without(*(e.kind() for e in whole.effects if e.kind() not in ("impact", "friction")))
     )
-    absent = {part.name for part in found.absent_effects}
+    absent = {part.name for part in explanation.absent_effects}
     assert {"heating", "cooling", "reaction", "fragmentation", "agglomeration"} <= absent
     assert not absent & {"impact", "friction", "impact_law", "operator", "force"}
-    fields = dict(found.absent_fields)
+    fields = dict(explanation.absent_fields)
     assert "reaction" in fields["temperature"]
     assert "fragmentation" in fields["pieces"]
-    assert not {item.name for item in found.memory} & set(fields)
+    assert not {item.name for item in explanation.memory} & set(fields)
 
 
 def test_without_any_effect_nothing_of_effects_is_compiled():
     whole = agglomeration(BEST, 1, grains=60)
-    found = explain(whole.without(*(effect.kind() for effect in whole.effects)))
-    assert found.effects == ()
+    explanation = explain(whole.without(*(effect.kind() for effect in whole.effects)))
+    assert explanation.effects == ()
     assert {
-        item.why for item in found.memory if item.bytes and not item.name.endswith(("table", "list"))
+        item.why for item in explanation.memory if item.bytes and not item.name.endswith(("table", "list"))
     } == {"every scene"}
-    assert not {"OpenContacts*", "Bid*", "Resolve*", "Rearrange", "SumForces"} & set(found.phases)
+    assert not {"OpenContacts*", "Bid*", "Resolve*", "Rearrange", "SumForces"} & set(explanation.phases)
 
 
 @pytest.mark.slow
@@ -65,32 +65,32 @@ def test_memory_is_what_is_allocated():
 
 
 def test_parameters_have_units_and_sources():
-    shown = text(agglomeration(BEST, 1, grains=60))
-    assert "hardness = 265480 Pa" in shown
-    assert "heat_capacity = 1796.3 J/(kg K)" in shown
-    assert "Z04 Eq. (6.9)" in shown
-    assert "Rounds" not in shown
-    assert "Resolve*" in shown
+    output = text(agglomeration(BEST, 1, grains=60))
+    assert "hardness = 265480 Pa" in output
+    assert "heat_capacity = 1796.3 J/(kg K)" in output
+    assert "Z04 Eq. (6.9)" in output
+    assert "Rounds" not in output
+    assert "Resolve*" in output
 
 
 @pytest.mark.long
 def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
     """Z13: forces on charges, and nothing else; no fields, lists or phases of anything more."""
-    found = explain(vibration(sites=2))
-    named = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
-    assert {part.name for part in found.effects} == named
-    absent = {part.name for part in found.absent_effects}
-    assert absent == {kind.kind() for kind in known_effects()} - named
+    explanation = explain(vibration(sites=2))
+    effects = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
+    assert {part.name for part in explanation.effects} == effects
+    absent = {part.name for part in explanation.absent_effects}
+    assert absent == {kind.kind() for kind in known_effects()} - effects
     assert {"contact", "contact_friction", "impact", "heating", "cooling", "agglomeration"} <= absent
     core = {"position", "velocity", "mass", "radius", "id"}
     before = {"position_before", "velocity_before", "force_before", "iterate_change"}
     more = {"parameter table", "sums of the iteration"}
-    assert {item.name for item in found.memory} == core | before | more | {"charge", "anchor", "force"}
-    fields = dict(found.absent_fields)
+    assert {item.name for item in explanation.memory} == core | before | more | {"charge", "anchor", "force"}
+    fields = dict(explanation.absent_fields)
     assert "heating" in fields["temperature"]
     forbidden = ("list", "contact", "touch", "spin", "torque", "temperature", "heat")
-    allocated = " ".join(item.name for item in found.memory)
-    assert not [word for word in forbidden if word in allocated]
+    memory_names = " ".join(item.name for item in explanation.memory)
+    assert not [word for word in forbidden if word in memory_names]
     iteration = ["SumTrialForces**", "Correct**", "JudgeIteration**"]
     step = [
         "Begin",
@@ -103,4 +103,4 @@ def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
         "AdvanceClock",
         "FinishStep",
     ]
-    assert list(found.phases) == step
+    assert list(explanation.phases) == step

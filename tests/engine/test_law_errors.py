@@ -44,9 +44,9 @@ SAID = {
 @pytest.mark.parametrize("name", SAID)
 def test_in_python(own_file, name):
     laws = python_file.load(own_file("laws.py", LAWS))
-    with pytest.raises(InputError, match=SAID[name]) as told:
+    with pytest.raises(InputError, match=SAID[name]) as error_info:
         tisim.run(scene([[0, 0, 0]], [[0, 0, 0]], (getattr(laws, name)(),)))
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(error_info.value)
 
 
 def test_on_the_command_line(own_file, capsys):

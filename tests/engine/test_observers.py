@@ -7,55 +7,55 @@ from tests.scenes import compiled, flow
 from tisim import InputError, Observer, PeriodicCheckpoint
 
 FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
-CAPACITY = max(made.capacity() for made in FLOWS)
+CAPACITY = max(scene.capacity() for scene in FLOWS)
 
 
 @pytest.fixture
 def simulation():
-    made = compiled(FLOWS[0], 2, CAPACITY)
-    made.load(FLOWS)
-    return made
+    scene = compiled(FLOWS[0], 2, CAPACITY)
+    scene.load(FLOWS)
+    return scene
 
 
 @pytest.fixture(scope="module")
 def whole():
     """Results in one go, and the times of all ends of steps of each world, s."""
-    made = compiled(FLOWS[0], 2, CAPACITY)
-    made.load(FLOWS)
-    times = [made.s.read("time")]
-    while len(made.ended()) < 2:
-        made.run(steps=1)
-        times.append(made.s.read("time"))
-    made.load(FLOWS)
-    made.run()
-    return made.results(), np.array(times).T
+    sim = compiled(FLOWS[0], 2, CAPACITY)
+    sim.load(FLOWS)
+    times = [sim.s.read("time")]
+    while len(sim.ended()) < 2:
+        sim.run(steps=1)
+        times.append(sim.s.read("time"))
+    sim.load(FLOWS)
+    sim.run()
+    return sim.results(), np.array(times).T
 
 
-def same(found, wanted):
-    for result, other in zip(found, wanted, strict=True):
+def same(results, expected):
+    for result, other in zip(results, expected, strict=True):
         assert (result.time, result.work, result.status) == (other.time, other.work, other.status)
         for name, values in result.state.items():
             np.testing.assert_array_equal(values, other.state[name], err_msg=name)
 
 
-def first_end(times, wanted):
+def first_end(times, pause):
     """The first of these times at or after one; the last where none is."""
-    return times[min(np.searchsorted(times, wanted), len(times) - 1)]
+    return times[min(np.searchsorted(times, pause), len(times) - 1)]
 
 
 class Waits(Observer):
     """Has each world wait at times of its own, and keeps when it has seen it."""
 
-    def __init__(self, *wanted):
-        self.wanted, self.seen = [list(times) for times in wanted], []
+    def __init__(self, *pauses):
+        self.pauses, self.observed = [list(times) for times in pauses], []
 
     def pause(self, simulation):
-        return np.array([min(times, default=np.inf) for times in self.wanted])
+        return np.array([min(times, default=np.inf) for times in self.pauses])
 
     def observe(self, simulation):
         now = simulation.s.read("time")
-        self.seen.append(now)
-        self.wanted = [[t for t in times if t > now[w]] for w, times in enumerate(self.wanted)]
+        self.observed.append(now)
+        self.pauses = [[t for t in times if t > now[w]] for w, times in enumerate(self.pauses)]
 
 
 def test_until_is_the_first_end_of_a_step_there_and_a_later_run_goes_on(simulation, whole):
@@ -79,30 +79,30 @@ def test_worlds_wait_for_the_earliest_of_all_observers(simulation, whole):
     simulation.run(observers=[one, other])
     same(simulation.results(), results)
     for observer in (one, other):
-        seen = np.array(observer.seen)
-        for w, wanted in ((0, (0.0, 1.1e-4, 2e-4, 2.5e-4, 3e-4, 1.0)), (1, (0.0, 2.2e-4, 2.5e-4, 1.0))):
-            assert {first_end(times[w], t) for t in wanted} <= set(seen[:, w])
+        observed_times = np.array(observer.observed)
+        for w, pauses in ((0, (0.0, 1.1e-4, 2e-4, 2.5e-4, 3e-4, 1.0)), (1, (0.0, 2.2e-4, 2.5e-4, 1.0))):
+            assert {first_end(times[w], t) for t in pauses} <= set(observed_times[:, w])
 
 
 def test_a_pause_that_has_passed_is_none(simulation, whole):
     class Stubborn(Observer):
-        seen = 0
+        observed = 0
 
         def pause(self, simulation):
             return 1e-4
 
         def observe(self, simulation):
-            self.seen += 1
+            self.observed += 1
 
     stubborn = Stubborn()
     simulation.run(observers=[stubborn])
     same(simulation.results(), whole[0])
-    assert stubborn.seen >= 3
+    assert stubborn.observed >= 3
 
 
 def test_a_function_is_called_from_the_start_to_the_end(simulation):
     fractions = []
-    simulation.run(observers=[lambda made: fractions.append(made.fraction())])
+    simulation.run(observers=[lambda simulation_: fractions.append(simulation_.fraction())])
     assert (fractions[0], fractions[-1]) == (0.0, 1.0)
     assert (np.diff(fractions) > 0).all()
 
@@ -111,8 +111,8 @@ def test_an_observer_that_raises_stops_between_two_steps(simulation, whole):
     class Enough(Exception):
         pass
 
-    def stop(made):
-        if made.fraction() > 0:
+    def stop(sim):
+        if sim.fraction() > 0:
             raise Enough
 
     with pytest.raises(Enough):
@@ -137,7 +137,7 @@ def test_a_checkpoint_now_and_then(simulation, whole, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("asked", "message"),
+    ("arguments", "message"),
     [
         ({"until": -1.0}, "until must be a number of s of simulated time, at least 0; received -1.0"),
         ({"until": float("nan")}, "until must be a number of s of simulated time, at least 0; received nan"),
@@ -146,14 +146,14 @@ def test_a_checkpoint_now_and_then(simulation, whole, tmp_path):
         ({"observers": [Observer]}, "an observer must be an Observer or a function"),
     ],
 )
-def test_what_cannot_be_asked_for(simulation, asked, message):
+def test_what_cannot_be_asked_for(simulation, arguments, message):
     with pytest.raises(InputError, match=message):
-        simulation.run(**asked)
+        simulation.run(**arguments)
     assert simulation.fraction() == 0
 
 
 def test_what_is_not_loaded_is_not_run(monkeypatch):
-    made = compiled(FLOWS[0], 2, CAPACITY)
-    monkeypatch.setattr(made, "scenes", [])
+    sim = compiled(FLOWS[0], 2, CAPACITY)
+    monkeypatch.setattr(sim, "scenes", [])
     with pytest.raises(InputError, match="simulation must be loaded before it is run; received 'no scene'"):
-        made.run()
+        sim.run()

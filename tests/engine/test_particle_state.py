@@ -8,7 +8,7 @@ from tisim import Box, InputError, Particles, Scene
 from tisim.effects import Mie
 
 FLOWS = [flow(0, grains=60), flow(1, grains=60)]
-CAPACITY = max(made.capacity() for made in FLOWS)
+CAPACITY = max(scene.capacity() for scene in FLOWS)
 
 
 def crystal(seed=0, lattice=None, speed=None):
@@ -28,15 +28,15 @@ def crystal(seed=0, lattice=None, speed=None):
 
 @pytest.fixture
 def simulation():
-    made = compiled(FLOWS[0], 2, CAPACITY)
-    made.load(FLOWS)
-    return made
+    sim = compiled(FLOWS[0], 2, CAPACITY)
+    sim.load(FLOWS)
+    return sim
 
 
-def same(found, wanted):
-    assert (found.time, found.work, found.status) == (wanted.time, wanted.work, wanted.status)
-    for name, values in found.state.items():
-        np.testing.assert_array_equal(values, wanted.state[name], err_msg=name)
+def same(actual, expected):
+    assert (actual.time, actual.work, actual.status) == (expected.time, expected.work, expected.status)
+    for name, values in actual.state.items():
+        np.testing.assert_array_equal(values, expected.state[name], err_msg=name)
 
 
 def test_it_is_what_a_result_would_have(simulation):
@@ -91,14 +91,14 @@ def test_forces_are_those_of_what_was_written():
 def test_to_write_what_is_there_changes_nothing(simulation):
     """Nor in what comes: events, steps and bits, in both worlds."""
     simulation.run()
-    wanted = simulation.results()
+    expected = simulation.results()
     simulation.load(FLOWS)
     simulation.run(steps=9)
     for name in ("velocity", "radius", "temperature"):
         simulation.states[1][name] = simulation.states[1][name]
     simulation.run()
-    for found, other in zip(simulation.results(), wanted, strict=True):
-        same(found, other)
+    for result, other in zip(simulation.results(), expected, strict=True):
+        same(result, other)
     assert simulation.results()[1].work["merges"] > 0
 
 
@@ -107,22 +107,22 @@ def test_a_checkpoint_knows_of_it(simulation, tmp_path):
     simulation.states[0]["velocity"] = 2.0 * simulation.states[0]["velocity"]
     simulation.checkpoint(tmp_path / "c.h5")
     simulation.run()
-    wanted = simulation.results()
+    expected = simulation.results()
     simulation.load(FLOWS)
     simulation.restore(tmp_path / "c.h5")
     simulation.run()
-    for found, other in zip(simulation.results(), wanted, strict=True):
-        same(found, other)
-        assert found.settings == other.settings
+    for result, other in zip(simulation.results(), expected, strict=True):
+        same(result, other)
+        assert result.settings == other.settings
     assert "velocity at t = " in simulation.results()[0].settings["edited"]
 
 
 def test_an_observer_may_write_too(simulation):
     """A thermostat by hand: the run stops where it was asked to."""
 
-    def cool(made):
-        if made.fraction() > 0:
-            made.states[0]["temperature"] = np.full_like(made.states[0]["temperature"], 300.0)
+    def cool(sim):
+        if sim.fraction() > 0:
+            sim.states[0]["temperature"] = np.full_like(sim.states[0]["temperature"], 300.0)
 
     simulation.run(steps=4, observers=[cool])
     result, _ = simulation.results()

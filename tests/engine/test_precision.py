@@ -11,9 +11,9 @@ from tisim.effects import Heating, Impact, Softening
 
 def world(elsewhere, precision, w):
     head = f"{precision}/{w}/"
-    found = {key.removeprefix(head): values for key, values in elsewhere.items() if key.startswith(head)}
-    start = {key.removeprefix("start/"): values for key, values in found.items() if key.startswith("start/")}
-    return {key: values for key, values in found.items() if "/" not in key}, start
+    arrays = {key.removeprefix(head): values for key, values in elsewhere.items() if key.startswith(head)}
+    start = {key.removeprefix("start/"): values for key, values in arrays.items() if key.startswith("start/")}
+    return {key: values for key, values in arrays.items() if "/" not in key}, start
 
 
 @pytest.mark.slow
@@ -48,14 +48,14 @@ def test_single_and_double_precision_agree_on_how_much_merges(elsewhere):
 
 def rebounds_of_cold_grains():
     """Status, impacts, bonds and impacts that have not settled, of grains with an immense hardness."""
-    found = []
+    rows = []
     for hardness, activation, temperature in ((1e5, 2e5, 300.0), (1e6, 1e3, 0.0), (1e9, 1e3, 1e-3)):
         effects = (
             Impact(hardness=hardness), Heating(heat_capacity=1e9), Softening(activation_energy=activation)
         )  # fmt: skip
         (result,) = simulate([head_on(0.01, effects, quantities={"temperature": temperature})])
-        found.append([result.status.ok, *(result.work[name] for name in ("impacts", "bonds", "unconverged"))])
-    return found
+        rows.append([result.status.ok, *(result.work[name] for name in ("impacts", "bonds", "unconverged"))])
+    return rows
 
 
 @pytest.mark.slow
@@ -70,9 +70,9 @@ def test_cooling_is_as_right_as_single_precision_can_be(single):
     assert max(single("operators.test_cooling", "errors_of_steps")) < 8 * np.finfo(np.float32).eps
 
 
-def refused():
+def refusals():
     """What is said of scenes whose numbers f64 holds and f32 does not."""
-    said = []
+    messages = []
     for hardness, more in (
         (1e200, {"quantities": {"temperature": 1.0}}),
         (1e5, {"radius": 1e-17, "quantities": {"temperature": 1.0}}),
@@ -81,14 +81,14 @@ def refused():
         try:
             simulate([head_on(0.01, (Impact(hardness=hardness), Heating(heat_capacity=1e3)), **more)])
         except InputError as fault:
-            said.append(str(fault))
-    return said
+            messages.append(str(fault))
+    return messages
 
 
 @pytest.mark.long
 def test_what_single_precision_cannot_hold_is_refused(single):
     """Not an infinite hardness, nor a mass of zero, which would make the particle vanish."""
-    hardness, mass, temperature = single("engine.test_precision", "refused")
+    hardness, mass, temperature = single("engine.test_precision", "refusals")
     assert hardness.startswith("impact.hardness must be within the range of f32; received 1e+200")
     assert mass.startswith("particles.mass must be within the range of f32; received 8.37")
     assert temperature.startswith("particles.temperature must be within the range of f32")

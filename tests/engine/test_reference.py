@@ -70,25 +70,25 @@ def test_a_template_makes_its_part_with_its_defaults(entry):
     table = tomllib.loads(entry.toml)
     for key in family.place.replace("NAME", entry.name).split("."):
         table = table[key]
-    made = serialization.from_dict(family.base, {"kind": entry.name, **table}, "template")
-    assert type(made) is entry.kind
+    part = serialization.from_dict(family.base, {"kind": entry.name, **table}, "template")
+    assert type(part) is entry.kind
     for name, info in template.fields(entry.kind).items():
-        shown = info.is_required() or info.examples
-        assert shown or getattr(made, name) == info.get_default(call_default_factory=True), name
+        has_example = info.is_required() or info.examples
+        assert has_example or getattr(part, name) == info.get_default(call_default_factory=True), name
         assert f"# {text_of(info)}" in entry.toml or name in dict(entry.kind.lists()), name
 
 
 def test_an_effect_of_the_users_own_is_among_them():
-    found = reference.find("buoy")
-    assert found.summary == "Water carries a buoy, F = k z"
-    assert found.body == "    F = k z\n\nz is its depth."
-    assert found.source == "Z99 Eq. (1)"
-    assert found.fields == (("radius", "m"),)
-    assert [(one.name, one.unit, one.rule, one.default) for one in found.settings] == [
+    buoy = reference.find("buoy")
+    assert buoy.summary == "Water carries a buoy, F = k z"
+    assert buoy.body == "    F = k z\n\nz is its depth."
+    assert buoy.source == "Z99 Eq. (1)"
+    assert buoy.fields == (("radius", "m"),)
+    assert [(one.name, one.unit, one.rule, one.default) for one in buoy.settings] == [
         ("stiffness", "N/m", "> 0, <= 9", ""),
         ("still", "", "true or false", "true"),
     ]
-    assert found.toml.splitlines() == [
+    assert buoy.toml.splitlines() == [
         "[effects.buoy]",
         "# stiffness k of the water (N/m; an example)",
         "stiffness = 2.0",
@@ -105,8 +105,8 @@ def test_only_rows_of_lists_have_no_table_of_their_own():
 def test_families_share_nothing_and_leave_nothing_out():
     names = [entry.name for entry in ENTRIES]
     assert len(set(names)) == len(names)
-    known = {kind.kind() for kind in Component.known().values() if kind.__module__.startswith("tisim.")}
-    assert known - set(names) == {"component", "scene"}
+    kinds = {kind.kind() for kind in Component.known().values() if kind.__module__.startswith("tisim.")}
+    assert kinds - set(names) == {"component", "scene"}
 
 
 def test_what_a_part_needs():

@@ -50,8 +50,8 @@ def test_each_world_has_its_own_number(rng):
     """None, one, and so many that the table is longer; the same bits alone."""
     worlds = [hung(rng, 5), hung(rng, 0), hung(rng, 1, share=0.5), hung(rng, 31)]
     together = simulate(worlds, worlds=4, capacity=4)
-    for made, result in zip(worlds, together, strict=True):
-        law = made.effects[0]
+    for setup, result in zip(worlds, together, strict=True):
+        law = setup.effects[0]
         r = result.state["position"]
         pull = [s.stiffness * (np.array(s.end) - r) for s in law.springs]
         np.testing.assert_allclose(result.state["force"], law.share * sum(pull, np.zeros((3, 3))), atol=1e-13)
@@ -63,15 +63,15 @@ def test_each_world_has_its_own_number(rng):
 
 def test_files_and_dotted_keys(rng):
     """An array of tables in TOML; a row by its number."""
-    made = hung(rng, 2)
-    assert made.to_toml().count("[[effects.springs.springs]]") == 2
-    for again in (Scene.from_dict(made.to_dict()), Scene.from_dict(tomllib.loads(made.to_toml()))):
-        assert again == made
-        assert again.digest() == made.digest()
-    changed = made.replace({"effects.springs.springs.1.stiffness": 7})
-    assert [s.stiffness for s in changed.effects[0].springs] == [made.effects[0].springs[0].stiffness, 7.0]
-    assert changed.structure() == made.structure()
-    assert changed.digest() != made.digest()
+    setup = hung(rng, 2)
+    assert setup.to_toml().count("[[effects.springs.springs]]") == 2
+    for again in (Scene.from_dict(setup.to_dict()), Scene.from_dict(tomllib.loads(setup.to_toml()))):
+        assert again == setup
+        assert again.digest() == setup.digest()
+    changed = setup.replace({"effects.springs.springs.1.stiffness": 7})
+    assert [s.stiffness for s in changed.effects[0].springs] == [setup.effects[0].springs[0].stiffness, 7.0]
+    assert changed.structure() == setup.structure()
+    assert changed.digest() != setup.digest()
     none = hung(rng, 0)
     assert Scene.from_dict(tomllib.loads(none.to_toml())) == none
 

@@ -66,8 +66,8 @@ def put_fifo(path, victim):
 
 
 def put_socket(path, victim):
-    with socket.socket(socket.AF_UNIX) as made:
-        made.bind(str(path))
+    with socket.socket(socket.AF_UNIX) as socket_:
+        socket_.bind(str(path))
 
 
 THINGS = {
@@ -162,9 +162,9 @@ def theirs(tmp_path):
 def test_files_of_another_user_are_read_or_refused(theirs):
     """A lock file of another user serves to read; a folder that nothing can be made in is read without."""
     command = [sys.executable, "-c", OTHER_USER, str(theirs)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.stderr == ""
-    lines = done.stdout.splitlines()
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert completed.stderr == ""
+    lines = completed.stdout.splitlines()
     assert [line.split()[:2] for line in lines] == [
         ["0", "got"], ["1", "got"], *([str(k), "InputError"] for k in range(2, 8)),
     ]  # fmt: skip
@@ -207,10 +207,10 @@ def test_commands_on_a_folder_that_may_not_be_entered_say_so(theirs):
     elsewhere = {name: value for name, value in os.environ.items() if "OFFLINE_CACHE" not in name}
     command = [sys.executable, "-c", code, str(theirs)]
     home = {**elsewhere, "HOME": str(theirs / "closed"), "MPLCONFIGDIR": str(theirs.parent)}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=home)
-    assert done.returncode == 0, done.stderr
-    ends = json.loads(done.stdout.splitlines()[-1])
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=300, env=home)
+    assert completed.returncode == 0, completed.stderr
+    ends = json.loads(completed.stdout.splitlines()[-1])
     assert [code for code, _ in ends] == [2] * len(COMMANDS)
     rule = r"(in a folder that may be entered|a regular file of its own that may be opened); received "
-    for _, said in ends:
-        assert re.fullmatch(rf"closed/\S+ must be {rule}.*(denied|without permission)\n", said)
+    for _, output in ends:
+        assert re.fullmatch(rf"closed/\S+ must be {rule}.*(denied|without permission)\n", output)

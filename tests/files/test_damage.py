@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 
 import h5py
@@ -12,7 +13,8 @@ from tests.files.test_growing_hdf5 import STILL, frame, same
 from tests.soak import damage
 from tisim import InputError, Recording
 from tisim.accuracy import storage
-from tisim.files import checksum
+from tisim.files import checksum, framing
+from tisim.files.superblock import SIGNATURE
 from tisim.io import checkpoint, h5md
 from tisim.io.export import export
 from tisim.io.reader import frames, world_count
@@ -27,13 +29,13 @@ def test_no_damage_goes_unnoticed(tmp_path, name):
     kind, rng = damage.KINDS[name], np.random.default_rng(12)
     path = kind.make(tmp_path)
     content, whole = path.read_bytes(), kind.read(path)
-    refused = 0
+    refusals = 0
     for _ in range(40):
-        path.write_bytes(damage.damaged(content, rng))
-        what, why = damage.verdict(kind, path, whole)
-        assert what == "", (what, why)
-        refused += why != whole
-    assert refused > 10
+        path.write_bytes(damage.with_mishap(content, rng))
+        column, why = damage.verdict(kind, path, whole)
+        assert column == "", (column, why)
+        refusals += why != whole
+    assert refusals > 10
 
 
 @pytest.mark.slow
@@ -41,7 +43,7 @@ def test_no_damage_goes_unnoticed(tmp_path, name):
 def test_hundreds_of_damaged_files(tmp_path, name):
     reader = damage.Reader()
     try:
-        counts = damage._counted(name, np.random.default_rng(4), 200, tmp_path / "files", reader)
+        counts = damage._count(name, np.random.default_rng(4), 200, tmp_path / "files", reader)
     finally:
         reader.end()
     assert counts.clean, counts
@@ -57,7 +59,7 @@ def test_a_kind_whose_undamaged_file_is_refused_is_not_counted(tmp_path):
         return "", "file must be another; received this one"
 
     with pytest.raises(AssertionError, match=r"the undamaged result\.h5 is not read: file must be another"):
-        damage._counted("result.h5", np.random.default_rng(0), 3, tmp_path / "files", reader)
+        damage._count("result.h5", np.random.default_rng(0), 3, tmp_path / "files", reader)
 
 
 def test_every_lost_page_of_a_result_is_found(tmp_path):
@@ -81,11 +83,11 @@ def test_damage_to_a_frame_is_damage_to_that_frame(tmp_path):
         place = file["particles/all/velocity/value"].id.get_chunk_info(3).byte_offset
     content = path.read_bytes()
     path.write_bytes(content[: place + 9] + bytes([content[place + 9] ^ 4]) + content[place + 10 :])
-    with frames(path) as found:
+    with frames(path) as sequence:
         for k in (0, 2, 4):
-            same(found[k], k)
+            same(sequence[k], k)
         with pytest.raises(InputError, match="file must be undamaged; received"):
-            found[3]
+            sequence[3]
     recording = Recording(path, frames=99)
     with pytest.raises(InputError, match="file must be undamaged; received"):
         Trajectory.resume(recording, STILL, 1.0)
@@ -99,8 +101,8 @@ def test_numbers_that_hdf5_does_not_check_are_checked(tmp_path):
         place = file["particles/all/position/time"].id.get_chunk_info(0).byte_offset
     content = path.read_bytes()
     path.write_bytes(content[: place + 15] + bytes([content[place + 15] ^ 1]) + content[place + 16 :])
-    with frames(path) as found, pytest.raises(InputError, match="frame 1, the checksum of whose time"):
-        len(found)
+    with frames(path) as sequence, pytest.raises(InputError, match="frame 1, the checksum of whose time"):
+        len(sequence)
 
 
 def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
@@ -109,16 +111,16 @@ def test_a_lost_last_step_leaves_a_run_that_has_not_ended(tmp_path):
     with Trajectory(Recording(path, frames=9), [short]) as trajectory:
         for k in range(4):
             trajectory.write(0, frame(k))
-    with frames(path) as found:
-        assert (len(found), found.missing) == (4, "")
+    with frames(path) as sequence:
+        assert (len(sequence), sequence.missing) == (4, "")
     with h5py.File(path) as file:
         place = file["particles/all/position/step"].id.get_chunk_info(0).byte_offset + 3 * 8
     content = path.read_bytes()
     path.write_bytes(content[:place] + b"\xff" * 8 + content[place + 8 :])
-    with frames(path) as found:
+    with frames(path) as sequence:
         for k in range(3):
-            same(found[k], k)
-        assert found.missing == "the run has come to t = 0.003 s of 0.004 s; what follows is missing"
+            same(sequence[k], k)
+        assert sequence.missing == "the run has come to t = 0.003 s of 0.004 s; what follows is missing"
 
 
 @pytest.fixture(params=["none", "folder", "fifo", "link to a fifo", "device", "unreadable", "empty", "text",
@@ -158,9 +160,9 @@ def no_file(request, tmp_path):
     ids=["frames", "worlds", "export", "checkpoint", "cost"],
 )
 def test_what_is_no_file_of_ours_is_refused(no_file, read):
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as error_info:
         read(no_file)
-    assert "\n" not in str(refused.value)
+    assert "\n" not in str(error_info.value)
     assert {path.name for path in no_file.parent.iterdir()} <= {no_file.name, "fifo"}
 
 
@@ -174,13 +176,13 @@ def test_files_of_versions_without_checksums_are_told_from_those_of_others(tmp_p
         with h5py.File(path, "w", libver="earliest" if "older" in name else LIBVER) as file:
             h5md.write_metadata(file, "0.1.0")
             file["particles/all/position/step"] = [0, 10]
-    told = "an older version has written it, whose files h5py still reads$"
-    with pytest.raises(InputError, match=told), frames(path):
+    message = "an older version has written it, whose files h5py still reads$"
+    with pytest.raises(InputError, match=message), frames(path):
         pass
     with h5py.File(path, "r"):
         pass
     if name == "result.h5":
-        with pytest.raises(InputError, match=told):
+        with pytest.raises(InputError, match=message):
             checkpoint.restore(_Loaded(), path)
 
 
@@ -193,8 +195,17 @@ class _Loaded:
             pass
 
 
+@pytest.mark.parametrize(
+    "trailer", [{"size": 9, "data": 5, "crc": 1}, {"size": 9, "data": ["ab"], "crc": 1}, []]
+)
+def test_a_frame_that_is_no_checksum_is_none(trailer):
+    image = SIGNATURE + b"x"
+    assert checksum.verified(image + framing.frame(json.dumps(trailer).encode())) is None
+    assert checksum.verified(checksum.with_checksum(image)) == image
+
+
 def test_a_link_to_a_trajectory_is_read(tmp_path):
     (tmp_path / "link.h5").symlink_to(damage._trajectory(tmp_path))
-    with frames(tmp_path / "link.h5") as found:
-        same(found[3], 3)
+    with frames(tmp_path / "link.h5") as sequence:
+        same(sequence[3], 3)
     assert frame(3).step == 30

@@ -36,21 +36,21 @@ def frame(k):
     return Frame(1e-3 * (k + 1), 10 * k, arrays)
 
 
-def same(found, k):
+def same(actual, k):
     expected = frame(k)
-    assert (found.time, found.step) == (expected.time, expected.step)
-    assert found.arrays.keys() == expected.arrays.keys()
+    assert (actual.time, actual.step) == (expected.time, expected.step)
+    assert actual.arrays.keys() == expected.arrays.keys()
     for name, values in expected.arrays.items():
-        np.testing.assert_array_equal(found.arrays[name], values)
+        np.testing.assert_array_equal(actual.arrays[name], values)
 
 
-def whole_frames(path, acknowledged):
+def whole_frames(path, least):
     """How many frames there are in the file, each as it was written, and none missing that was."""
-    with frames(path) as found:
-        assert acknowledged <= len(found) <= acknowledged + 1
-        for k, one in enumerate(found):
+    with frames(path) as sequence:
+        assert least <= len(sequence) <= least + 1
+        for k, one in enumerate(sequence):
             same(one, k)
-        return len(found)
+        return len(sequence)
 
 
 @contextlib.contextmanager
@@ -67,23 +67,23 @@ def files_of_at_most(size):
 @pytest.mark.parametrize("rows", [4, pytest.param(12, marks=pytest.mark.slow)])
 def test_it_can_be_read_by_others_after_every_write(tmp_path, monkeypatch, rows):
     """So at whatever write the writer is killed. HDF5 opens it as any other file, and finds all frames."""
-    path, left = tmp_path / "t.h5", []
+    path, contents = tmp_path / "t.h5", []
 
     def note(self, at, piece, put=GrowingFile._write_piece):
         put(self, at, piece)
-        left.append((path.read_bytes(), written))
+        contents.append((path.read_bytes(), count))
 
     monkeypatch.setattr(GrowingFile, "_write_piece", note)
-    written = 0
+    count = 0
     with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
-        for written in range(rows):
-            trajectory.write(0, frame(written))
-    assert len(left) > 8 * rows
-    for content, acknowledged in left:
+        for count in range(rows):
+            trajectory.write(0, frame(count))
+    assert len(contents) > 8 * rows
+    for content, least in contents:
         path.write_bytes(content)
-        whole_frames(path, acknowledged)
+        whole_frames(path, least)
         with h5py.File(io.BytesIO(content)) as plain:
-            assert len(plain["particles/all/position/value"]) >= acknowledged
+            assert len(plain["particles/all/position/value"]) >= least
 
 
 def test_it_can_be_read_while_it_is_written(tmp_path):
@@ -99,12 +99,12 @@ def test_it_can_be_read_while_it_is_written(tmp_path):
 def test_frames_that_come_after_the_file_was_opened_are_read_too(tmp_path):
     """HDF5 itself would refuse them: they lie behind the end of the file that it has found."""
     path = tmp_path / "t.h5"
-    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory, frames(path) as found:
+    with Trajectory(Recording(path, frames=99), [STILL]) as trajectory, frames(path) as sequence:
         for k in range(5):
             trajectory.write(0, frame(k))
-        assert len(found) == 5
+        assert len(sequence) == 5
         for k in range(5):
-            same(found[k], k)
+            same(sequence[k], k)
 
 
 def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
@@ -114,11 +114,11 @@ def test_what_is_met_half_written_is_read_again(tmp_path, monkeypatch):
         trajectory.write(0, frame(0))
     calls, at = 0, 0
 
-    def torn(self, size, settled=SharedFile._read_stable):
+    def torn(self, size, read_stable=SharedFile._read_stable):
         nonlocal calls
         calls += 1
-        found = settled(self, size)
-        return bytes(len(found) // 2) + found[len(found) // 2 :] if calls == at else found
+        content = read_stable(self, size)
+        return bytes(len(content) // 2) + content[len(content) // 2 :] if calls == at else content
 
     monkeypatch.setattr(SharedFile, "_read_stable", torn)
     while calls >= at:
@@ -141,31 +141,31 @@ def test_a_trajectory_that_is_cut_short_is_refused(tmp_path):
     [0.1, 0.5, 0.7, 0.98, *(pytest.param(p, marks=pytest.mark.slow) for p in np.linspace(0.02, 0.96, 16))],
 )
 def test_full_disk_says_so_and_keeps_what_is_there(tmp_path, part):
-    path, written = tmp_path / "t.h5", 0
+    path, count = tmp_path / "t.h5", 0
 
     def write():
-        nonlocal written
+        nonlocal count
         with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
-            for written in range(10):
-                trajectory.write(0, frame(written))
+            for count in range(10):
+                trajectory.write(0, frame(count))
 
     write()
     size = int(path.stat().st_size * part)
     path.unlink()
-    written = 0
+    count = 0
     message = (
         "t.h5 could not be written: File too large; (frames before are|everything stored before is) intact"
     )
     with files_of_at_most(size), pytest.raises(RunError, match=message):
         write()
     if path.exists():
-        assert whole_frames(path, written) == written
+        assert whole_frames(path, count) == count
         assert path.stat().st_size <= size
     assert [file.name for file in tmp_path.iterdir()] in ([], ["t.h5"])
 
 
-@pytest.mark.parametrize("kept", [3, 9])
-def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, kept):
+@pytest.mark.parametrize("last", [3, 9])
+def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, last):
     path = tmp_path / "t.h5"
     recording = Recording(path, frames=99)
     with Trajectory(recording, [STILL]) as trajectory:
@@ -173,11 +173,11 @@ def test_full_disk_while_a_run_goes_on_leaves_the_file_of_before(tmp_path, kept)
             trajectory.write(0, frame(k))
     content = path.read_bytes()
     with files_of_at_most(len(content) // 4), pytest.raises(RunError, match="could not be written"):
-        Trajectory.resume(recording, STILL, frame(kept).time)
+        Trajectory.resume(recording, STILL, frame(last).time)
     assert path.read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["t.h5"]
-    with Trajectory.resume(recording, STILL, frame(kept).time):
-        assert whole_frames(path, kept + 1) == kept + 1
+    with Trajectory.resume(recording, STILL, frame(last).time):
+        assert whole_frames(path, last + 1) == last + 1
 
 
 def test_killed_before_its_first_frame_it_can_be_opened_and_gone_on_with(tmp_path):
@@ -239,14 +239,14 @@ def test_ctrl_c_while_hdf5_writes_waits_for_the_frame(tmp_path, monkeypatch, nam
     path = tmp_path / "t.h5"
 
     def write():
-        written = 0
+        count = 0
         try:
             with Trajectory(Recording(path, frames=99), [STILL]) as trajectory:
                 for k in range(2):
                     trajectory.write(0, frame(k))
-                    written = k + 1
+                    count = k + 1
         finally:
-            whole_frames(path, written)
+            whole_frames(path, count)
 
     stride, least = {"write": (4, 50), "readinto": (7, 2), "truncate": (1, 0)}[name]
     assert interrupted(monkeypatch, GrowingFile, name, write, stride) > least

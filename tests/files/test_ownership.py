@@ -14,11 +14,11 @@ from tisim.files.ownership import MARKER, LegacyFiles, check, check_all, claim
 @pytest.fixture(autouse=True)
 def before(monkeypatch):
     """What a version without markers is said to have left."""
-    left = (LegacyFiles(("all.h5",), ("all.csv",)), LegacyFiles(("more.h5",), ("more.csv",)))
-    monkeypatch.setattr(ownership, "LEGACY_FILES", left)
+    legacy = (LegacyFiles(("all.h5",), ("all.csv",)), LegacyFiles(("more.h5",), ("more.csv",)))
+    monkeypatch.setattr(ownership, "LEGACY_FILES", legacy)
 
 
-def written(folder, name, text="theirs"):
+def write_file(folder, name, text="theirs"):
     (folder / name).write_text(text)
 
 
@@ -27,12 +27,14 @@ def test_what_was_taken_may_be_replaced_and_nothing_else(tmp_path):
     check(folder, ["a", "b"])
     assert not folder.exists()
     claim(folder, ["a", "b"])
-    written(folder, "a")
-    written(folder, "a.new")
-    written(folder, "c")
+    write_file(folder, "a")
+    write_file(folder, "a.new")
+    write_file(folder, "c")
     claim(folder, ["a", "b"])
-    for names, found in ((["a", "c"], "c"), (["c", "d"], "c")):
-        with pytest.raises(InputError, match=rf"\(or give --overwrite\); received '.*/below' with {found}$"):
+    for names, foreign in ((["a", "c"], "c"), (["c", "d"], "c")):
+        with pytest.raises(
+            InputError, match=rf"\(or give --overwrite\); received '.*/below' with {foreign}$"
+        ):
             claim(folder, names)
     claim(folder, ["c"], overwrite=True)
     claim(folder, ["c"])
@@ -42,7 +44,7 @@ def test_what_was_taken_may_be_replaced_and_nothing_else(tmp_path):
 def test_many_files_are_not_all_spelled_out(tmp_path):
     names = [f"f{k}" for k in range(9)]
     for name in names:
-        written(tmp_path, name)
+        write_file(tmp_path, name)
     with pytest.raises(InputError, match=r"with f0, f1, f2, f3, f4 and 4 more$"):
         check(tmp_path, names)
 
@@ -52,8 +54,8 @@ def test_links_and_folders_are_refused_even_where_all_may_be_replaced(tmp_path, 
     claim(tmp_path, ["a", "b"])
     (tmp_path / "a").symlink_to("elsewhere")
     (tmp_path / "b.new").mkdir()
-    for name, what in (("a", "a symbolic link"), ("b", "a folder")):
-        with pytest.raises(InputError, match=rf"must be a regular file of its own .* received {what}"):
+    for name, kind in (("a", "a symbolic link"), ("b", "a folder")):
+        with pytest.raises(InputError, match=rf"must be a regular file of its own .* received {kind}"):
             claim(tmp_path, [name], overwrite)
 
 
@@ -75,8 +77,8 @@ def hdf5(path, creator):
 )
 def test_a_folder_without_a_marker_is_known_by_what_is_in_its_main_files(tmp_path, make, ours):
     make(tmp_path / "all.h5")
-    written(tmp_path, "all.csv")
-    written(tmp_path, "other.csv")
+    write_file(tmp_path, "all.csv")
+    write_file(tmp_path, "other.csv")
     if ours:
         claim(tmp_path, ["new.csv"])
         assert (tmp_path / MARKER).read_text() == ".tisim.lock\nall.csv\nall.h5\nnew.csv\n"
@@ -93,8 +95,8 @@ def test_where_names_are_not_known_yet_all_must_be_ours(tmp_path):
     check_all(tmp_path / "none")
     check_all(tmp_path)
     claim(tmp_path, ["a"])
-    written(tmp_path, "a")
-    written(tmp_path, "a.new")
+    write_file(tmp_path, "a")
+    write_file(tmp_path, "a.new")
     check_all(tmp_path)
     (tmp_path / "theirs").mkdir()
     with pytest.raises(InputError, match=r"has not written and might replace .* with theirs"):
@@ -130,7 +132,7 @@ def test_nothing_is_taken_for_granted(tmp_path):
     """Of what such a version has not left there, nothing is ours."""
     hdf5(tmp_path / "all.h5", "tisim")
     hdf5(tmp_path / "another.h5", "tisim")
-    written(tmp_path, "more.csv")
+    write_file(tmp_path, "more.csv")
     for name in ("another.h5", "more.csv"):
         with pytest.raises(InputError, match=f"with {name}"):
             check(tmp_path, [name])

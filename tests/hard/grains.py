@@ -60,21 +60,21 @@ def grains(position, velocity, dt, steps, mass=1.0, temperature=300.0, **laws):
     return scene(position, velocity, effects, R, mass=mass, **more)
 
 
-def watched(made, looks=1):
+def watched(scenes, looks=1):
     """Results, and the states of each world at the start and after each of so many equal parts of its run."""
-    simulation = compiled(made[0], WORLDS, CAPACITY)
-    simulation.load(made)
-    steps = max(round(m.duration / m.stepper.control.dt) for m in made)
-    seen = [[by_id(result)] for result in simulation.results()]
+    simulation = compiled(scenes[0], WORLDS, CAPACITY)
+    simulation.load(scenes)
+    steps = max(round(m.duration / m.stepper.control.dt) for m in scenes)
+    states_by_world = [[by_id(result)] for result in simulation.results()]
     for _ in range(looks):
         simulation.run(steps=-(-steps // looks))
-        for states, result in zip(seen, simulation.results(), strict=True):
+        for states, result in zip(states_by_world, simulation.results(), strict=True):
             states.append(by_id(result))
-    return simulation.results(), seen
+    return simulation.results(), states_by_world
 
 
-def run(made):
-    results, _ = watched(made)
+def run(scenes):
+    results, _ = watched(scenes)
     for result in results:
         assert result.status.ok, result.status.reason
     return [by_id(result) for result in results]
@@ -90,7 +90,7 @@ def push(d):
     return K * (1 - d / (2 * R)) ** 2 * area(d)
 
 
-def stored(d):
+def stored_energy(d):
     """Energy of contact, J."""
     return quad(push, d, 2 * R)[0] if d < 2 * R else 0.0
 

@@ -238,15 +238,15 @@ def test_every_cut_of_a_scene_file_is_refused_or_read(tmp_path):
     """At whichever byte a file ends: InputError, or a valid scene; never anything else."""
     whole = flow(grains=2).to_toml().encode()
     file = tmp_path / "scene.toml"
-    refused = []
+    refusals = []
     for end in range(0, len(whole), 7):
         file.write_bytes(whole[:end])
         try:
             Scene.from_toml(file)
         except InputError as fault:
-            refused.append(str(fault))
-    assert len(refused) > 20
-    assert all(" must " in text and "; received " in text for text in refused)
+            refusals.append(str(fault))
+    assert len(refusals) > 20
+    assert all(" must " in text and "; received " in text for text in refusals)
 
 
 def test_a_start_that_does_not_fit_is_refused():
@@ -282,6 +282,6 @@ def test_a_start_that_does_not_fit_is_refused():
 
 def test_more_than_the_machine_holds_is_refused_before_anything_runs():
     """A smallest piece of next to nothing asks for slots without end."""
-    made = flow(seed=1, grains=20).replace({"effects.fragmentation.grain_mass": 1e-20})
+    scene = flow(seed=1, grains=20).replace({"effects.fragmentation.grain_mass": 1e-20})
     with pytest.raises(InputError, match=r"memory for 1 x \d+ particles must be within the \d+ GB"):
-        Simulation(made)
+        Simulation(scene)

@@ -91,13 +91,13 @@ def plane(vector):
 def rotations(request):
     """One charge in B, and one in E and B, from rest, for the same steps; with what they were asked for."""
     name = request.param
-    made = []
+    scenes = []
     for z, steps in ROTATIONS[name]:
         stepper, duration = equal_steps(name, z / W), steps * z / W
-        made.append(charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], stepper, duration))
+        scenes.append(charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], stepper, duration))
         if steps > 1000:
-            made.append(charges([[0, 0, 0]], [[0, 0, 0]], stepper, duration, field=1.5))
-    results = run(made)
+            scenes.append(charges([[0, 0, 0]], [[0, 0, 0]], stepper, duration, field=1.5))
+    results = run(scenes)
     kinds = {0.0: [], 1.5: []}
     for result in results:
         kinds[result.scene.effects[1].constant[0]].append(result)
@@ -141,8 +141,8 @@ def test_drift_across_both_fields(rotations):
 @pytest.mark.slow
 def test_sweeps_that_cannot_follow_the_rotation_say_so():
     """Five stages of w dt = 20: not a wrong number but a failure, which keeps the start."""
-    made = charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], equal_steps("collocation", 20.0 / W), 100.0)
-    (result,) = simulate([made], worlds=WORLDS, capacity=2)
+    setup = charges([[0, 0, 0]], [[0.6, -0.8, 0.5]], equal_steps("collocation", 20.0 / W), 100.0)
+    (result,) = simulate([setup], worlds=WORLDS, capacity=2)
     assert "cannot be solved even at the shortest step, by effects.lorentz" in result.status.reason
     np.testing.assert_array_equal(result.state["velocity"], result.start["velocity"])
 
@@ -183,10 +183,10 @@ def test_like_charges_from_a_nanometre(name, bound):
     """Two electrons released at rest: k q^2/d comes out as kinetic energy, through six decades of distance,
     also where the first step is a million times too long for the start."""
     q, m, gap = ELECTRON["charge"], ELECTRON["mass"], 1e-9
-    stored = K_E * q * q / gap
-    swiftest = np.sqrt(stored / m)
+    energy = K_E * q * q / gap
+    swiftest = np.sqrt(energy / m)
     duration = 1e-3 / (2 * swiftest)
-    made = [
+    scenes = [
         charges(
             [[0, 0, 0], [gap, 0, 0]],
             np.zeros((2, 3)),
@@ -198,12 +198,12 @@ def test_like_charges_from_a_nanometre(name, bound):
         )
         for first in (1e-18, 1e-9)
     ]
-    for result in run(made):
+    for result in run(scenes):
         state = by_id(result)
         distance = np.linalg.norm(state["position"][1] - state["position"][0])
         expected = swiftest * np.sqrt(1 - gap / distance)
         np.testing.assert_allclose(np.abs(state["velocity"][:, 0]), expected, rtol=bound)
         assert distance == pytest.approx(1e-3, rel=1e-2)
         np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12 * swiftest)
-    assert made[1].stepper.control.first > 1e5 * gap / swiftest
+    assert scenes[1].stepper.control.first > 1e5 * gap / swiftest
     assert result.work["rejections"] > 3

@@ -15,7 +15,7 @@ from tests.hard.grains import (
     kinetic,
     push,
     run,
-    stored,
+    stored_energy,
     watched,
 )
 
@@ -28,22 +28,22 @@ def test_head_on_beyond_the_speed_of_waves():
     dt = R / v / 500
     place, speed = [[-1.5 * R, 0, 0], [1.5 * R, 0, 0]], [[v, 0, 0], [-v, 0, 0]]
     free, damped = run([grains(place, speed, dt, 1500, damping=c) for c in (0.0, 1e3)])
-    assert abs(kinetic(free) - v**2) < 0.02 * stored(0.0)
+    assert abs(kinetic(free) - v**2) < 0.02 * stored_energy(0.0)
     assert free["velocity"][0, 0] > 0
     assert free["position"][0, 0] > 1.4 * R
-    lost = 1e3 * 2 * quad(area, 0, 2 * R)[0] * 2 * v
-    assert v**2 - kinetic(damped) == pytest.approx(lost, rel=2e-2)
+    loss = 1e3 * 2 * quad(area, 0, 2 * R)[0] * 2 * v
+    assert v**2 - kinetic(damped) == pytest.approx(loss, rel=2e-2)
 
 
 def test_grazing():
     """Past each other with 1e-3 radii of overlap: turned by the impulse along the straight path; with none,
     not at all."""
     v, deep, reach = 100.0, 1e-3 * R, 1.0
-    made = []
+    scenes = []
     for offset in (2 * R - deep, 2 * R):
         place = [[-reach, 0, 0], [reach, offset, 0]]
-        made.append(grains(place, [[v, 0, 0], [-v, 0, 0]], 1e-6, 20_000))
-    touched, missed = run(made)
+        scenes.append(grains(place, [[v, 0, 0], [-v, 0, 0]], 1e-6, 20_000))
+    touched, missed = run(scenes)
     b = 2 * R - deep
     impulse, _ = quad(lambda x: push(np.hypot(b, x)) * b / np.hypot(b, x), -0.1, 0.1, points=[0])
     assert touched["velocity"][1, 1] == pytest.approx(impulse / (2 * v), rel=1e-3)
@@ -69,27 +69,27 @@ def test_a_tall_column_rests():
     off = place.copy()
     off[5:, 2] += 1e-4 * R
     still = np.zeros_like(place)
-    made = [
+    scenes = [
         grains(place, still, 1e-3, 20_000, **more),
         grains(place, still, 1e-3, 20_000, friction=(1e5, 0.5, 0.4), damping=100.0, **more),
         grains(off, still, 1e-3, 20_000, **more),
         grains(off, still, 1e-3, 20_000, damping=100.0, **more),
     ]
-    results, seen = watched(made, looks=40)
+    results, states_by_world = watched(scenes, looks=40)
     assert all(result.status.ok for result in results)
 
     def energy(state):
         z = state["position"][:, 2]
-        held = 0.5 * SPRING * (z[0] - anchor[0, 2]) ** 2
-        return kinetic(state) + sum(map(stored, np.diff(z))) + 10.0 * z.sum() + held
+        anchored = 0.5 * SPRING * (z[0] - anchor[0, 2]) ** 2
+        return kinetic(state) + sum(map(stored_energy, np.diff(z))) + 10.0 * z.sum() + anchored
 
-    rest = energy(seen[0][0])
-    scale = energy(seen[2][0]) - rest
-    for states in seen[:2]:
+    rest = energy(states_by_world[0][0])
+    scale = energy(states_by_world[2][0]) - rest
+    for states in states_by_world[:2]:
         for state in states:
             np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-12)
             assert kinetic(state) < 1e-20
-    free, damped = ([(energy(state) - rest) / scale for state in states] for states in seen[2:])
+    free, damped = ([(energy(state) - rest) / scale for state in states] for states in states_by_world[2:])
     np.testing.assert_allclose(free, 1.0, atol=3e-3)
     assert np.diff(damped).max() < 0
     assert damped[-1] < 1e-3
@@ -108,11 +108,11 @@ def test_friction_just_below_and_just_above_its_angle():
         [1e12, 1e12, 1.0],
         {"held": 2, "friction": (k_f, mu_s, mu_d)},
     )
-    made = [
+    scenes = [
         grains(place, np.zeros((3, 3)), dt, steps, masses, pull=(f * hold, 0, 0), **more)
         for f in (0.99, 1.01)
     ]
-    results, (below, above) = watched(made, looks=4)
+    results, (below, above) = watched(scenes, looks=4)
     assert all(result.status.ok for result in results)
     for state in below[1:]:
         assert state["velocity"][2, 0] == pytest.approx(0.99 * hold / grip, rel=1e-3)
@@ -135,26 +135,26 @@ def test_a_spinning_pair_never_gains_energy():
     """Bonded grains that rub, roll and twist: with spin and what contact and bond store, energy never rises
     from one look to the next, and angular momentum is that of the start."""
     place = [[-DEEP / 2, 0.1, 0], [DEEP / 2, 0.1, 0]]
-    made = [
+    scenes = [
         spinning(place, spin, friction=(1e6, 0.5, 0.3), **BONDED)
         for spin in ([[0, 0, 5.0], [0, 0, 5.0]], [[0, 0, 5.0], [0, 0, -5.0]], [[3.0, 4, 1], [-2, 1, 7]])
     ]
-    results, seen = watched(made, looks=40)
+    results, states_by_world = watched(scenes, looks=40)
 
     def energy(state):
         d = np.linalg.norm(state["position"][1] - state["position"][0])
         pull, _ = quad(lambda x: 1e5 * (1 - x / (2 * R)) * area(x), d, DEEP)
-        return kinetic(state) + stored(d) - stored(DEEP) - pull
+        return kinetic(state) + stored_energy(d) - stored_energy(DEEP) - pull
 
-    for result, states in zip(results, seen, strict=True):
+    for result, states in zip(results, states_by_world, strict=True):
         assert result.status.ok
         energies = np.array([energy(state) for state in states])
         assert np.diff(energies).max() < 1e-9 * energies[0]
         momenta = np.array([angular_momentum(state) for state in states])
         np.testing.assert_allclose(momenta, momenta[:1] + 0 * momenta, atol=1e-11)
-    rubbed, rolled, _ = (energy(states[-1]) for states in seen)
-    assert rubbed < 0.4 * energy(seen[0][0])
-    assert rolled == pytest.approx(energy(seen[1][0]), rel=1e-12)
+    rubbed, rolled, _ = (energy(states[-1]) for states in states_by_world)
+    assert rubbed < 0.4 * energy(states_by_world[0][0])
+    assert rolled == pytest.approx(energy(states_by_world[1][0]), rel=1e-12)
 
 
 def test_a_bonded_pair_under_torsion():
@@ -162,11 +162,11 @@ def test_a_bonded_pair_under_torsion():
     Spins across it, both alike, decay into a rigid rotation of the pair with the same angular momentum."""
     place = [[-DEEP / 2, 0, 0], [DEEP / 2, 0, 0]]
     grip = {"bond": (1e5, 1e6, 0.05)}
-    made = [
+    scenes = [
         spinning(place, [[2.0, 0, 0], [-2.0, 0, 0]], **grip),
         spinning(place, [[0, 0, 1.0], [0, 0, 1.0]], **grip),
     ]
-    results, (twist, shear) = watched(made, looks=8)
+    results, (twist, shear) = watched(scenes, looks=8)
     assert all(result.status.ok for result in results)
     np.testing.assert_allclose(twist[-1]["spin"], [[2, 0, 0], [-2, 0, 0]], rtol=1e-12)
     np.testing.assert_allclose(twist[-1]["position"], place, rtol=0, atol=1e-12)
@@ -184,8 +184,8 @@ def test_a_bonded_pair_under_torsion():
 def test_softening_from_absolute_zero_to_a_thousand_times_hotter():
     """exp(-a (T/T* - 1)) at a = 1e3: cold grains are beyond numbers, said clearly; hot ones do not push."""
     place, still = [[0, 0, 0], [1.8 * R, 0, 0]], np.zeros((2, 3))
-    made = [grains(place, still, 1e-6, 10, sensitivity=1e3, temperature=t) for t in (0.0, 300.0, 3e5)]
-    (cold, warm, hot), _ = watched(made)
+    scenes = [grains(place, still, 1e-6, 10, sensitivity=1e3, temperature=t) for t in (0.0, 300.0, 3e5)]
+    (cold, warm, hot), _ = watched(scenes)
     assert "effects.contact, at particle 0" in cold.status.reason
     np.testing.assert_array_equal(cold.state["velocity"], 0.0)
     np.testing.assert_array_equal(hot.state["velocity"], 0.0)

@@ -15,12 +15,12 @@ from tisim.steppers import StepControl, Stepper
 
 @pytest.fixture(scope="module")
 def runs():
-    found = Runs()
-    yield found
-    found.end()
+    runner = Runs()
+    yield runner
+    runner.end()
 
 
-def came(runs, name, cases):
+def count_outcomes(runs, name, cases):
     """How many scenes have come to what; none of them to anything but words or numbers."""
     counts = Counter()
     for values in cases:
@@ -34,8 +34,8 @@ def came(runs, name, cases):
 @pytest.mark.parametrize("name", extremes.scenes())
 def test_extremes_of_a_kind(runs, name):
     """One number after another; as they are, the scene runs."""
-    assert came(runs, name, [{}]) == {RAN: 1}
-    counts = came(runs, name, extremes.one_by_one(name))
+    assert count_outcomes(runs, name, [{}]) == {RAN: 1}
+    counts = count_outcomes(runs, name, extremes.one_by_one(name))
     assert counts[RAN] > 0
     assert counts[REFUSED] > 0
 
@@ -44,16 +44,16 @@ def test_extremes_of_one_kind(runs):
     """A quick one of them."""
     name = "effects.stokes_drag"
     cases = [{("effects", "stokes_drag", "viscosity"): value} for value in (0.0, 2.3e-308, 1e155, 1.7e308)]
-    assert came(runs, name, cases) == {REFUSED: 1, RAN: 1, FAILED: 2}
+    assert count_outcomes(runs, name, cases) == {REFUSED: 1, RAN: 1, FAILED: 2}
 
 
 def test_every_kind_is_there():
     """Each stepper and control of the package is in some scene; effects are taken as they are found."""
     serialization.load(steppers)
-    found = [data["stepper"] for data in extremes.scenes().values()]
+    tables = [data["stepper"] for data in extremes.scenes().values()]
     for contract, names in (
-        (Stepper, {stepper["kind"] for stepper in found}),
-        (StepControl, {stepper["control"]["kind"] for stepper in found}),
+        (Stepper, {stepper["kind"] for stepper in tables}),
+        (StepControl, {stepper["control"]["kind"] for stepper in tables}),
     ):
         own = {name for name, kind in contract.known().items() if kind.__module__.startswith("tisim.")}
         assert own == names

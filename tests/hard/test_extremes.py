@@ -44,7 +44,7 @@ def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approa
     try:
         n = np.array([2.0, -3.0, 6.0]) / 7
         place = np.array([radius * away, 0, 0])
-        made = scene(
+        setup = scene(
             [place, place + 2 * radius * (1 - 1e-9) * n],
             [approach * n, 0 * n],
             merging(hardness),
@@ -52,7 +52,7 @@ def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approa
             mass=masses,
             dt=1e-30,
         )
-        (result,) = run_merging([made])
+        (result,) = run_merging([setup])
     except InputError as fault:
         check_message(str(fault))
         return
@@ -64,10 +64,10 @@ def test_any_magnitudes_are_refused_or_give_numbers(masses, radius, away, approa
 def test_a_place_that_rounding_cannot_tell_is_refused():
     """1 m from a place at 1e17 m, grains of a millimetre are in one point: nobody knows what they touch."""
     place = np.array([1e17, 0, 0])
-    made = scene([place, place + 1e-3], np.zeros((2, 3)), merging(1e9), radius=1e-3, dt=1e-30)
-    said = r"particles.position must be so near the origin that f\d\d rounds it by less than a radius"
-    with pytest.raises(InputError, match=said):
-        run_merging([made])
+    setup = scene([place, place + 1e-3], np.zeros((2, 3)), merging(1e9), radius=1e-3, dt=1e-30)
+    message = r"particles.position must be so near the origin that f\d\d rounds it by less than a radius"
+    with pytest.raises(InputError, match=message):
+        run_merging([setup])
 
 
 @pytest.mark.long
@@ -100,9 +100,9 @@ def test_touching_exactly_at_the_sum_of_radii():
     radius = 0.25
     for gap, impacts in ((0.5, 1), (np.nextafter(0.5, 1), 0)):
         place = [[0, 0, 0], [gap, 0, 0]]
-        made = scene(place, [[1e-3, 0, 0], [1e-3, 0, 0]], merging(1e9), radius=radius, dt=1e-30)
-        slow = made.replace({"particles.velocity": [[1e-3, 0, 0], [0, 0, 0]]})
-        together, closing = run_merging([made, slow])
+        setup = scene(place, [[1e-3, 0, 0], [1e-3, 0, 0]], merging(1e9), radius=radius, dt=1e-30)
+        slow = setup.replace({"particles.velocity": [[1e-3, 0, 0], [0, 0, 0]]})
+        together, closing = run_merging([setup, slow])
         assert together.work["impacts"] == 0
         assert closing.work["impacts"] == impacts
 
@@ -112,15 +112,15 @@ def test_mass_and_size_ratios(hardness):
     """Radii 1 : 1000, masses 1 : 1e9 and worse: momentum and energy to rounding of the larger."""
     for small, large, density in ((1e-6, 1e-3, DENSITY), (1e-6, 1e-3, [1.0, 1e4]), (1e-9, 1.0, DENSITY)):
         mass = np.asarray(density) * 4 / 3 * np.pi * np.array([small, large]) ** 3
-        made = pair((small + large) * (1 - 1e-12), 10.0, hardness, radius=[small, large], mass=mass)
-        (result,) = run_merging([made])
+        setup = pair((small + large) * (1 - 1e-12), 10.0, hardness, radius=[small, large], mass=mass)
+        (result,) = run_merging([setup])
         assert result.work["impacts"] == 1
         assert result.work["merges"] == (hardness < 1)
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=1e-14)
         if hardness > 1:
             # The light one bounces off as from a wall.
-            bounced = by_id(result)["velocity"][0]
-            np.testing.assert_allclose(bounced, -result.start["velocity"][0], rtol=1e-3)
+            velocity = by_id(result)["velocity"][0]
+            np.testing.assert_allclose(velocity, -result.start["velocity"][0], rtol=1e-3)
 
 
 def test_impact_at_any_speed():
@@ -158,17 +158,17 @@ def test_two_charges_in_one_place_fail_clearly():
 def test_like_charges_from_a_nanometre():
     """Two like charges released from 1e-9 m: with steps short enough, the energy comes out as kinetic."""
     q, gap = 1e-12, 1e-9
-    stored = 8.9875517873681764e9 * q * q / gap
-    tau = np.sqrt(gap**2 / (2 * stored))
-    made = charges(
+    potential_before = 8.9875517873681764e9 * q * q / gap
+    tau = np.sqrt(gap**2 / (2 * potential_before))
+    setup = charges(
         [[0, 0, 0], [gap, 0, 0]], np.zeros((2, 3)), [q, q], {"stiffness": 0.0}, dt=tau / 200, steps=20_000
     )
-    (result,) = run_charges([made])
+    (result,) = run_charges([setup])
     state = result.state
     kinetic = 0.5 * (state["velocity"] ** 2).sum()
-    left = stored * gap / np.linalg.norm(state["position"][1] - state["position"][0])
-    assert kinetic + left == pytest.approx(stored, rel=1e-4)
-    assert kinetic > 0.9 * stored
+    potential = potential_before * gap / np.linalg.norm(state["position"][1] - state["position"][0])
+    assert kinetic + potential == pytest.approx(potential_before, rel=1e-4)
+    assert kinetic > 0.9 * potential_before
     np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-14 * np.abs(state["velocity"]).max())
 
 
@@ -187,9 +187,9 @@ def test_reversed_time_returns_to_the_start():
 
 def test_time_does_not_drift_over_a_million_steps():
     """A step of 0.1, which binary numbers cannot hold: after 1e6 of them, time is right to its last bit."""
-    made = charges([[0, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 0.0}, dt=0.1, duration=1e6)
-    simulation = compiled(made, 40, 32)
-    simulation.load([made])
+    setup = charges([[0, 0, 0]], [[0, 0, 0]], [0.0], {"stiffness": 0.0}, dt=0.1, duration=1e6)
+    simulation = compiled(setup, 40, 32)
+    simulation.load([setup])
     simulation.run(steps=10**6)
     (result,) = simulation.results()
     exact = 10**6 * Fraction(0.1)

@@ -33,9 +33,9 @@ class Poison(Operator):
                 s.velocity[w, i][0] = 1e300 * 1e300
 
 
-def poisoned(what, when=50, seed=9):
+def poisoned(quantity, when=50, seed=9):
     base = flow(seed=seed, grains=30, hardness=1e7, duration=2e-4, stepper=fixed(1e-6))
-    poison = Poison(at_step=when, victim=17, **{what: 1.0} if what else {})
+    poison = Poison(at_step=when, victim=17, **{quantity: 1.0} if quantity else {})
     return type(base)(
         **{**{n: getattr(base, n) for n in type(base).model_fields}, "effects": (*base.effects, poison)}
     )
@@ -43,7 +43,7 @@ def poisoned(what, when=50, seed=9):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("what", "fault"),
+    ("quantity", "fault"),
     [
         ("velocity", "velocity of particle 17 is not finite"),
         # Seen in the move itself, where it is not yet known what has spoilt it.
@@ -53,9 +53,9 @@ def poisoned(what, when=50, seed=9):
     ],
     ids=["velocity", "position", "temperature", "overflow"],
 )
-def test_is_named_and_kept_apart(what, fault):
+def test_is_named_and_kept_apart(quantity, fault):
     clean = poisoned(None, seed=1)
-    batch = [clean, poisoned(what), poisoned(None, seed=2)]
+    batch = [clean, poisoned(quantity), poisoned(None, seed=2)]
     simulation = compiled(clean, worlds=3, capacity=32)
     simulation.load(batch)
     for _ in range(40):
@@ -64,9 +64,9 @@ def test_is_named_and_kept_apart(what, fault):
     assert not bad.status.ok
     reason = bad.status.reason
     assert fault in reason
-    at, kept = (float(part.split("t = ")[1].split(" s")[0]) for part in reason.split("kept"))
-    assert 49e-6 * (1 - 1e-9) <= at <= 55e-6 * (1 + 1e-9)
-    assert kept == pytest.approx(bad.time, rel=1e-5)
+    fault_time, kept_time = (float(part.split("t = ")[1].split(" s")[0]) for part in reason.split("kept"))
+    assert 49e-6 * (1 - 1e-9) <= fault_time <= 55e-6 * (1 + 1e-9)
+    assert kept_time == pytest.approx(bad.time, rel=1e-5)
     assert 44e-6 < bad.time < 51e-6
     assert all(np.isfinite(values).all() for values in bad.state.values())
     assert energy(bad.state) == pytest.approx(energy(bad.start), rel=1e-12)

@@ -17,8 +17,8 @@ def run(scenes):
 @pytest.mark.slow
 def test_all_particles_merge_into_one():
     """Everything bonds, images across the faces: one sphere of all mass, and it travels on, to rounding."""
-    made = flow(seed=5, grains=150, hardness=10.0, side=0.016, images=True, duration=0.05)
-    (result,) = run([made])
+    scene = flow(seed=5, grains=150, hardness=10.0, side=0.016, images=True, duration=0.05)
+    (result,) = run([scene])
     check_sums(result)
     assert len(result.state["mass"]) == 1
     assert result.work["merges"] == 149
@@ -55,9 +55,9 @@ def test_a_long_violent_flow_keeps_its_sums_and_books():
 def test_fragments_of_one_grain_fill_every_slot():
     """Two grains of 32 break into all 64: exactly the room there is, nothing lost."""
     radius = RADIUS * 32 ** (1 / 3)
-    made = hit(1e3, laws(1.0, surface_energy=1.0), radius=radius)
-    assert made.capacity() == 64
-    (result,) = simulate([made], worlds=64, capacity=64)
+    scene = hit(1e3, laws(1.0, surface_energy=1.0), radius=radius)
+    assert scene.capacity() == 64
+    (result,) = simulate([scene], worlds=64, capacity=64)
     check_sums(result)
     assert len(result.state["mass"]) == 64
     np.testing.assert_allclose(result.state["mass"], GRAIN, rtol=1e-13)

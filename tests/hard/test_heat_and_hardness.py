@@ -11,18 +11,18 @@ from tisim.effects import DeformationWork, Friction, Heating, Impact, Reaction, 
 
 def flip_flop(a0=0.0, af=1.0, pressure=0.5, iterations=200):
     """Z04's own fixed point: e_(K+1) = max(1 - I_n / (2 a(e_K) H), 0) from e = 0, at constant hardness."""
-    e, seen = 0.0, []
+    e, history = 0.0, []
     for _ in range(iterations):
         e = max(1 - pressure / (a0 + (af - a0) * (1 - e)) if (1 - e) * (af - a0) + a0 > 0 else 0.0, 0.0)
-        seen.append(e)
-    return np.array(seen)
+        history.append(e)
+    return np.array(history)
 
 
 @pytest.mark.slow
 def test_the_papers_own_iteration_never_settles_and_ours_does():
     """x = 1 - e -> p / x flips between 1 and p for ever; here the pair is solved: e = 1 - sqrt(p)."""
-    seen = flip_flop(pressure=0.5)
-    assert np.ptp(seen[-2:]) == pytest.approx(0.5), "bond, rebound, bond, ..."
+    history = flip_flop(pressure=0.5)
+    assert np.ptp(history[-2:]) == pytest.approx(0.5), "bond, rebound, bond, ..."
     hardness, speed = 1e6, 0.0
     speed = np.sqrt(0.5 * 3 * hardness / (2 * DENSITY))
     (result,) = simulate([head_on(speed, (Impact(hardness=hardness),))], worlds=300, capacity=2)
@@ -77,10 +77,10 @@ def test_unconverged_impacts_are_bounded_and_counted():
 @pytest.mark.parametrize("temperature", [0.0, 1e-30, 1e-3, 1.0, 1e6, 1e9])
 def test_extreme_temperatures(temperature):
     """exp(Q / (R T)) overflows below 0.4 K; T^4 is 1e36 at 1e9 K. Books close and all stays finite."""
-    made = flow(seed=8, grains=60, hardness=1e5, duration=2e-4)
-    data = made.to_dict()
+    scene = flow(seed=8, grains=60, hardness=1e5, duration=2e-4)
+    data = scene.to_dict()
     data["particles"]["quantities"]["temperature"] = temperature
-    (result,) = simulate([type(made).from_dict(data)], worlds=BATCH, capacity=200, schedule="world")
+    (result,) = simulate([type(scene).from_dict(data)], worlds=BATCH, capacity=200, schedule="world")
     assert result.status.ok, result.status.reason
     assert all(np.isfinite(values).all() for values in result.state.values())
     assert (result.state["temperature"] >= 0).all()

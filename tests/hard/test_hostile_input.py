@@ -109,8 +109,8 @@ def test_commands(words, tmp_path, monkeypatch):
     scene.write_text(Scene.from_dict(hostile.valid()[1]).to_toml())
     with nothing_runs():
         for last in words[-1]:
-            given_ = [str(scene) if word == "SCENE" else word for word in (*words[:-1], last)]
-            code, err = command(given_)
+            arguments = [str(scene) if word == "SCENE" else word for word in (*words[:-1], last)]
+            code, err = command(arguments)
             if ACCEPTED not in err and code != 0:
                 assert code == 2, (last[:50], err)
                 assert len(err.strip().splitlines()) == 1, (last[:50], err)
@@ -154,8 +154,8 @@ def test_odd_names_come_back_from_a_file(file):
     data = dict(hostile.valid()[1])
     for name in ("a b", "a.b", "", "größer", "😀", '"', "\\", "\n", "\x00", "\x7f", "\u2028", "#", "[x]"):
         quantities = {name: [1.0, 2.0], "temperature": 300.0}
-        made = Scene.from_dict(
+        scene = Scene.from_dict(
             {**data, "name": name, "particles": {**data["particles"], "quantities": quantities}}
         )
-        assert tomllib.loads(made.to_toml())["particles"]["quantities"] == quantities
-        check_file(made, file)
+        assert tomllib.loads(scene.to_toml())["particles"]["quantities"] == quantities
+        check_file(scene, file)

@@ -56,33 +56,33 @@ def drifting(place=CLIFF, step=STEP, duration=1.0):
     )  # fmt: skip
 
 
-def gone(made):
+def velocities(setup):
     """Velocities on the way to the cliff, m/s."""
-    ahead = SPEED if isinstance(made.stepper, Trapezoid) else np.ones(len(SPEED))
-    return np.outer(ahead, [1.0, 0, 0]) + np.array([0.0, made.effects[0].push, 0.0])
+    ahead = SPEED if isinstance(setup.stepper, Trapezoid) else np.ones(len(SPEED))
+    return np.outer(ahead, [1.0, 0, 0]) + np.array([0.0, setup.effects[0].push, 0.0])
 
 
-BOTH = pytest.mark.parametrize("made", [inert, pytest.param(drifting, marks=pytest.mark.slow)])
+BOTH = pytest.mark.parametrize("make", [inert, pytest.param(drifting, marks=pytest.mark.slow)])
 
 
-def in_launches(made, monkeypatch, attempts):
+def in_launches(setup, monkeypatch, attempts):
     """A simulation of which a launch has a particle make so many attempts at a step."""
     monkeypatch.setattr(intervals, "LAUNCH_ATTEMPTS", 1)
     monkeypatch.setattr(intervals, "LEAST_INTERVALS", attempts)
-    return Simulation(made, worlds=2)
+    return Simulation(setup, worlds=2)
 
 
-def same(found, wanted):
+def same(actual, expected):
     """To the bit."""
-    assert (found.status, found.time, found.work) == (wanted.status, wanted.time, wanted.work)
-    for name, values in wanted.state.items():
-        np.testing.assert_array_equal(found.state[name], values, err_msg=name)
+    assert (actual.status, actual.time, actual.work) == (expected.status, expected.time, expected.work)
+    for name, values in expected.state.items():
+        np.testing.assert_array_equal(actual.state[name], values, err_msg=name)
 
 
 @BOTH
-def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(made, tmp_path):
+def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(make, tmp_path):
     """All particles are where they are at that time; whoever goes on from there fails at once."""
-    fails, ends = made(), made(duration=CLIFF / 2)
+    fails, ends = make(), make(duration=CLIFF / 2)
     simulation = compiled(fails, worlds=2, capacity=len(SPEED))
     simulation.load([fails, ends])
     simulation.run()
@@ -90,11 +90,13 @@ def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(made, tmp
     assert good.status.ok
     assert not bad.status.ok
     assert bad.time == pytest.approx(CLIFF, abs=2 * STEP)
-    found, kept = (float(part.split("t = ")[1].split(" s")[0]) for part in bad.status.reason.split("kept"))
-    assert found == kept == pytest.approx(bad.time, rel=1e-5)
+    fault, kept_time = (
+        float(part.split("t = ")[1].split(" s")[0]) for part in bad.status.reason.split("kept")
+    )
+    assert fault == kept_time == pytest.approx(bad.time, rel=1e-5)
     assert "by effects.ledge" in bad.status.reason
     assert "at particle 0" in bad.status.reason
-    way, free = bad.state["position"] - bad.start["position"], gone(fails) * bad.time
+    way, free = bad.state["position"] - bad.start["position"], velocities(fails) * bad.time
     np.testing.assert_allclose(way, free, atol=1e-2 * STEP)
     there = bad.state["position"][:, 0] > CLIFF - 1e-2 * STEP
     assert there.sum() == 4
@@ -103,46 +105,46 @@ def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(made, tmp
     save(simulation, tmp_path / "c.h5")
     simulation.load([fails, ends])
     restore(simulation, tmp_path / "c.h5")
-    for result, wanted in zip(simulation.results(), (bad, good), strict=True):
-        same(result, wanted)
+    for result, expected in zip(simulation.results(), (bad, good), strict=True):
+        same(result, expected)
 
 
 @BOTH
-def test_launches_that_end_within_a_step(made, monkeypatch, tmp_path):
+def test_launches_that_end_within_a_step(make, monkeypatch, tmp_path):
     """Looked at every 64 steps of a particle, and stopped and restored there: progress, the last state that
     all particles have had in common, and the same bits at the end, fail or not."""
-    fails, ends = made(), made(place=5.0)
+    fails, ends = make(), make(place=5.0)
     whole = compiled(fails, worlds=2, capacity=len(SPEED))
     whole.load([fails, ends])
     whole.run()
-    wanted = whole.results()
-    assert [result.status.ok for result in wanted] == [False, True]
+    expected = whole.results()
+    assert [result.status.ok for result in expected] == [False, True]
     simulation = in_launches(fails, monkeypatch, 64)
     simulation.load([fails, ends])
-    done = []
+    fractions = []
     for _ in islice(simulation.chunks(), 1, None):
-        done.append(simulation.fraction())
+        fractions.append(simulation.fraction())
         ended = simulation.s.read("underway")[1] == 0
         assert simulation.results()[1].time == (1.0 if ended else 0.0)
-        if len(done) in (3, 9):
+        if len(fractions) in (3, 9):
             save(simulation, tmp_path / "c.h5")
             before = simulation.results()
             simulation.load([fails, ends])
             restore(simulation, tmp_path / "c.h5")
             for result, other in zip(simulation.results(), before, strict=True):
                 same(result, other)
-            assert simulation.fraction() == done[-1]
-    assert len(done) > 10
-    assert (np.diff(done) > 0).all()
-    assert done[-1] == 1
-    for result, other in zip(simulation.results(), wanted, strict=True):
+            assert simulation.fraction() == fractions[-1]
+    assert len(fractions) > 10
+    assert (np.diff(fractions) > 0).all()
+    assert fractions[-1] == 1
+    for result, other in zip(simulation.results(), expected, strict=True):
         same(result, other)
 
 
 @BOTH
-def test_a_launch_is_of_so_many_steps(made):
+def test_a_launch_is_of_so_many_steps(make):
     """Of all particles together: so Ctrl-C is heard, and progress seen, within a run of one longest step."""
-    long = made(step=1e-7, place=5.0)
+    long = make(step=1e-7, place=5.0)
     simulation = compiled(long, worlds=2, capacity=len(SPEED))
     simulation.load([long])
     list(islice(simulation.chunks(), 2))

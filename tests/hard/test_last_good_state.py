@@ -55,12 +55,12 @@ def crowded():
     place /= np.linalg.norm(place, axis=1)[:, None]
     radius = 1e-3
     speed = (1.0 - 0.9 * radius) / 0.78
-    made = scene(place, -speed * place, (Impact(hardness=1e30),), radius=radius, dt=1e-2, duration=1.0)
-    return made, 1e-2, "more simultaneous contacts"
+    setup = scene(place, -speed * place, (Impact(hardness=1e30),), radius=radius, dt=1e-2, duration=1.0)
+    return setup, 1e-2, "more simultaneous contacts"
 
 
 @pytest.mark.parametrize(
-    "made",
+    "make",
     [
         not_finite,
         pytest.param(stuck, marks=pytest.mark.slow),
@@ -68,10 +68,10 @@ def crowded():
         pytest.param(crowded, marks=pytest.mark.slow),
     ],
 )
-def test_the_state_is_that_of_the_last_step_before_the_failure(made):
-    start, step, fault = made()
+def test_the_state_is_that_of_the_last_step_before_the_failure(make):
+    start, step, fault = make()
     simulation = compiled(start, worlds=4)
-    kept = []
+    failures = []
     for stretches in (1, 7):
         simulation.load([start, start.replace({"duration": WHEN / 2})])
         for _ in range(stretches):
@@ -85,27 +85,27 @@ def test_the_state_is_that_of_the_last_step_before_the_failure(made):
         )
         assert until == pytest.approx(bad.time, rel=1e-5)
         assert bad.time <= when <= bad.time + 1.001 * step
-        kept.append(bad)
-    assert kept[0].status == kept[1].status
-    for name, values in kept[0].state.items():
-        np.testing.assert_array_equal(values, kept[1].state[name])
+        failures.append(bad)
+    assert failures[0].status == failures[1].status
+    for name, values in failures[0].state.items():
+        np.testing.assert_array_equal(values, failures[1].state[name])
     # A run that stops there by itself has the same state, and the next step fails.
     simulation.load([start])
-    simulation.run(steps=kept[0].work["steps"])
+    simulation.run(steps=failures[0].work["steps"])
     (there,) = simulation.results()
-    assert there.time == kept[0].time
+    assert there.time == failures[0].time
     for name, values in there.state.items():
-        np.testing.assert_array_equal(values, kept[0].state[name])
+        np.testing.assert_array_equal(values, failures[0].state[name])
     assert simulation.fraction() < 1
     simulation.run(steps=1)
-    assert simulation.results()[0].status == kept[0].status
+    assert simulation.results()[0].status == failures[0].status
 
 
-def same(found, wanted):
+def same(actual, expected):
     """To the bit, how they ended and what they have done too."""
-    assert (found.status, found.time, found.work) == (wanted.status, wanted.time, wanted.work)
-    for name, values in wanted.state.items():
-        np.testing.assert_array_equal(found.state[name], values)
+    assert (actual.status, actual.time, actual.work) == (expected.status, expected.time, expected.work)
+    for name, values in expected.state.items():
+        np.testing.assert_array_equal(actual.state[name], values)
 
 
 def several():
@@ -138,8 +138,8 @@ def test_worlds_that_fail_in_one_batch_end_as_each_does_alone(batch, stretch):
     simulation.load(scenes)
     while simulation.fraction() < 1:
         simulation.run(steps=stretch)
-    for found, wanted in zip(simulation.results(), alone, strict=True):
-        same(found, wanted)
+    for result, expected in zip(simulation.results(), alone, strict=True):
+        same(result, expected)
 
 
 def test_worlds_that_fail_together_are_run_once_more_together(batch, monkeypatch):
@@ -180,8 +180,8 @@ def test_ctrl_c_while_worlds_are_run_once_more_leaves_the_batch_where_it_was(bat
     monkeypatch.undo()
     np.testing.assert_array_equal(simulation.s.read("steps"), reached[0])
     simulation.run()
-    for found, wanted in zip(simulation.results(), alone, strict=True):
-        same(found, wanted)
+    for result, expected in zip(simulation.results(), alone, strict=True):
+        same(result, expected)
 
 
 @pytest.mark.parametrize("steps", [150, 250])
@@ -194,8 +194,8 @@ def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
     save(simulation, tmp_path / "c.h5")
     simulation.load(scenes)
     restore(simulation, tmp_path / "c.h5")
-    for found, wanted in zip(simulation.results(), before, strict=True):
-        same(found, wanted)
+    for result, expected in zip(simulation.results(), before, strict=True):
+        same(result, expected)
     simulation.run()
-    for found, wanted in zip(simulation.results(), alone, strict=True):
-        same(found, wanted)
+    for result, expected in zip(simulation.results(), alone, strict=True):
+        same(result, expected)

@@ -56,15 +56,15 @@ def ratios(real=np.float32):
 @pytest.mark.parametrize("real", [np.float64, np.float32])
 def test_langevins_function_is_right_to_rounding(real, request):
     """For x from 1e-30 to 1e30, in both precisions, against 60 digits; 1/3 at 0."""
-    found = np.array(
+    values = np.array(
         ratios(real)
         if real is np.float64
         else request.getfixturevalue("single")("hard.test_magnetism", "ratios")
     )
-    assert found[-1] == real(1 / 3)
+    assert values[-1] == real(1 / 3)
     x = ARGUMENTS.astype(real).astype(float)
     expected = np.array([langevin(x) / x if x > 1e-15 else 1 / 3 for x in x])
-    assert np.abs(found[:-1] / expected - 1).max() < 4 * np.finfo(real).eps
+    assert np.abs(values[:-1] / expected - 1).max() < 4 * np.finfo(real).eps
 
 
 @pytest.mark.slow
@@ -98,13 +98,13 @@ def test_no_field_no_moment_and_no_force(rng):
 def test_langevin_moments_of_weak_and_strong_fields():
     """x from 1e-12 to 1e6: linear, m_s x / 3, and saturated, m_s (1 - 1/x); of particles of one domain."""
     law = LangevinMoment(temperature=300.0)
-    made = []
+    scenes = []
     for b in (1e-12, 1e-6, 1e3, 1e6):
         effects = (Quadrupole(constant=b * N, scale=(0, 0, 0)), law, Magnetophoresis())
         quantities = {"saturation_moment": K_B * 300.0}
-        made.append(scene([[0, 0, 0]], [[0, 0, 0]], effects, mass=1.0, quantities=quantities))
+        scenes.append(scene([[0, 0, 0]], [[0, 0, 0]], effects, mass=1.0, quantities=quantities))
     sizes = [1e-12 / 3, 1e-6 / 3, 1 - 1e-3, 1 - 1e-6]
-    for state, size in zip(loads(made), sizes, strict=True):
+    for state, size in zip(loads(scenes), sizes, strict=True):
         np.testing.assert_allclose(state["moment"], [K_B * 300.0 * size * N], rtol=1e-12)
 
 
@@ -144,9 +144,9 @@ def test_dipoles_at_contact_and_closer(rng):
     assert SIDE > 2
 
 
-def settled(made, capacity=128):
-    simulation = Simulation(made[0], worlds=len(made), capacity=capacity)
-    simulation.load(made)
+def solved_results(scenes, capacity=128):
+    simulation = Simulation(scenes[0], worlds=len(scenes), capacity=capacity)
+    simulation.load(scenes)
     results = simulation.results()
     simulation.close()
     return results
@@ -186,7 +186,7 @@ def test_mutual_induction_converges_or_says_that_it_cannot():
         (faces, {}, 1.3313),
         (pair(0.0), {}, np.nan),
     ]
-    results = settled([spheres(place, **enough, **options) for place, options, _ in cases])
+    results = solved_results([spheres(place, **enough, **options) for place, options, _ in cases])
     for (place, _, factor), result in zip(cases, results, strict=True):
         if factor is None:
             assert result.status.ok or result.status.reason == "running", result.status.reason
@@ -216,7 +216,7 @@ def test_a_trial_state_in_which_nothing_converges_is_given_up():
     b, power = (0.0, 0, 1e-2), 30
     push = NearField(alpha2=900.0 * (power - 1) * 2.05 ** (power - 1), beta2=power)
     stepper = Trapezoid(control=ErrorControl(error=1e-6, tolerance=1e-9, first=0.05, longest=0.05))
-    made, never = (
+    solvable, never = (
         scene(
             [[0, 0, -2.0], [0, 0, 2.0]],
             [[0, 0, 30.0], [0, 0, -30.0]],
@@ -233,10 +233,10 @@ def test_a_trial_state_in_which_nothing_converges_is_given_up():
         )
         for tolerance in (1e-6, 1e-13)
     )
-    simulation = Simulation(made, worlds=2)
-    simulation.load([made, made])
+    simulation = Simulation(solvable, worlds=2)
+    simulation.load([solvable, solvable])
     start = simulation.results()[0]
-    simulation.load([made, never])
+    simulation.load([solvable, never])
     simulation.run()
     result, failed = simulation.results()
     simulation.close()
@@ -256,7 +256,7 @@ def test_a_trial_state_in_which_nothing_converges_is_given_up():
 def test_a_pair_that_snaps_together_keeps_its_energy():
     """Head to tail, from rest, onto hard spheres and off again, twenty times: Mie(30, 15) takes the blows."""
     size, bottom, steps = 4e3, 2 * 2 ** (1 / 15), 300
-    made = scene(
+    setup = scene(
         [[0, 0, -1.3], [0, 0, 1.3]],
         np.zeros((2, 3)),
         (DipoleDipole(), Mie(epsilon=3.0)),
@@ -274,15 +274,15 @@ def test_a_pair_that_snaps_together_keeps_its_energy():
         pull = -2 * MU_0 / (4 * np.pi) * size**2 / gap**3
         return gap, 0.5 * (state["velocity"] ** 2).sum() + pull + wall
 
-    simulation = Simulation(made)
-    simulation.load([made])
-    seen = [look(*simulation.results())]
+    simulation = Simulation(setup)
+    simulation.load([setup])
+    looks = [look(*simulation.results())]
     while simulation.fraction() < 1:
         simulation.run(steps=steps)
-        seen.append(look(*simulation.results()))
+        looks.append(look(*simulation.results()))
     assert simulation.results()[0].status.ok
     simulation.close()
-    gaps, energies = np.array(seen).T
+    gaps, energies = np.array(looks).T
     assert (np.diff(np.sign(np.diff(gaps))) != 0).sum() > 30
     assert gaps.min() < bottom < 2.55 < gaps.max() < 2.601
     np.testing.assert_allclose(energies, energies[0], rtol=1e-3)
@@ -297,20 +297,20 @@ def colloids():
         DipoleDipole(),
         Mie(epsilon=100 * K_B * 298.0),
     )
-    found = []
+    numbers = []
     for radius, moment in ((25e-9, 0.016e-16), (212e-9, 19.35e-16)):
         place = 1.9 * radius * np.array([[0, 0, 0], [0.6, 0, 0.8]])
         quantities = {"saturation_moment": moment, "domain_moment": 2e-19}
-        made = scene(place, 0 * place, effects, radius=radius, dt=1e-12, quantities=quantities)
-        (result,) = simulate([made], capacity=4)
+        setup = scene(place, 0 * place, effects, radius=radius, dt=1e-12, quantities=quantities)
+        (result,) = simulate([setup], capacity=4)
         state = by_id(result)
         assert result.status.ok, result.status.reason
-        found += [state[name].tolist() for name in ("force", "moment")]
+        numbers += [state[name].tolist() for name in ("force", "moment")]
     draw = np.random.default_rng(0)
     lattice = 2.06 * np.argwhere(np.ones((4, 4, 4))) + 0.02 * draw.normal(size=(64, 3))
-    (result,) = settled([spheres(lattice, relaxation=0.75, tolerance=1e-12)])
+    (result,) = solved_results([spheres(lattice, relaxation=0.75, tolerance=1e-12)])
     assert result.status.reason == "running", result.status.reason
-    return [*found, (MU_0 * result.state["moment"]).tolist()]
+    return [*numbers, (MU_0 * result.state["moment"]).tolist()]
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ def run_grains(scenes):
     return simulate(scenes, worlds=WORLDS, capacity=CROWD)
 
 
-def stored(d, a, b, young=1e3, stiffness=1e3):
+def stored_energy(d, a, b, young=1e3, stiffness=1e3):
     """Energy of a pair at a distance d under both laws of contact (Z16 7.3, B.5, B.7), by quadrature. J."""
 
     def push(x):
@@ -52,10 +52,10 @@ def test_near_field_in_one_place_and_hardly_apart():
     """In one point the force has neither direction nor size: a failure that names law and particle and keeps
     the start, even if the law is of no strength. At 1e-12 of a radius it is as anywhere."""
     law, place = NearField(alpha1=2.0, alpha2=1e-13), [[0, 0, 0], [1, 1, 1], [1, 1, 1]]
-    made = [scene(place, np.zeros((3, 3)), (effect,), mass=1.0) for effect in (law, NearField())]
+    scenes = [scene(place, np.zeros((3, 3)), (effect,), mass=1.0) for effect in (law, NearField())]
     close = scene([[0, 0, 0], 1e-13 * N], np.zeros((2, 3)), (law,), radius=0.1, mass=1.0, dt=1e-30)
     # With room for so many, sums are made for a tile of particles at once.
-    *bad, good = simulate([*made, close], worlds=3, capacity=40)
+    *bad, good = simulate([*scenes, close], worlds=3, capacity=40)
     for result in bad:
         for word in ("at t = 0 s", "effects.near_field", "particle 1", "not finite"):
             assert word in result.status.reason
@@ -104,10 +104,10 @@ def test_energy_released_is_energy_stored(couples):
         assert result.status.ok
         state = by_id(result)
         gap = state["position"][1] - state["position"][0]
-        left = stored(np.linalg.norm(gap - np.round(gap)), R, R)
-        before = stored(PLACES[name], R, R)
-        assert left < 0.5 * before
-        assert kinetic(state) + left == pytest.approx(before, rel=1e-6)
+        remaining = stored_energy(np.linalg.norm(gap - np.round(gap)), R, R)
+        before = stored_energy(PLACES[name], R, R)
+        assert remaining < 0.5 * before
+        assert kinetic(state) + remaining == pytest.approx(before, rel=1e-6)
         np.testing.assert_allclose(state["velocity"].sum(axis=0), 0, atol=1e-12)
 
 
@@ -133,7 +133,7 @@ def test_a_thousand_pressed_into_each_other(rng):
         d = np.linalg.norm(gap - np.round(gap), axis=2)
         reach = radius[:, None] + radius
         near = np.argwhere(np.triu(d < reach, 1))
-        return sum(stored(d[i, j], radius[i], radius[j]) for i, j in near), len(near)
+        return sum(stored_energy(d[i, j], radius[i], radius[j]) for i, j in near), len(near)
 
     state = by_id(result)
     (before, contacts), (after, _) = potential(by_id(result) | {"position": place}), potential(state)
@@ -159,9 +159,9 @@ def worlds_of_lists(rng):
 
 def test_forces_over_lists_are_those_over_all_pairs(rng):
     """As by NumPy over all pairs, none twice and none left out; and they add up to nothing."""
-    made = [grains(place, np.broadcast_to(radius, len(place))) for _, place, radius in worlds_of_lists(rng)]
+    scenes = [grains(place, np.broadcast_to(radius, len(place))) for _, place, radius in worlds_of_lists(rng)]
     contacts = []
-    for state in loads(made, capacity=CROWD):
+    for state in loads(scenes, capacity=CROWD):
         place, a = state["position"], state["radius"]
         gap = place[None] - place[:, None]
         gap -= np.round(gap)
@@ -198,26 +198,26 @@ def test_a_world_that_loses_all_its_particles_runs_to_its_end():
     places = np.random.default_rng(2).uniform(0, 1, (60, 3))
     laws = Hertz(young=1.0, poisson=0.0)
     more = {"radius": 0.1, "mass": 1.0, "stepper": fixed(1e-3), "duration": 1.0, "domain": BOX}
-    made = [scene(places, np.zeros((60, 3)), (laws, Vanish(at_step=step)), **more) for step in (3.0, 1e9)]
-    gone, there = simulate(made, worlds=2, capacity=60)
-    for result, left in ((gone, 0), (there, 60)):
+    scenes = [scene(places, np.zeros((60, 3)), (laws, Vanish(at_step=step)), **more) for step in (3.0, 1e9)]
+    empty, full = simulate(scenes, worlds=2, capacity=60)
+    for result, count in ((empty, 0), (full, 60)):
         assert result.status.ok, result.status.reason
         assert result.time == 1.0
-        assert len(result.state["mass"]) == left
+        assert len(result.state["mass"]) == count
 
 
 def far_out():
     """In single precision, 1e3 m out: momentum, what was exchanged, distances and forces at the start."""
-    found = []
+    rows = []
     for gap in (1e-4, 1e-3, 1e-2):
         place = np.array([1e3, -1e3, 1e3]) + np.array([[0, 0, 0], [gap, 0, 0], [0, gap, 0]])
         effects = (NearField(alpha1=1e-3, alpha2=1e-3), Contact(stiffness=1e3))
-        made = scene(place, np.zeros((3, 3)), effects, radius=1e-2, mass=1.0, dt=1e-9, steps=50)
-        (result,) = simulate([made], worlds=1, capacity=4)
+        setup = scene(place, np.zeros((3, 3)), effects, radius=1e-2, mass=1.0, dt=1e-9, steps=50)
+        (result,) = simulate([setup], worlds=1, capacity=4)
         velocity = np.asarray(by_id(result)["velocity"], float)
         there = np.asarray(place, np.float32).astype(float)
-        found.append([result.status.ok, velocity.tolist(), there.tolist()])
-    return found
+        rows.append([result.status.ok, velocity.tolist(), there.tolist()])
+    return rows
 
 
 @pytest.mark.slow

@@ -69,13 +69,13 @@ FACTORS = (1.0, 1e2, 1e6)
 def test_stiffness_beyond_what_the_steps_are_meant_for(name):
     """Springs 1, 1e2 and 1e6 times as stiff, with the same control: the first step is up to 20 radians long.
     After 3 1/4 periods each is in the middle, at full speed, in steps that are as many for all."""
-    made = []
+    scenes = []
     for factor in FACTORS:
         period = 2 * np.pi / np.sqrt(4.0 * factor)
         stepper = adaptive(name, 0.01, 0.1)
         more = {"mass": 1.0, "tether": 4.0 * factor, "quantities": {"anchor": np.zeros((1, 3))}}
-        made.append(forced([[1.0, 0, 0]], [[0, 0, 0]], stepper, 3.25 * period, **more))
-    results = good(run(made))
+        scenes.append(forced([[1.0, 0, 0]], [[0, 0, 0]], stepper, 3.25 * period, **more))
+    results = good(run(scenes))
     for factor, result in zip(FACTORS, results, strict=True):
         np.testing.assert_allclose(result.state["position"], 0, atol=1e-4)
         np.testing.assert_allclose(result.state["velocity"][0, 0], -2 * np.sqrt(factor), rtol=1e-6)
@@ -112,7 +112,7 @@ def test_masses_a_million_apart(name):
     light, heavy = 1e-3, 1e3
     reduced, duration = light * heavy / (light + heavy), 1.003
     stepper = fixed(2e-5) if name == "verlet" else adaptive(name, 1e-3, 1e-2)
-    made = [
+    scenes = [
         forced([[0, 0, 0], [0.6, 0, 0]], np.zeros((2, 3)), stepper, duration, near=(2, 1), mass=mass)
         for mass in ([light, heavy], [heavy, light])
     ]
@@ -124,7 +124,7 @@ def test_masses_a_million_apart(name):
         rtol=1e-11,
         atol=1e-11,
     ).y[:, -1]
-    for result in good(run(made)):
+    for result in good(run(scenes)):
         state = by_id(result)
         distance = state["position"][1, 0] - state["position"][0, 0]
         opening = state["velocity"][1, 0] - state["velocity"][0, 0]
@@ -152,10 +152,10 @@ def test_a_force_that_comes_out_of_nothing(name):
     stepper = fixed(1e-6) if name == "verlet" else adaptive(name, 1e-4, 1e-4)
     places = 1e-9 + width / 2 + v * np.array([MEETINGS, 2.5e-3 - MEETINGS])
     speed, more = [[v, 0, 0], [-v, 0, 0]], {"shell": k, "width": width, "radius": 1e-9, "mass": m}
-    made = [
+    scenes = [
         forced([[-half, 0, 0], [half, 0, 0]], speed, stepper, 2.5e-3 + contact, **more) for half in places[0]
     ]
-    for place, result in zip(places[1], good(run(made)), strict=True):
+    for place, result in zip(places[1], good(run(scenes)), strict=True):
         state = by_id(result)
         np.testing.assert_allclose(state["velocity"][:, 0], [-v, v], rtol=5e-6)
         np.testing.assert_allclose(state["position"][:, 0], [-place, place], rtol=5e-6)
@@ -166,7 +166,7 @@ def test_steps_that_a_contact_has_made_short_grow_again():
     """Grains that meet in mid-step, at any speed: they rebound, energy kept, in few steps. An old contraction
     of the sweeps must not keep steps as short as those in which they met."""
     radius, speeds = 1e-3, np.geomspace(0.1, 100, 10)
-    made = [
+    scenes = [
         scene(
             radius * np.array([[-5, 0, 0], [5, 0, 0]]),
             [[v, 0, 0], [-v, 0, 0]],
@@ -179,8 +179,8 @@ def test_steps_that_a_contact_has_made_short_grow_again():
         # Two long steps past each other would not see each other at all.
         for longest in (0.3, 0.9)
     ]
-    simulation = compiled(made[0], worlds=len(made), capacity=2)
-    simulation.load(made)
+    simulation = compiled(scenes[0], worlds=len(scenes), capacity=2)
+    simulation.load(scenes)
     simulation.run(steps=1000)
     for v, result in zip(np.repeat(speeds, 2), good(simulation.results()), strict=True):
         np.testing.assert_allclose(by_id(result)["velocity"][:, 0], [-v, v], rtol=1e-5)
@@ -195,11 +195,11 @@ def test_a_fall_into_an_attraction_without_bottom(name):
     fall = np.sqrt(np.pi / 4)
     # By default what is below a thousandth of a radius is not resolved; here everything is.
     stepper = adaptive(name, 1e-3, 0.1, resolution=0.0)
-    made = [
+    scenes = [
         forced([[0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)), stepper, end * fall, near=(1, 0), mass=1.0)
         for end in (0.99, 2.0)
     ]
-    early, late = run(made)
+    early, late = run(scenes)
     assert early.status.ok
     assert early.time == early.scene.duration
     for result in (early, late):

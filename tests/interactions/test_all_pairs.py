@@ -66,12 +66,12 @@ def test_two_in_one_place_are_named_and_harm_no_other_world(usual, pair):
     """Whether they share a tile or not."""
     position = np.random.default_rng(1).uniform(0, 1, (ROOM, 3))
     position[pair[1]] = position[pair[0]]
-    made = [
+    scenes = [
         cloud(NUMBERS[0], NUMBERS[0]),
         cloud(ROOM, position=position),
         *(cloud(n, n) for n in NUMBERS[2:]),
     ]
-    results = simulate(made, worlds=len(NUMBERS), capacity=ROOM, schedule="world")
+    results = simulate(scenes, worlds=len(NUMBERS), capacity=ROOM, schedule="world")
     reason = results[1].status.reason
     assert not results[1].status.ok
     assert "near_field" in reason

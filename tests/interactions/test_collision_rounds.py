@@ -108,15 +108,15 @@ def agree(result, expected, twin):
 def test_many_impacts_are_those_of_resolving_the_list_one_by_one(rng, hardness):
     """Eight jammed worlds, about a hundred simultaneous impacts in each, against the serial twin."""
     scenes = [jam(rng, hardness) for _ in range(8)]
-    counted = 0
+    impacts = 0
     for result in run(scenes):
         twin = Twin(result.start, hardness)
         agree(result, twin.step(), twin)
-        counted += twin.impacts
+        impacts += twin.impacts
         scale = np.abs(result.start["mass"][:, None] * result.start["velocity"]).sum()
         np.testing.assert_allclose(momentum(result.state), momentum(result.start), rtol=0, atol=1e-15 * scale)
         assert result.state["mass"].sum() == pytest.approx(result.start["mass"].sum(), rel=1e-15)
-    assert counted > 8 * (40 if hardness == 1e8 else 15)
+    assert impacts > 8 * (40 if hardness == 1e8 else 15)
 
 
 def test_the_order_of_impacts_matters_in_these_worlds(rng):

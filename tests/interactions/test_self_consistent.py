@@ -129,9 +129,9 @@ def solved(state, chi=CHI):
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
 def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
     """At the start and after 20 steps, in two worlds that need different numbers of sweeps; and the force."""
-    made = [cloud(1, tolerance=1e-13), cloud(2, chi=5.0, tolerance=1e-13)]
-    simulation = Simulation(made[0], worlds=2, schedule=schedule)
-    simulation.load(made)
+    scenes = [cloud(1, tolerance=1e-13), cloud(2, chi=5.0, tolerance=1e-13)]
+    simulation = Simulation(scenes[0], worlds=2, schedule=schedule)
+    simulation.load(scenes)
     for steps in (0, 20):
         simulation.run(steps=steps)
         for result, chi in zip(simulation.results(), (CHI, 5.0), strict=True):
@@ -154,8 +154,8 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
 def test_what_does_not_converge_is_a_clear_failure():
     """Sweeps of too strong a coupling grow without bound: the world stops and says which effect it was, and
     by how much they grow, which tends to the spectral radius: as in NumPy."""
-    made = cloud(3, n=20, chi=60.0, spread=1.0, sweeps=20)
-    start = made.particles.arrays(made.domain, 0)
+    setup = cloud(3, n=20, chi=60.0, spread=1.0, sweeps=20)
+    start = setup.particles.arrays(setup.domain, 0)
     coupling = np.eye(60) - solved(start, 60.0)[2]
     spread = np.abs(np.linalg.eigvals(coupling)).max()
     alone = 60.0 * start["radius"][:, None] ** 3 * (FIELD + SLOPE * start["position"][:, :1])
@@ -163,8 +163,8 @@ def test_what_does_not_converge_is_a_clear_failure():
     for _ in range(19):
         m, last = alone.ravel() + coupling @ m, m
         changes.append(np.linalg.norm((m - last).reshape(20, 3), axis=1).max())
-    simulation = Simulation(made)
-    simulation.load([made])
+    simulation = Simulation(setup)
+    simulation.load([setup])
     simulation.run()
     (result,) = simulation.results()
     simulation.close()
@@ -183,9 +183,9 @@ def test_what_does_not_converge_is_a_clear_failure():
 @pytest.mark.slow
 def test_one_sweep_a_step_when_asked():
     """``sweeps=0``: one sweep at the start and one in each step, started from the last values."""
-    made = cloud(1, sweeps=0)
-    simulation = Simulation(made)
-    simulation.load([made])
+    setup = cloud(1, sweeps=0)
+    simulation = Simulation(setup)
+    simulation.load([setup])
     simulation.run()
     (result,) = simulation.results()
     simulation.close()
@@ -216,8 +216,8 @@ class Potential(SelfConsistentQuantity):
 def test_a_number_settles_too_and_without_any_force(schedule):
     """Two at distance d: phi = 1/(1 - strength/d). Nothing in the scene needs a force, so there is none."""
     effects = (Potential(strength=0.1, tolerance=1e-14),)
-    made = scene([[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 0, 0], [0.5, 0, 0]], effects, dt=0.1, steps=10)
-    (result,) = simulate([made], schedule=schedule)
+    setup = scene([[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 0, 0], [0.5, 0, 0]], effects, dt=0.1, steps=10)
+    (result,) = simulate([setup], schedule=schedule)
     assert result.status.ok
     assert "force" not in result.state
     np.testing.assert_allclose(result.state["potential"], 1 / (1 - 0.1 / 1.5), rtol=1e-13)
@@ -230,6 +230,6 @@ class Forgetful(Polarisation):
 
 
 def test_a_quantity_that_is_not_needed_is_refused():
-    made = scene([[0, 0, 0]], [[0, 0, 0]], (Forgetful(chi=1.0),))
+    setup = scene([[0, 0, 0]], [[0, 0, 0]], (Forgetful(chi=1.0),))
     with pytest.raises(TypeError, match=r"Forgetful\.fields must name its quantity, 'dipole'"):
-        Simulation(made)
+        Simulation(setup)

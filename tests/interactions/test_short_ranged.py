@@ -33,14 +33,14 @@ def test_short_ranged_forces_over_the_list_are_those_over_all_pairs(images, sche
     """Through many lists made anew: same trajectories to rounding, and momentum conserved to rounding."""
     results = []
     for kind in (SoftShell, SoftShellOfAll):
-        wanted = shells(kind, np.random.default_rng(3), images)
-        simulation = Simulation(wanted, schedule=schedule)
-        simulation.load([wanted])
+        setup = shells(kind, np.random.default_rng(3), images)
+        simulation = Simulation(setup, schedule=schedule)
+        simulation.load([setup])
         simulation.run()
         results += simulation.results()
         simulation.close()
-    listed, everyone = results
-    np.testing.assert_allclose(listed.state["velocity"], everyone.state["velocity"], rtol=0, atol=1e-9)
+    by_list, over_all = results
+    np.testing.assert_allclose(by_list.state["velocity"], over_all.state["velocity"], rtol=0, atol=1e-9)
     for result in results:
         assert np.abs(result.state["velocity"] - result.start["velocity"]).max() > 0.1
         before = (result.start["mass"][:, None] * result.start["velocity"]).sum(axis=0)
@@ -147,9 +147,9 @@ def twin(start, steps, stiffness, grip):
 @pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     """Through many new lists: velocity and spin of the twin, and the same bits after a restart half-way."""
-    made = grains()
-    simulation = compiled(made, capacity=160, schedule=schedule)
-    simulation.load([made])
+    setup = grains()
+    simulation = compiled(setup, capacity=160, schedule=schedule)
+    simulation.load([setup])
     simulation.run(steps=70)
     checkpoint.save(simulation, tmp_path / "half")
     simulation.run()
@@ -164,7 +164,7 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
     assert np.abs(twin(result.start, 150, 500.0, 0.0)[0] - v).max() > 0.1
     assert np.abs(spin).max() > 1
 
-    simulation.load([made])
+    simulation.load([setup])
     checkpoint.restore(simulation, tmp_path / "half")
     simulation.run()
     (again,) = simulation.results()
@@ -175,15 +175,15 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
 @pytest.mark.long
 def test_what_is_remembered_is_bounded_and_forgotten():
     """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
-    made = grains()
-    (result,) = simulate([made], capacity=160, schedule="world")
+    setup = grains()
+    (result,) = simulate([setup], capacity=160, schedule="world")
     state = by_id(result)
     d = state["position"][None] - state["position"][:, None]
     d -= SIDE * np.round(d / SIDE)
     radius = state["radius"]
     touch = (np.linalg.norm(d, axis=2) <= radius[:, None] + radius) & ~np.eye(len(radius), dtype=bool)
-    kept = [(i, int(j)) for i, row in enumerate(state["grip_partners"]) for j in row if j >= 0]
-    assert len(kept) > 50
-    assert {tuple(sorted(pair)) for pair in kept} == {tuple(pair) for pair in np.argwhere(np.triu(touch))}
-    assert len(kept) == touch.sum() / 2
-    assert all(radius[i] <= radius[j] for i, j in kept)
+    partners = [(i, int(j)) for i, row in enumerate(state["grip_partners"]) for j in row if j >= 0]
+    assert len(partners) > 50
+    assert {tuple(sorted(pair)) for pair in partners} == {tuple(pair) for pair in np.argwhere(np.triu(touch))}
+    assert len(partners) == touch.sum() / 2
+    assert all(radius[i] <= radius[j] for i, j in partners)

@@ -20,9 +20,9 @@ def flow(seed=3, number=100, heat_capacity=500.0):
 
 @pytest.fixture(scope="module", params=["world", pytest.param("particle", marks=pytest.mark.slow)])
 def simulation(request):
-    made = Simulation(flow(), worlds=2, schedule=request.param)
-    yield made
-    made.close()
+    compiled = Simulation(flow(), worlds=2, schedule=request.param)
+    yield compiled
+    compiled.close()
 
 
 def ends(simulation):
@@ -55,7 +55,7 @@ def test_goes_on_to_the_same_bits(simulation, tmp_path):
 
 
 @pytest.fixture
-def saved(simulation, tmp_path):
+def checkpoint_file(simulation, tmp_path):
     simulation.load([flow()])
     simulation.run(steps=9)
     save(simulation, tmp_path / "c.h5")
@@ -63,48 +63,48 @@ def saved(simulation, tmp_path):
 
 
 @pytest.mark.parametrize("other", [flow(seed=4), flow(number=99), flow(heat_capacity=501.0)])
-def test_refuses_another_scene(simulation, saved, other):
+def test_refuses_another_scene(simulation, checkpoint_file, other):
     simulation.load([other])
     with pytest.raises(InputError, match="checkpoint must be of the same scenes"):
-        restore(simulation, saved)
+        restore(simulation, checkpoint_file)
     assert simulation.results()[0].work["steps"] == 0
 
 
 @pytest.mark.slow
-def test_refuses_another_capacity(simulation, saved):
+def test_refuses_another_capacity(simulation, checkpoint_file):
     larger = Simulation(flow(), worlds=2, capacity=120)
     larger.load([flow()])
     with pytest.raises(InputError, match=r"checkpoint's capacity must be 120; received .*100"):
-        restore(larger, saved)
+        restore(larger, checkpoint_file)
     larger.close()
 
 
-def test_refuses_a_file_cut_short_damaged_or_none(simulation, saved, tmp_path):
-    content, velocity = saved.read_bytes(), simulation.s.read("velocity").tobytes()[:200]
+def test_refuses_a_file_cut_short_damaged_or_none(simulation, checkpoint_file, tmp_path):
+    content, velocity = checkpoint_file.read_bytes(), simulation.s.read("velocity").tobytes()[:200]
     simulation.load([flow()])
     for size in (0, 10, len(content) // 2, len(content) - 1):
-        saved.write_bytes(content[:size])
+        checkpoint_file.write_bytes(content[:size])
         with pytest.raises(
             InputError, match="checkpoint must be a file of tisim, whole and with its checksum"
         ):
-            restore(simulation, saved)
+            restore(simulation, checkpoint_file)
     at = content.index(velocity) + 100
-    saved.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+    checkpoint_file.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
     with pytest.raises(InputError, match="checkpoint must be a file of tisim, whole and with its checksum"):
-        restore(simulation, saved)
+        restore(simulation, checkpoint_file)
     with pytest.raises(InputError, match="checkpoint must be an existing file"):
         restore(simulation, tmp_path / "none.h5")
     assert simulation.results()[0].work["steps"] == 0
 
 
-def test_full_disk_keeps_the_checkpoint_before(simulation, saved, monkeypatch):
-    before = saved.read_bytes()
+def test_full_disk_keeps_the_checkpoint_before(simulation, checkpoint_file, monkeypatch):
+    before = checkpoint_file.read_bytes()
 
     def full(handle):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("tisim.files.atomic.os.fsync", full)
     with pytest.raises(RunError, match="No space left on device; everything stored before is intact"):
-        save(simulation, saved)
-    assert saved.read_bytes() == before
-    assert [path.name for path in saved.parent.iterdir()] == ["c.h5"]
+        save(simulation, checkpoint_file)
+    assert checkpoint_file.read_bytes() == before
+    assert [path.name for path in checkpoint_file.parent.iterdir()] == ["c.h5"]

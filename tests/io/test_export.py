@@ -31,13 +31,13 @@ def file(tmp_path_factory):
 
 
 def every_frame(path, world=0):
-    with frames(path, world) as found:
-        return list(found)
+    with frames(path, world) as sequence:
+        return list(sequence)
 
 
-def drawn(file, folder):
-    with frames(file) as found:
-        movie(found, folder / "flow.gif")
+def draw_movie(file, folder):
+    with frames(file) as sequence:
+        movie(sequence, folder / "flow.gif")
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def drawn(file, folder):
         (lambda file, folder: export(file, "xyz", folder), "flow.xyz.new"),
         (lambda file, folder: export(file, "vtk", folder), "flow_00000.vtu.new"),
         (lambda file, folder: export(file, "h5md", folder), "flow_copy.h5.new"),
-        (drawn, "flow.new.gif"),
+        (draw_movie, "flow.new.gif"),
     ],
 )
 def test_planted_links_are_refused_and_not_followed(file, tmp_path, write, name):
@@ -61,10 +61,10 @@ def test_planted_links_are_refused_and_not_followed(file, tmp_path, write, name)
 
 @pytest.mark.slow
 def test_meshio_reads_what_paraview_would(file, tmp_path):
-    opened = export(file, "vtk", tmp_path)
-    assert opened == tmp_path / "flow.pvd"
-    listed = ElementTree.parse(opened).findall("Collection/DataSet")
-    for entry, frame in zip(listed, every_frame(file), strict=True):
+    path = export(file, "vtk", tmp_path)
+    assert path == tmp_path / "flow.pvd"
+    datasets = ElementTree.parse(path).findall("Collection/DataSet")
+    for entry, frame in zip(datasets, every_frame(file), strict=True):
         assert float(entry.get("timestep")) == frame.time
         mesh = meshio.read(tmp_path / entry.get("file"))
         np.testing.assert_array_equal(mesh.points, frame.arrays["position"])
@@ -118,9 +118,9 @@ def test_each_world_has_its_own_files(tmp_path):
     path = tmp_path / "t.h5"
     two = [scene([(k * 1.0, 0, 0)], [(0, 0, 0)]) for k in range(2)]
     tisim.run(two, record=Recording(path, frames=1))
-    done = []
-    export(path, "vtk", tmp_path, done.append)
-    assert done == [0.25, 0.5, 0.75, 1.0]
+    fractions = []
+    export(path, "vtk", tmp_path, fractions.append)
+    assert fractions == [0.25, 0.5, 0.75, 1.0]
     for k in range(2):
         assert meshio.read(tmp_path / f"t_{k}_00001.vtu").points.tolist() == [[k, 0, 0]]
 
@@ -128,8 +128,8 @@ def test_each_world_has_its_own_files(tmp_path):
 @pytest.fixture
 def growing(tmp_path):
     """A trajectory of three worlds in single precision, of which only the second has come to a frame."""
-    with Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL] * 3, "f32") as made:
-        made.write(1, grown(4))
+    with Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL] * 3, "f32") as trajectory:
+        trajectory.write(1, grown(4))
     return tmp_path / "t.h5"
 
 
@@ -146,14 +146,14 @@ def test_a_world_without_a_frame_yet_is_copied_as_one(growing, tmp_path):
 
 
 def test_worlds_with_and_without_frames_are_exported(growing, tmp_path):
-    for kind, written in (("xyz", "t_1.xyz"), ("vtk", "t_1_00000.vtu")):
+    for kind, name in (("xyz", "t_1.xyz"), ("vtk", "t_1_00000.vtu")):
         export(growing, kind, tmp_path)
         assert set(file_names(growing, kind)) <= {path.name for path in tmp_path.iterdir()}
-        assert written in file_names(growing, kind)
+        assert name in file_names(growing, kind)
     (alone,) = ase.io.read(tmp_path / "t_1.xyz", index=":", format="extxyz")
     assert alone.info["Step"] == grown(4).step
-    with frames(growing) as found, pytest.raises(InputError, match="file must be one with"):
-        movie(found, tmp_path / "t.gif")
+    with frames(growing) as sequence, pytest.raises(InputError, match="file must be one with"):
+        movie(sequence, tmp_path / "t.gif")
 
 
 def test_a_result_has_its_start_and_end(tmp_path):

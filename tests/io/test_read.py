@@ -10,44 +10,46 @@ import pytest
 
 import tisim
 from optimize.storage import hdf5_store
+from optimize.storage.cache import Cache
 from tests.accuracy.scenes import oscillator
 from tests.scenes import compiled, flow, scene
 from tisim import InputError, Recording, Result, Scene, Status
 from tisim.accuracy import Study, storage
 from tisim.accuracy.row import Row
 from tisim.effects import Contact, ContactFriction
+from tisim.io import checkpoint, run_folder
 from tisim.io import read as reading
-from tisim.io import run_folder
+from tisim.io.reader import world_count
 from tisim.io.run_folder import RunFolder
 
 FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
 CONTACT = Contact(stiffness=1.0), ContactFriction(stiffness=1.0, static=0.5, dynamic=0.4)
-CAPACITY = max(made.capacity() for made in FLOWS)
+CAPACITY = max(world_scene.capacity() for world_scene in FLOWS)
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
+def completed_run(tmp_path_factory):
     """Two flows: a trajectory of both, one of the first, a checkpoint on the way, and results."""
     folder = tmp_path_factory.mktemp("ran")
-    made = compiled(FLOWS[0], 2, CAPACITY)
-    made.load(FLOWS)
+    simulation = compiled(FLOWS[0], 2, CAPACITY)
+    simulation.load(FLOWS)
     both, half = Recording(folder / "both.h5", frames=7), folder / "half.h5"
-    with both.observer(made) as recorder:
-        made.run(until=3e-4, observers=[recorder])
-        made.checkpoint(half)
-        middle = made.results()
-        made.run(observers=[recorder])
-    results = made.results()
-    made.load(FLOWS[0])
-    with Recording(folder / "one.h5", frames=5).observer(made) as recorder:
-        made.run(observers=[recorder])
+    with both.observer(simulation) as recorder:
+        simulation.run(until=3e-4, observers=[recorder])
+        simulation.checkpoint(half)
+        middle = simulation.results()
+        simulation.run(observers=[recorder])
+    results = simulation.results()
+    simulation.load(FLOWS[0])
+    with Recording(folder / "one.h5", frames=5).observer(simulation) as recorder:
+        simulation.run(observers=[recorder])
     return SimpleNamespace(folder=folder, half=half, middle=middle, results=results)
 
 
-def identical(found, wanted):
+def identical(actual, expected):
     """All of a Result, arrays bit by bit and with their types."""
     for field in dataclasses.fields(Result):
-        one, other = getattr(found, field.name), getattr(wanted, field.name)
+        one, other = getattr(actual, field.name), getattr(expected, field.name)
         if field.name not in ("state", "start"):
             assert one == other, field.name
             continue
@@ -58,8 +60,8 @@ def identical(found, wanted):
 
 
 @pytest.mark.parametrize("world", [0, 1])
-def test_a_result_is_the_same_to_the_bit(ran, tmp_path, world):
-    folder, result = RunFolder(tmp_path), ran.results[world]
+def test_a_result_is_the_same_to_the_bit(completed_run, tmp_path, world):
+    folder, result = RunFolder(tmp_path), completed_run.results[world]
     run_folder.write(result, folder)
     identical(tisim.read(tmp_path), result)
     identical(tisim.read(str(folder.result)), result)
@@ -67,10 +69,11 @@ def test_a_result_is_the_same_to_the_bit(ran, tmp_path, world):
     assert tisim.read(tmp_path / "versions.json") == {**run_folder.versions(), **result.settings}
 
 
-def test_so_are_one_that_failed_and_one_of_odd_numbers(ran, tmp_path):
+def test_so_are_one_that_failed_and_one_of_odd_numbers(completed_run, tmp_path):
     odd = np.array([[np.nan, -0.0, 5e-324]])
     result = dataclasses.replace(
-        ran.results[0], state={"position": odd}, start={}, time=0.1 + 0.2, work={"steps": 2**53 + 1},
+        completed_run.results[0], state={"position": odd}, start={},
+        time=0.1 + 0.2, work={"steps": 2**53 + 1},
         status=Status(False, "found at t = 1 s: µ"), settings={"edited": "velocity at t = 1 s"},
         measures={"peak": math.inf, "least": 1e-300}, wall_s=1 / 3,
     )  # fmt: skip
@@ -88,15 +91,15 @@ def test_all_quantities_have_units(tmp_path):
         assert {name: values.attrs["unit"] for name, values in file["end"].items()} == units
 
 
-def test_frames_of_a_trajectory(ran):
-    trajectory = tisim.read(ran.folder / "one.h5")
+def test_frames_of_a_trajectory(completed_run):
+    trajectory = tisim.read(completed_run.folder / "one.h5")
     assert len(trajectory) == 6
     assert trajectory.scene == FLOWS[0]
     assert (trajectory.times[0], trajectory.times[-1]) == (0.0, FLOWS[0].duration)
     first, last = trajectory[0], trajectory[-1]
-    np.testing.assert_array_equal(first.arrays["position"], ran.results[0].start["position"])
-    order = np.argsort(ran.results[0].state["id"])
-    np.testing.assert_array_equal(last.arrays["velocity"], ran.results[0].state["velocity"][order])
+    np.testing.assert_array_equal(first.arrays["position"], completed_run.results[0].start["position"])
+    order = np.argsort(completed_run.results[0].state["id"])
+    np.testing.assert_array_equal(last.arrays["velocity"], completed_run.results[0].state["velocity"][order])
     times = trajectory.times.tolist()
     assert [frame.time for frame in trajectory] == times
     assert [frame.time for frame in trajectory[1:3]] == times[1:3]
@@ -108,37 +111,37 @@ def test_frames_of_a_trajectory(ran):
         _ = trajectory[6]
 
 
-def test_worlds_of_a_trajectory(ran):
-    with tisim.read(ran.folder / "both.h5") as trajectory:
+def test_worlds_of_a_trajectory(completed_run):
+    with tisim.read(completed_run.folder / "both.h5") as trajectory:
         assert [world.scene for world in trajectory.worlds] == FLOWS
-        for world, result in zip(trajectory.worlds, ran.results, strict=True):
+        for world, result in zip(trajectory.worlds, completed_run.results, strict=True):
             assert world[-1].time == result.time
             assert len(world) == len(world.times) == 8
     with pytest.raises(InputError, match=r"trajectory must be of one world \(or ask worlds\[w\]\)"):
         len(trajectory)
 
 
-def test_a_frame_is_read_when_it_is_asked_for(ran, monkeypatch):
+def test_a_frame_is_read_when_it_is_asked_for(completed_run, monkeypatch):
     """Of a thousand frames one costs as much as of one."""
-    seen = []
+    rows = []
     row = reading.recorded_trajectory.Frames._read_row
     monkeypatch.setattr(
         reading.recorded_trajectory.Frames,
         "_read_row",
-        lambda self, file, k: seen.append(k) or row(self, file, k),
+        lambda self, file, k: rows.append(k) or row(self, file, k),
     )
-    trajectory = tisim.read(ran.folder / "one.h5")
+    trajectory = tisim.read(completed_run.folder / "one.h5")
     assert len(trajectory.times) == 6
-    assert seen == []
+    assert rows == []
     _ = trajectory[3]
-    assert seen == [3]
+    assert rows == [3]
 
 
-def test_a_checkpoint_is_the_state_of_each_world(ran):
-    snapshot = tisim.read(ran.half)
-    assert snapshot.times.tolist() == [result.time for result in ran.middle]
-    assert snapshot.steps.tolist() == [result.work["steps"] for result in ran.middle]
-    for state, result in zip(snapshot.states, ran.middle, strict=True):
+def test_a_checkpoint_is_the_state_of_each_world(completed_run):
+    snapshot = tisim.read(completed_run.half)
+    assert snapshot.times.tolist() == [result.time for result in completed_run.middle]
+    assert snapshot.steps.tolist() == [result.work["steps"] for result in completed_run.middle]
+    for state, result in zip(snapshot.states, completed_run.middle, strict=True):
         assert state.keys() == result.state.keys()
         for name, values in state.items():
             np.testing.assert_array_equal(values, result.state[name], err_msg=name)
@@ -185,6 +188,13 @@ def test_what_cannot_be_read(tmp_path, name, content, message):
         (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message):
         tisim.read(tmp_path / name)
+
+
+@pytest.mark.parametrize(("name", "received"), [("a\0.h5", "a NUL"), ("x" * 300, "that is too long")])
+@pytest.mark.parametrize("reader", [tisim.read, world_count, checkpoint.snapshot, Cache])
+def test_a_name_that_no_file_can_have_is_refused(reader, name, received):
+    with pytest.raises(InputError, match=f"must be a regular file .*; received a name (with )?{received}$"):
+        reader(name)
 
 
 def test_the_format_of_a_search_is_the_one_known():

@@ -23,7 +23,7 @@ from tisim.io.trajectory import Trajectory, recorded_fields
 
 FLOWS = [flow(0, surface_energy=1e3, threshold=0.9, images=True), flow(1, duration=4e-4, images=True)]
 """Worlds in which grains merge and break, of different durations."""
-CAPACITY = max(made.capacity() for made in FLOWS)
+CAPACITY = max(one.capacity() for one in FLOWS)
 ROOT = Path(__file__).parents[2]
 
 
@@ -31,49 +31,49 @@ def simulation(schedule="world"):
     return compiled(FLOWS[0], 2, CAPACITY, schedule)
 
 
-def recorded(path, schedule="world", **rate):
+def record(path, schedule="world", **rate):
     """Results of the flows, and their trajectory at the path."""
-    made = simulation(schedule)
-    made.load(FLOWS)
-    with Recording(path, **rate).observer(made) as recorder:
-        made.run(observers=[recorder])
-    return made.results()
+    sim = simulation(schedule)
+    sim.load(FLOWS)
+    with Recording(path, **rate).observer(sim) as recorder:
+        sim.run(observers=[recorder])
+    return sim.results()
 
 
 def every_frame(path, world=0):
-    with frames(path, world) as found:
-        return list(found)
+    with frames(path, world) as sequence:
+        return list(sequence)
 
 
 @pytest.fixture(scope="module", params=["world", pytest.param("particle", marks=pytest.mark.slow)])
 def file(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("trajectory") / "flows.h5"
-    recorded(path, request.param, every=5e-5)
+    record(path, request.param, every=5e-5)
     return path
 
 
 @pytest.fixture(scope="module")
 def states():
     """(time, state) of the flows after every step, without a trajectory."""
-    made = simulation()
-    made.load(FLOWS)
-    seen = [[(r.time, by_id(r))] for r in made.results()]
-    while len(made.ended()) < 2:
-        made.run(steps=1)
-        for w, result in enumerate(made.results()):
-            if result.time > seen[w][-1][0]:
-                seen[w].append((result.time, by_id(result)))
-    return seen
+    sim = simulation()
+    sim.load(FLOWS)
+    states_by_world = [[(r.time, by_id(r))] for r in sim.results()]
+    while len(sim.ended()) < 2:
+        sim.run(steps=1)
+        for w, result in enumerate(sim.results()):
+            if result.time > states_by_world[w][-1][0]:
+                states_by_world[w].append((result.time, by_id(result)))
+    return states_by_world
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("schedule", ["world", "particle"])
 def test_a_run_is_the_same_to_the_last_bit_with_a_trajectory(tmp_path, schedule):
-    made = simulation(schedule)
-    made.load(FLOWS)
-    made.run()
-    plain = made.results()
-    for w, result in enumerate(recorded(tmp_path / "t.h5", schedule, frames=23)):
+    sim = simulation(schedule)
+    sim.load(FLOWS)
+    sim.run()
+    plain = sim.results()
+    for w, result in enumerate(record(tmp_path / "t.h5", schedule, frames=23)):
         assert (result.work, result.time, result.status) == (plain[w].work, plain[w].time, plain[w].status)
         for name, values in result.state.items():
             np.testing.assert_array_equal(values, plain[w].state[name], err_msg=name)
@@ -86,13 +86,13 @@ def test_frames_are_the_first_states_at_or_after_the_wanted_times(file, states, 
     due = np.arange(0.0, FLOWS[world].duration * (1 + 1e-9), 5e-5)
     # A step may be longer than the interval: then one frame stands for two times.
     expected = np.unique(np.searchsorted(times, due - 1e-9 * 5e-5))
-    found = every_frame(file, world)
-    assert [frame.step for frame in found] == expected.tolist()
-    for frame, k in zip(found, expected, strict=True):
+    recorded_frames = every_frame(file, world)
+    assert [frame.step for frame in recorded_frames] == expected.tolist()
+    for frame, k in zip(recorded_frames, expected, strict=True):
         assert frame.time == times[k]
         for name, values in frame.arrays.items():
             np.testing.assert_array_equal(values, states[world][k][1][name], err_msg=name)
-    counts = [len(frame.arrays["id"]) for frame in found]
+    counts = [len(frame.arrays["id"]) for frame in recorded_frames]
     assert min(counts) < counts[0]
     assert (np.diff(counts) > 0).any() == (world == 0)
 
@@ -114,9 +114,9 @@ def test_a_failed_run_ends_with_its_last_good_state(tmp_path):
     fast = scene([(0, 0, 0)], [(1e308, 0, 0)], dt=10.0, steps=3)
     result = tisim.run(fast, record=Recording(tmp_path / "t.h5", frames=3))
     assert not result.status.ok
-    found = every_frame(tmp_path / "t.h5")
-    assert found[-1].time == result.time
-    assert np.isfinite(found[-1].arrays["position"]).all()
+    recorded_frames = every_frame(tmp_path / "t.h5")
+    assert recorded_frames[-1].time == result.time
+    assert np.isfinite(recorded_frames[-1].arrays["position"]).all()
 
 
 @pytest.mark.slow
@@ -126,10 +126,10 @@ def test_scenes_of_different_structure_go_to_one_file(tmp_path):
     results = tisim.run(mixed, record=Recording(tmp_path / "t.h5", frames=2))
     assert world_count(tmp_path / "t.h5") == 3
     for w, result in enumerate(results):
-        with frames(tmp_path / "t.h5", w) as found:
-            assert found.scene == mixed[w]
-            assert len(found) == 3
-            np.testing.assert_array_equal(found[-1].arrays["position"], result.state["position"])
+        with frames(tmp_path / "t.h5", w) as sequence:
+            assert sequence.scene == mixed[w]
+            assert len(sequence) == 3
+            np.testing.assert_array_equal(sequence[-1].arrays["position"], result.state["position"])
 
 
 def test_an_independent_reader_reads_it(file):
@@ -160,14 +160,14 @@ def test_layout_is_that_of_the_specification(file):
             text = head[group].attrs.get_id(name)
             assert (text.dtype.kind, text.shape) == ("S", ())
         assert head["modules/units"].attrs["system"] == "SI"
-        for w, made in enumerate(FLOWS):
+        for w, one in enumerate(FLOWS):
             group = read[f"particles/world_{w}"]
             box = group["box"]
             assert box.attrs["dimension"] == 3
             assert box.attrs["boundary"].tolist() == [b"periodic"] * 3
-            low, high = made.domain.bounds()
+            low, high = one.domain.bounds()
             np.testing.assert_array_equal(box["edges"], high - low)
-            assert set(group) - {"box"} == {field.name for field in recorded_fields(made)}
+            assert set(group) - {"box"} == {field.name for field in recorded_fields(one)}
             position = group["position"]
             assert (np.diff(position["step"]) > 0).all()
             for name in set(group) - {"box"}:
@@ -213,27 +213,27 @@ def test_open_space_has_no_edges(tmp_path):
 
 def test_it_goes_on_from_a_checkpoint(tmp_path):
     """Frames after the checkpoint are written again, and none is missing or double."""
-    made = simulation()
-    asked = Recording(tmp_path / "t.h5", frames=15)
-    made.load(FLOWS[:1])
-    with asked.observer(made) as recorder:
-        made.run(until=3e-4, observers=[recorder])
-        save(made, tmp_path / "c.h5")
-        made.run(steps=100, observers=[recorder])
+    sim = simulation()
+    recording = Recording(tmp_path / "t.h5", frames=15)
+    sim.load(FLOWS[:1])
+    with recording.observer(sim) as recorder:
+        sim.run(until=3e-4, observers=[recorder])
+        save(sim, tmp_path / "c.h5")
+        sim.run(steps=100, observers=[recorder])
     cut = every_frame(tmp_path / "t.h5")
-    made.load(FLOWS[:1])
-    restore(made, tmp_path / "c.h5")
-    now = float(made.s.read("time")[0])
+    sim.load(FLOWS[:1])
+    restore(sim, tmp_path / "c.h5")
+    now = float(sim.s.read("time")[0])
     assert now < cut[-1].time < FLOWS[0].duration
-    with asked.observer(made, resume=True) as recorder:
-        kept = [frame.time for frame in cut if frame.time <= now]
-        assert recorder.trajectory.groups[0]["position/time"][:].tolist() == kept
-        assert len(kept) > 1
-        made.run(observers=[recorder])
-    recorded(tmp_path / "whole.h5", frames=15)
-    whole, found = every_frame(tmp_path / "whole.h5"), every_frame(tmp_path / "t.h5")
-    assert [f.step for f in found] == [f.step for f in whole]
-    for frame, other in zip(found, whole, strict=True):
+    with recording.observer(sim, resume=True) as recorder:
+        times = [frame.time for frame in cut if frame.time <= now]
+        assert recorder.trajectory.groups[0]["position/time"][:].tolist() == times
+        assert len(times) > 1
+        sim.run(observers=[recorder])
+    record(tmp_path / "whole.h5", frames=15)
+    whole, resumed = every_frame(tmp_path / "whole.h5"), every_frame(tmp_path / "t.h5")
+    assert [f.step for f in resumed] == [f.step for f in whole]
+    for frame, other in zip(resumed, whole, strict=True):
         for name, values in frame.arrays.items():
             np.testing.assert_array_equal(values, other.arrays[name])
     assert [path.name for path in tmp_path.glob("t.h5*")] == ["t.h5"]
@@ -290,9 +290,9 @@ def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
         finally:
             running.kill()
             running.wait()
-        found = every_frame(path)
-        assert 5 < len(alive) <= len(found)
-        for k, frame in enumerate(found):
+        recorded_frames = every_frame(path)
+        assert 5 < len(alive) <= len(recorded_frames)
+        for k, frame in enumerate(recorded_frames):
             expected = synthetic(k)
             assert (frame.time, frame.step) == (expected.time, expected.step)
             for name, values in expected.arrays.items():

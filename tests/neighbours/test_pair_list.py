@@ -125,10 +125,10 @@ def test_every_near_pair_is_offered_once_by_its_larger_member(rng, domain):
         )
     simulation = Simulation(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
-    seen = Recorder.latest
+    counts_on_device = Recorder.latest
     for step in range(STEPS):
-        counts = in_taichi_thread(seen.to_numpy)()
-        in_taichi_thread(seen.fill)(0)
+        counts = in_taichi_thread(counts_on_device.to_numpy)()
+        in_taichi_thread(counts_on_device.fill)(0)
         for w, (name, result) in enumerate(zip(names, simulation.results(), strict=True)):
             state, n = result.state, len(result.state["mass"])
             table = counts[w, :n, :n]

@@ -190,8 +190,8 @@ def test_four_normal_numbers_are_those_of_box_and_muller():
         first, second = 1.0 - (words[:, k + 1] & 2), 1.0 - 2.0 * (words[:, k + 1] & 1)
         np.testing.assert_allclose(normals[:, k], length * first * np.cos(angle), rtol=0, atol=5e-11)
         np.testing.assert_allclose(normals[:, k + 1], length * second * np.sin(angle), rtol=0, atol=5e-11)
-    drawn = normals[:-3]
-    for column in drawn.T:
+    columns = normals[:-3]
+    for column in columns.T:
         assert stats.kstest(column, "norm").pvalue > 0.01
-    correlation = np.corrcoef(np.hstack([drawn, drawn**2]).T)
-    assert np.abs(correlation - np.diag(np.diag(correlation))).max() < 5 / np.sqrt(len(drawn))
+    correlation = np.corrcoef(np.hstack([columns, columns**2]).T)
+    assert np.abs(correlation - np.diag(np.diag(correlation))).max() < 5 / np.sqrt(len(columns))

@@ -9,7 +9,7 @@ from tisim.numerics import random_streams
 STREAMS = {name: value for name, value in vars(random_streams).items() if name.isupper()}
 
 
-def drawn(tree):
+def stream_names(tree):
     """The stream of every call of ``bits`` in a module, as it is written."""
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
     return [ast.unparse(call.args[1]) for call in calls if ast.unparse(call.func).endswith("philox.bits")]
@@ -22,6 +22,8 @@ def test_no_two_streams_are_the_same():
 
 def test_whoever_draws_names_its_stream_and_no_other_does():
     files = rooms.modules(Path(__file__).parents[2])
-    named = {name: set(drawn(ast.parse(file.read_text(encoding="utf-8")))) for name, file in files.items()}
-    uses = [stream for streams in named.values() for stream in streams]
+    uses_by_file = {
+        name: set(stream_names(ast.parse(file.read_text(encoding="utf-8")))) for name, file in files.items()
+    }
+    uses = [stream for streams in uses_by_file.values() for stream in streams]
     assert sorted(uses) == sorted(STREAMS)

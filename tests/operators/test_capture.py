@@ -62,10 +62,10 @@ def flying(rng, magnets, n=60, **more):
     )
 
 
-def twin(made):
+def twin(setup):
     """Which magnet each particle touches first and when, -1 for none, and where it then is."""
-    solids = [*made.effects[0].cylinders, *made.effects[1].spheres]
-    r, v = np.array(made.particles.position), np.array(made.particles.velocity)
+    solids = [*setup.effects[0].cylinders, *setup.effects[1].spheres]
+    r, v = np.array(setup.particles.position), np.array(setup.particles.velocity)
     by, at = np.full(len(r), -1), np.full(len(r), -1.0)
     for step in range(1, STEPS + 1):
         free = by < 0
@@ -82,22 +82,22 @@ def test_against_the_twin(rng):
     worlds = [flying(rng, bodies(rng, *numbers)) for numbers in ((1, 0), (3, 2), (0, 6), (8, 5))]
     results = simulate(worlds, worlds=4, capacity=64)
     caught = 0
-    for made, result in zip(worlds, results, strict=True):
+    for setup, result in zip(worlds, results, strict=True):
         assert result.status.ok, result.status.reason
-        by, at, r = twin(made)
+        by, at, r = twin(setup)
         np.testing.assert_array_equal(result.state["captured_by"], by)
         np.testing.assert_array_equal(result.state["fixed"], by >= 0)
         np.testing.assert_allclose(result.state["captured_at"], at, rtol=1e-12)
         assert result.work["captures"] == (by >= 0).sum()
-        solids = [*made.effects[0].cylinders, *made.effects[1].spheres]
+        solids = [*setup.effects[0].cylinders, *setup.effects[1].spheres]
         for k, body in enumerate(solids):
-            held = result.state["position"][by == k]
-            np.testing.assert_allclose(distance(body, held), RADIUS, rtol=1e-12)
+            positions = result.state["position"][by == k]
+            np.testing.assert_allclose(distance(body, positions), RADIUS, rtol=1e-12)
         assert (result.state["velocity"][by >= 0] == 0).all()
         np.testing.assert_allclose(result.state["position"][by < 0], r[by < 0], atol=1e-12)
         # Put back from where the step brought it, the shortest way.
         moved = np.linalg.norm(result.state["position"] - r, axis=1)
-        assert (moved <= DT * np.linalg.norm(made.particles.velocity, axis=1) + 1e-12).all()
+        assert (moved <= DT * np.linalg.norm(setup.particles.velocity, axis=1) + 1e-12).all()
         caught += (by >= 0).sum()
     assert caught > 20
     alone = simulate(worlds[1:2], worlds=4, capacity=64)[0]
@@ -109,7 +109,7 @@ def test_against_the_twin(rng):
 def test_what_is_fixed_takes_no_force():
     """Gravity and the magnet's pull act on the free one only; what a start fixes is no capture."""
     magnet = MagneticCylinders(cylinders=[Cylinder(radius=0.5, length=1, magnetisation=(0, 0, 1e6))])
-    made = scene(
+    setup = scene(
         [[0.0, 0, 0.56], [3, 0, 0], [0, 0, 2]],
         [[0.0, 0, -2], [0, 0, 0], [0, 0, 0]],
         (magnet, MagneticField(constant=(0, 0, 1)), MagneticBodyForce(gamma=1e-2), Gravity(), Capture()),
@@ -119,7 +119,7 @@ def test_what_is_fixed_takes_no_force():
         steps=20,
         quantities={"fixed": [0, 0, 1]},
     )
-    (result,) = simulate([made], capacity=4)
+    (result,) = simulate([setup], capacity=4)
     end = result.state
     np.testing.assert_allclose(end["position"][0], [0, 0, 0.55], atol=1e-15)
     np.testing.assert_array_equal(end["position"][2], [0, 0, 2])
@@ -128,7 +128,7 @@ def test_what_is_fixed_takes_no_force():
     np.testing.assert_array_equal(end["fixed"], [1, 0, 1])
     np.testing.assert_array_equal(end["captured_by"], [0, -1, -1])
     assert result.work["captures"] == 1
-    force = compiled(made, capacity=4).s.read("force")[0]
+    force = compiled(setup, capacity=4).s.read("force")[0]
     assert (force[[0, 2]] == 0).all()
     assert (force[1] != 0).any()
 
@@ -136,10 +136,10 @@ def test_what_is_fixed_takes_no_force():
 def test_it_needs_a_magnet_and_files_give_it_back():
     with pytest.raises(InputError, match=r"effects\.capture must be used together with effects\.magnetic_"):
         scene([[0, 0, 0]], [[0, 0, 0]], (Capture(),))
-    made = scene(
+    setup = scene(
         [[0, 0, 5]], [[0, 0, 0]], (MagneticCylinders(cylinders=[Cylinder(radius=1, length=1)]), Capture())
     )
-    assert Scene.from_dict(made.to_dict()).digest() == made.digest()
+    assert Scene.from_dict(setup.to_dict()).digest() == setup.digest()
 
 
 def test_what_is_fixed_is_at_rest_and_stays():

@@ -60,9 +60,9 @@ def test_cools_as_the_differential_equation_at_first_order(temperature):
 def errors_of_steps():
     """Relative errors of T' = T + dt rate(T') after one step: bracketed here, solved by Newton there."""
     draw = np.random.Generator(np.random.Philox(6))
-    given = [(float(t), 10.0**dt) for t in (0.0, 1e-3, 300.0, 3e3, 1e5) for dt in draw.uniform(-9, 2, 12)]
+    cases = [(float(t), 10.0**dt) for t in (0.0, 1e-3, 300.0, 3e3, 1e5) for dt in draw.uniform(-9, 2, 12)]
     errors = []
-    for (t, dt), result in zip(given, run([alone(t, dt, 1, LAW) for t, dt in given]), strict=True):
+    for (t, dt), result in zip(cases, run([alone(t, dt, 1, LAW) for t, dt in cases]), strict=True):
         root = brentq(lambda x, t=t, dt=dt: x - t - dt * rate(x), 0, 2e5, xtol=1e-300, rtol=1e-15)
         errors.append(abs(float(result.state["temperature"][0]) / root - 1))
     return errors

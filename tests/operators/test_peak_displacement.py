@@ -37,21 +37,21 @@ def test_the_largest_displacement_is_kept_and_not_the_last(tmp_path):
 
 def test_masses_weigh():
     """Only the light one of 1 kg and 3 kg moves: the centre of gravity moves a quarter as far."""
-    made = scene(
+    setup = scene(
         [[0.0, 0, 0], [1.0, 0, 0]], [[1.0, 0, 0], [0, 0, 0]],
         (Tether(stiffness=(0.0, 0.0, 0.0)), PeakDisplacement()), mass=[1.0, 3.0], dt=1e-3, steps=100,
     )  # fmt: skip
-    (result,) = simulate([made], worlds=4, capacity=4)
+    (result,) = simulate([setup], worlds=4, capacity=4)
     assert result.measures["peak_displacement"] == pytest.approx(0.1 / 4, rel=1e-12)
 
 
 def test_a_displacement_that_is_no_number_stops_the_world():
     """Of 1e297 m the square is none: the state before is given back, and the run is not said to be good."""
-    made = scene(
+    setup = scene(
         [[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 1e300, 0], [0, 0, 0]],
         (Tether(stiffness=(0.0, 0.0, 0.0)), PeakDisplacement()), mass=1.0, dt=1e-3, steps=3,
     )  # fmt: skip
-    (result,) = simulate([made], worlds=4, capacity=4)
+    (result,) = simulate([setup], worlds=4, capacity=4)
     assert not result.status.ok
     assert "a quantity is not finite, by effects.peak_displacement; kept t = 0 s" in result.status.reason
     assert result.measures["peak_displacement"] == 0.0

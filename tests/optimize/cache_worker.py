@@ -35,13 +35,13 @@ def stepwise(folder):
             cache.put(fake_record(0))
         child = os.fork()
         if child == 0:
-            left = kill_at
+            remaining = kill_at
 
             def last_straw(call):
                 def counted(*arguments, **options):
-                    nonlocal left
-                    left -= 1
-                    if left == 0:
+                    nonlocal remaining
+                    remaining -= 1
+                    if remaining == 0:
                         if call.__name__ == "pwrite":  # half of it gets through
                             call(arguments[0], bytes(arguments[1][: len(arguments[1]) // 2]), arguments[2])
                         os.kill(os.getpid(), signal.SIGKILL)
@@ -65,13 +65,13 @@ def limited(path, size):
     """Store records, and fold, on a file system that lets no file grow beyond size bytes."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(size), int(size)))
     cache = Cache(path)
-    stored = 0
+    count = 0
     try:
         for number in range(1000, 2000):
             cache.put(fake_record(number))
-            stored += 1
+            count += 1
     except RunError as error:
-        print(stored, "put", error)
+        print(count, "put", error)
     try:
         cache.fold()
     except RunError as error:
@@ -93,9 +93,9 @@ def announce():
     put = Cache.put
 
     def put_and_say(cache, record):
-        stored = put(cache, record)
+        kept_record = put(cache, record)
         os.write(1, f"stored {record.key}\n".encode())
-        return stored
+        return kept_record
 
     Cache.put = put_and_say
 

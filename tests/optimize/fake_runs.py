@@ -39,16 +39,16 @@ class FakeEvaluator:
     def __init__(self, function=bowl, interrupt_after=math.inf, delay=0.0):
         self.settings = {"precision": "f64", "device": "cpu"}
         self.function, self.interrupt_after, self.delay = function, interrupt_after, delay
-        self.calls, self.ran = [], []
+        self.calls, self.digests = [], []
 
     def evaluate(self, scenes, progress):
         self.calls.append(list(scenes))
         for index in reversed(range(len(scenes))):
-            if len(self.ran) >= self.interrupt_after:
+            if len(self.digests) >= self.interrupt_after:
                 raise KeyboardInterrupt
             time.sleep(self.delay)
             scene = scenes[index]
-            self.ran.append(scene.digest())
+            self.digests.append(scene.digest())
             value = self.function(scene.design, scene.seed)
             failed = isinstance(value, str)
             status = SimpleNamespace(ok=not failed, reason=value if failed else "")
@@ -84,16 +84,16 @@ class FakeCache:
     """Evaluations in memory only, for searches by the dozen."""
 
     def __init__(self):
-        self.known = {}
+        self.records_by_key = {}
 
     def refresh(self):
         pass
 
     def get(self, key):
-        return self.known.get(key)
+        return self.records_by_key.get(key)
 
     def put(self, record):
-        return self.known.setdefault(record.key, record)
+        return self.records_by_key.setdefault(record.key, record)
 
     def put_table(self, name, columns, attrs=None):
         pass

@@ -64,11 +64,11 @@ def test_it_is_what_the_runs_give_start_by_start(record):
 
 def test_a_file_of_it_gives_the_same_bits_again(record, tmp_path):
     record.save(tmp_path / "fitness.json")
-    stored = FitnessRecord.load(tmp_path / "fitness.json")
-    assert stored == record
-    again = stored.again(problem())
-    assert stored.same_arithmetic(again)
-    assert stored.deviations(again) == {"slow": 0.0, "fast": 0.0}
+    loaded_record = FitnessRecord.load(tmp_path / "fitness.json")
+    assert loaded_record == record
+    again = loaded_record.again(problem())
+    assert loaded_record.same_arithmetic(again)
+    assert loaded_record.deviations(again) == {"slow": 0.0, "fast": 0.0}
 
 
 def test_a_change_of_the_laws_is_seen(record):
@@ -82,8 +82,10 @@ def test_other_rounding_is_not(record):
     draw = np.random.default_rng(5)
     values = {
         name: {
-            what: (np.array(old) * (1 + 1e-7) + 0.1 * draw.normal(size=6) * (np.arange(6) < 3)).tolist()
-            for what, old in objectives.items()
+            name_of_start: (
+                np.array(old) * (1 + 1e-7) + 0.1 * draw.normal(size=6) * (np.arange(6) < 3)
+            ).tolist()
+            for name_of_start, old in objectives.items()
         }
         for name, objectives in record.values.items()
     }
@@ -119,8 +121,8 @@ def test_what_is_no_record_of_this_problem_is_refused(record, tmp_path):
 
 def test_a_run_that_fails_names_its_design():
     def scene(design, seed):
-        made = fall(design, seed)
-        return made.model_copy(update={"effects": (Blowing(),)}) if design["speed"] > 5 else made
+        setup = fall(design, seed)
+        return setup.model_copy(update={"effects": (Blowing(),)}) if design["speed"] > 5 else setup
 
     wild = problem(scene)
     with pytest.raises(RunError, match="design 'fast', start 0: "):

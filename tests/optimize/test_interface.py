@@ -84,21 +84,21 @@ def test_other_threads_wait_until_a_search_is_over(monkeypatch):
     """Between its evaluations too: they would start Taichi with settings that are not its own."""
 
     def free():
-        got = runtime.turn.acquire(blocking=False)
-        if got:
+        acquired = runtime.turn.acquire(blocking=False)
+        if acquired:
             runtime.turn.release()
-        return got
+        return acquired
 
     def look(*arguments):
-        seen.append(other.submit(free).result())
-        return made.scene(*arguments)
+        outcomes.append(other.submit(free).result())
+        return fake.scene(*arguments)
 
-    seen, made = [], fake_problem()
+    outcomes, fake = [], fake_problem()
     with ThreadPoolExecutor(1) as other:
         monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", FakeEvaluator)
-        optimize.run(replace(made, scene=look), **SMALL)
-        assert seen
-        assert not any(seen)
+        optimize.run(replace(fake, scene=look), **SMALL)
+        assert outcomes
+        assert not any(outcomes)
         assert other.submit(free).result()
 
 
@@ -140,8 +140,8 @@ def test_another_objective_has_another_identity():
 def test_importing_it_loads_nothing_heavy():
     heavy = ("taichi", "quadrants", "numpy", "deap", "h5py", "pydantic", "pandas")
     code = f"import optimize, sys; print([m for m in {heavy} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert completed.stdout == "[]\n"
 
 
 def test_every_name_is_there():

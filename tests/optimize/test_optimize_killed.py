@@ -53,9 +53,9 @@ def contents_of(folder):
     """All that a search has found: in its file, and in what it has written of its best designs."""
     cache = Cache(folder / "search.h5")
     tables = {name: cache.table(name).columns for name in cache.tables()}
-    written = [(folder / name).read_bytes() for name in ("best.csv", "best_scene.toml")]
+    files = [(folder / name).read_bytes() for name in ("best.csv", "best_scene.toml")]
     fitness = {record.key: (record.fitness, record.design) for record in cache.records()}
-    return repr(tables), written, fitness
+    return repr(tables), files, fitness
 
 
 @pytest.mark.slow
@@ -68,25 +68,25 @@ def test_killed_search_ends_as_if_never_stopped(tmp_path, case, kills):
     folder = tmp_path / "cut"
     file = folder / "search.h5"
     rng = random.Random(kills)
-    seen, leftovers = {}, set()
+    records_before, leftovers = {}, set()
     for number in range(kills):
-        if 2 * len(seen) > len(whole[2]):
+        if 2 * len(records_before) > len(whole[2]):
             break  # What is left is for the run that is not killed, however fast the machine is.
         with begin(case, folder) as search:
-            stored = kill(search, folder, rng)
-        if not (file.exists() or stored):
+            keys = kill(search, folder, rng)
+        if not (file.exists() or keys):
             continue  # killed before there was anything
         report = verify(file)
         assert report.ok, report
         leftovers |= {name for name in ("journal", "torn", "duplicates") if getattr(report, name)}
         records = {record.key: record.payload() for record in existing(file).records()}
-        assert stored <= set(records), number
-        assert {key: records.get(key) for key in seen} == seen, number
-        seen = records
+        assert keys <= set(records), number
+        assert {key: records.get(key) for key in records_before} == records_before, number
+        records_before = records
     assert "journal" in leftovers, "killed within a generation"
     with begin(case, folder) as search:
         again = search.communicate()[0].count("stored ")
     assert search.returncode == 0
-    assert again == len(whole[2]) - len(seen) > 0, "nothing is run twice"
+    assert again == len(whole[2]) - len(records_before) > 0, "nothing is run twice"
     assert contents_of(folder) == whole
     assert verify(file).ok

@@ -31,31 +31,31 @@ def test_resume_after_interrupt_equals_never_interrupted(path, uninterrupted, af
     first = FakeEvaluator(interrupt_after=after)
     part = run(path, first)
     assert (part.stopped, part.interrupted) == ("interrupted", True)
-    assert len(first.ran) == part.evaluations == after
+    assert len(first.digests) == part.evaluations == after
     assert list(part.logbook) == list(uninterrupted.logbook)[: len(part.logbook)]
     assert Cache(path).table(part.name).attrs["stopped"] == "interrupted"
     second = FakeEvaluator()
     whole = run(path, second)
     assert contents_of(whole) == contents_of(uninterrupted)
     assert (whole.stopped, whole.interrupted) == ("generations", False)
-    assert not set(first.ran) & set(second.ran), "nothing is evaluated twice"
-    assert len(first.ran) + len(second.ran) == uninterrupted.evaluations
+    assert not set(first.digests) & set(second.digests), "nothing is evaluated twice"
+    assert len(first.digests) + len(second.digests) == uninterrupted.evaluations
 
 
 def test_resume_after_sigkill_equals_never_interrupted(path, uninterrupted):
     rng = random.Random(3)
-    stored = []
+    counts = []
     for _ in range(4):
         with worker("search", path, pipesize=PIPE) as process:
             for _ in range(rng.randint(1, 30)):
                 assert process.stdout.readline().startswith("stored")
             process.kill()
-        stored.append(len(Cache(path)))
+        counts.append(len(Cache(path)))
         assert verify(path).ok
-    assert stored == sorted(stored)
-    assert 0 < stored[-1] < uninterrupted.evaluations
+    assert counts == sorted(counts)
+    assert 0 < counts[-1] < uninterrupted.evaluations
     evaluator = FakeEvaluator()
     outcome = run(path, evaluator)
     assert contents_of(outcome) == contents_of(uninterrupted)
-    assert len(evaluator.ran) == uninterrupted.evaluations - stored[-1]
+    assert len(evaluator.digests) == uninterrupted.evaluations - counts[-1]
     assert verify(path).duplicates == 0

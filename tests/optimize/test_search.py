@@ -113,8 +113,8 @@ def test_wall_clock_stops_in_the_middle_of_a_generation(path):
     assert outcome.elapsed_s >= 0.3
     assert len(outcome.logbook) == 0
     assert outcome.best is None
-    assert 0 < len(evaluator.ran) <= 16 < 20 * 6
-    assert len(evaluator.ran) == len(Cache(path)) == outcome.evaluations
+    assert 0 < len(evaluator.digests) <= 16 < 20 * 6
+    assert len(evaluator.digests) == len(Cache(path)) == outcome.evaluations
 
 
 def test_wall_clock_stops_between_generations(path):
@@ -230,7 +230,7 @@ def test_unfit_operators_stop_it_before_anything_runs(path):
     evaluator = FakeEvaluator()
     with pytest.raises(InputError, match="fit for real-valued strings"):
         run(path, evaluator, options={"breeding": "deap", "mate": GeneticOperator(name="cxOrdered")})
-    assert evaluator.ran == []
+    assert evaluator.digests == []
 
 
 def test_full_disk_ends_the_search_clearly(path, monkeypatch):

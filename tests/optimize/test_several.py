@@ -74,15 +74,15 @@ def test_nsga2_finds_the_front_and_spreads_along_it(outcome):
 
 def test_front_is_what_nothing_dominates(outcome):
     costs = [[estimate.mean for estimate in estimates] for estimates in outcome.estimates.values()]
-    front, seen = values(outcome), np.array([outcome.problem.costs(each) for each in costs])
-    better = (seen[:, None, 0] >= front[None, :, 0]) & (seen[:, None, 1] <= front[None, :, 1])
-    strictly = (seen[:, None, 0] > front[None, :, 0]) | (seen[:, None, 1] < front[None, :, 1])
+    front, points = values(outcome), np.array([outcome.problem.costs(each) for each in costs])
+    better = (points[:, None, 0] >= front[None, :, 0]) & (points[:, None, 1] <= front[None, :, 1])
+    strictly = (points[:, None, 0] > front[None, :, 0]) | (points[:, None, 1] < front[None, :, 1])
     assert not np.any(better & strictly)
     dominated = (
-        (seen[:, None, 0] >= seen[None, :, 0]) & (seen[:, None, 1] <= seen[None, :, 1])
-        & ((seen[:, None, 0] > seen[None, :, 0]) | (seen[:, None, 1] < seen[None, :, 1]))
+        (points[:, None, 0] >= points[None, :, 0]) & (points[:, None, 1] <= points[None, :, 1])
+        & ((points[:, None, 0] > points[None, :, 0]) | (points[:, None, 1] < points[None, :, 1]))
     ).any(axis=0)  # fmt: skip
-    assert len({tuple(point) for point in seen[~dominated]}) == len(front)
+    assert len({tuple(point) for point in points[~dominated]}) == len(front)
     assert list(front[:, 0]) == sorted(front[:, 0], reverse=True), "most gain first"
 
 
@@ -125,9 +125,9 @@ def test_log_and_report(outcome, tmp_path):
     assert [float(row["gain (1/s)"]) for row in rows] == list(values(outcome)[:, 0])
     assert [float(row["price"]) for row in rows] == list(values(outcome)[:, 1])
     (axis,) = report.front_figure(outcome).axes
-    shown = {bars.get_label(): bars.lines[0].get_xydata() for bars in axis.containers}
-    np.testing.assert_array_equal(shown["front, 1 start"], values(outcome))
-    assert len(shown["other designs, 1 start"]) == len(outcome.estimates) - len(outcome.hall)
+    series = {bars.get_label(): bars.lines[0].get_xydata() for bars in axis.containers}
+    np.testing.assert_array_equal(series["front, 1 start"], values(outcome))
+    assert len(series["other designs, 1 start"]) == len(outcome.estimates) - len(outcome.hall)
     assert axis.get_xlabel() == "gain (1/s), more is better"
     assert imread(paths["front.png"]).std() > 0.01
 
@@ -141,11 +141,11 @@ def test_designs_of_few_starts_are_told_from_those_that_are_known(outcome):
         string.estimates = of_all
         return string
 
-    front, known, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
+    front, precise, lucky = design(0.5, 9), design(0.4, 9), design(0.9, 3)
     front.fitness.values = (-0.5, 0.5)
     other = Outcome(outcome.problem, outcome.settings, {}, hall=[front])
-    other.estimates = {tuple(string): string.estimates for string in (front, known, lucky)}
-    assert others(other) == ([known.estimates], [lucky.estimates])
+    other.estimates = {tuple(string): string.estimates for string in (front, precise, lucky)}
+    assert others(other) == ([precise.estimates], [lucky.estimates])
     (axis,) = report.front_figure(other).axes
     lines = {bars.get_label(): bars for bars in axis.containers}
     assert list(lines) == [
@@ -185,18 +185,18 @@ def test_cache_holds_all_objectives(path):
         Record(**{**vars(fake_record(n)), "others": (n / 3, -1.0) if n % 2 else (), "ok": n != 3})
         for n in range(8)
     ]
-    lost = Record(**{**vars(fake_record(9, float("nan"), ok=False)), "others": (float("nan"),)})
+    failed = Record(**{**vars(fake_record(9, float("nan"), ok=False)), "others": (float("nan"),)})
     with Cache(path) as cache:
         for record in many:
             cache.put(record)
         cache.fold()
-        cache.put(lost)
+        cache.put(failed)
         assert [r.values for r in Cache(path).records()[:8]] == [r.values for r in many]
     assert compact(path) == 9
-    stored = existing(path).records()
-    assert [record.payload() for record in stored] == [record.payload() for record in (*many, lost)]
-    assert np.isnan(stored[-1].values).all()
-    assert len(stored[-1].values) == 2
+    records = existing(path).records()
+    assert [record.payload() for record in records] == [record.payload() for record in (*many, failed)]
+    assert np.isnan(records[-1].values).all()
+    assert len(records[-1].values) == 2
     assert verify(path).ok
 
 

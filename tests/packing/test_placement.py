@@ -245,8 +245,8 @@ def test_more_than_the_machine_holds_is_refused_before_it_is_allocated(monkeypat
         tracemalloc.start()
         scene = Scene(particles=cloud, duration=1.0)
         assert tracemalloc.get_traced_memory()[1] < 10**8
-        said = r"memory for a cloud of 100000000 particles must be within the 1 GB .*; received '30 GB'"
-        with pytest.raises(InputError, match=said):
+        message = r"memory for a cloud of 100000000 particles must be within the 1 GB .*; received '30 GB'"
+        with pytest.raises(InputError, match=message):
             scene.particles.arrays(scene.domain, 0)
         assert tracemalloc.get_traced_memory()[1] < 10**8
         tracemalloc.stop()

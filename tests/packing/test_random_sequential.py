@@ -46,9 +46,9 @@ def test_what_cannot_be_reached_is_refused():
 
 
 def test_what_is_just_beyond_reach_says_what_was_reached():
-    with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as refused:
+    with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as error_info:
         place(2280, RADIUS, box(LOW, HIGH, periodic=True), 0)
-    reached = float(str(refused.value).split("at most ")[1][:6])
+    reached = float(str(error_info.value).split("at most ")[1][:6])
     # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
     assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
 
@@ -88,12 +88,12 @@ def test_filling_voids_is_the_same_process_as_trying_everywhere():
     def neighbours(centres):
         return 2 * len(cKDTree(centres % 1, boxsize=1).query_pairs(2.2 * radius)) / number
 
-    tried, filled = [], []
+    by_trial, by_voids = [], []
     for seed in range(8):
-        tried.append(neighbours(place(number, radius, region, seed)))
+        by_trial.append(neighbours(place(number, radius, region, seed)))
         generator = np.random.Generator(np.random.Philox(100 + seed))
-        filled.append(neighbours(fill(np.empty((0, 3)), number, 2 * radius, region, generator)))
-    spread = np.hypot(np.std(tried), np.std(filled)) / np.sqrt(7)
-    assert abs(np.mean(tried) - np.mean(filled)) < 4 * spread
+        by_voids.append(neighbours(fill(np.empty((0, 3)), number, 2 * radius, region, generator)))
+    spread = np.hypot(np.std(by_trial), np.std(by_voids)) / np.sqrt(7)
+    assert abs(np.mean(by_trial) - np.mean(by_voids)) < 4 * spread
     # Tight enough to tell a process that favours narrow voids from one that does not.
-    assert spread < 0.03 * np.mean(tried)
+    assert spread < 0.03 * np.mean(by_trial)

@@ -129,21 +129,23 @@ def test_clouds_are_of_the_first_and_last_frame(file):
 def test_start_and_end_are_on_one_scale_with_the_axes_of_space_and_gravity():
     """A cloud that spreads tenfold in open space."""
     states = [{"position": k * np.eye(3), "radius": np.full(3, 0.1)} for k in (1.0, 10.0)]
-    for effects, seen in (((), "xyz"), ((tisim.effects.Gravity(acceleration=(0, 0, -2.0)),), "xyzg")):
+    for effects, letters in (((), "xyz"), ((tisim.effects.Gravity(acceleration=(0, 0, -2.0)),), "xyzg")):
         figure = start_and_end(states, (0.0, 1.0), SimpleNamespace(domain=Open(), effects=effects))
         left, right = figure.axes
         assert left.get_xlim() == right.get_xlim()
         assert left.get_ylim() == right.get_ylim()
-        named = {text.get_text(): text.get_position()[1] for text in right.texts if text.get_text() in "xyzg"}
-        assert "".join(sorted(filter(None, named), key="xyzg".index)) == seen
-        assert "g" not in named or named["g"] < named["x"] < named["z"]
+        heights = {
+            text.get_text(): text.get_position()[1] for text in right.texts if text.get_text() in "xyzg"
+        }
+        assert "".join(sorted(filter(None, heights), key="xyzg".index)) == letters
+        assert "g" not in heights or heights["g"] < heights["x"] < heights["z"]
 
 
 def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
-    done = []
+    fractions = []
     with frames(file) as trajectory:
-        movie(trajectory, tmp_path / "t.gif", 10, done.append)
-    assert done[-1] == 1.0
+        movie(trajectory, tmp_path / "t.gif", 10, fractions.append)
+    assert fractions[-1] == 1.0
     assert [path.name for path in tmp_path.iterdir()] == ["t.gif"]
     with Image.open(tmp_path / "t.gif") as read:
         assert read.n_frames == 5
@@ -157,12 +159,12 @@ def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
 
 def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path, monkeypatch):
     """In the narrowest picture, with numbers of all digits."""
-    seen = []
+    pages = []
 
     def grab(writer, **more):
         figure = writer.fig
         figure.draw_without_rendering()
-        seen.append([(part, part.get_window_extent()) for part in (*figure.texts, *figure.axes)])
+        pages.append([(part, part.get_window_extent()) for part in (*figure.texts, *figure.axes)])
 
     monkeypatch.setattr(PillowWriter, "grab_frame", grab)
     monkeypatch.setattr(PillowWriter, "finish", lambda writer: None)
@@ -170,8 +172,8 @@ def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path,
     monkeypatch.setattr(Frames, "missing", message)
     with frames(file) as trajectory:
         movie(trajectory, tmp_path / "t.gif")
-    assert len(seen) == 5
-    for parts in seen:
+    assert len(pages) == 5
+    for parts in pages:
         ((note, place),) = [pair for pair in parts if getattr(pair[0], "get_text", str)() == message]
         whole = note.figure.bbox
         assert whole.x0 < place.x0 < place.x1 < whole.x1

@@ -63,9 +63,9 @@ def main() -> int:
         now.save(options.write)
         print(f"stored {options.write.name}")
         return 0
-    stored = FitnessRecord.load(FILE)
-    for name, deviation in stored.deviations(now).items():
-        new, old = now.values[name]["Pi"], stored.values[name]["Pi"]
+    recorded = FitnessRecord.load(FILE)
+    for name, deviation in recorded.deviations(now).items():
+        new, old = now.values[name]["Pi"], recorded.values[name]["Pi"]
         same = "same bits" if new == old else f"{deviation:.2f} standard errors apart"
         print(f"{name:20s} {np.mean(new):.6f} (stored {np.mean(old):.6f}): {same}")
     return 0

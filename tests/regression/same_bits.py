@@ -48,8 +48,8 @@ def fingerprint(name: str, size: str, part: float) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trajectory.h5"
         result = tisim.run(scene, record=tisim.Recording(path, frames=FRAMES))
-        with frames(path) as found:
-            for frame in found:
+        with frames(path) as sequence:
+            for frame in sequence:
                 _add(digest, {"time": np.asarray(frame.time), **frame.arrays})
     _add(digest, result.state)
     digest.update(json.dumps([result.time, result.work, result.measures], sort_keys=True).encode())
@@ -73,34 +73,34 @@ def checked(name: str) -> dict[str, str]:
 
 def measure(check: bool) -> dict[str, Any]:
     """Fingerprints of all runs, and the numbers of all checks where they are asked for."""
-    found: dict[str, Any] = {}
+    fingerprints: dict[str, Any] = {}
     for name, size, part in RUNS:
-        found[f"{name}, {size}"] = fingerprint(name, size, part)
-        print(f"{name}, {size}: {found[f'{name}, {size}'][:16]}", flush=True)
+        fingerprints[f"{name}, {size}"] = fingerprint(name, size, part)
+        print(f"{name}, {size}: {fingerprints[f'{name}, {size}'][:16]}", flush=True)
     for name in dict.fromkeys(name for name, _, _ in RUNS if check):
-        found[f"check {name}"] = checked(name)
-        print(f"check {name}: {len(found[f'check {name}'])} numbers", flush=True)
-    return found
+        fingerprints[f"check {name}"] = checked(name)
+        print(f"check {name}: {len(fingerprints[f'check {name}'])} numbers", flush=True)
+    return fingerprints
 
 
 def main() -> int:
     """Write, or compare."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--write", type=Path, metavar="FILE")
-    what.add_argument("--compare", type=Path, metavar="FILE")
+    action = parser.add_mutually_exclusive_group(required=True)
+    action.add_argument("--write", type=Path, metavar="FILE")
+    action.add_argument("--compare", type=Path, metavar="FILE")
     parser.add_argument("--check", action="store_true", help="also the numbers of tisim check")
     options = parser.parse_args()
-    found = measure(options.check)
+    fingerprints = measure(options.check)
     if options.write:
-        options.write.write_text(json.dumps(found, indent=1) + "\n")
+        options.write.write_text(json.dumps(fingerprints, indent=1) + "\n")
         return 0
     before = json.loads(options.compare.read_text())
-    different = [name for name in found if found[name] != before.get(name)]
+    different = [name for name in fingerprints if fingerprints[name] != before.get(name)]
     for name in different:
         print(f"{name}: different bits")
     if not different:
-        print(f"all {len(found)} have the same bits")
+        print(f"all {len(fingerprints)} have the same bits")
     return 1 if different else 0
 
 

@@ -67,12 +67,12 @@ def caught(**changed):
 
 @pytest.mark.long
 def test_fitness_of_capture_is_that_of_the_record():
-    found, flow = caught()
+    fractions, flow = caught()
     turned = 1 if runtime.current().precision == "f64" else 2
     for variant, designs in CAUGHT.items():
-        np.testing.assert_allclose(found[variant], list(designs.values()), atol=turned + 0.1)
+        np.testing.assert_allclose(fractions[variant], list(designs.values()), atol=turned + 0.1)
     assert flow == pytest.approx(FLOW_SPEED * CHANNEL_WIDTH * CHANNEL_HEIGHT)
     # Particles of 100 nm have half the moment: fewer are caught, in every variant, than rounding may turn.
     smaller, _ = caught(radius=100.0)
     for variant in CAUGHT:
-        assert (found[variant] - smaller[variant]).sum() > turned * found[variant].size
+        assert (fractions[variant] - smaller[variant]).sum() > turned * fractions[variant].size

@@ -19,7 +19,7 @@ STANDARD_ERRORS = 4.0
 
 
 @pytest.fixture(scope="module")
-def stored():
+def recorded_fitness():
     return FitnessRecord.load(fitness_record.FILE)
 
 
@@ -28,17 +28,17 @@ def now():
     return fitness_record.measure()
 
 
-def test_the_record_is_of_this_physics(stored):
-    assert stored.physics == PHYSICS_VERSION
+def test_the_record_is_of_this_physics(recorded_fitness):
+    assert recorded_fitness.physics == PHYSICS_VERSION
 
 
 @pytest.mark.long
-def test_same_settings_give_the_same_fitness_to_the_last_bit(stored, now):
+def test_same_settings_give_the_same_fitness_to_the_last_bit(recorded_fitness, now):
     """On the platform of the record; on another one, whose exp and pow round differently, in the mean."""
-    if stored.same_arithmetic(now):
-        assert now.values == stored.values
+    if recorded_fitness.same_arithmetic(now):
+        assert now.values == recorded_fitness.values
     else:
-        assert max(stored.deviations(now).values()) < STANDARD_ERRORS
+        assert max(recorded_fitness.deviations(now).values()) < STANDARD_ERRORS
 
 
 @pytest.mark.slow
@@ -62,10 +62,10 @@ def elsewhere(folder, *options):
 
 
 @pytest.mark.slow
-def test_single_precision_gives_the_same_fitness_in_the_mean(stored, tmp_path):
+def test_single_precision_gives_the_same_fitness_in_the_mean(recorded_fitness, tmp_path):
     single = elsewhere(tmp_path, "--precision", "f32")
-    assert not stored.same_arithmetic(single)
-    assert max(stored.deviations(single).values()) < STANDARD_ERRORS
+    assert not recorded_fitness.same_arithmetic(single)
+    assert max(recorded_fitness.deviations(single).values()) < STANDARD_ERRORS
 
 
 @pytest.mark.slow

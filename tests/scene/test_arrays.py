@@ -94,32 +94,32 @@ def test_digests_are_those_of_before(make):
 
 
 def test_a_start_of_arrays_equals_that_of_lists():
-    made = one()
-    data = {key: value for key, value in Scene(particles=made, duration=1.0).to_dict()["particles"].items()}
+    start = one()
+    data = {key: value for key, value in Scene(particles=start, duration=1.0).to_dict()["particles"].items()}
     assert data.pop("kind") == "particles"
     assert data["mass"] == [1e-9, 2e-9, 3e-9]
-    assert Particles(**data) == made
-    assert Scene(particles=Particles(**data), duration=1.0) == Scene(particles=made, duration=1.0)
+    assert Particles(**data) == start
+    assert Scene(particles=Particles(**data), duration=1.0) == Scene(particles=start, duration=1.0)
     moved = np.zeros((3, 3))
     moved[2, 2] = 1e-300
     for other in (
         {"position": moved}, {"mass": np.array([1e-9, 2e-9])[:1]}, {"quantities": {"temperature": 301.0}},
         {"quantities": {}}, {"quantities": {"temperature": np.full(3, 300.0)}},
     ):  # fmt: skip
-        assert Particles(**{**data, **other}) != made
+        assert Particles(**{**data, **other}) != start
     arrays = {**data, "quantities": {"temperature": np.full(3, 300.0)}}
     lists = {**data, "quantities": {"temperature": [300.0] * 3}}
     assert Particles(**arrays) == Particles(**lists) == Particles(**arrays)
-    assert made != "particles"
+    assert start != "particles"
     with pytest.raises(TypeError, match="unhashable"):
-        hash(made)
+        hash(start)
 
 
 def test_arrays_are_copies_that_cannot_be_written_to():
     heat = np.full(3, 300.0)
-    made = Particles(**{**one().model_dump(), "quantities": {"temperature": heat}})
+    start = Particles(**{**one().model_dump(), "quantities": {"temperature": heat}})
     heat[0] = 0.0
-    for particles in (made, pickle.loads(pickle.dumps(made))):
+    for particles in (start, pickle.loads(pickle.dumps(start))):
         assert particles.quantities["temperature"].tolist() == [300.0] * 3
         for values in (
             particles.position,
@@ -129,7 +129,7 @@ def test_arrays_are_copies_that_cannot_be_written_to():
         ):
             with pytest.raises(ValueError, match="read-only"):
                 values[0] = 1.0
-    assert pickle.loads(pickle.dumps(made)) == made
+    assert pickle.loads(pickle.dumps(start)) == start
 
 
 @pytest.mark.parametrize(
@@ -153,9 +153,9 @@ def test_arrays_are_copies_that_cannot_be_written_to():
 )
 def test_what_is_wrong_with_an_array_is_said_as_of_a_list(changes, message):
     data = one().model_dump()
-    for given in (changes, {name: v if isinstance(v, dict) else v.tolist() for name, v in changes.items()}):
+    for arrays in (changes, {name: v if isinstance(v, dict) else v.tolist() for name, v in changes.items()}):
         with pytest.raises(InputError, match=message):
-            Particles(**{**data, **given})
+            Particles(**{**data, **arrays})
 
 
 def test_neither_making_nor_digesting_takes_lists_of_all(rng):
@@ -164,10 +164,10 @@ def test_neither_making_nor_digesting_takes_lists_of_all(rng):
     tracemalloc.start()
     particles = Particles(position=where, velocity=where, radius=1e-3, mass=1.0)
     _, making = tracemalloc.get_traced_memory()
-    scene, (held, _) = Scene(particles=particles, duration=1.0), tracemalloc.get_traced_memory()
+    scene, (before, _) = Scene(particles=particles, duration=1.0), tracemalloc.get_traced_memory()
     tracemalloc.reset_peak()
     scene.digest()
     _, digesting = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert making < 6 * where.nbytes
-    assert digesting - held < 15e6
+    assert digesting - before < 15e6

@@ -37,9 +37,9 @@ def test_an_effect_of_a_file_is_found_by_its_name(own_file):
     with pytest.raises(InputError, match=r"effects.pull.kind must be one of .*, mie, .*; received 'pull'"):
         Scene.from_dict(data())
     law = plugins.load(own_file("own_laws.py", LAW))
-    made = Scene.from_dict(data())
-    assert made.effects == (law.Pull(strength=2.0),)
-    assert Scene.from_dict(made.to_dict()).digest() == made.digest()
+    setup = Scene.from_dict(data())
+    assert setup.effects == (law.Pull(strength=2.0),)
+    assert Scene.from_dict(setup.to_dict()).digest() == setup.digest()
     with pytest.raises(InputError, match=r"pull.strength must be a number; received 'x'"):
         Scene.from_dict(data("x"))
 
@@ -47,11 +47,11 @@ def test_an_effect_of_a_file_is_found_by_its_name(own_file):
 def test_the_digest_and_versions_name_the_file_of_an_effect(own_file):
     plain = scene(*ONE).digest()
     plugins.load(own_file("own_laws.py", LAW))
-    first, known = Scene.from_dict(data()).digest(), versions()
-    assert len(known["plugin own_laws"]) == 12
+    first, before = Scene.from_dict(data()).digest(), versions()
+    assert len(before["plugin own_laws"]) == 12
     plugins.load(own_file("own_laws.py", LAW.replace("-self", "-2.0 * self")))
     assert Scene.from_dict(data()).digest() != first
-    assert versions()["plugin own_laws"] != known["plugin own_laws"]
+    assert versions()["plugin own_laws"] != before["plugin own_laws"]
     assert scene(*ONE).digest() == plain, "a plugin changes no scene that does not use it"
 
 
@@ -61,22 +61,22 @@ def test_the_digest_and_versions_name_the_file_of_an_effect(own_file):
 )
 def test_a_name_that_is_taken_is_refused_and_nothing_of_the_file_is_known(own_file, name, other):
     plugins.load(own_file("own_laws.py", LAW))
-    taken = own_file("more_laws.py", LAW.replace("Pull", name))
+    path = own_file("more_laws.py", LAW.replace("Pull", name))
     message = (
         rf"^name of more_laws.{name} must be one that no other .*; received '{name.lower()}, as {other} has'"
     )
     with pytest.raises(InputError, match=message):
-        plugins.load(taken)
+        plugins.load(path)
     assert type(Scene.from_dict(data()).effects[0]).__module__ == "own_laws"
     assert "plugin more_laws" not in versions()
 
 
 def test_an_installed_package_offers_its_effects(installed):
     installed("laws_of_a_package", LAW.replace("Pull", "Tug"))
-    made = Scene.from_dict({**data(), "effects": {"tug": {"strength": 1.0}}})
-    assert type(made.effects[0]).__module__ == "laws_of_a_package"
+    setup = Scene.from_dict({**data(), "effects": {"tug": {"strength": 1.0}}})
+    assert type(setup.effects[0]).__module__ == "laws_of_a_package"
     assert len(versions()["plugin laws_of_a_package"]) == 12
-    assert "laws_of_a_package" in plugins.python_file.module_checksums(type(made.effects[0]))
+    assert "laws_of_a_package" in plugins.python_file.module_checksums(type(setup.effects[0]))
 
 
 def test_an_installed_package_that_is_broken_is_told_in_a_line(installed):

@@ -75,16 +75,16 @@ def other(key, value):
 def test_digest_changes_with_every_number_in_the_scene():
     """Each leaf of the data, changed alone, changes the digest; and nothing else does."""
     base = flow(grains=3)
-    seen = {base.digest()}
+    digests = {base.digest()}
     changed = 0
     for path, value in leaves(base.to_dict()):
         if path[-1] in ("kind", "name"):
             continue
         new = other(path[-1], value)
-        seen.add(base.replace({".".join(path): new}).digest())
+        digests.add(base.replace({".".join(path): new}).digest())
         changed += 1
     assert changed > 25
-    assert len(seen) == changed + 1
+    assert len(digests) == changed + 1
     assert base.digest() == flow(grains=3).digest()
 
 

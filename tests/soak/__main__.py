@@ -28,14 +28,14 @@ def main() -> int:
     parser.add_argument("mishaps", nargs="*", help=f"of {', '.join(MISHAPS)}; all unless given")
     parser.add_argument("--share", type=float, default=1.0, help="part of the trials to make, 0..1")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of what is random")
-    asked = parser.parse_args()
-    print(f"seed {asked.seed}")
+    options = parser.parse_args()
+    print(f"seed {options.seed}")
     print(line(Counts.headings()))
     clean = True
-    for name in asked.mishaps or MISHAPS:
+    for name in options.mishaps or MISHAPS:
         module = importlib.import_module(f"tests.soak.{name}")
         with tempfile.TemporaryDirectory() as folder:
-            for counts in module.soak(asked.seed, asked.share, Path(folder)):
+            for counts in module.soak(options.seed, options.share, Path(folder)):
                 print(line(counts.cells()), flush=True)
                 clean &= counts.clean
     return 0 if clean else 1

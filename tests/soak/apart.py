@@ -8,57 +8,57 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-Came = tuple[str, str]
+Outcome = tuple[str, str]
 """What came of a trial: the column of Counts in which it belongs, "" when all is well; a word about it."""
 
 
-def _work(calls: Connection, make: Callable[..., Callable[[Any], str]], given: tuple[Any, ...]) -> None:
+def _work(calls: Connection, make: Callable[..., Callable[[Any], str]], arguments: tuple[Any, ...]) -> None:
     """Answer each call with what came of it."""
-    answer = make(*given)
+    answer = make(*arguments)
     calls.send("ready")
     while True:
         call = calls.recv()
         try:
-            came: Came = "", answer(call)
+            outcome: Outcome = "", answer(call)
         except AssertionError:
-            came = "wrong", traceback.format_exc()
+            outcome = "wrong", traceback.format_exc()
         except TimeoutError:
-            came = "hung", traceback.format_exc()
+            outcome = "hung", traceback.format_exc()
         except BaseException:
-            came = "tracebacks", traceback.format_exc()
-        calls.send(came)
+            outcome = "tracebacks", traceback.format_exc()
+        calls.send(outcome)
 
 
 class Apart:
-    """A process in which ``make(*given)`` gives a function of a call, which does a trial and may raise:
+    """A process in which ``make(*arguments)`` gives a function of a call, which does a trial and may raise:
     AssertionError for what is wrong, TimeoutError for what takes too long."""
 
-    def __init__(self, make: Callable[..., Callable[[Any], str]], *given: Any) -> None:
-        self.make, self.given = make, given
+    def __init__(self, make: Callable[..., Callable[[Any], str]], *arguments: Any) -> None:
+        self.make, self.arguments = make, arguments
         self._start()
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.calls, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, self.make, self.given), daemon=True)
+        self.process = context.Process(target=_work, args=(theirs, self.make, self.arguments), daemon=True)
         self.process.start()
         theirs.close()
         self.calls.recv()
 
-    def trial(self, call: Any, patience: float) -> Came:
+    def trial(self, call: Any, patience: float) -> Outcome:
         """What came of a trial; one that takes longer than ``patience`` (s, wall time) is ended."""
         self.calls.send(call)
         try:
             if self.calls.poll(patience):
                 column, word = self.calls.recv()
                 return column, word
-            came = "hung", f"no answer in {patience:g} s"
+            outcome = "hung", f"no answer in {patience:g} s"
         except EOFError:
             self.process.join()
-            came = "tracebacks", f"the process ended with {self.process.exitcode}"
+            outcome = "tracebacks", f"the process ended with {self.process.exitcode}"
         self.end()
         self._start()
-        return came
+        return outcome
 
     def end(self) -> None:
         """End the process."""

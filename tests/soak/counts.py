@@ -9,14 +9,14 @@ from dataclasses import dataclass, fields
 class Counts:
     """The outcome of many trials of one kind.
 
-    tried : trials made. lost : records or frames that had been acknowledged and are gone. doubled : records
+    trials : their number. lost : records or frames that had been acknowledged and are gone. doubled : records
     that are there twice. wrong : answers that differ from those of an undisturbed process, without an error.
     hung : trials that had to be ended from outside. tracebacks : errors that are not messages for people,
     crashes of the process among them.
     """
 
     name: str
-    tried: int = 0
+    trials: int = 0
     lost: int = 0
     doubled: int = 0
     wrong: int = 0
@@ -36,4 +36,4 @@ class Counts:
     def clean(self) -> bool:
         """Whether something was tried and nothing went wrong."""
         failures = (self.lost, self.doubled, self.wrong, self.hung, self.tracebacks)
-        return self.tried > 0 and not any(failures)
+        return self.trials > 0 and not any(failures)

@@ -87,14 +87,14 @@ class Bench:
 
     def call(self, *words: object) -> int:
         """The exit code of a command."""
-        said = io.StringIO()
+        output = io.StringIO()
         try:
-            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
                 command_line.main([str(word) for word in words])
-        except SystemExit as left:
-            if left.code not in (0, 1, 2):
-                raise Wrong("tracebacks", f"exit code {left.code}: {said.getvalue()}") from None
-            return int(left.code)
+        except SystemExit as exit_:
+            if exit_.code not in (0, 1, 2):
+                raise Wrong("tracebacks", f"exit code {exit_.code}: {output.getvalue()}") from None
+            return int(exit_.code)
         raise AssertionError("a command ends with an exit code")
 
     def check(self, folder: Path, code: int) -> None:
@@ -103,11 +103,11 @@ class Bench:
             if path.name.endswith(".new") or ".new." in path.name:
                 raise Wrong("wrong", f"{path.name} is left")
             if path.suffix == ".h5" and path.name not in ("checkpoint.h5", "cost.h5"):
-                found = damage._frames(path)
+                parts = damage._frames(path)
                 expected = self.result if path.name == "result.h5" else self.frames
                 whole = path.name != "trajectory.h5" or code == 0
-                if found != (expected if whole else expected[: len(found)]):
-                    raise Wrong("wrong", f"{path.name} holds {len(found)} of {len(expected)} parts")
+                if parts != (expected if whole else expected[: len(parts)]):
+                    raise Wrong("wrong", f"{path.name} holds {len(parts)} of {len(expected)} parts")
             elif path.name in ("cloud.png", "time_series.png") or path.suffix == ".gif":
                 with Image.open(path) as picture:
                     picture.load()
@@ -123,12 +123,12 @@ def run(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) ->
     with room(folder, _part(rng, bench.whole / "trajectory.h5", bench.whole / "cloud.png")):
         code = bench.call(*command)
         bench.check(folder, code)
-    left = [path.name for path in folder.iterdir()]
+    names = [path.name for path in folder.iterdir()]
     if code:
-        code = bench.call(*command, "--resume" if "checkpoint.h5" in left else "--overwrite")
+        code = bench.call(*command, "--resume" if "checkpoint.h5" in names else "--overwrite")
     bench.check(folder, code)
     if code or damage._frames(folder / "result.h5") != bench.result:
-        raise Wrong("lost", f"the run did not go on from {left}: exit code {code}")
+        raise Wrong("lost", f"the run did not go on from {names}: exit code {code}")
 
 
 def checkpoint(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
@@ -169,10 +169,10 @@ def show(name: str) -> Callable:
 
     def trial(bench: Bench, folder: Path, room: Callable, rng: np.random.Generator) -> None:
         file = bench.whole / "trajectory.h5"
-        made = [
+        files = [
             path for path in bench.whole.iterdir() if path.name in MADE[name] or path.suffix in MADE[name]
         ]
-        with room(folder, _part(rng, *made)):
+        with room(folder, _part(rng, *files)):
             code = bench.call(*EXPORTS[name](file, folder))
             bench.check(folder, code)
 
@@ -220,8 +220,8 @@ def main() -> None:
         name = list(TRIALS)[k % len(TRIALS)]
         print(json.dumps([name]), flush=True)
         rng = np.random.default_rng([seed, k])
-        made = {"limit": limited, "tmpfs": mounted}[room]
-        print(json.dumps(trial(bench, name, folder / str(k) / "out", made, rng)), flush=True)
+        room_context = {"limit": limited, "tmpfs": mounted}[room]
+        print(json.dumps(trial(bench, name, folder / str(k) / "out", room_context, rng)), flush=True)
 
 
 if __name__ == "__main__":

@@ -69,8 +69,11 @@ def _result(folder: Path) -> Path:
 def _frames(path: Path) -> list[str]:
     from tisim.io.reader import frames
 
-    with frames(path) as found:
-        return [found.scene.digest(), *(_digest(f.time, f.step, *sorted(f.arrays.items())) for f in found)]
+    with frames(path) as sequence:
+        return [
+            sequence.scene.digest(),
+            *(_digest(f.time, f.step, *sorted(f.arrays.items())) for f in sequence),
+        ]
 
 
 def _digest(*values: object) -> str:
@@ -100,7 +103,7 @@ def _checkpoint(folder: Path) -> Path:
     return folder / "checkpoint.h5"
 
 
-def _restored(path: Path) -> list[str]:
+def _restore(path: Path) -> list[str]:
     from tisim.io.checkpoint import restore
 
     simulation = _simulation()
@@ -172,53 +175,53 @@ def _records(path: Path) -> list[str]:
 KINDS = {
     "result.h5": Kind(_result, _frames),
     "trajectory.h5": Kind(_trajectory, _frames),
-    "checkpoint.h5": Kind(_checkpoint, _restored),
+    "checkpoint.h5": Kind(_checkpoint, _restore),
     "cost.h5": Kind(_cost, _rows),
     "search.h5": Kind(_search, _records),
     "journal of a search": Kind(_journal, _records),
 }
 
 
-def damaged(content: bytes, rng: np.random.Generator) -> bytes:
+def with_mishap(content: bytes, rng: np.random.Generator) -> bytes:
     """The bytes after one mishap: bits flipped, a stretch zeroed or overwritten, cut short, two swapped."""
     hurt, size = bytearray(content), len(content)
     at, other = (int(x) for x in rng.integers(size, size=2))
     length = int(min(rng.choice([1, 16, 512, BLOCK]), size - max(at, other)))
-    what = int(rng.integers(6))
-    if what == 0:
+    mishap = int(rng.integers(6))
+    if mishap == 0:
         hurt[at] ^= 1 << int(rng.integers(8))
-    elif what == 1:
+    elif mishap == 1:
         for place in rng.integers(size, size=3):
             hurt[place] ^= 1 << int(rng.integers(8))
-    elif what == 2:
+    elif mishap == 2:
         hurt[at : at + length] = bytes(length)
-    elif what == 3:
+    elif mishap == 3:
         hurt[at : at + length] = rng.bytes(length)
-    elif what == 4:
+    elif mishap == 4:
         del hurt[at:]
     else:
         one, two = bytes(hurt[at : at + length]), bytes(hurt[other : other + length])
         hurt[at : at + length], hurt[other : other + length] = two, one
-    return bytes(hurt) if bytes(hurt) != content else damaged(content, rng)
+    return bytes(hurt) if bytes(hurt) != content else with_mishap(content, rng)
 
 
 def verdict(kind: Kind, path: Path, whole: list[str] | None) -> tuple[str, object]:
     """What reading a file has come to: the name of a column of Counts or "", and what was read."""
     from tisim import InputError
 
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as messages:
         warnings.simplefilter("always")
         try:
-            found = kind.read(path)
+            content = kind.read(path)
         except InputError as error:
             return ("", str(error)) if "\n" not in str(error) else ("tracebacks", str(error))
         except BaseException:
             return "tracebacks", traceback.format_exc()
-    if whole is None or found == whole:
-        return "", found
-    if set(found) <= set(whole) and len(set(found)) == len(found):
-        return ("" if told else "lost"), found
-    return "wrong", found
+    if whole is None or content == whole:
+        return "", content
+    if set(content) <= set(whole) and len(set(content)) == len(content):
+        return ("" if messages else "lost"), content
+    return "wrong", content
 
 
 def _reader(pipe: Connection) -> None:
@@ -252,12 +255,12 @@ class Reader:
         try:
             if self.pipe.poll(patience):
                 return self.pipe.recv()
-            found = "hung", f"no answer within {patience:g} s"
+            answer = "hung", f"no answer within {patience:g} s"
         except EOFError:
             self.process.join()
-            found = "tracebacks", f"ended with exit code {self.process.exitcode}"
+            answer = "tracebacks", f"ended with exit code {self.process.exitcode}"
         self.end()
-        return found
+        return answer
 
     def end(self) -> None:
         if self.process is not None:
@@ -272,14 +275,12 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
     reader = Reader()
     try:
         for k, name in enumerate(KINDS):
-            yield _counted(
-                name, np.random.default_rng([seed, k]), round(FILES * share), folder / name, reader
-            )
+            yield _count(name, np.random.default_rng([seed, k]), round(FILES * share), folder / name, reader)
     finally:
         reader.end()
 
 
-def _counted(name: str, rng: np.random.Generator, number: int, folder: Path, reader: Reader) -> Counts:
+def _count(name: str, rng: np.random.Generator, number: int, folder: Path, reader: Reader) -> Counts:
     counts = Counts(f"damaged {name}")
     folder.mkdir(parents=True)
     path = reader(name, "make", folder, patience=600.0)
@@ -288,10 +289,10 @@ def _counted(name: str, rng: np.random.Generator, number: int, folder: Path, rea
     # Or all that follows would be refused, as it should be, and nothing found.
     assert isinstance(whole, list), f"the undamaged {name} is not read: {whole}"
     for _ in range(number):
-        path.write_bytes(damaged(content, rng))
-        counts.tried += 1
-        what, why = reader(name, "read", path, whole)
-        if what:
-            setattr(counts, what, getattr(counts, what) + 1)
-            print(f"{name}: {what}: {str(why)[-1500:]}", flush=True)
+        path.write_bytes(with_mishap(content, rng))
+        counts.trials += 1
+        column, why = reader(name, "read", path, whole)
+        if column:
+            setattr(counts, column, getattr(counts, column) + 1)
+            print(f"{name}: {column}: {str(why)[-1500:]}", flush=True)
     return counts

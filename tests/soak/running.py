@@ -9,7 +9,7 @@ from random import Random
 
 from tests import extremes
 from tests.judged import check_message, check_result
-from tests.soak.apart import Apart, Came
+from tests.soak.apart import Apart, Outcome
 from tisim import InputError, Scene, Simulation
 from tisim.backend import runtime
 from tisim.engine.monitor import REASONS
@@ -37,22 +37,22 @@ def runner() -> Callable[[Call], str]:
     compiled: dict[str, Simulation] = {}
 
     def run(call: Call) -> str:
-        name, what = call
+        name, numbers = call
         if name not in compiled:
             compiled[name] = Simulation(Scene.from_dict(extremes.scenes()[name]))
-        if what is None:
+        if numbers is None:
             return RAN
-        tries: Iterable[Values] = (what,)
-        if isinstance(what, int):
-            random = Random(what)
-            tries = islice(iter(lambda: extremes.drawn(name, random), None), DRAWS)
-        came = (_ran(compiled[name], name, values) for values in tries)
-        return next((end for end in came if end != REFUSED), REFUSED)
+        tries: Iterable[Values] = (numbers,)
+        if isinstance(numbers, int):
+            random = Random(numbers)
+            tries = islice(iter(lambda: extremes.draw_values(name, random), None), DRAWS)
+        outcomes = (_run_values(compiled[name], name, values) for values in tries)
+        return next((end for end in outcomes if end != REFUSED), REFUSED)
 
     return run
 
 
-def _ran(simulation: Simulation, name: str, values: Values) -> str:
+def _run_values(simulation: Simulation, name: str, values: Values) -> str:
     try:
         scene = Scene.from_dict(extremes.changed(extremes.scenes()[name], values))
         simulation.load([scene])
@@ -73,18 +73,18 @@ class Runs:
         self.apart = Apart(runner)
         self.compiled: set[str] = set()
 
-    def __call__(self, name: str, what: Values | int) -> Came:
+    def __call__(self, name: str, numbers: Values | int) -> Outcome:
         """What came of a scene with these numbers, or with those drawn from a seed."""
         if name not in self.compiled:
-            came = self.apart.trial((name, None), COMPILING)
-            if came[0]:
-                return came
+            outcome = self.apart.trial((name, None), COMPILING)
+            if outcome[0]:
+                return outcome
             self.compiled.add(name)
-        came = self.apart.trial((name, what), PATIENCE)
-        if came[0]:
+        outcome = self.apart.trial((name, numbers), PATIENCE)
+        if outcome[0]:
             # Another process may have taken the place of the one that has compiled.
             self.compiled.clear()
-        return came
+        return outcome
 
     def end(self) -> None:
         """End the process."""

@@ -40,33 +40,33 @@ def begin(folder: Path, *more: str) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def ended(running: subprocess.Popen[str]) -> str:
+def wait_for_end(running: subprocess.Popen[str]) -> str:
     """What a run says that ends in another way than it should; empty when all is well."""
     try:
-        said = running.communicate(timeout=PATIENCE)[1]
+        output = running.communicate(timeout=PATIENCE)[1]
     except subprocess.TimeoutExpired:
         running.kill()
         running.communicate()
         raise
-    return said[-1500:] if running.returncode else ""
+    return output[-1500:] if running.returncode else ""
 
 
 def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
     """Counts of killed runs, and of each command on a full disk; what went wrong is printed above them."""
-    yield _killed(np.random.default_rng(seed), max(round(KILLS * share), 1), folder / "kills")
-    yield from _crowded(seed, max(round(SIZES * share), 1), folder / "crowded")
+    yield _kill_runs(np.random.default_rng(seed), max(round(KILLS * share), 1), folder / "kills")
+    yield from _fill_disks(seed, max(round(SIZES * share), 1), folder / "crowded")
 
 
-def _killed(rng: np.random.Generator, number: int, folder: Path) -> Counts:
+def _kill_runs(rng: np.random.Generator, number: int, folder: Path) -> Counts:
     counts = Counts("killed runs with frames")
     began = time.monotonic()
-    assert not ended(begin(folder / "whole"))
+    assert not wait_for_end(begin(folder / "whole"))
     whole = {name: damage._frames(folder / "whole" / name) for name in ("trajectory.h5", "result.h5")}
     longest = time.monotonic() - began
     for k in range(number):
-        counts.tried += 1
+        counts.trials += 1
         try:
-            why = _one(folder / str(k), rng, longest, whole)
+            why = _kill_one(folder / str(k), rng, longest, whole)
         except subprocess.TimeoutExpired:
             why = "hung", "no end"
         if why[0]:
@@ -75,7 +75,7 @@ def _killed(rng: np.random.Generator, number: int, folder: Path) -> Counts:
     return counts
 
 
-def _one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) -> tuple[str, str]:
+def _kill_one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) -> tuple[str, str]:
     """Kill a run at random times, go on with it, and compare with the whole one."""
     more: tuple[str, ...] = ()
     for _ in range(int(rng.integers(1, 4))):
@@ -83,17 +83,17 @@ def _one(folder: Path, rng: np.random.Generator, longest: float, whole: dict) ->
         _wait(running, folder / "trajectory.h5", rng, longest)
         running.kill()
         running.communicate()
-        left = {path.name for path in folder.iterdir()} if folder.exists() else set()
-        for name in whole.keys() & left:
-            found = damage._frames(folder / name)
+        names = {path.name for path in folder.iterdir()} if folder.exists() else set()
+        for name in whole.keys() & names:
+            parts = damage._frames(folder / name)
             with h5py.File(folder / name):  # as any other program opens it
                 pass
-            if found != whole[name][: len(found)]:
+            if parts != whole[name][: len(parts)]:
                 return "wrong", f"{name} of a killed run differs from that of a whole one"
-        if "result.h5" in left:
+        if "result.h5" in names:
             break
-        more = ("--resume",) if "checkpoint.h5" in left else ("--overwrite",) if left else ()
-    if "result.h5" not in left and (why := ended(begin(folder, *more))):
+        more = ("--resume",) if "checkpoint.h5" in names else ("--overwrite",) if names else ()
+    if "result.h5" not in names and (why := wait_for_end(begin(folder, *more))):
         return "tracebacks" if "Traceback" in why else "lost", why
     for name, frames in whole.items():
         if damage._frames(folder / name) != frames:
@@ -111,7 +111,7 @@ def _wait(running: subprocess.Popen[str], file: Path, rng: np.random.Generator, 
     time.sleep(rng.uniform(0, longest) * rng.choice([0.01, 0.3, 1.0]))
 
 
-def _crowded(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
+def _fill_disks(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
     """Half of the sizes are those of a small file system, where one can be mounted."""
     mounts = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
     counts: dict[str, Counts] = {}
@@ -125,16 +125,16 @@ def _crowded(seed: int, sizes: int, folder: Path) -> Iterator[Counts]:
 def _trials(room: str, seed: int, sizes: int, folder: Path, counts: dict[str, Counts]) -> None:
     from tests.soak.crowded import TRIALS
 
-    done, number = 0, sizes * len(TRIALS)
-    while done < number:
+    finished, number = 0, sizes * len(TRIALS)
+    while finished < number:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, what, why in _process(room, seed, done, number, folder):
-            done += 1
+        for name, column, why in _process(room, seed, finished, number, folder):
+            finished += 1
             one = counts.setdefault(name, Counts(f"full disk: {name}"))
-            one.tried += 1
-            if what:
-                setattr(one, what, getattr(one, what) + 1)
-                print(f"full disk ({room}), {name}: {what}: {why[-1500:]}", flush=True)
+            one.trials += 1
+            if column:
+                setattr(one, column, getattr(one, column) + 1)
+                print(f"full disk ({room}), {name}: {column}: {why[-1500:]}", flush=True)
         shutil.rmtree(folder)
 
 
@@ -153,20 +153,20 @@ def _process(room: str, seed: int, first: int, last: int, folder: Path) -> Itera
     with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0, env=environment, cwd=ROOT) as process:
         name = ""
         while True:
-            heard = select.select([process.stdout], [], [], PATIENCE)[0]
-            line = process.stdout.readline() if heard and process.stdout else b""
+            readable = select.select([process.stdout], [], [], PATIENCE)[0]
+            line = process.stdout.readline() if readable and process.stdout else b""
             if not line:
                 break
-            said = json.loads(line)
-            if len(said) == 1:
-                name = said[0]
+            answer = json.loads(line)
+            if len(answer) == 1:
+                name = answer[0]
             else:
-                yield name, *said
+                yield name, *answer
                 name = ""
-        if not heard:
+        if not readable:
             process.kill()
         process.wait()
         if name:
-            yield name, "tracebacks" if heard else "hung", f"the process ended with {process.returncode}"
+            yield name, "tracebacks" if readable else "hung", f"the process ended with {process.returncode}"
         elif process.returncode:
             raise RuntimeError(f"{command} ended with {process.returncode} before a trial")

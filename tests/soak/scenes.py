@@ -10,7 +10,7 @@ from random import Random
 
 from tests import extremes, hostile
 from tests.judged import ACCEPTED, check_file, check_message, command, nothing_runs
-from tests.soak.apart import Apart, Came
+from tests.soak.apart import Apart, Outcome
 from tests.soak.counts import Counts
 from tests.soak.running import RAN, REFUSED, Runs
 from tisim import InputError, Scene
@@ -84,24 +84,24 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
     try:
         for k, kind in enumerate(KINDS):
             seeds = range((seed * len(KINDS) + k) * TRIALS, (seed * len(KINDS) + k) * TRIALS + number)
-            yield _counted(kind, ((f"seed {s}", worker.trial((kind, s), PATIENCE)) for s in seeds))
+            yield _count(kind, ((f"seed {s}", worker.trial((kind, s), PATIENCE)) for s in seeds))
     finally:
         worker.end()
     runs, names = Runs(), list(extremes.scenes())
     try:
         seeds = range(seed * TRIALS, seed * TRIALS + number)
-        chosen = ((names[s // OF_ONE % len(names)], s) for s in seeds)
-        yield _counted("extreme scenes run", ((f"{name}, seed {s}", runs(name, s)) for name, s in chosen))
+        draws = ((names[s // OF_ONE % len(names)], s) for s in seeds)
+        yield _count("extreme scenes run", ((f"{name}, seed {s}", runs(name, s)) for name, s in draws))
     finally:
         runs.end()
 
 
-def _counted(kind: str, trials: Iterator[tuple[str, Came]]) -> Counts:
+def _count(kind: str, trials: Iterator[tuple[str, Outcome]]) -> Counts:
     """Counts of trials, each with what it is; what went wrong is printed."""
     counts = Counts(kind)
-    for what, (column, word) in trials:
-        counts.tried += word != REFUSED
+    for scene_name, (column, word) in trials:
+        counts.trials += word != REFUSED
         if column:
             setattr(counts, column, getattr(counts, column) + 1)
-            print(f"{kind}, {what}: {column}: {word[-1500:]}", flush=True)
+            print(f"{kind}, {scene_name}: {column}: {word[-1500:]}", flush=True)
     return counts

@@ -62,8 +62,8 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
         if signal.getsignal(number) is signal.SIG_IGN:  # as in the background; searches would inherit it
             signal.signal(number, lambda *_: None)
     alone = _Search(folder / "alone" / "0", "batch")
-    assert alone.wait() == 0, alone.said()
-    expected = found(folder / "alone" / "0")
+    assert alone.wait() == 0, alone.stderr_text()
+    expected = contents(folder / "alone" / "0")
 
     def one(kind: Kind) -> Counts:
         rng = random.Random(f"{seed} {kind.name}")
@@ -76,24 +76,24 @@ def soak(seed: int, share: float, folder: Path) -> Iterator[Counts]:
 def killed(kind: Kind, kills: int, expected: dict, rng: random.Random, folder: Path) -> Counts:
     """Kill so often; whenever a search has ended in spite of it, compare it and begin another one."""
     counts = Counts(kind.name)
-    round_, told = 0, set()
+    round_, acknowledged = 0, set()
     while True:
         place = folder / str(round_)
         search = _Search(place, kind.executor)
-        shot = counts.tried < kills and shoot(search, kind, rng)
+        shot = counts.trials < kills and shoot(search, kind, rng)
         code = search.wait()
-        counts.tried += shot
+        counts.trials += shot
         counts.hung += search.hung
         stopped = {0, 128 + kind.number, -kind.number} if shot and kind.whom != "worker" else {0}
-        counts.tracebacks += not search.hung and ("Traceback" in search.said() or code not in stopped)
-        told |= search.stored
-        counts.lost += len(told - keys(place))
+        counts.tracebacks += not search.hung and ("Traceback" in search.stderr_text() or code not in stopped)
+        acknowledged |= search.stored
+        counts.lost += len(acknowledged - keys(place))
         if code == 0:
-            counts.wrong += found(place) != expected
+            counts.wrong += contents(place) != expected
             counts.doubled += verify(place / "search.h5").duplicates
-            if counts.tried == kills:
+            if counts.trials == kills:
                 return counts
-            round_, told = round_ + 1, set()
+            round_, acknowledged = round_ + 1, set()
         elif search.hung or code not in stopped:
             return counts  # it would only fail again
 
@@ -141,14 +141,14 @@ class _Search:
 
     def follow(self, evaluations: int | None = None) -> bool:
         """Read on until so many more have been stored, or no process is left to tell; whether there were."""
-        left = evaluations
-        while left is None or left > 0:
+        remaining = evaluations
+        while remaining is None or remaining > 0:
             line = self.process.stdout.readline()
             if not line.endswith("\n"):
                 return False
             if line.startswith("stored "):
                 self.stored.add(line.split()[1])
-                left = None if left is None else left - 1
+                remaining = None if remaining is None else remaining - 1
         return True
 
     def wait(self) -> int:
@@ -160,7 +160,7 @@ class _Search:
         self._dog.cancel()
         return code
 
-    def said(self) -> str:
+    def stderr_text(self) -> str:
         """What it has written to its standard error."""
         return self._errors.read_text()
 
@@ -172,8 +172,8 @@ class _Search:
 
 def living(group: int) -> list[tuple[int, str]]:
     """Ids and command lines of the processes of a group that have not ended."""
-    asked = ["ps", "-eo", "pid=,pgid=,stat=,args="]
-    table = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    command = ["ps", "-eo", "pid=,pgid=,stat=,args="]
+    table = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     rows = (line.split(maxsplit=3) for line in table.splitlines())
     return [(int(row[0]), row[3]) for row in rows if int(row[1]) == group and not row[2].startswith("Z")]
 
@@ -186,8 +186,8 @@ def keys(folder: Path) -> set[str]:
     return {record.key for record in existing(file).records()}
 
 
-def found(folder: Path) -> dict:
-    """All that a search has found."""
+def contents(folder: Path) -> dict:
+    """All that a search has left in its folder: evaluations, tables and best designs."""
     cache = Cache(folder / "search.h5")
     return {
         "records": {record.key: (record.values, record.seed, record.design) for record in cache.records()},

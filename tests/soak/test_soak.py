@@ -18,13 +18,13 @@ SCRIPT = Path(__file__).parents[1] / "soak.sh"
 def test_mishaps_cost_nothing(mishap):
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     command = ["bash", str(SCRIPT), mishap, "--share", "0.1", "--seed", "1"]
-    done = subprocess.run(
+    completed = subprocess.run(
         command, capture_output=True, text=True, check=False, env={**os.environ, "PATH": path}
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert completed.returncode == 0, completed.stdout + completed.stderr
     width = len(Counts.headings()) - 1
-    rows = [line.split()[-width:] for line in done.stdout.splitlines()[2:]]
+    rows = [line.split()[-width:] for line in completed.stdout.splitlines()[2:]]
     assert rows
-    for tried, *failures in rows:
-        assert int(tried) > 0
-        assert set(failures) == {"0"}, done.stdout
+    for trials, *failures in rows:
+        assert int(trials) > 0
+        assert set(failures) == {"0"}, completed.stdout

@@ -42,10 +42,10 @@ def fields(sources, points):
     return out[:, :, 0], np.swapaxes(out[:, :, 1:4], 2, 3)
 
 
-def relative(found, expected):
+def relative(values, expected):
     """Length of the difference over that of the expected vector or matrix, for each point of one world."""
-    axes = tuple(range(1, found.ndim))
-    return np.sqrt(((found - expected) ** 2).sum(axes) / (expected**2).sum(axes))
+    axes = tuple(range(1, values.ndim))
+    return np.sqrt(((values - expected) ** 2).sum(axes) / (expected**2).sum(axes))
 
 
 def steepness(field, gradient, points, half):

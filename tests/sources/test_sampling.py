@@ -16,7 +16,7 @@ def test_sum_of_the_sources_of_one_quantity():
     uniform = MagneticField(constant=(1.0, 0, 0), amplitude=(0.5, 0, 0), omega=(np.pi, 0, 0))
     points = np.array([[1.0, 0.2, -0.4], [-0.3, 2.0, 1.0]])
     effects = (Lorentz(), uniform, ElectricField(constant=(9.0, 9.0, 9.0)), sphere)
-    found, slope = sample(effects, "magnetic_flux_density", points, time=0.5)
+    field, slope = sample(effects, "magnetic_flux_density", points, time=0.5)
 
     def dipole(r):
         d = np.linalg.norm(r)
@@ -25,14 +25,16 @@ def test_sum_of_the_sources_of_one_quantity():
 
     precise = current().precision == "f64"
     expected = [np.array([1.5, 0, 0]) + dipole(r) for r in points]
-    np.testing.assert_allclose(found, expected, rtol=1e-8 if precise else 1e-5)
+    np.testing.assert_allclose(field, expected, rtol=1e-8 if precise else 1e-5)
     step = 1e-5
     for r, gradient in zip(points, slope, strict=True):
         for axis in range(3):
             ahead, behind = r.copy(), r.copy()
             ahead[axis], behind[axis] = r[axis] + step, r[axis] - step
-            wanted = (dipole(ahead) - dipole(behind)) / (2 * step)
-            np.testing.assert_allclose(gradient[:, axis], wanted, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
+            difference = (dipole(ahead) - dipole(behind)) / (2 * step)
+            np.testing.assert_allclose(
+                gradient[:, axis], difference, rtol=1e-5, atol=1e-6 * np.abs(slope).max()
+            )
 
 
 def test_nothing_to_sample_and_points_of_another_shape():
@@ -50,7 +52,7 @@ def test_fields_of_sources_go_when_the_kernel_fails(monkeypatch):
         raise RuntimeError("does not compile")
 
     monkeypatch.setattr("tisim.sources.sampling._Sum.at", broken)
-    with pytest.raises(RuntimeError, match="does not compile") as told:
+    with pytest.raises(RuntimeError, match="does not compile") as error_info:
         sample((MagneticField(constant=(1.0, 0, 0)),), "magnetic_flux_density", [[0.0, 0, 0]])
     assert len(memory.in_use()) == before
-    assert told.value
+    assert error_info.value

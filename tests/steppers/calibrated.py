@@ -70,8 +70,8 @@ class Single:
             StokesDrag(viscosity=self.drag / (6 * np.pi * RADIUS)),
             UniformFlow(velocity=(self.flow, 0, 0)),
         )
-        given = {"charge": 1.0, "anchor": np.zeros((1, 3))}
-        more = {"mass": 1.0, "radius": RADIUS, "quantities": given, "duration": self.duration}
+        quantities = {"charge": 1.0, "anchor": np.zeros((1, 3))}
+        more = {"mass": 1.0, "radius": RADIUS, "quantities": quantities, "duration": self.duration}
         return scene([[*self.place, 0.0]], [[*self.speed, 0.0]], effects, stepper=stepper, **more)
 
     @cached_property
@@ -123,8 +123,8 @@ class Several:
 
         start = np.concatenate([self.place, self.speed]).ravel()
         looks = np.linspace(0, self.duration, LOOKS)
-        found = solve_ivp(rates, (0, self.duration), start, "DOP853", looks, rtol=3e-14, atol=1e-16)
-        path = found.y[: self.place.size].reshape(*shape, -1)
+        solution = solve_ivp(rates, (0, self.duration), start, "DOP853", looks, rtol=3e-14, atol=1e-16)
+        path = solution.y[: self.place.size].reshape(*shape, -1)
         away = np.linalg.norm(path - path[..., :1], axis=1).max(axis=1)
         return End(path[..., -1], away.sum())
 
@@ -189,14 +189,18 @@ CONTROLS = {
 }
 
 
-def ratios(make: Callable[[float], Stepper], asked: Sequence[float], known=KNOWN) -> dict[str, np.ndarray]:
+def ratios(
+    make: Callable[[float], Stepper], tolerances: Sequence[float], scenes=KNOWN
+) -> dict[str, np.ndarray]:
     """The error at the end over that asked for, of each scene for each error."""
-    found = {}
+    ratios_by_name = {}
     for kind in (Single, Several):
-        names = [name for name in known if isinstance(known[name], kind)]
-        made = [known[name].scene(make(e)) for name in names for e in asked]
-        if made:
-            results = iter(simulate(made, worlds=len(made), capacity=5 if kind is Several else 1))
+        names = [name for name in scenes if isinstance(scenes[name], kind)]
+        runs = [scenes[name].scene(make(e)) for name in names for e in tolerances]
+        if runs:
+            results = iter(simulate(runs, worlds=len(runs), capacity=5 if kind is Several else 1))
             for name in names:
-                found[name] = np.array([known[name].end.error(next(results)) / e for e in asked])
-    return found
+                ratios_by_name[name] = np.array(
+                    [scenes[name].end.error(next(results)) / e for e in tolerances]
+                )
+    return ratios_by_name

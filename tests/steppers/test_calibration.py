@@ -27,32 +27,32 @@ BAND = 1 / 20, 20.0
 """Of the error at the end over that asked for, where a motion neither forgets errors nor multiplies them."""
 
 
-def within(found, least=BAND[0], most=BAND[1]):
-    for name, values in found.items():
+def within(ratios_by_scene, least=BAND[0], most=BAND[1]):
+    for name, values in ratios_by_scene.items():
         assert (values > (0.0 if name == FORGETS else least)).all(), f"{name}: {values}"
         assert (values < most).all(), f"{name}: {values}"
 
 
 def test_the_error_at_the_end_of_a_particle_alone_is_that_asked_for():
     """By the trapezoidal rule: within a factor of 4 for each motion that is linear, whatever is asked for."""
-    found = ratios(trapezoid("run"), ASKED, SINGLE)
-    within(found, 0.25, 4.0)
-    assert list(found) == list(SINGLE)
+    ratios_by_scene = ratios(trapezoid("run"), ASKED, SINGLE)
+    within(ratios_by_scene, 0.25, 4.0)
+    assert list(ratios_by_scene) == list(SINGLE)
 
 
 def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path):
     """How far a particle has been from its start is its own, and kept."""
-    made = [known.scene(trapezoid("run")(ASKED[0])) for known in SINGLE.values()]
+    scenes = [calibrated.scene(trapezoid("run")(ASKED[0])) for calibrated in SINGLE.values()]
     worlds = len(SINGLE) * len(ASKED)
-    together = simulate(made, worlds=worlds, capacity=1)
-    simulation = compiled(made[0], worlds, 1)
-    for scene, result in zip(made[::3], together[::3], strict=True):
+    together = simulate(scenes, worlds=worlds, capacity=1)
+    simulation = compiled(scenes[0], worlds, 1)
+    for scene, result in zip(scenes[::3], together[::3], strict=True):
         (alone,) = simulate([scene], worlds=worlds, capacity=1)
         assert alone.work == result.work
         np.testing.assert_array_equal(alone.state["position"], result.state["position"])
     # Windows of a tenth of a second, to stop at.
     control = ErrorControl(error=1e-3, tolerance=1e-5, per="run", first=1e-4, longest=0.1)
-    stops = made[0].model_copy(update={"stepper": Trapezoid(control=control)})
+    stops = scenes[0].model_copy(update={"stepper": Trapezoid(control=control)})
     simulation.load([stops])
     simulation.run()
     (whole,) = simulation.results()
@@ -67,19 +67,19 @@ def test_particles_in_a_batch_and_from_a_checkpoint_have_the_same_bits(tmp_path)
     np.testing.assert_array_equal(rest.state["position"], whole.state["position"])
 
 
-def from_first_steps(asked):
+def from_first_steps(tolerances):
     """The error at the end over that asked for, of an oscillator by collocation, for each first step (s)."""
     oscillator = {"oscillator": Single(3.25, (1.0, 0.0), spring=(2 * np.pi) ** 2)}
     makes = [collocation("run", first) for first in (1e-4, StageControl().first, 1e-8)]
-    return [ratios(make, asked, oscillator)["oscillator"].tolist() for make in makes]
+    return [ratios(make, tolerances, oscillator)["oscillator"].tolist() for make in makes]
 
 
 def test_steps_are_solved_whatever_the_first_one():
     """A first step so short that a sweep changes nothing there says nothing of longer ones: taken for a
     contraction of 0 it had them all unsolved, and the end 20 times as far off as asked for."""
-    found = np.array(from_first_steps(10.0 ** -np.arange(7, 11)))
-    assert (found > 0.25).all(), found
-    assert (found < 1.0).all(), found
+    ratios_by_step = np.array(from_first_steps(10.0 ** -np.arange(7, 11)))
+    assert (ratios_by_step > 0.25).all(), ratios_by_step
+    assert (ratios_by_step < 1.0).all(), ratios_by_step
 
 
 @pytest.mark.slow
@@ -105,41 +105,46 @@ def test_what_the_estimate_says_of_the_leading_term():
 @pytest.mark.parametrize("name", [name for name in CONTROLS if "run" in name])
 def test_the_error_at_the_end_is_that_asked_for(name):
     """Within a factor of 20 for every decade; the chaotic motion multiplies errors, by some 50."""
-    make, asked = CONTROLS[name]
-    found = ratios(make, asked)
-    within({scene: values for scene, values in found.items() if scene != CHAOTIC})
-    assert (found[CHAOTIC] < 100).all(), found[CHAOTIC]
+    make, tolerances = CONTROLS[name]
+    ratios_by_scene = ratios(make, tolerances)
+    within({scene: values for scene, values in ratios_by_scene.items() if scene != CHAOTIC})
+    assert (ratios_by_scene[CHAOTIC] < 100).all(), ratios_by_scene[CHAOTIC]
 
 
 @pytest.mark.slow
 def test_the_error_at_the_end_from_the_first_step_by_default():
     """Collocation takes few steps, and where they fall matters: a factor of 50, for the same motions."""
-    found = ratios(collocation("run", StageControl().first), CONTROLS["Collocation, StageControl"][1])
-    within({scene: values for scene, values in found.items() if scene != CHAOTIC}, 1 / 50, 50.0)
-    assert (found[CHAOTIC] < 100).all(), found[CHAOTIC]
+    ratios_by_scene = ratios(
+        collocation("run", StageControl().first), CONTROLS["Collocation, StageControl"][1]
+    )
+    within({scene: values for scene, values in ratios_by_scene.items() if scene != CHAOTIC}, 1 / 50, 50.0)
+    assert (ratios_by_scene[CHAOTIC] < 100).all(), ratios_by_scene[CHAOTIC]
 
 
 @pytest.mark.slow
 def test_an_error_of_steps_says_less_of_the_end():
     """Of the same motions: what is asked of steps is missed at the end by a factor of 100 and more, either
     way, and by one that depends on what is asked for."""
-    for name, (make, asked) in CONTROLS.items():
+    for name, (make, tolerances) in CONTROLS.items():
         if "run" not in name:
             values = np.concatenate(
-                [v for scene, v in ratios(make, asked).items() if scene not in (CHAOTIC, FORGETS)]
+                [v for scene, v in ratios(make, tolerances).items() if scene not in (CHAOTIC, FORGETS)]
             )
             assert max(values.max(), 1 / values.min()) > 100
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("make", "asked", "expected"), [(trapezoid, ASKED, 2.0), (collocation, 10.0 ** -np.arange(4, 11), 8.0)]
+    ("make", "tolerances", "expected"),
+    [(trapezoid, ASKED, 2.0), (collocation, 10.0 ** -np.arange(4, 11), 8.0)],
 )
-def test_order_is_kept(make, asked, expected):
+def test_order_is_kept(make, tolerances, expected):
     """The error falls with the number of steps as that of equal ones does."""
-    known = Single(30.25, (1.0, 0.0), spring=(2 * np.pi) ** 2)
-    results = simulate([known.scene(make("run")(e)) for e in asked], worlds=len(asked), capacity=1)
-    errors = [known.end.error(result) for result in results]
+    oscillator = Single(30.25, (1.0, 0.0), spring=(2 * np.pi) ** 2)
+    results = simulate(
+        [oscillator.scene(make("run")(e)) for e in tolerances], worlds=len(tolerances), capacity=1
+    )
+    errors = [oscillator.end.error(result) for result in results]
     steps = [result.work["particle_steps"] for result in results]
     assert order(steps, errors) == pytest.approx(expected, rel=0.1)
 

@@ -50,8 +50,8 @@ def test_error_falls_as_the_square_of_the_step(name):
         scenes += [charged(STEPPERS[name](int(n)), DURATION, **settings) for n in steps]
     results = simulate(scenes, worlds=len(scenes), capacity=1)
     for k, (what, velocity) in enumerate(zip(named, expected, strict=True)):
-        found = [final(r)[:2] for r in results[len(steps) * k : len(steps) * (k + 1)]]
-        errors = np.linalg.norm(np.array(found) - velocity, axis=1)
+        velocities = [final(r)[:2] for r in results[len(steps) * k : len(steps) * (k + 1)]]
+        errors = np.linalg.norm(np.array(velocities) - velocity, axis=1)
         assert order(steps, errors) == pytest.approx(2.0, abs=0.06), what
         assert errors[-1] < 1e-3, what
 
@@ -75,8 +75,8 @@ def test_order_of_the_implicit_stepper(phi, expected):
 @pytest.mark.slow
 def test_the_error_asked_for_is_met_and_costs_work():
     """Error control over five decades: the error falls with what is asked, and work rises."""
-    asked = 10.0 ** -np.arange(3, 8)
-    scenes = [charged(accurate(e), DURATION, stiffness=8.0, amplitude=1.5, omega=2.0) for e in asked]
+    tolerances = 10.0 ** -np.arange(3, 8)
+    scenes = [charged(accurate(e), DURATION, stiffness=8.0, amplitude=1.5, omega=2.0) for e in tolerances]
     results = simulate(scenes, worlds=len(scenes), capacity=1)
     velocity = np.array(driven(DURATION, W, 4.0, 1.5 * PUSH, 2.0))
     errors = np.array([np.linalg.norm(final(r)[:2] - velocity) for r in results]) / np.linalg.norm(velocity)
@@ -84,5 +84,5 @@ def test_the_error_asked_for_is_met_and_costs_work():
     assert (np.diff(errors) < 0).all()
     assert (np.diff(work) > 0).all()
     # A second-order rule: a hundredth of the error for ten times the steps, within what iterations vary.
-    assert (errors < 30 * asked).all()
+    assert (errors < 30 * tolerances).all()
     assert errors[-1] < errors[0] * 1e-3

@@ -106,15 +106,15 @@ class Implicit(Stepper):
         return Step((Begin(context), Keep(context.s), Iteration(context.s, correct)))
 
 
-def implicit(made: Scene, **more) -> Scene:
-    return made.model_copy(update={"stepper": Implicit(control=made.stepper.control, **more)})
+def implicit(setup: Scene, **more) -> Scene:
+    return setup.model_copy(update={"stepper": Implicit(control=setup.stepper.control, **more)})
 
 
 def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
     """The trapezoidal rule is exact in energy for a linear spring, whatever the step."""
     stiffness, end = 4.0, 3.0
     steps = 2 ** np.arange(6, 11)
-    made = [
+    scenes = [
         implicit(
             scene(
                 [[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=stiffness),), mass=1.0, dt=end / n, steps=int(n)
@@ -122,7 +122,7 @@ def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
         )
         for n in steps
     ]
-    results = simulate(made, worlds=len(made))
+    results = simulate(scenes, worlds=len(scenes))
     angle = np.sqrt(stiffness) * end
     errors = [abs(r.state["position"][0, 0] - np.cos(angle)) for r in results]
     assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.02)
@@ -135,8 +135,8 @@ def test_it_is_of_second_order_and_keeps_the_energy_of_an_oscillator():
 
 
 def test_its_parameters_may_differ_per_world_and_are_written_to_files():
-    made = scene([[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=4.0),), mass=1.0, dt=0.1, steps=30)
-    loose, tight = implicit(made, tolerance=1e-4), implicit(made, tolerance=1e-12)
+    setup = scene([[1.0, 0, 0]], [[0, 1.0, 0]], (Trap(stiffness=4.0),), mass=1.0, dt=0.1, steps=30)
+    loose, tight = implicit(setup, tolerance=1e-4), implicit(setup, tolerance=1e-12)
     assert loose.structure() == tight.structure()
     assert Scene.from_dict(tight.to_dict()).digest() == tight.digest()
     assert "tolerance = 1e-12" in tight.to_toml()
@@ -149,8 +149,8 @@ def test_lists_and_forces_in_an_iteration():
     """Short-ranged forces over lists that are made anew within it, and the same over all pairs."""
     results = []
     for kind in (SoftShell, SoftShellOfAll):
-        made = implicit(shells(kind, np.random.default_rng(3), True), tolerance=1e-13)
-        results += simulate([made], capacity=300, schedule="particle")
+        setup = implicit(shells(kind, np.random.default_rng(3), True), tolerance=1e-13)
+        results += simulate([setup], capacity=300, schedule="particle")
     listed, everyone = results
     assert listed.status.ok
     assert np.abs(listed.state["velocity"] - listed.start["velocity"]).max() > 0.1
@@ -160,8 +160,8 @@ def test_lists_and_forces_in_an_iteration():
 @pytest.mark.slow
 def test_what_settles_in_an_iteration_is_an_iteration_in_an_iteration():
     """Induced dipoles, in every correction of every step: the same bits on both schedules, worlds at odds."""
-    made = [implicit(cloud(1), tolerance=1e-13), implicit(cloud(2, chi=5.0), tolerance=1e-12)]
-    results = [simulate(made, worlds=2, schedule=schedule) for schedule in ("world", "particle")]
+    scenes = [implicit(cloud(1), tolerance=1e-13), implicit(cloud(2, chi=5.0), tolerance=1e-12)]
+    results = [simulate(scenes, worlds=2, schedule=schedule) for schedule in ("world", "particle")]
     for a, b in zip(*results, strict=True):
         assert a.work == b.work
         assert a.work["mutual_sweeps"] > a.work["corrections"] > 20

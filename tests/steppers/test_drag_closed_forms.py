@@ -37,17 +37,17 @@ def stokes(r, factor, v):
 def test_distance_and_its_order(form, name):
     """All parameters at once, four step lengths each: order 2, along a direction that is none of the axes."""
     along = np.array([2.0, -1.0, 2.0]) / 3
-    made, expected = [], []
+    scenes, expected = [], []
     for r, factor, v in GRID:
         law, distance = form(r, factor, v)
         expected.append(distance)
         for n in STEPS.tolist():
             more = {"density": RHO, "stepper": STEPPERS[name](n), "duration": DURATION}
-            made.append(scene([[0.0, 0.0, 0.0]], [v * along], (law,), radius=r, **more))
-    results = simulate(made, worlds=len(made), capacity=1)
+            scenes.append(scene([[0.0, 0.0, 0.0]], [v * along], (law,), radius=r, **more))
+    results = simulate(scenes, worlds=len(scenes), capacity=1)
     assert all(result.status.ok for result in results)
     places = np.array([result.state["position"][0] for result in results])
     errors = np.linalg.norm(places - np.repeat(expected, len(STEPS))[:, None] * along, axis=1)
-    for what, found, distance in zip(GRID, errors.reshape(len(GRID), -1), expected, strict=True):
-        assert order(STEPS, found) == pytest.approx(2.0, abs=0.02), what
-        assert found[-1] < 2e-5 * distance, what
+    for label, errors_of_steps, distance in zip(GRID, errors.reshape(len(GRID), -1), expected, strict=True):
+        assert order(STEPS, errors_of_steps) == pytest.approx(2.0, abs=0.02), label
+        assert errors_of_steps[-1] < 2e-5 * distance, label

@@ -72,8 +72,8 @@ def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
     """Two grains of 1 um, 10 um apart, that meet at 5 m/s each: in 1 us, the shortest step of the default,
     they would be past each other and no impact be seen. With shorter steps they collide."""
     apart, speed = [[0, 0, 0], [1e-5, 0, 0]], [[5.0, 0, 0], [-5.0, 0, 0]]
-    given = {"radius": 1e-6, "duration": 2e-6}
-    meeting = scene(apart, speed, (Impact(hardness=1e5),), stepper=Verlet(), **given)
+    common = {"radius": 1e-6, "duration": 2e-6}
+    meeting = scene(apart, speed, (Impact(hardness=1e5),), stepper=Verlet(), **common)
     rule = r"so short that no particle moves by more than the smallest radius, 1e-06 m, in it at 5 m/s"
     with pytest.raises(InputError, match=rf"^stepper\.control\.shortest must be {rule}; received 1e-06$"):
         run([meeting])
@@ -81,9 +81,9 @@ def test_a_scene_that_the_default_steps_cannot_resolve_is_refused():
     (result,) = run([meeting.model_copy(update={"stepper": shorter})])
     assert result.work["impacts"] == 1
     # Where all move alike nothing meets, and without impacts nothing can be missed.
-    along = scene(apart, [[5.0, 0, 0]] * 2, (Impact(hardness=1e5),), stepper=Verlet(), **given)
-    free = scene(apart, speed, (), stepper=Verlet(), **given)
+    along = scene(apart, [[5.0, 0, 0]] * 2, (Impact(hardness=1e5),), stepper=Verlet(), **common)
+    free = scene(apart, speed, (), stepper=Verlet(), **common)
     assert all(result.status.ok for result in (*run([along]), *run([free])))
-    beyond = scene(apart, [[1e155, 0, 0], [0, 0, 0]], (Impact(hardness=1e5),), stepper=Verlet(), **given)
+    beyond = scene(apart, [[1e155, 0, 0], [0, 0, 0]], (Impact(hardness=1e5),), stepper=Verlet(), **common)
     with pytest.raises(InputError, match=r"^stepper\.control\.shortest must be so short"):
         run([beyond])

@@ -122,12 +122,12 @@ def test_growth_of_steps_is_counted():
 
 def test_steps_ahead():
     """As many as are left at the length of the last one, in the world that has most."""
-    made = [
+    scenes = [
         scene([[0.0] * 3], [[1.0] * 3], stepper=FREE["verlet, fixed"](dt), duration=1.0)
         for dt in (1e-2, 1e-3)
     ]
-    simulation = compiled(made[0], WORLDS, PARTICLES, "world")
-    simulation.load(made)
+    simulation = compiled(scenes[0], WORLDS, PARTICLES, "world")
+    simulation.load(scenes)
     assert simulation.ahead() == pytest.approx(1000, abs=1)
     simulation.run(steps=40)
     assert simulation.ahead() == pytest.approx(960, abs=1)
@@ -150,9 +150,9 @@ def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
             simulation.run(observers=[recorder])
         for w, (result, other) in enumerate(zip(simulation.results(), alone, strict=True)):
             np.testing.assert_array_equal(result.state["position"], other.state["position"])
-            with frames(path, w) as seen:
+            with frames(path, w) as sequence:
                 times = []
-                for frame in seen:
+                for frame in sequence:
                     times.append(frame.time)
                     on_line(frame.arrays, result.start, frame.time)
             assert times[0] == 0.0
@@ -161,6 +161,6 @@ def test_looks_at_times_near_those_at_which_particles_meet(name, tmp_path):
             meetings = np.append(
                 np.arange(np.ceil(result.time / LONGEST[0] - 1e-6)) * LONGEST[0], result.time
             )
-            asked = np.arange(np.floor(result.time / every) + 1) * every
-            due = np.searchsorted(meetings, asked * (1 - 1e-8))
+            frame_times = np.arange(np.floor(result.time / every) + 1) * every
+            due = np.searchsorted(meetings, frame_times * (1 - 1e-8))
             assert set(meetings[np.minimum(due, len(meetings) - 1)]) <= set(times)

@@ -64,7 +64,7 @@ def test_spring_under_a_force_that_depends_on_time():
     """Forced oscillator from rest, r = g (cos(omega t) - cos(w0 t)) / (w0^2 - omega^2), at second order."""
     stiffness, omega, shake, end = 4.0, 1.3, 0.7, 3.0
     steps = 2 ** np.arange(5, 10)
-    made = [
+    scenes = [
         charges(
             [[0, 0, 0]],
             [[0, 0, 0]],
@@ -77,6 +77,6 @@ def test_spring_under_a_force_that_depends_on_time():
     ]
     w0 = np.sqrt(stiffness)
     expected = shake * (np.cos(omega * end) - np.cos(w0 * end)) / (w0**2 - omega**2)
-    errors = np.array([abs(r.state["position"][0, 0] - expected) for r in run(made)])
+    errors = np.array([abs(r.state["position"][0, 0] - expected) for r in run(scenes)])
     assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.05)
     assert errors[-1] < 1e-5

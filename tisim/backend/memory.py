@@ -22,7 +22,7 @@ MAX_TREES_PER_START = 300
 """Taichi is started anew after so many trees: it never gives back the memory of compiled kernels, some
 hundred kB to each tree, and takes longer to compile the more there are."""
 
-_made: Counter[int] = Counter()
+_tree_counts: Counter[int] = Counter()
 """Trees that have been made, by the start of Taichi."""
 _collecting: list[list[Tree]] = []
 _live: weakref.WeakSet[Tree] = weakref.WeakSet()
@@ -47,7 +47,7 @@ class Tree:
         _live.add(self)
         for trees in _collecting:
             trees.append(self)
-        _made[self.generation] += 1
+        _tree_counts[self.generation] += 1
         _release_lost()
         if len(in_use()) > MAX_TREES:
             self.destroy()
@@ -87,14 +87,14 @@ def collected() -> Iterator[list[Tree]]:
         _collecting.pop()
 
 
-def trees_made() -> int:
+def tree_count() -> int:
     """Trees that have been made in this process."""
-    return _made.total()
+    return _tree_counts.total()
 
 
-def worn() -> bool:
+def needs_restart() -> bool:
     """Whether so many trees have been made that Taichi should be started anew."""
-    return _made[runtime.generation()] >= MAX_TREES_PER_START
+    return _tree_counts[runtime.generation()] >= MAX_TREES_PER_START
 
 
 @in_taichi_thread

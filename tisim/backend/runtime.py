@@ -91,16 +91,16 @@ def init(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runti
     ``tisim.run``, ``tisim.accuracy.study`` or ``optimize.run`` do in other threads is over. It invalidates
     every Simulation made before; those say so when used.
     """
-    wanted = Runtime(device, precision, threads or cores())
-    if wanted == _current:
-        return wanted
+    requested = Runtime(device, precision, threads or cores())
+    if requested == _current:
+        return requested
     with turn:
-        _start(wanted)
-    return wanted
+        _start(requested)
+    return requested
 
 
 @in_taichi_thread
-def _start(wanted: Runtime) -> None:
+def _start(requested: Runtime) -> None:
     global _current, _generation
     if not _generation:
         atexit.register(_stop)
@@ -110,9 +110,9 @@ def _start(wanted: Runtime) -> None:
         # Taichi announces the device on standard output, where results go.
         with kernel_cache.alone(), contextlib.redirect_stdout(io.StringIO()):
             ti.init(
-                arch=ti.cuda if wanted.device == "cuda" else ti.cpu,
-                default_fp=wanted.real,
-                cpu_max_num_threads=wanted.threads,
+                arch=ti.cuda if requested.device == "cuda" else ti.cpu,
+                default_fp=requested.real,
+                cpu_max_num_threads=requested.threads,
                 fast_math=False,
                 enable_fallback=False,
                 # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
@@ -123,9 +123,9 @@ def _start(wanted: Runtime) -> None:
             _compile_first()
     except RuntimeError as failure:
         raise InputError(
-            f"device must be present on this machine; received {wanted.device!r} ({failure})"
+            f"device must be present on this machine; received {requested.device!r} ({failure})"
         ) from failure
-    _current = wanted
+    _current = requested
 
 
 @ti.kernel

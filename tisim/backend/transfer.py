@@ -19,7 +19,7 @@ UNROLL_LIMIT = 32
 TYPES = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32, ti.i64: np.int64}
 
 
-def _divided(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
+def _divide(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
     return tuple(entries[k : k + UNROLL_LIMIT] for k in range(0, len(entries), UNROLL_LIMIT))
 
 
@@ -42,7 +42,7 @@ class Exchange:
         self.sizes = sizes
         placed.sort(key=lambda entry: entry[0])
         groups = [(shape, tuple(entry[1:] for entry in of)) for shape, of in groupby(placed, lambda e: e[0])]
-        self.groups = tuple((shape, _divided(entries)) for shape, entries in groups)
+        self.groups = tuple((shape, _divide(entries)) for shape, entries in groups)
 
     def _buffers(self) -> tuple[np.ndarray, ...]:
         """One for each type. No array may be empty."""

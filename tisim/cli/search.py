@@ -24,7 +24,6 @@ from tisim.cli.options import (
 )
 from tisim.console import err, out, print_stopping
 from tisim.errors import RunError
-from tisim.files import lock, ownership
 from tisim.files.atomic import replace_file
 from tisim.files.resuming import resume_hint
 from tisim.interrupt import Interrupt
@@ -75,9 +74,9 @@ def optimize(
     All goes to search.h5. The same command, given again, goes on where it was stopped.
     """
     from optimize.evaluation.executors import evaluator_named
-    from optimize.search_folder import SEARCH_FILE, going_on
+    from optimize.search_folder import SEARCH_FILE, resume_or_clear
     from optimize.session import session
-    from optimize.settings import Settings, fit, followed, proposed
+    from optimize.settings import Settings, fit, proposed, without_dependent_options
 
     problem, defaults = targets.inverse_problem(case, size, variant)
     options = {
@@ -91,12 +90,14 @@ def optimize(
     }
     changed = {key: value for key, value in options.items() if value is not None}
     settings = Settings(
-        **scene_arguments.with_changes(followed(proposed(problem, defaults, method), changed), changed)
+        **scene_arguments.with_changes(
+            without_dependent_options(proposed(problem, defaults, method), changed), changed
+        )
     )
     fit(problem, settings)
     out_folder = folder or Path("out") / problem.name
     with closing(evaluator_named(executor, device, precision, threads)) as evaluator:
-        going_on(out_folder, fresh, overwrite)
+        resume_or_clear(out_folder, fresh, overwrite)
         outcome = session(problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite)
     if outcome.interrupted:
         err().print(
@@ -136,23 +137,20 @@ def compare(
     """
     from optimize.evaluation.executors import evaluator_named
     from optimize.report import comparison
-    from optimize.search_folder import going_on
-    from optimize.settings import followed
+    from optimize.settings import without_dependent_options
     from optimize.storage.cache import Cache
 
     problem, defaults = targets.inverse_problem(case, size, variant)
     changed = scene_arguments.table_changes("search", scene_arguments.assignments(changes or ()))
-    base = scene_arguments.with_changes(followed(defaults, changed), changed)
+    base = scene_arguments.with_changes(without_dependent_options(defaults, changed), changed)
     names = [name.strip() for name in methods.split(",") if name.strip()]
     out_folder = folder or Path("out") / f"compare-{problem.name}"
-    resume = going_on(
-        out_folder, fresh, overwrite, "comparison", comparison.COMPARISON_FILE, (comparison.CSV,)
-    )
-    ownership.claim(out_folder, comparison.COMPARISON_FILES, overwrite)
+    plan = comparison.plan(problem, base, names, evaluations, repeats, fresh_starts)
     results = []
     with (
+        # What cannot be is refused before anything in the folder is removed.
         closing(evaluator_named(executor, device, precision, threads)) as evaluator,
-        lock.acquire(out_folder, exclusive=False),
+        comparison.claim(out_folder, fresh, overwrite) as resume,
         Cache(out_folder / comparison.COMPARISON_FILE) as run_cache,
         Interrupt(print_stopping) as ctrl_c,
     ):
@@ -161,10 +159,7 @@ def compare(
             err().print(
                 f"going on with {out_folder / comparison.COMPARISON_FILE}, which has {len(run_cache)} runs"
             )
-        searches = comparison.compare(
-            problem, base, names, evaluations, repeats, fresh_starts, evaluator, run_cache,
-            lambda _: ctrl_c.check(),
-        )  # fmt: skip
+        searches = comparison.compare(plan, evaluator, run_cache, lambda _: ctrl_c.check())
         try:
             for result in searches:
                 results.append(result)

@@ -49,7 +49,7 @@ def _rows(array: np.ndarray) -> str:
     size = np.abs(numbers)
     other = ((size < PLAIN[0]) & (size > 0)) | (size >= PLAIN[1])
     # Written by Python, in the places that hold no number.
-    written = [repr(number) for number in numbers[other].tolist()]
+    digits = [repr(number) for number in numbers[other].tolist()]
     listed = np.where(other, np.nan, numbers).tolist()
     between = to_json(listed, inf_nan_mode="constants").decode().replace(",", ", ").split("NaN")
-    return "".join(part for pair in zip_longest(between, written, fillvalue="") for part in pair)
+    return "".join(part for pair in zip_longest(between, digits, fillvalue="") for part in pair)

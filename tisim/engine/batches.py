@@ -29,9 +29,12 @@ all of its room is loaded and looked at."""
 Progress = Callable[[float], None]
 
 
-def share(progress: Progress, done: int, parts: int) -> Progress:
-    """For one of several parts of equal length, ``done`` of which are over: reports of it as of the whole."""
-    return lambda fraction: progress((done + fraction) / parts)
+def share(progress: Progress, finished_parts: int, parts: int) -> Progress:
+    """Return the function that reports the progress of one of several equal parts as that of the whole.
+
+    finished_parts : how many of the ``parts`` are over already.
+    """
+    return lambda fraction: progress((finished_parts + fraction) / parts)
 
 
 class Batches:
@@ -72,28 +75,28 @@ class Batches:
                 yield index, Result(scene, {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
                 continue
             groups.setdefault(scene.structure(), []).append(index)
-        done = len(scenes) - len(starts)
+        finished_scenes = len(scenes) - len(starts)
         for members in groups.values():
             with self._simulation([scenes[k] for k in members]) as simulation:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
                     simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
                     observers = [trajectory.recorder(simulation, batch)] if trajectory else []
-                    given: set[int] = set()
+                    handed_on: set[int] = set()
                     for _ in simulation.chunks(observers=observers):
-                        new = [w for w in simulation.ended() if w not in given]
+                        new = [w for w in simulation.ended() if w not in handed_on]
                         yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
-                        given.update(new)
+                        handed_on.update(new)
                         if progress:
-                            progress((done + len(batch) * simulation.fraction()) / len(scenes))
-                    done += len(batch)
+                            progress((finished_scenes + len(batch) * simulation.fraction()) / len(scenes))
+                    finished_scenes += len(batch)
 
     @contextmanager
     def _simulation(self, scenes: Sequence[Scene]) -> Iterator[Simulation]:
         """A compiled simulation for scenes of one structure, which is nobody else's meanwhile."""
         capacity = max(scene.capacity() for scene in scenes)
         worlds = max(1, min(len(scenes), self.limit, SLOTS // capacity))
-        simulation = self._kept(scenes[0].structure(), worlds, capacity)
+        simulation = self._reusable(scenes[0].structure(), worlds, capacity)
         if simulation is None:
             _renew()
             capacity = rounded(capacity)
@@ -108,7 +111,7 @@ class Batches:
             for each in old:
                 each.close()
 
-    def _kept(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
+    def _reusable(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
         """The smallest kept simulation that serves, taken out of those kept; None where there is none."""
         most = max(SPARE, WASTE * worlds * capacity)
         with _lock:
@@ -152,7 +155,7 @@ def rounded(number: int) -> int:
 
 def _renew() -> None:
     """Start Taichi anew where it has grown, and nothing would be lost but simulations that are kept idle."""
-    if memory.worn():
+    if memory.needs_restart():
         _give_up()
         memory.renew()
 

@@ -105,8 +105,10 @@ def explain(scene: Scene) -> Explanation:
 
 def known_effects() -> list[type[Effect]]:
     """Every effect of the package, by name."""
-    known = (reference.FAMILIES[family].kinds().values() for family in ("effects", "operators", "sources"))
-    mine = [kind for kinds in known for kind in kinds if kind.__module__.startswith("tisim.")]
+    kinds_by_family = (
+        reference.FAMILIES[family].kinds().values() for family in ("effects", "operators", "sources")
+    )
+    mine = [kind for kinds in kinds_by_family for kind in kinds if kind.__module__.startswith("tisim.")]
     return sorted(mine, key=lambda kind: kind.kind())  # type: ignore[arg-type]
 
 

@@ -25,9 +25,14 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     if low is not None:
         inside = ((start["position"] >= low) & (start["position"] < high)).all()
         must(bool(inside), "particles.position", "inside the domain", "a particle outside")
-    known = {f.name for f in fields} | SHARED.keys()
+    field_names = {f.name for f in fields} | SHARED.keys()
     for name in start:
-        must(name in known, f"particles.{name}", f"a field of the scene ({', '.join(sorted(known))})", name)
+        must(
+            name in field_names,
+            f"particles.{name}",
+            f"a field of the scene ({', '.join(sorted(field_names))})",
+            name,
+        )
     missing = [f.name for f in fields if f.default is None and f.name not in start]
     if missing:
         names = ", ".join(sorted(missing))
@@ -55,19 +60,19 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
 def check_field(f: Field, values: np.ndarray, n: int) -> None:
     """InputError unless values of n particles have the shape and the range of a field."""
     must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
-    held: np.ndarray
+    rounded: np.ndarray
     with np.errstate(over="ignore"):
-        held = values.astype(_real())
-    lost, least = ~np.isfinite(held), float(np.finfo(_real()).tiny)
+        rounded = values.astype(_real())
+    unrepresentable, least = ~np.isfinite(rounded), float(np.finfo(_real()).tiny)
     if f.name == "mass":
         # Kernels flush smaller numbers to zero, and no mass is what marks a particle as gone.
-        lost |= held < least
+        unrepresentable |= rounded < least
     if f.name == "radius":
         # Volumes are its cube.
-        lost |= (held < least ** (1 / 3)) | (held > float(np.finfo(_real()).max) ** (1 / 3))
-    if lost.any():
+        unrepresentable |= (rounded < least ** (1 / 3)) | (rounded > float(np.finfo(_real()).max) ** (1 / 3))
+    if unrepresentable.any():
         rule = f"within the range of {runtime.current().precision}"
-        must(False, f"particles.{f.name}", rule, float(values[lost][0]))
+        must(False, f"particles.{f.name}", rule, float(values[unrepresentable][0]))
     if f.minimum is not None:
         least = float(values.min())
         must(least >= f.minimum, f"particles.{f.name}", f"at least {f.minimum:g} {f.unit}", least)

@@ -51,9 +51,9 @@ class Monitor:
         now = self._snapshot()
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
         wrong = ~self._finite(now) | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
-        known = ~wrong & (now["underway"] == 0)
-        for name, saved in self.good.items():
-            saved[known] = now[name][known]
+        undecided = ~wrong & (now["underway"] == 0)
+        for name, good_values in self.good.items():
+            good_values[undecided] = now[name][undecided]
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))
@@ -82,8 +82,8 @@ class Monitor:
             self.simulation.put(live)
         for w in map(int, worlds):
             self.faults[w] = float(then["time"][w]), self._fault(w, then)
-        for name, saved in self.good.items():
-            saved[worlds] = good[name][worlds]
+        for name, good_values in self.good.items():
+            good_values[worlds] = good[name][worlds]
 
     def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
         """Each quantity with the live particles, (worlds, capacity), of which it is not finite."""

@@ -55,12 +55,12 @@ class Callback(Observer):
 class Observers:
     """All observers of a run, as one."""
 
-    def __init__(self, given: Sequence[Observing]) -> None:
+    def __init__(self, observers: Sequence[Observing]) -> None:
         """InputError when one is neither an Observer nor a function."""
-        for one in given:
+        for one in observers:
             sound = isinstance(one, Observer) or (callable(one) and not isinstance(one, type))
             must(sound, "an observer", "an Observer or a function of the simulation", one)
-        self.members = [one if isinstance(one, Observer) else Callback(one) for one in given]
+        self.members = [one if isinstance(one, Observer) else Callback(one) for one in observers]
 
     def observe(self, simulation: Simulation) -> None:
         """Have all look, in the order given."""
@@ -75,7 +75,7 @@ class Observers:
             return pauses
         time = simulation.s.read("time")[:n]
         for member in self.members:
-            asked = np.broadcast_to(np.asarray(member.pause(simulation), float), n)
-            ahead = np.where(asked > time, asked, np.inf)
+            own_pauses = np.broadcast_to(np.asarray(member.pause(simulation), float), n)
+            ahead = np.where(own_pauses > time, own_pauses, np.inf)
             pauses[:n] = np.minimum(pauses[:n], ahead)
         return pauses

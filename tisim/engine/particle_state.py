@@ -51,8 +51,8 @@ class ParticleState(Mapping[str, np.ndarray]):
         fields = {f.name: f for f in self._simulation.s.reported}
         derived = {e.quantity for e in self._simulation.scenes[0].effects if isinstance(e, DerivedQuantity)}
         derived |= {"id", FORCE.name, TORQUE.name} | {f.name for f in fields.values() if f.slots}
-        given = [known for known in fields if known not in derived]
-        must(name in given, "quantity to write", f"one of {', '.join(given)}", name)
+        writable = [field for field in fields if field not in derived]
+        must(name in writable, "quantity to write", f"one of {', '.join(writable)}", name)
         new, whole = _numbers(name, values, fields[name].integer), dict(self)
         check_field(fields[name], new, len(whole["mass"]))
         must(bool(np.isfinite(new).all()), f"particles.{name}", "finite", new[~np.isfinite(new)][:1])

@@ -54,7 +54,7 @@ class Replay:
             before = self.base
             if before is None:
                 try:
-                    before = self._rewound()
+                    before = self._rewind()
                 finally:
                     self.simulation.put(image)
             for name, values in image.items():
@@ -70,49 +70,49 @@ class Replay:
         last, pauses = self.simulation.s.read("steps"), self.simulation.s.read("pause_time")
         # Nobody waits for them on the way.
         self.simulation.s.write("pause_time", np.inf)
-        good = self._rewound()
+        good = self._rewind()
         going = worlds[sound(good)[worlds]]
         # How many steps are good, from the highest binary digit of that number to the lowest.
         jump = 1 << int((last - good["steps"])[going].max(initial=0)).bit_length()
         while jump > 1:
             jump //= 2
             able = going[good["steps"][going] + jump <= last[going]]
-            now = self._after(good, able, jump)
+            now = self._image_after(good, able, jump)
             fine = able[sound(now)[able]]
             for name, values in good.items():
                 values[fine] = now[name][fine]
-        self._cut(good, going, sound)
-        self._after(good, going, 1)
+        self._cut_step(good, going, sound)
+        self._image_after(good, going, 1)
         self.simulation.s.write("pause_time", pauses)
         return good
 
-    def _cut(self, good: Image, going: np.ndarray, sound: Callable[[Image], np.ndarray]) -> None:
+    def _cut_step(self, good: Image, going: np.ndarray, sound: Callable[[Image], np.ndarray]) -> None:
         """Go as far into the step that fails as all was well, where from there it fails again."""
-        cut = self._after(good, going, 1)["cut"]
+        cut = self._image_after(good, going, 1)["cut"]
         part = going[cut[going] > 0]
         if len(part) == 0:
             return
         good["cut"][part] = cut[part]
-        met = self._after(good, part, 1)
+        end = self._image_after(good, part, 1)
         good["cut"][part] = 0.0
-        again = self._after(met, part, 1)
-        fine = part[sound(met)[part] & ~sound(again)[part]]
+        next_end = self._image_after(end, part, 1)
+        fine = part[sound(end)[part] & ~sound(next_end)[part]]
         for name, values in good.items():
-            values[fine] = met[name][fine]
+            values[fine] = end[name][fine]
 
-    def _rewound(self) -> Image:
+    def _rewind(self) -> Image:
         if self.base is None:
             self.simulation.begin()
         else:
             self.simulation.put(self.base)
         return self.simulation.s.image()
 
-    def _after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
+    def _image_after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
         """What an image becomes when only these worlds take a number of steps."""
         image["status"][:] = WorldStatus.ENDED
         image["status"][worlds] = WorldStatus.RUNNING
         image["goal"] = image["steps"] + steps
         self.simulation.put(image)
-        while self.simulation.going_on():
+        while self.simulation.is_running():
             self.simulation.program.advance(steps)
         return self.simulation.s.image()

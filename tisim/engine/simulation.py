@@ -172,26 +172,26 @@ class Simulation:
         yield
         # Short enough to be heard from soon, long enough that looking costs little.
         chunk = max(8, FIRST // (self.worlds * self.s.capacity))
-        written = self.s.read("pause_time")
-        while self.going_on(stop):
+        pauses_on_device = self.s.read("pause_time")
+        while self.is_running(stop):
             pauses = watching.pauses(self, stop)
-            if not np.array_equal(pauses, written):
+            if not np.array_equal(pauses, pauses_on_device):
                 self.s.write("pause_time", pauses)
-                written = pauses
+                pauses_on_device = pauses
             began = time.perf_counter()
             self.program.advance(chunk)
             self.monitor.check_worlds()
-            taken = time.perf_counter() - began
-            self.wall_s += taken
-            if taken < CHUNK_SECONDS / 2:
+            seconds = time.perf_counter() - began
+            self.wall_s += seconds
+            if seconds < CHUNK_SECONDS / 2:
                 chunk = min(2 * chunk, 100_000)
-            elif taken > 2 * CHUNK_SECONDS:
+            elif seconds > 2 * CHUNK_SECONDS:
                 chunk = max(chunk // 2, 1)
             watching.observe(self)
             yield
 
-    def going_on(self, until: float = np.inf) -> bool:
-        """Whether any world runs that has not taken all of the steps asked for, nor come to ``until`` (s)."""
+    def is_running(self, until: float = np.inf) -> bool:
+        """Return whether a world still has steps to take before it comes to ``until`` (s) or to its goal."""
         now = self.s.snapshot(("status", "steps", "goal", "time"))
         going = (now["status"] == WorldStatus.RUNNING) & (now["steps"] < now["goal"])
         return bool((going & (now["time"] < until)).any())
@@ -200,17 +200,17 @@ class Simulation:
         """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
         n = len(self.scenes)
         now = self.s.snapshot(("status", "time", "reached", "end"))
-        done = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
-        return float(np.where(now["status"][:n] != WorldStatus.RUNNING, 1.0, done).mean())
+        fractions = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
+        return float(np.where(now["status"][:n] != WorldStatus.RUNNING, 1.0, fractions).mean())
 
     def ahead(self) -> float:
         """Steps before the world that has most of them, if they go on as long as its last one; those that it
         takes at least where there was none."""
         n = len(self.scenes)
         running = self.s.read("status")[:n] == WorldStatus.RUNNING
-        left, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
+        remaining, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
         fewest = [scene.stepper.fewest(scene.effects, scene.duration) for scene in self.scenes]
-        steps = np.where(dt > 0, left / np.where(dt > 0, dt, 1.0), fewest)
+        steps = np.where(dt > 0, remaining / np.where(dt > 0, dt, 1.0), fewest)
         return float(np.where(running, np.ceil(steps), 0.0).max())
 
     def ended(self) -> list[int]:

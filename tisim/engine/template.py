@@ -20,10 +20,10 @@ def toml(kind: type[Component], place: str, named: bool) -> str:
 
 def fields(kind: type[Component]) -> dict[str, FieldInfo]:
     """What a table says of a part; the name of an effect is that of its table."""
-    shown = dict(kind.model_fields)
+    infos = dict(kind.model_fields)
     if issubclass(kind, Effect):
-        del shown["name"]
-    return shown
+        del infos["name"]
+    return infos
 
 
 def _lines(kind: type[Component], place: str, named: bool, row: bool = False) -> Iterator[str]:
@@ -31,16 +31,16 @@ def _lines(kind: type[Component], place: str, named: bool, row: bool = False) ->
     yield f"[[{place}]]" if row else f"[{place}]"
     if named:
         yield f'kind = "{kind.kind()}"'
-    listed, inner = dict(kind.lists()), []
+    row_kinds, inner = dict(kind.lists()), []
     for name, info in fields(kind).items():
         value = example(info)
-        if name in listed:
-            inner += ["", *_lines(listed[name], f"{place}.{name}", named=False, row=True)]
+        if name in row_kinds:
+            inner += ["", *_lines(row_kinds[name], f"{place}.{name}", named=False, row=True)]
         elif isinstance(value, Component):
             inner += ["", f"# {text_of(info)}", *_lines(type(value), f"{place}.{name}", named=True)]
         else:
-            given = "; ".join(filter(None, (unit_of(info), "an example" * info.is_required())))
-            yield f"# {text_of(info)}{f' ({given})' if given else ''}"
+            remark = "; ".join(filter(None, (unit_of(info), "an example" * info.is_required())))
+            yield f"# {text_of(info)}{f' ({remark})' if remark else ''}"
             yield f"# {name} =" if value is None or value == {} else f"{name} = {serialization.inline(value)}"
     yield from inner
 

@@ -48,11 +48,11 @@ def _open_for_reading(path: Path) -> int:
         pass
     try:
         return open_descriptor(path, os.O_RDONLY | os.O_CREAT)
-    except InputError as refused:
+    except InputError as error:
         try:
             return os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
         except OSError:
-            raise refused from None
+            raise error from None
 
 
 def _wait_for_lock(handle: int, path: Path, kind: int, timeout: float) -> None:
@@ -138,8 +138,10 @@ def replacing(path: Path, new: Path) -> Iterator[None]:
 
 
 def _create_empty(path: Path) -> None:
-    """Make an empty file for those who write by name, in place of one that a killed process has left: that
-    may have another name, and a link in its place would have them write over what it points to."""
+    """Make an empty file for those who write by name, in place of one that a killed process has left.
+
+    The old one may be a hard link or a symbolic one: what is written would go to what else has its name.
+    """
     if file_status(path) is not None:
         path.unlink()
     os.close(open_descriptor(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -54,7 +53,7 @@ def read_image(path: Path, what: str, rule: str) -> bytes:
 
     what, rule : what it is called in messages, and what it must be.
     """
-    content = regular_file.content(Path(os.path.realpath(path)))
+    content = regular_file.content(regular_file.target(path))
     if content is None:
         raise InputError(f"{what} must be an existing file; received {str(path)!r}")
     image = verified(content)
@@ -80,12 +79,12 @@ def verified(content: bytes) -> bytes | None:
         return None
     try:
         trailer = json.loads(payloads[0])
-        size, spans, crc = trailer["size"], trailer["data"], trailer["crc"]
+        image = content[:start]
+        whole = len(image) == trailer["size"] and _checksum(image, trailer["data"]) == trailer["crc"]
     except (ValueError, KeyError, TypeError):
         # A frame, but of something else.
         return None
-    image = content[:start]
-    return image if len(image) == size and _checksum(image, spans) == crc else None
+    return image if whole else None
 
 
 def _checksum(image: bytes, spans: Iterable[Iterable[int]]) -> int:

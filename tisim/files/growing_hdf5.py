@@ -18,7 +18,7 @@ from tisim.files.superblock import SIZE, superblock
 
 
 class GrowingFile(Seekable):
-    """It is the HDF5 file at path, made with a superblock of version 3, as a file object for ``h5py.File``.
+    """A growing file is the HDF5 file at path, with a superblock of version 3, as h5py.File writes to it.
 
     failure : why something could not be written, after which nothing is; None while all is well.
     """

@@ -20,7 +20,7 @@ AT_WORK_TIMEOUT = 1.0
 
 
 def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
-    """InputError where another process is at work in the folder; touches nothing."""
+    """Raise InputError where another process is at work in the folder; touch nothing."""
     if regular_file.file_status(folder / LOCK) is not None:
         with acquire(folder, exclusive=False, timeout=timeout):
             pass

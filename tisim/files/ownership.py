@@ -102,11 +102,11 @@ def claim(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
     if set(claimed) <= _marked_names(folder):
         return
     with locked(folder / MARKER, exclusive=True):
-        check(folder, claimed, overwrite)  # another process may have come first
+        # Another process may have written to the folder since.
+        check(folder, claimed, overwrite)
         content = regular_file.content(folder / MARKER) or b""
-        newline = (
-            b"\n" if content and not content.endswith(b"\n") else b""
-        )  # a killed writer's last name is not
+        # The last name that a killed writer has left may lack the end of its line.
+        newline = b"\n" if content and not content.endswith(b"\n") else b""
         added = sorted({*claimed, *_owned_names(folder)} - _marked_names(folder))
         append_at(folder / MARKER, len(content), newline + "".join(f"{name}\n" for name in added).encode())
 

@@ -11,7 +11,7 @@ import os
 import stat
 from pathlib import Path
 
-from tisim.errors import InputError
+from tisim.errors import InputError, printable
 
 _REFUSALS = {
     errno.ELOOP: "a symbolic link",
@@ -33,10 +33,11 @@ def open_descriptor(path: Path, flags: int) -> int:
     InputError unless it is a regular file that may be opened, and one to be written to has no other name (a
     hard link). Other errors (no such file, a full disk) are those of os.open.
     """
+    _check_name(path)
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC, 0o644)
     except OSError as error:
-        raise _translated(path, error) or error from None
+        raise _refusal(path, error) or error from None
     info = os.fstat(descriptor)
     fault = _irregular_kind(info)
     if fault is None and flags & _WRITING and info.st_nlink > 1:
@@ -52,12 +53,13 @@ def file_status(path: Path) -> os.stat_result | None:
 
     InputError unless it is a regular file; see ``open_descriptor``.
     """
+    _check_name(path)
     try:
         info = path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise _translated(path, error) or error from None
+        raise _refusal(path, error) or error from None
     fault = _irregular_kind(info)
     if fault is not None:
         raise _not_regular(path, fault)
@@ -75,12 +77,27 @@ def is_folder(path: Path) -> bool:
     return info is not None and stat.S_ISDIR(info.st_mode)
 
 
+def target(path: Path) -> Path:
+    """Return the path that a path leads to, links followed; InputError where no file can have its name."""
+    _check_name(path)
+    return Path(os.path.realpath(path))
+
+
+def _check_name(path: Path) -> None:
+    """Raise InputError for a name with a NUL, which Python passes on to no system call."""
+    if "\0" in str(path):
+        raise _not_regular(path, "a name with a NUL")
+
+
 def _stat_following_links(path: Path) -> os.stat_result | None:
+    _check_name(path)
     try:
         return path.stat()
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
+        if error.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+            raise _refusal(path, error) or error from None
         why = error.strerror or error
         raise InputError(f"{path} must be in a folder that may be entered; received {why}") from None
 
@@ -109,10 +126,12 @@ def _irregular_kind(info: os.stat_result) -> str | None:
     return kinds.get(stat.S_IFMT(info.st_mode), "something else")
 
 
-def _translated(path: Path, error: OSError) -> InputError | None:
+def _refusal(path: Path, error: OSError) -> InputError | None:
     received = _REFUSALS.get(error.errno or 0)
     return None if received is None else _not_regular(path, received)
 
 
 def _not_regular(path: Path, received: str) -> InputError:
-    return InputError(f"{path} must be a regular file of its own that may be opened; received {received}")
+    return InputError(
+        f"{printable(str(path))} must be a regular file of its own that may be opened; received {received}"
+    )

@@ -34,6 +34,6 @@ def resume_hint(fresh: bool | None, overwrite: bool, first: str = "") -> str:
 
     first : what is to be done before.
     """
-    omitted = [name for name, given in (("--fresh", fresh), ("--overwrite", overwrite)) if given]
+    omitted = [name for name, is_given in (("--fresh", fresh), ("--overwrite", overwrite)) if is_given]
     without = f", without {' and '.join(omitted)}" if omitted else ""
     return f"To go on, {first}give the same command again{without}."

@@ -21,7 +21,10 @@ READ_ATTEMPTS = 100
 
 
 class SharedFile(Seekable):
-    """The file at path has a valid superblock; ``whole`` is whether it is as long as that says."""
+    """A shared file is the HDF5 file at path, whose superblock is valid, as ``h5py.File`` reads it.
+
+    whole : whether the file is as long as its superblock says.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__(regular_file.open_descriptor(path, os.O_RDONLY))

@@ -41,16 +41,16 @@ def lookup3(data: bytes) -> int:
         if k + 3 < len(words):
             for step, bits in enumerate((4, 6, 8, 16, 19, 4)):
                 i, j, other = step % 3, (step - 1) % 3, (step + 1) % 3
-                s[i] = ((s[i] - s[j]) & _ALL) ^ _rotated(s[j], bits)
+                s[i] = ((s[i] - s[j]) & _ALL) ^ _rotate_left(s[j], bits)
                 s[j] = (s[j] + s[other]) & _ALL
     for step, bits in enumerate((14, 11, 25, 16, 4, 14, 24)):
         i, j = (step + 2) % 3, (step + 1) % 3
-        s[i] = ((s[i] ^ s[j]) - _rotated(s[j], bits)) & _ALL
+        s[i] = ((s[i] ^ s[j]) - _rotate_left(s[j], bits)) & _ALL
     return s[2]
 
 
 _ALL = 0xFFFFFFFF
 
 
-def _rotated(x: int, bits: int) -> int:
+def _rotate_left(x: int, bits: int) -> int:
     return (x << bits | x >> (32 - bits)) & _ALL

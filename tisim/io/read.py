@@ -48,7 +48,7 @@ def read(path: str | Path) -> Any:
             raise InputError(f"folder must be {rule}; received {str(path)!r}")
         return read(file)
     must(regular_file.exists(file_path), "file to read", "there", str(path))
-    head = regular_file.content(Path(os.path.realpath(file_path)), SIZE) or b""
+    head = regular_file.content(regular_file.target(file_path), SIZE) or b""
     if not head.startswith(SIGNATURE):
         return _read_text(file_path)
     # A trajectory has its own checksums, and may be large.
@@ -74,7 +74,7 @@ def _read_hdf5(path: Path) -> Any:
 
 def _read_text(path: Path) -> Any:
     """Return what is in a text file: JSON or TOML."""
-    content = regular_file.content(Path(os.path.realpath(path))) or b""
+    content = regular_file.content(regular_file.target(path)) or b""
     try:
         text = content.decode()
         if text.lstrip().startswith("{"):

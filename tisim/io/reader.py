@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import time
 import tomllib
 from collections.abc import Callable, Iterator
@@ -145,7 +144,7 @@ def world_count(path: str | Path) -> int:
 
 
 @contextmanager
-def undamaged() -> Iterator[None]:
+def refuse_damage() -> Iterator[None]:
     """Turn the errors of HDF5 at a damaged file into an InputError."""
     try:
         yield
@@ -156,13 +155,13 @@ def undamaged() -> Iterator[None]:
 
 
 class _RetryingFile:
-    """The HDF5 file is read through ``source``, again where it looks damaged."""
+    """It reads an HDF5 file through ``source``, and reads it again where it looks damaged."""
 
     def __init__(self, source: io.IOBase) -> None:
         self._source = source
         self._file: h5py.File | None = None
 
-    # HDF5 calls Reading, in which no signal may be raised: it would be lost.
+    # HDF5 calls ``source``, in which no signal may be raised: HDF5 would swallow it.
     @defer_signals()
     def read(self, extract: Callable[[h5py.File], T]) -> T:
         """Return what ``extract`` takes from the file; InputError where that is damaged.
@@ -172,7 +171,7 @@ class _RetryingFile:
         """
         for attempts_left in reversed(range(FILE_READ_ATTEMPTS)):
             try:
-                with undamaged():
+                with refuse_damage():
                     self._file = self._file or h5py.File(self._source, "r")
                     return extract(self._file)
             except InputError:
@@ -192,7 +191,7 @@ class _RetryingFile:
 @contextmanager
 def _open_file(path: Path) -> Iterator[_RetryingFile]:
     """Yield the file, once the checksum of its superblock or of all of it has been verified."""
-    rule, real = "a trajectory.h5 or result.h5 of a run", Path(os.path.realpath(path))
+    rule, real = "a trajectory.h5 or result.h5 of a run", regular_file.target(path)
     head = regular_file.content(real, SIZE)
     must(head is not None and head.startswith(SIGNATURE), "file", rule, str(path))
     if not is_valid(head or b""):

@@ -28,7 +28,7 @@ from tisim.errors import must
 from tisim.files import checksum, lock, ownership, regular_file
 from tisim.files.atomic import replace_file
 from tisim.files.resuming import resumes
-from tisim.io.reader import RESULT, undamaged
+from tisim.io.reader import RESULT, refuse_damage
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -142,7 +142,7 @@ def write_result(result: Result, path: Path) -> None:
 
 def read_result(path: Path) -> Result:
     """Return the Result that ``write_result`` has written, to the bit. InputError unless it is whole."""
-    with checksum.open_file(path, "result", RESULT) as file, undamaged():
+    with checksum.open_file(path, "result", RESULT) as file, refuse_damage():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}
             for group in ("start", "end")

@@ -55,8 +55,8 @@ class Recording:
     every: float | None = None
 
     def __post_init__(self) -> None:
-        given = "both" if self.every is not None else "neither"
-        must((self.frames is None) != (self.every is None), "recording", "given frames or every", given)
+        received = "both" if self.every is not None else "neither"
+        must((self.frames is None) != (self.every is None), "recording", "given frames or every", received)
         must(self.frames is None or self.frames >= 1, "frames", "at least 1", self.frames)
         sound = self.every is None or 0 < self.every < np.inf
         must(sound, "every", "above 0 s, and finite", self.every)
@@ -107,7 +107,7 @@ class Trajectory:
             self._finish()
             raise
 
-    # HDF5 calls Growing, in which no signal may be raised: the HDF5 library cannot close the file any more.
+    # HDF5 calls GrowingFile, in which no signal may be raised: HDF5 could not close the file any more.
     @defer_signals()
     def _open(self) -> None:
         self.disk = self._resources.enter_context(GrowingFile(self.path))
@@ -221,11 +221,9 @@ def recording_from_options(
 ) -> Recording | None:
     """Return the recording that the options of a command ask for; None when they ask for none."""
     if frames is None and every is None:
-        resumable, rule = (
-            resume and regular_file.exists(path),
-            "to go on with trajectory.h5 (or give --fresh)",
-        )
-        must(not resumable, "--frames or --every", f"given as before, {rule}", "neither")
+        resumable = resume and regular_file.exists(path)
+        rule = "given as before, to go on with trajectory.h5 (or give --fresh)"
+        must(not resumable, "--frames or --every", rule, "neither")
         return None
     return Recording(path, frames, every)
 

@@ -30,7 +30,7 @@ def elliptic(kc, over_m, gamma, rest):
     For two kc side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0. over_m : 1/m. rest :
     n - m + gamma^2 n, which the caller knows without cancellation. sigma = sum_i 2^i c_i^2 / m^2, i >= 1.
     """
-    met = ti.static(limits()[0])
+    tolerance = ti.static(limits()[0])
     square = gamma * gamma
     over_pole, over_both = 1.0 / (square + kc), 1.0 / (1.0 + kc)
     sigma = 0.5 * over_both * over_both
@@ -38,7 +38,7 @@ def elliptic(kc, over_m, gamma, rest):
     other, p = 0.0 * kc, 0.5 / (gamma * over_pole)
     a, g, scale = 0.5 * (1.0 + kc), ti.sqrt(kc), over_m * over_m
     k = 0
-    while (ti.abs(a - g) - met * a).max() > 0.0 and k < ITERATIONS:
+    while (ti.abs(a - g) - tolerance * a).max() > 0.0 and k < ITERATIONS:
         product, apart = a * g, a - g
         pole = p * p + product
         inverse = 1.0 / (pole * p)

@@ -52,12 +52,12 @@ class Cooling(Operator):
         before = s.temperature[w, i]
         # t + c t + a t^4 = before + c T_gas + a T_s^4, solved from above, from where Newton cannot overshoot:
         # t only falls, so this ends.
-        known = before + c * self.gas(w) + a * self.surroundings(w) ** 4
+        right_side = before + c * self.gas(w) + a * self.surroundings(w) ** 4
         t = ti.max(before, ti.max(self.surroundings(w), self.gas(w)))
         change = t
         while change > ti.static(CONVERGED[s.real]) * t:
             cube = a * t * t * t
-            change = (t + c * t + cube * t - known) / (1.0 + c + 4.0 * cube)
+            change = (t + c * t + cube * t - right_side) / (1.0 + c + 4.0 * cube)
             t -= change
         s.temperature[w, i] = t
         s.cooling_loss[w, i] += capacity * (before - t)

@@ -60,9 +60,9 @@ class RandomAroundCylinder(Placement):
         generator = np.random.default_rng([seed, 0x6C61796572])
         centres = np.empty((0, 3))
         for _ in range(MAX_ROUNDS):
-            centres = _apart(np.vstack([centres, self._tries(number, radius, generator)]), 2 * radius)[
-                :number
-            ]
+            centres = _without_overlaps(
+                np.vstack([centres, self._tries(number, radius, generator)]), 2 * radius
+            )[:number]
             if len(centres) == number:
                 break
         else:
@@ -70,7 +70,7 @@ class RandomAroundCylinder(Placement):
                 f"cloud.number must be at most what finds room around the cylinder, {len(centres)} here; "
                 f"received {number}"
             )
-        return self._turned(centres) + np.asarray(self.centre)
+        return self._rotate(centres) + np.asarray(self.centre)
 
     def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
         """Points of the part, evenly, in a frame whose z axis is that of the cylinder. m."""
@@ -88,14 +88,14 @@ class RandomAroundCylinder(Placement):
         up = generator.choice([-1.0, 1.0], number)
         return np.stack([rho * np.cos(angle), rho * np.sin(angle), up * z], axis=1)
 
-    def _turned(self, points: np.ndarray) -> np.ndarray:
+    def _rotate(self, points: np.ndarray) -> np.ndarray:
         axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
         first = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
         first /= np.linalg.norm(first)
         return points @ np.stack([first, np.cross(axis, first), axis])
 
 
-def _apart(points: np.ndarray, distance: float) -> np.ndarray:
+def _without_overlaps(points: np.ndarray, distance: float) -> np.ndarray:
     """The points (m) without those nearer than a distance (m) to one that comes before."""
     free = np.ones(len(points), bool)
     for i, j in sorted(cKDTree(points).query_pairs(distance)):

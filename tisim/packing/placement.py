@@ -93,8 +93,8 @@ class Lattice(Placement):
         must(min(self.shape) > 0, "lattice.shape", "at least 1 in each direction", self.shape)
         rule = f"of at most {PARTICLES:.0e} sites together"
         must(self.sites() <= PARTICLES, "lattice.shape", rule, self.shape)
-        given = "both" if self.size is not None else "neither"
-        must((self.spacing is None) != (self.size is None), "lattice", "given spacing or size", given)
+        received = "both" if self.size is not None else "neither"
+        must((self.spacing is None) != (self.size is None), "lattice", "given spacing or size", received)
         for n, length in zip(self.shape, self.size or (), strict=False):
             rule = "above 0 along an axis with several sites, and 0 along others"
             must(length > 0 if n > 1 else length == 0, "lattice.size", rule, self.size)

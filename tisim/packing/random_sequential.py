@@ -113,7 +113,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
     check_resolved("places of the packing", np.stack([region.low, region.high]), radius)
     sphere = 4 / 3 * np.pi * radius**3
     # Refused at once where no choice of places would do: a few spheres can exceed the limit of many.
-    most = (SATURATION_FRACTION + count**-0.5) * region.covered(radius) / region.volume
+    most = (SATURATION_FRACTION + count**-0.5) * region.reachable_volume(radius) / region.volume
     fraction = count * sphere / region.volume
     rule = f"at most {SATURATION_FRACTION:.3f}, where random sequential addition of many spheres ends"
     must(fraction <= most, "volume fraction", rule, float(f"{fraction:.4g}"))

@@ -38,8 +38,8 @@ class Region:
         """The radius of the ball, m."""
         return float(self.side[0]) / 2
 
-    def covered(self, radius: float) -> float:
-        """Volume of all places that spheres of ``radius`` (m) with centres in the region can take up, m^3."""
+    def reachable_volume(self, radius: float) -> float:
+        """Return the volume that spheres of ``radius`` (m) with centres in the region can take up, m^3."""
         if self.ball:
             return 4 / 3 * np.pi * (self.reach + radius) ** 3
         return float(np.prod(self.side if self.periodic else self.side + 2 * radius))

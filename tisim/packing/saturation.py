@@ -66,7 +66,7 @@ class _Voids:
                     break
             if not len(self.index) or len(self.places) >= count:
                 break
-            self._cut()
+            self._split_cells()
         return self.region.low + self.places
 
     def _try(self, tries: int, generator: np.random.Generator) -> np.ndarray:
@@ -95,7 +95,7 @@ class _Voids:
         added = self._tree(new)
         self.index = np.concatenate([self._outside(block, added) for block in _blocks(self.index)])
 
-    def _cut(self) -> None:
+    def _split_cells(self) -> None:
         """Cut each voxel in eight, and keep what may hold a further centre."""
         parents, coarse = self.index, self.step
         self.step = coarse / 2
@@ -109,7 +109,7 @@ class _Voids:
             uncovered = np.ones(index.shape[:2], dtype=bool)
             for k in range(NEAREST_CENTRES):
                 there = near[:, k] < len(self.places)
-                uncovered[there] &= ~self._covered(middle[there], self.places[near[there, k], None, :])
+                uncovered[there] &= ~self._is_covered(middle[there], self.places[near[there, k], None, :])
             children.append(self._in_ball(index[uncovered]))
         self.index = np.concatenate(children)
 
@@ -118,10 +118,10 @@ class _Voids:
         middle = (index + 0.5) * self.step
         distance, nearest = tree.query(middle, distance_upper_bound=self.diameter)
         close = np.flatnonzero(np.isfinite(distance))
-        covered = self._covered(middle[close], tree.data[nearest[close]])
+        covered = self._is_covered(middle[close], tree.data[nearest[close]])
         return np.delete(index, close[covered], axis=0)
 
-    def _covered(self, middle: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    def _is_covered(self, middle: np.ndarray, centre: np.ndarray) -> np.ndarray:
         """Whether all of a voxel lies within a diameter of a centre: its farthest corner does."""
         apart = np.abs(middle - centre)
         if self.box is not None:

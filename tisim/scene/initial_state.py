@@ -108,8 +108,8 @@ class Particles(Start):
         arrays = {
             name: self._column(name, getattr(self, name), n) for name in ("position", "velocity", "radius")
         }
-        given = "both" if self.mass is not None else "neither"
-        must((self.mass is None) != (self.density is None), "particles", "given mass or density", given)
+        received = "both" if self.mass is not None else "neither"
+        must((self.mass is None) != (self.density is None), "particles", "given mass or density", received)
         farthest = float(np.abs(arrays["position"]).max())
         must(farthest <= MOST, "particles.position", f"at most {MOST:g} m from the origin", farthest)
         check_sizes("radius", "m", arrays["radius"])

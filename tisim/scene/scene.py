@@ -58,25 +58,25 @@ class Scene(Component):
             must(labels.count(label) == 1, f"effects.{label}", "given once", labels.count(label))
             alone = (kind.repeatable and not kind.world_quantities) or present.count(kind) == 1
             must(alone, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
-            for needed in kind.requires:
+            for required_kinds in kind.requires:
                 must(
-                    any(issubclass(other, needed) for other in present),
+                    any(issubclass(other, required_kinds) for other in present),
                     f"effects.{label}",
-                    f"used together with {' or '.join(_names(needed))}",
+                    f"used together with {' or '.join(_names(required_kinds))}",
                     ", ".join(labels),
                 )
-            for other, named in zip(present, labels, strict=True):
+            for other, other_label in zip(present, labels, strict=True):
                 apart = not issubclass(other, kind.excludes)
-                must(apart, f"effects.{label}", f"used without {other.kind()}", named)
+                must(apart, f"effects.{label}", f"used without {other.kind()}", other_label)
             must(
                 self.stepper.control.kind() not in kind.incompatible_controls,
                 "stepper.control",
                 f"one that suits {label}, such as fixed_step or that of an implicit stepper",
                 self.stepper.control.kind(),
             )
-            given = {other.quantity for other in present if issubclass(other, Source)}
+            quantities = {other.quantity for other in present if issubclass(other, Source)}
             must(
-                not kind.requires_source or not given.isdisjoint(kind.requires_source),
+                not kind.requires_source or not quantities.isdisjoint(kind.requires_source),
                 f"effects.{label}",
                 f"used together with a source of {' or '.join(kind.requires_source)}",
                 ", ".join(labels),
@@ -140,8 +140,8 @@ class Scene(Component):
             fields["domain"] = serialization.from_dict(Domain, rest.pop("domain"), "domain")
         if "stepper" in rest:
             fields["stepper"] = cls._stepper(rest.pop("stepper"))
-        listed = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
-        fields["effects"] = tuple(_effect(name, values) for name, values in listed.items())
+        effects_table = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
+        fields["effects"] = tuple(_effect(name, values) for name, values in effects_table.items())
         return cls(**fields, **rest)
 
     @staticmethod
@@ -154,23 +154,23 @@ class Scene(Component):
     @classmethod
     def from_toml(cls, path: str | Path) -> Scene:
         """Read a scene from a TOML file; InputError when it is not one."""
-        file, what = Path(path), "scene file"
+        file, label = Path(path), "scene file"
         text = None
         try:
             # Neither a folder nor a pipe, which may never end.
             if file.is_file() or not file.exists():
                 text = file.read_text(encoding="utf-8")
         except FileNotFoundError:
-            raise InputError(f"{what} must exist; received {abbreviated(str(path))}") from None
+            raise InputError(f"{label} must exist; received {abbreviated(str(path))}") from None
         except OSError as error:
             received = f"{abbreviated(str(path))} ({error.strerror})"
-            raise InputError(f"{what} must be readable; received {received}") from None
+            raise InputError(f"{label} must be readable; received {received}") from None
         except ValueError as fault:
             # Bytes that are no text, or a name with a NUL.
-            raise InputError(f"{what} must be TOML; received {abbreviated(str(path))} ({fault})") from None
+            raise InputError(f"{label} must be TOML; received {abbreviated(str(path))} ({fault})") from None
         if text is None:
-            raise InputError(f"{what} must be a file; received {abbreviated(str(path))}")
-        return cls.from_dict(serialization.read_toml(text, what, str(path)))
+            raise InputError(f"{label} must be a file; received {abbreviated(str(path))}")
+        return cls.from_dict(serialization.read_toml(text, label, str(path)))
 
     def to_toml(self) -> str:
         """Return the scene as TOML text; ``from_toml`` gives it back."""
@@ -193,8 +193,8 @@ class Scene(Component):
         """Return a copy without some effects; InputError when one is not there, or is needed by others."""
         data = self.to_dict()
         for name in names:
-            known = ", ".join(data["effects"]) or "none, as this scene has none"
-            must(name in data["effects"], "effect to leave out", f"one of {known}", name)
+            present = ", ".join(data["effects"]) or "none, as this scene has none"
+            must(name in data["effects"], "effect to leave out", f"one of {present}", name)
         others = {kind: values for kind, values in data["effects"].items() if kind not in names}
         return type(self).from_dict({**data, "effects": others})
 
@@ -211,16 +211,16 @@ def _effect(name: str, values: Any) -> Effect:
     table = serialization.table(values, where)
     own = table.pop("name", None)
     must(own in (None, name), f"{where}.name", "left out, as it is that of the table", own)
-    given = {"name": name} if table.get("kind", name) != name else {}
-    return serialization.from_dict(Effect, {"kind": name, **table, **given}, where)
+    name_entry = {"name": name} if table.get("kind", name) != name else {}
+    return serialization.from_dict(Effect, {"kind": name, **table, **name_entry}, where)
 
 
 def _step(place: Any, step: str, key: str) -> Any:
     """The key or number by which a place in plain data is entered; InputError naming the whole ``key``."""
     # Of few digits: Python does not read numbers of some thousand.
-    listed = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
-    must(listed or (isinstance(place, dict) and step in place), key, "a setting of this scene", step)
-    return int(step) if listed else step
+    in_list = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
+    must(in_list or (isinstance(place, dict) and step in place), key, "a setting of this scene", step)
+    return int(step) if in_list else step
 
 
 def _names(kind: type[Component]) -> list[str]:

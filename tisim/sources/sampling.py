@@ -51,19 +51,19 @@ def sample(
     real = runtime.current().real
     places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)
     must(places.ndim == 2 and places.shape[1] == 3, "points", "of shape (n, 3)", places.shape)
-    given = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
-    must(bool(given), "effects", f"with a source of {quantity}", [effect.label for effect in effects])
+    sources = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
+    must(bool(sources), "effects", f"with a source of {quantity}", [effect.label for effect in effects])
     out = np.zeros((len(places), 4, 3), places.dtype)
-    _sample(given, real, time, places, out)
+    _sample(sources, real, time, places, out)
     return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
 
 
 @in_taichi_thread
-def _sample(given: Sequence[Source], real: Any, time: float, places: np.ndarray, out: np.ndarray) -> None:
+def _sample(sources: Sequence[Source], real: Any, time: float, places: np.ndarray, out: np.ndarray) -> None:
     with collected() as trees:
-        table = ParameterTable(given, 1, real)
-        bound = connected([table.bind(source) for source in given])
-        table.write([given])
+        table = ParameterTable(sources, 1, real)
+        bound = connected([table.bind(source) for source in sources])
+        table.write([sources])
         _Sum(bound).at(time, places, out)
     for tree in trees:
         tree.destroy()

@@ -44,10 +44,10 @@ class BeginStep(Phase):
         if ti.static(self.lists):
             horizon = self.neighbour_list.sure(w)
         dt = self.control.next(s, w, horizon)
-        left = s.end[w] - s.time[w]
+        remaining = s.end[w] - s.time[w]
         # A remainder as small as rounding leaves is not worth a step of its own.
-        if dt * (1.0 + 1e-6) >= left:
-            dt = left
+        if dt * (1.0 + 1e-6) >= remaining:
+            dt = remaining
         s.dt[w] = dt
         s.approach_time[w] = ti.math.inf
         s.fastest[w] = 0.0

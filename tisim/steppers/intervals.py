@@ -51,9 +51,9 @@ class BeginIntervals(Phase):
             going = s.count[w]
             interval = ti.cast(self.control.longest(w), ti.f64)
             until = ti.min(s.pause_time[w], s.end[w])
-            wanted = ti.ceil(until / interval - LITTLE) - s.intervals[w]
+            remaining = ti.ceil(until / interval - LITTLE) - s.intervals[w]
             allowed = ti.cast(ti.min(s.step_limit[w] - s.steps[w], self.most), ti.f64)
-            s.launch_intervals[w], s.halted[w] = ti.max(1.0, ti.min(wanted, allowed)), 0
+            s.launch_intervals[w], s.halted[w] = ti.max(1.0, ti.min(remaining, allowed)), 0
         s.attempt_limit[w] = ti.max(LEAST_INTERVALS, LAUNCH_ATTEMPTS // (s.worlds * ti.max(1, going)))
         s.underway[w] = 0
 

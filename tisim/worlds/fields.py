@@ -70,9 +70,9 @@ def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
 
     InputError for a field that two parts declare differently.
     """
-    wanted = {field.name: field for field in CORE}
+    fields = {field.name: field for field in CORE}
     for need in needs:
         field = SHARED[need] if isinstance(need, str) else need
-        known = wanted.setdefault(field.name, field)
-        must(known == field, f"field {field.name}", f"declared as everywhere, {known}", field)
-    return tuple(wanted.values())
+        declared = fields.setdefault(field.name, field)
+        must(declared == field, f"field {field.name}", f"declared as everywhere, {declared}", field)
+    return tuple(fields.values())

@@ -116,9 +116,9 @@ class ParameterTable:
         column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
         builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
         self.trees.append(Tree(builder))
-        held = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
-        column.from_numpy(held)
-        self.array_bytes += held.nbytes
+        rounded = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)
+        column.from_numpy(rounded)
+        self.array_bytes += rounded.nbytes
         return column
 
     def _bind_rows(self, kind: type[Component], slot: int) -> Bound[Any]:
@@ -140,13 +140,13 @@ class ParameterTable:
             table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.label)]
         real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
         with np.errstate(over="ignore", under="ignore"):
-            held = table.astype(real)
-        flushed = (table != 0) & (np.abs(held) < np.finfo(real).tiny)
-        for world, slot in np.argwhere(~np.isfinite(held) | flushed):
+            rounded = table.astype(real)
+        flushed = (table != 0) & (np.abs(rounded) < np.finfo(real).tiny)
+        for world, slot in np.argwhere(~np.isfinite(rounded) | flushed):
             names = [name for part in rows[world] for name, _ in _entries(part, part.label)]
             must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
-        self._put(held)
+        self._put(rounded)
 
     @in_taichi_thread
-    def _put(self, held: np.ndarray) -> None:
-        self.field.from_numpy(held)
+    def _put(self, values: np.ndarray) -> None:
+        self.field.from_numpy(values)

@@ -69,7 +69,7 @@ class DaskCluster:
     def submit(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> cf.Future[Answer]:
         self._check()
         self._answered = time.monotonic()
-        return self._executor.submit(_run, worker.packed(scenes), worker_settings)
+        return self._executor.submit(_run, worker.pack_scenes(scenes), worker_settings)
 
     def outcome(self, future: cf.Future[Answer]) -> Answer:
         from distributed import KilledWorker

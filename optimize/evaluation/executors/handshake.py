@@ -55,15 +55,15 @@ def source() -> str:
 def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
     """InputError that names both sides unless they are the same."""
     differ = [name for name in {**ours, **theirs} if ours.get(name) != theirs.get(name)]
-    must(not differ, who, f"of {_named(ours, differ)}, as the search is", _named(theirs, differ))
+    must(not differ, who, f"of {_listing(ours, differ)}, as the search is", _listing(theirs, differ))
 
 
-def stranger(sent: object, who: str) -> InputError:
+def stranger(answer: object, who: str) -> InputError:
     """The error for a worker that cannot even say what it is: it has sent something else."""
     ours = program()
-    rule = f"one that knows what the search is made of ({_named(ours, ours)})"
-    return InputError(f"{who} must be {rule}; received {shorten(repr(sent), 200)}")
+    rule = f"one that knows what the search is made of ({_listing(ours, ours)})"
+    return InputError(f"{who} must be {rule}; received {shorten(repr(answer), 200)}")
 
 
-def _named(program: Mapping[str, str], names: Iterable[str]) -> str:
+def _listing(program: Mapping[str, str], names: Iterable[str]) -> str:
     return ", ".join(f"{name} {program.get(name, 'unknown')}" for name in names)

@@ -60,7 +60,7 @@ class Processes:
             one.process.join()
 
     def _ask(self, scenes: Sequence[Scene], worker_settings: WorkerSettings) -> Answer:
-        question = worker.packed(scenes)
+        question = worker.pack_scenes(scenes)
         with self._changing:
             if self._stopped:
                 raise Lost("workers have been stopped")

@@ -69,31 +69,31 @@ class Remote:
         """
         waiting: dict[cf.Future[Answer], tuple[list[int], int]] = {}
 
-        def send(unit: list[int], lost: int) -> None:
-            waiting[self.pool.submit([scenes[k] for k in unit], self.worker_settings)] = unit, lost
+        def send(unit: list[int], losses: int) -> None:
+            waiting[self.pool.submit([scenes[k] for k in unit], self.worker_settings)] = unit, losses
 
         for unit in units(scenes, self.pool.workers):
             send(unit, 0)
-        done = 0
+        finished_scenes = 0
         while waiting:
             finished, _ = cf.wait(waiting, POLL_S, cf.FIRST_COMPLETED)
             for future in finished:
-                unit, lost = waiting.pop(future)
+                unit, losses = waiting.pop(future)
                 try:
                     results = self._results(self.pool.outcome(future))
-                except Lost as gone:
-                    if lost + 1 == MAX_LOST_WORKERS:
+                except Lost as error:
+                    if losses + 1 == MAX_LOST_WORKERS:
                         raise RunError(
-                            f"{gone}; it was the worker number {MAX_LOST_WORKERS} to be lost with the same "
+                            f"{error}; it was the worker number {MAX_LOST_WORKERS} to be lost with the same "
                             "work. What had finished is kept"
-                        ) from gone
-                    send(unit, lost + 1)
+                        ) from error
+                    send(unit, losses + 1)
                     continue
-                done += len(unit)
+                finished_scenes += len(unit)
                 yield from zip(unit, results, strict=True)
             self.pool.check_workers()
             if progress is not None:
-                progress(done / len(scenes))
+                progress(finished_scenes / len(scenes))
 
     def _results(self, answer: Answer) -> list[Result]:
         """What a worker has found. Its error if it failed, InputError if it is of another program."""

@@ -66,7 +66,7 @@ _work = cf.ThreadPoolExecutor(1)
 _evaluator: list[BatchEvaluator] = []
 
 
-def packed(scenes: Sequence[Scene]) -> bytes:
+def pack_scenes(scenes: Sequence[Scene]) -> bytes:
     """Scenes as they are sent: a worker imports the files that define their parts before it reads them."""
     try:
         return pickle.dumps(scenes)
@@ -87,16 +87,16 @@ def serve(connection: Connection, share: int) -> None:
     This thread does nothing but listen. When the searching process is gone, however it went, the system
     closes its end, and what is being run for it ends here and now.
     """
-    sent: cf.Future[None] | None = None
+    answer_sent: cf.Future[None] | None = None
     while True:
         try:
             question = connection.recv_bytes()
         except (EOFError, OSError):
             break
         future = _work.submit(_run_pickled, question, share)
-        sent = _work.submit(_send, connection, future)
-        sent.add_done_callback(_end_unless_sent)
-    if sent is not None and not sent.done():
+        answer_sent = _work.submit(_send, connection, future)
+        answer_sent.add_done_callback(_end_unless_sent)
+    if answer_sent is not None and not answer_sent.done():
         os._exit(1)
 
 
@@ -105,8 +105,8 @@ def _run_pickled(question: bytes, share: int) -> Answer:
     return _run(scenes, worker_settings, share)
 
 
-def _run(sent: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
-    scenes = _unpacked(sent, worker_settings)
+def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
+    scenes = _unpack_scenes(pickled, worker_settings)
     before = runtime.generation()
     runtime.init(worker_settings.device, worker_settings.precision, worker_settings.threads or share)
     if not _evaluator or runtime.generation() != before:
@@ -116,12 +116,12 @@ def _run(sent: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
     return Answer(made_by, [results[index] for index in range(len(scenes))])
 
 
-def _unpacked(sent: bytes, worker_settings: WorkerSettings) -> Sequence[Scene]:
+def _unpack_scenes(pickled: bytes, worker_settings: WorkerSettings) -> Sequence[Scene]:
     """InputError, in a line, when what they are made of cannot be imported here."""
     try:
         for file in worker_settings.files:
             python_file.install(file)
-        scenes: Sequence[Scene] = pickle.loads(sent)
+        scenes: Sequence[Scene] = pickle.loads(pickled)
     except InputError as error:
         raise InputError(f"{_name()}: {error}") from None
     except (ImportError, AttributeError) as error:
@@ -139,9 +139,9 @@ def _send(connection: Connection, future: cf.Future[Answer]) -> None:
     connection.send(_answered(future))
 
 
-def _end_unless_sent(sent: cf.Future[None]) -> None:
+def _end_unless_sent(answer_sent: cf.Future[None]) -> None:
     """Who waits for the answer would wait for ever; that a process has ended is noticed."""
-    if sent.exception():
+    if answer_sent.exception():
         os._exit(1)
 
 

@@ -56,8 +56,8 @@ def test_neighbours_agglomerate_where_contact_alone_does_not():
     blast = scene(number=100, duration=0.1, contact=True, near=True, cutoff=NEIGHBOURS)
     law = "effects.truncated_near_field"
     without = blast.replace({f"{law}.alpha1": 0.0, f"{law}.alpha2": 0.0})
-    alone, clumped = simulate([without, blast], worlds=2, capacity=100)
-    assert clumped.status.ok, clumped.status.reason
-    assert contacts(clumped.state) > 5 * contacts(alone.state)
-    assert contacts(clumped.state) > 40
-    assert half_axes(clumped.state)[0] > 1.1 * half_axes(clumped.start)[0]
+    alone, blast_result = simulate([without, blast], worlds=2, capacity=100)
+    assert blast_result.status.ok, blast_result.status.reason
+    assert contacts(blast_result.state) > 5 * contacts(alone.state)
+    assert contacts(blast_result.state) > 40
+    assert half_axes(blast_result.state)[0] > 1.1 * half_axes(blast_result.start)[0]

@@ -51,8 +51,8 @@ def test_wanted_ellipsoid_begins_as_the_starts_of_its_number_do(size):
     sizes = [ball(moments(one.particles.arrays(one.domain, one.seed))) for one in scenes]
     assert np.mean(sizes) == pytest.approx(start(number), rel=4e-3)
     target = ellipsoid(TARGET_FLUX, DURATION, start(number))
-    shown = ", ".join(f"{a:.3f}" for a in principal_half_axes(target))
-    assert f"half axes of {shown} m" in problem(size).title
+    half_axes = ", ".join(f"{a:.3f}" for a in principal_half_axes(target))
+    assert f"half axes of {half_axes} m" in problem(size).title
 
 
 def test_moments_weigh_by_mass_and_contacts_count_pairs():
@@ -71,12 +71,12 @@ def test_details_say_what_was_wanted_and_reached(rng):
     result = Result(None, state, state, DURATION, {}, Status(True, ""), 0.0)
     for sign in (1.0, -1.0):
         turned = dict(zip(("flux_x", "flux_y", "flux_z"), sign * TARGET_FLUX, strict=True))
-        shown = details(turned, result, ellipsoid(TARGET_FLUX, DURATION, 1.0))
-        assert shown["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
-    assert shown["strength of the field, T"] == pytest.approx(0.7)
+        details_ = details(turned, result, ellipsoid(TARGET_FLUX, DURATION, 1.0))
+        assert details_["field to the long axis wanted, degrees"] == pytest.approx(0.0, abs=1e-5)
+    assert details_["strength of the field, T"] == pytest.approx(0.7)
     for k in (1, 2, 3):
-        assert shown[f"half axis {k} reached, m"] == pytest.approx(
-            shown[f"half axis {k} wanted, m"], rel=0.05
+        assert details_[f"half axis {k} reached, m"] == pytest.approx(
+            details_[f"half axis {k} wanted, m"], rel=0.05
         )
 
 

@@ -145,8 +145,8 @@ def test_picture_shows_the_fibres_and_what_they_caught():
             [(result.start, ~stopped), (result.start, stopped), (result.state, stopped)],
             strict=True,
         ):
-            shown = 1e3 * places["position"][which][:, [2, k]]
-            np.testing.assert_allclose(line.get_xydata(), shown, atol=1e-9)
+            projected = 1e3 * places["position"][which][:, [2, k]]
+            np.testing.assert_allclose(line.get_xydata(), projected, atol=1e-9)
     assert [line.get_label() for line in side.lines] == ["passed by", "caught", "where it was caught"]
 
 

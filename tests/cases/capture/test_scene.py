@@ -54,8 +54,8 @@ def test_a_scene_of_its_own_placement_is_read_where_nothing_else_is_imported(tmp
     file = tmp_path / "scene.toml"
     file.write_text(capture.scene().to_toml(), encoding="utf-8")
     code = f"import tisim; print(tisim.Scene.from_toml({str(file)!r}).digest())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == capture.scene().digest()
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert completed.stdout.strip() == capture.scene().digest()
 
 
 def test_force_towards_a_cylinder():

@@ -16,17 +16,17 @@ from tisim import RandomAroundCylinder, run
 def stages(monkeypatch):
     """Every stage captures its first three particles, at 1/10, 2/10 and 3/10 of its time. Returns the scenes
     of all stages, in order."""
-    seen = []
+    stages_seen = []
 
     def captured(scenes):
-        seen.append(scenes)
+        stages_seen.append(scenes)
         for scene in scenes:
             at = np.full(scene.particles.number, -1.0)
             at[:3] = scene.duration * np.array([0.3, 0.1, 0.2])[: len(at)]
             yield SimpleNamespace(status=SimpleNamespace(ok=True), state={"captured_at": at})
 
     monkeypatch.setattr(capture_times, "run", lambda scenes: list(captured(scenes)))
-    return seen
+    return stages_seen
 
 
 def test_times_count_from_the_start_of_the_cascade_and_end_with_the_share(stages):

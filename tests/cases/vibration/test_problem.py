@@ -45,9 +45,9 @@ def test_fitness_is_the_closed_form():
     np.testing.assert_allclose(peaks, exact, rtol=2e-3)
     opposite = [problem(variant="avoid").objective(result) for result in results]
     np.testing.assert_array_equal(opposite, -np.array(peaks))
-    shown = details(DESIGNS["far"], results[0])
-    assert shown["nearest resonance over drive"] == pytest.approx(1.0 / 0.8, rel=2e-3)
-    assert shown["largest displacement, m"] == displacement(results[0])
+    table = details(DESIGNS["far"], results[0])
+    assert table["nearest resonance over drive"] == pytest.approx(1.0 / 0.8, rel=2e-3)
+    assert table["largest displacement, m"] == displacement(results[0])
 
 
 def test_resonance_nearest_to_the_drive():

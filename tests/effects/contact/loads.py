@@ -60,18 +60,18 @@ def jacobians(scenes, step, capacity=16):
     claimed = np.zeros((WORLDS, capacity, 3, 3))
     _jacobians(simulation.s, force, claimed)
     start = simulation.s.read("velocity")
-    found = np.zeros_like(claimed)
+    difference = np.zeros_like(claimed)
     for b, sign in ((b, sign) for b in range(3) for sign in (1, -1)):
         simulation.s.write("velocity", start + sign * step * np.eye(3)[b])
         simulation.first.advance(1)
-        found[..., b] += sign * simulation.s.read("force") / (2 * step)
+        difference[..., b] += sign * simulation.s.read("force") / (2 * step)
     n = [len(scene.particles.position) for scene in scenes]
-    return [claimed[w, : n[w]] for w in range(len(n))], [found[w, : n[w]] for w in range(len(n))]
+    return [claimed[w, : n[w]] for w in range(len(n))], [difference[w, : n[w]] for w in range(len(n))]
 
 
-def fields_beside_the_core(made):
+def fields_beside_the_core(setup):
     """Names of what a scene needs and so has allocated, beyond position, velocity, mass, radius and id."""
-    fields = resolve_fields(needed_fields(made.effects, made.stepper))
+    fields = resolve_fields(needed_fields(setup.effects, setup.stepper))
     return {field.name for field in fields} - {field.name for field in CORE}
 
 
@@ -82,9 +82,9 @@ def pairs(state):
     return gap / distance[..., None], distance
 
 
-def close(found, expected, tolerance=1e-12):
+def close(actual, expected, tolerance=1e-12):
     """Equal to within a part of the largest component."""
-    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * np.abs(expected).max())
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * np.abs(expected).max())
 
 
 def balanced(state, tolerance=1e-13):

@@ -43,10 +43,10 @@ def heap(rng, kinds):
 class Twin:
     """All pairs [i, j] of a state at once, as printed in Z16; forces are on i by j."""
 
-    def __init__(self, made, state):
-        self.laws = {type(effect): effect for effect in made.effects}
+    def __init__(self, setup, state):
+        self.laws = {type(effect): effect for effect in setup.effects}
         self.radius, self.v = state["radius"], state["velocity"]
-        self.spin, self.temperature = state.get("spin"), made.particles.arrays(None, 0)["temperature"]
+        self.spin, self.temperature = state.get("spin"), setup.particles.arrays(None, 0)["temperature"]
         self.n, self.d = pairs(state)
         a, b = self.radius[:, None], self.radius
         self.touch = (self.d <= a + b) & ~np.eye(len(b), dtype=bool)
@@ -131,9 +131,9 @@ COMBINATIONS = {
 def test_contact_is_its_numpy_twin(name, rng):
     """Random heaps, all worlds of one batch; forces and torques; momentum and angular momentum."""
     kinds = COMBINATIONS[name]
-    made = [heap(rng, kinds) for _ in range(WORLDS)]
-    seen = dict.fromkeys(("touch", "apart", "slips", "sticks", "bonded", "softest", "stiffer"), 0)
-    for one, state in zip(made, loads(made, dt=DT), strict=True):
+    scenes = [heap(rng, kinds) for _ in range(WORLDS)]
+    counts = dict.fromkeys(("touch", "apart", "slips", "sticks", "bonded", "softest", "stiffer"), 0)
+    for one, state in zip(scenes, loads(scenes, dt=DT), strict=True):
         twin = Twin(one, state)
         force, torque = twin.loads()
         close(state["force"], force)
@@ -143,15 +143,15 @@ def test_contact_is_its_numpy_twin(name, rng):
             close(state["torque"], torque)
             assert np.abs(torque).max() > 1e-3 * np.abs(force).max()
         balanced(state)
-        seen = {key: count + np.sum(getattr(twin, key, 0)) for key, count in seen.items()}
+        counts = {key: count + np.sum(getattr(twin, key, 0)) for key, count in counts.items()}
     # The states are worth something: of everything that a law can meet there are many.
-    assert min(seen["touch"], seen["apart"]) > 100
+    assert min(counts["touch"], counts["apart"]) > 100
     if ContactSoftening in kinds:
-        assert min(seen["softest"], seen["stiffer"]) > 8
+        assert min(counts["softest"], counts["stiffer"]) > 8
     if ContactFriction in kinds:
-        assert min(seen["slips"], seen["sticks"]) > 40
+        assert min(counts["slips"], counts["sticks"]) > 40
     if ContactBond in kinds:
-        assert 40 < seen["bonded"] < seen["touch"] - 40
+        assert 40 < counts["bonded"] < counts["touch"] - 40
 
 
 def pair(effects, gap, radius, velocity=(0, 0), spin=None):
@@ -169,8 +169,8 @@ def pair(effects, gap, radius, velocity=(0, 0), spin=None):
 @pytest.mark.slow
 def test_a_grain_inside_another_is_not_pushed():
     """Where surfaces do not meet there is no contact area; nor is there a NaN."""
-    made = [pair((Contact(stiffness=1e3),), gap, [1.0, 0.3]) for gap in (0.5, 0.7, 0.71, 1.3, 1.31)]
-    inside, edge, meeting, touching, apart = (state["force"][1, 0] for state in loads(made))
+    scenes = [pair((Contact(stiffness=1e3),), gap, [1.0, 0.3]) for gap in (0.5, 0.7, 0.71, 1.3, 1.31)]
+    inside, edge, meeting, touching, apart = (state["force"][1, 0] for state in loads(scenes))
     assert inside == apart == 0
     assert meeting > 0
     assert abs(edge) + abs(touching) < 1e-12
@@ -190,11 +190,11 @@ def test_friction_of_grains_that_roll_on_each_other():
     """Spins that make the surfaces move as one leave no friction; the opposite doubles the slip."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))
     arm = 0.9
-    made = [
+    scenes = [
         pair(friction, 2 * arm, 1.0, (1.0, -1.0), [[0, 0, sign / arm], [0, 0, sign / arm]])
         for sign in (-1.0, 0.0, 1.0)
     ]
-    rolling, sliding, worse = (state["force"][0, 1] for state in loads(made, dt=DT))
+    rolling, sliding, worse = (state["force"][0, 1] for state in loads(scenes, dt=DT))
     assert abs(rolling) < 1e-14
     assert sliding < 0
     assert worse == pytest.approx(2 * sliding)
@@ -205,12 +205,12 @@ def test_grains_that_just_touch_at_rest_rub_with_no_force():
     smooth = ContactFriction(stiffness=10.0, static=0.0, dynamic=0.0)
     rough = ContactFriction(stiffness=10.0, static=1e3, dynamic=1.0)
     law = Contact(stiffness=1e3)
-    made = [
+    scenes = [
         pair((law, rough), 2.0, 1.0),
         pair((law, smooth), 1.8, 1.0),
         pair((law, rough), 2.0, 1.0, (1, -1)),
     ]
-    for state in loads(made, dt=DT):
+    for state in loads(scenes, dt=DT):
         np.testing.assert_array_equal(state["force"][:, 1:], 0)
         np.testing.assert_array_equal(state["torque"], 0)
 
@@ -218,8 +218,8 @@ def test_grains_that_just_touch_at_rest_rub_with_no_force():
 def test_stick_vanishes_with_the_time_step():
     """What the docstring says of the paper's regularisation."""
     friction = (Contact(stiffness=1e3), ContactFriction(stiffness=10.0, static=1e3, dynamic=0.0))
-    made = [pair(friction, 1.8, 1.0, (1.0, -1.0))]
-    at = [loads(made, dt)[0]["force"][0, 1] for dt in (1e-3, 1e-6, 0.0)]
+    scenes = [pair(friction, 1.8, 1.0, (1.0, -1.0))]
+    at = [loads(scenes, dt)[0]["force"][0, 1] for dt in (1e-3, 1e-6, 0.0)]
     assert at[1] == pytest.approx(at[0] / 1e3)
     assert at[2] == 0
 

@@ -63,8 +63,8 @@ def drags(rng, kind):
 
 def at_reynolds(rng, law, n=12):
     """Particles at rest, in the fluid's frame or not, whose Re are REYNOLDS; each radius its own."""
-    made = cloud(rng, (law,), n=n)
-    start = made.particles.arrays(made.domain, 0)
+    setup = cloud(rng, (law,), n=n)
+    start = setup.particles.arrays(setup.domain, 0)
     speed = REYNOLDS * law.viscosity / (2 * start["radius"] * law.density)
     unit = start["velocity"] / np.linalg.norm(start["velocity"], axis=1, keepdims=True)
     return scene(start["position"], unit * speed[:, None], (law,), radius=start["radius"], mass=start["mass"])
@@ -72,10 +72,10 @@ def at_reynolds(rng, law, n=12):
 
 @pytest.mark.parametrize("kind", [ConstantDrag, ChowDrag, StokesDrag])
 def test_drag_in_a_fluid_at_rest(kind, rng):
-    made = [at_reynolds(rng, drags(rng, ChowDrag)) for _ in range(WORLDS)]
+    scenes = [at_reynolds(rng, drags(rng, ChowDrag)) for _ in range(WORLDS)]
     if kind is not ChowDrag:
-        made = [cloud(rng, (drags(rng, kind),)) for _ in range(WORLDS)]
-    for one, state in zip(made, loads(made), strict=True):
+        scenes = [cloud(rng, (drags(rng, kind),)) for _ in range(WORLDS)]
+    for one, state in zip(scenes, loads(scenes), strict=True):
         expected = drag_twin(one.effects[0], state)
         np.testing.assert_allclose(state["force"], expected, rtol=1e-12)
         assert ((state["force"] * state["velocity"]).sum(axis=1) < 0).all()
@@ -91,8 +91,10 @@ def test_drag_in_a_fluid_at_rest(kind, rng):
 )
 def test_drag_in_a_flow(kind, rng):
     """Relative to the flow at the place of each particle."""
-    made = [cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)]
-    for one, state in zip(made, loads(made), strict=True):
+    scenes = [
+        cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)
+    ]
+    for one, state in zip(scenes, loads(scenes), strict=True):
         flow, law = one.effects
         np.testing.assert_allclose(
             state["force"], drag_twin(law, state, Shear.twin(flow, state["position"])), rtol=1e-12
@@ -100,8 +102,8 @@ def test_drag_in_a_flow(kind, rng):
 
 
 def test_chow_meets_stokes_at_small_reynolds_numbers(rng):
-    made = at_reynolds(rng, ChowDrag(density=1.2, viscosity=1.8e-5))
-    (state,) = loads([made])
+    setup = at_reynolds(rng, ChowDrag(density=1.2, viscosity=1.8e-5))
+    (state,) = loads([setup])
     slow = REYNOLDS <= 1
     assert slow.sum() == 2
     stokes = drag_twin(StokesDrag(viscosity=1.8e-5), state)
@@ -112,9 +114,9 @@ def test_chow_meets_stokes_at_small_reynolds_numbers(rng):
 def test_nothing_drags_at_rest(kind, rng):
     """No force, and no NaN; the derivative is that of Stokes or zero."""
     law = drags(rng, kind)
-    made = scene(np.zeros((1, 3)), np.zeros((1, 3)), (law,), radius=0.3)
-    np.testing.assert_array_equal(loads([made])[0]["force"], 0)
-    ((claimed,),) = (jacobians([made], 1e-6)[0],)
+    setup = scene(np.zeros((1, 3)), np.zeros((1, 3)), (law,), radius=0.3)
+    np.testing.assert_array_equal(loads([setup])[0]["force"], 0)
+    ((claimed,),) = (jacobians([setup], 1e-6)[0],)
     expected = 0.0 if kind is ConstantDrag else -6 * np.pi * law.viscosity * 0.3
     np.testing.assert_allclose(claimed[0], expected * np.eye(3), rtol=1e-12, atol=0)
 
@@ -122,17 +124,19 @@ def test_nothing_drags_at_rest(kind, rng):
 @pytest.mark.parametrize("kind", [ConstantDrag, StokesDrag])
 def test_velocity_jacobians_are_the_derivatives(kind, rng):
     """Against a central difference of the force, in a flow."""
-    made = [cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)]
-    for claimed, found in zip(*jacobians(made, 1e-4), strict=True):
-        close(claimed, found, 1e-7)
+    scenes = [
+        cloud(rng, (Shear(mean=vector(rng), rate=vector(rng)), drags(rng, kind))) for _ in range(WORLDS)
+    ]
+    for claimed, difference in zip(*jacobians(scenes, 1e-4), strict=True):
+        close(claimed, difference, 1e-7)
 
 
 def test_velocity_jacobian_of_chow_in_each_of_its_pieces(rng):
     """Steps that are small for the slowest particles of a range, and not all rounding for the fastest."""
-    made = [at_reynolds(rng, drags(rng, ChowDrag)) for _ in range(WORLDS)]
+    scenes = [at_reynolds(rng, drags(rng, ChowDrag)) for _ in range(WORLDS)]
     for which, step in ((slice(0, 3), 1e-7), (slice(3, 8), 1e-4), (slice(8, 12), 1.0)):
-        for claimed, found in zip(*jacobians(made, step), strict=True):
-            for a, b in zip(claimed[which], found[which], strict=True):
+        for claimed, difference in zip(*jacobians(scenes, step), strict=True):
+            for a, b in zip(claimed[which], difference[which], strict=True):
                 close(a, b, 2e-6)
 
 

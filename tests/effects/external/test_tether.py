@@ -15,8 +15,8 @@ def stiffnesses(rng):
 
 def test_a_tether_draws_back_to_where_each_began(rng):
     """The anchor is a copy of the start, to the bit, and stays where it is."""
-    made = [cloud(rng, (Tether(stiffness=k),), dt=0.1, steps=3) for k in stiffnesses(rng)]
-    for one, result in zip(made, simulate(made, worlds=WORLDS, capacity=16), strict=True):
+    scenes = [cloud(rng, (Tether(stiffness=k),), dt=0.1, steps=3) for k in stiffnesses(rng)]
+    for one, result in zip(scenes, simulate(scenes, worlds=WORLDS, capacity=16), strict=True):
         np.testing.assert_array_equal(result.state["anchor"], result.start["position"])
         away = result.state["position"] - result.start["position"]
         assert np.abs(away).max() > 0.1
@@ -25,17 +25,17 @@ def test_a_tether_draws_back_to_where_each_began(rng):
 
 def test_a_tether_to_an_anchor_that_the_start_gives(rng):
     anchors = rng.normal(size=(WORLDS, 12, 3))
-    made = [
+    scenes = [
         cloud(rng, (Tether(stiffness=k),), quantities={"anchor": anchor})
         for k, anchor in zip(stiffnesses(rng), anchors, strict=True)
     ]
-    for one, anchor, state in zip(made, anchors, loads(made), strict=True):
+    for one, anchor, state in zip(scenes, anchors, loads(scenes), strict=True):
         close(state["force"], -np.array(one.effects[0].stiffness) * (state["position"] - anchor))
 
 
 def test_gravity(rng):
-    made = [cloud(rng, (Gravity(acceleration=vector(rng)),)) for _ in range(WORLDS)]
-    for one, state in zip(made, loads(made), strict=True):
+    scenes = [cloud(rng, (Gravity(acceleration=vector(rng)),)) for _ in range(WORLDS)]
+    for one, state in zip(scenes, loads(scenes), strict=True):
         close(state["force"], state["mass"][:, None] * np.array(one.effects[0].acceleration))
     assert Gravity().acceleration == (0.0, 0.0, -9.80665)
 

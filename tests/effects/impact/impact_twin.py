@@ -53,7 +53,7 @@ def draw(rng):
 
 def effects(pair, kinds):
     """The effects of a pair, those of ``kinds`` among them."""
-    made = {
+    factories = {
         Friction: lambda: Friction(coefficient=pair["friction"]),
         Heating: lambda: Heating(heat_capacity=HEAT_CAPACITY),
         DeformationWork: DeformationWork,
@@ -67,7 +67,7 @@ def effects(pair, kinds):
         final_area=pair["af"],
         tolerance=1e-14,
     )
-    return (impact, *(made[kind]() for kind in kinds))
+    return (impact, *(factories[kind]() for kind in kinds))
 
 
 def as_scene(pair, kinds):
@@ -107,11 +107,11 @@ def twin(pair, kinds):
         after = np.outer(after_n, n) + after_t
         # In the frame of the pair's centre of mass (see impact.py on the paper's split).
         centre = (m @ v) / m.sum()
-        lost = 0.5 * m * (((v - centre) ** 2).sum(axis=1) - ((after - centre) ** 2).sum(axis=1))
+        loss = 0.5 * m * (((v - centre) ** 2).sum(axis=1) - ((after - centre) ** 2).sum(axis=1))
         area = (pair["a0"] + (pair["af"] - pair["a0"]) * (1 - e)) * np.pi * least**2
         work = m.prod() / m.sum() * approach**2 * (1 - e**2) / 3 * (DeformationWork in kinds)
         heat = pair["alpha"] * area * (Reaction in kinds)
-        hot = t + (lost + work + heat) / (m * HEAT_CAPACITY) * (Heating in kinds)
+        hot = t + (loss + work + heat) / (m * HEAT_CAPACITY) * (Heating in kinds)
         hard = pair["hardness"] * np.exp(pair["q"] / (GAS_CONSTANT * hot) * (Softening in kinds))
         return after, hot, force, area, hard.min(), work, heat
 

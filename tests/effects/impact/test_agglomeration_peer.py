@@ -33,17 +33,17 @@ EVEN = Verlet(control=ApproachTime(shortest=1e-6, longest=1e-6))
 @pytest.fixture(scope="module")
 def simulation(the_runtime):
     """One compilation serves every scene of the case."""
-    made = Simulation(scene(BEST, 0, 200), WORLDS)
-    yield made
-    made.close()
+    simulation_ = Simulation(scene(BEST, 0, 200), WORLDS)
+    yield simulation_
+    simulation_.close()
 
 
 def prepare(design, grains, **changes):
     """Scenes from 16 starts, and the same for the other program."""
     scenes = [scene(design, seed, grains).model_copy(update=changes) for seed in range(WORLDS)]
     starts = [s.particles.arrays(s.domain, s.seed) for s in scenes]
-    given = [{**design, "grain_mass": start["mass"][0]} for start in starts]
-    return scenes, starts, given
+    laws = [{**design, "grain_mass": start["mass"][0]} for start in starts]
+    return scenes, starts, laws
 
 
 def apart(result, final):
@@ -68,30 +68,30 @@ def test_every_step_has_the_same_events_and_particles(simulation, hardness, even
     if runtime.current().precision != "f64":
         pytest.skip("a comparison of f64 programs")
     design = {**BEST, "hardness": hardness * BEST["hardness"]}
-    scenes, starts, given = prepare(design, GRAINS, **({"stepper": EVEN} if even else {}))
+    scenes, starts, laws = prepare(design, GRAINS, **({"stepper": EVEN} if even else {}))
     settings = {"longest": 1e-6} if even else {}
     simulation.load(scenes)
     stride = 1 if steps < 100 else 10
-    for done in range(stride, steps + 1, stride):
+    for number in range(stride, steps + 1, stride):
         simulation.run(steps=stride)
         results = simulation.results()
-        finals, counts = peer.simulate(starts, given, DURATION, steps=done, **settings)
+        finals, counts = peer.simulate(starts, laws, DURATION, steps=number, **settings)
         for w, result in enumerate(results):
             ours = dict(zip(peer.COUNTS, (result.work[name] for name in peer.COUNTS), strict=True))
             theirs = dict(zip(peer.COUNTS, counts[w].tolist(), strict=True))
-            assert ours == theirs, f"world {w}, step {done}"
-            assert apart(result, finals[w]) < tolerance, f"world {w}, step {done}"
+            assert ours == theirs, f"world {w}, step {number}"
+            assert apart(result, finals[w]) < tolerance, f"world {w}, step {number}"
     assert counts[:, 2].min() >= 20
 
 
 @pytest.mark.slow
 def test_cost_of_a_design_is_the_same(simulation):
     """Mean Pi over 16 starts of 200 grains, whole runs, where events may part as rounding has it."""
-    scenes, starts, given = prepare(BEST, 200)
+    scenes, starts, laws = prepare(BEST, 200)
     simulation.load(scenes)
     simulation.run()
     ours = np.array([cost(result) for result in simulation.results()])
-    finals, _ = peer.simulate(starts, given, DURATION)
+    finals, _ = peer.simulate(starts, laws, DURATION)
     whole = [np.cbrt((start["radius"] ** 3).sum()) for start in starts]
     theirs = np.array([1 - final["radius"].mean() / b for final, b in zip(finals, whole, strict=True)])
     error = np.sqrt((ours.var(ddof=1) + theirs.var(ddof=1)) / WORLDS)

@@ -25,7 +25,7 @@ def pairs(rng, boost=0.0, gravity=0.0, breaks=False, across=False):
         Fragmentation(surface_energy=1e-3 if breaks else 1e16),
         Gravity(acceleration=(0.0, 0.0, -gravity)),
     )
-    found = []
+    scenes = []
     for _ in range(PAIRS):
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
@@ -35,7 +35,7 @@ def pairs(rng, boost=0.0, gravity=0.0, breaks=False, across=False):
         push *= np.sign(push @ normal) * 10.0 ** rng.uniform(0, 2)
         touch = 1 - 1e4 * np.finfo(runtime.current().precision.replace("f", "float")).eps
         centres = place + radius[:, None] * touch * np.array([-normal, normal])
-        found.append(
+        scenes.append(
             scene(
                 (centres + SIDE / 2) % SIDE - SIDE / 2,
                 rng.normal(size=3) * boost + np.array([push, -rng.uniform() * push]),
@@ -47,7 +47,7 @@ def pairs(rng, boost=0.0, gravity=0.0, breaks=False, across=False):
                 domain=Box(low=(-SIDE / 2,) * 3, high=(SIDE / 2,) * 3),
             )
         )
-    return found
+    return scenes
 
 
 LOADS = {
@@ -83,8 +83,8 @@ def test_a_bonded_pair_collides_once(load):
         scale = np.abs(result.start["mass"][:, None] * result.start["velocity"]).sum()
         assert speed <= 1e-15 * np.abs(result.state["velocity"]).max() * (1 + 200 * (load == "falling"))
         if load != "falling":
-            lost = momentum(result.state) - momentum(result.start)
-            np.testing.assert_allclose(lost, 0, rtol=0, atol=1e-15 * scale)
+            gain = momentum(result.state) - momentum(result.start)
+            np.testing.assert_allclose(gain, 0, rtol=0, atol=1e-15 * scale)
 
 
 def summaries():
@@ -103,6 +103,6 @@ def summaries():
 
 @pytest.mark.slow
 def test_nor_does_it_in_single_precision(single):
-    counted = np.array(single("effects.impact.test_bonded_pairs", "summaries"))
-    assert (counted[..., 0] == 1).all()
-    np.testing.assert_allclose(counted[..., 1], 1, rtol=1e-5)
+    counts = np.array(single("effects.impact.test_bonded_pairs", "summaries"))
+    assert (counts[..., 0] == 1).all()
+    np.testing.assert_allclose(counts[..., 1], 1, rtol=1e-5)

@@ -142,11 +142,11 @@ def test_smallest_piece_is_the_lightest_grain_of_the_start_whatever_its_density(
         laws(SOFT, 1.0, grain_mass=None), radius=[2 * RADIUS, 2 * RADIUS, RADIUS], dt=1e-15,
         quantities={"temperature": 300.0},
     )  # fmt: skip
-    given = light.replace({"effects.fragmentation.grain_mass": 2 * GRAIN})
-    results = run([light, light.replace({"particles.density": 7 * DENSITY}), given])
+    heavy = light.replace({"effects.fragmentation.grain_mass": 2 * GRAIN})
+    results = run([light, light.replace({"particles.density": 7 * DENSITY}), heavy])
     assert [len(result.state["mass"]) for result in results] == [17, 17, 9]
     assert light.replace({"particles.density": DENSITY / 7}).capacity() == light.capacity() == 17
-    assert given.capacity() == 9
+    assert heavy.capacity() == 9
 
 
 def test_agglomerate_of_grains_breaks_into_all_of_them():

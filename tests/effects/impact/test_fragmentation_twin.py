@@ -71,10 +71,10 @@ class Twin:
         after_i = centre - e * (v_i - v_j) * self.m[j] / total
         after_j = centre + e * (v_i - v_j) * self.m[i] / total
         for k, before, after in ((i, v_i, after_i), (j, v_j, after_j)):
-            lost = 0.5 * self.m[k] * ((before - centre) ** 2 - (after - centre) ** 2)
+            loss = 0.5 * self.m[k] * ((before - centre) ** 2 - (after - centre) ** 2)
             self.v[k] += (after - before) * n
-            self.T[k] += lost / (self.m[k] * HEAT_CAPACITY)
-            self.strain(k, lost)
+            self.T[k] += loss / (self.m[k] * HEAT_CAPACITY)
+            self.strain(k, loss)
 
     def strain(self, k, energy):
         """(5.2), (5.3): b = b_0 / (dK / (4 pi gamma b_0^2) + 1); below the threshold b_0^3 / b^3 pieces."""

@@ -28,7 +28,7 @@ def impacts(request):
 @pytest.mark.long
 def test_impact_is_its_twin(impacts):
     kinds, pairs, results = impacts
-    seen = set()
+    bond_outcomes = set()
     for pair, result in zip(pairs, results, strict=True):
         expected = twin(pair, kinds)
         speed = np.abs(pair["velocity"][0] - pair["velocity"][1]).max()
@@ -44,8 +44,8 @@ def test_impact_is_its_twin(impacts):
             np.testing.assert_allclose(
                 result.state["deformation_work"], expected["work"], rtol=1e-9, atol=1e-300
             )
-        seen.add(expected["e"] == 0)
-    assert seen == {True, False}, "the sample must hold bonds and rebounds"
+        bond_outcomes.add(expected["e"] == 0)
+    assert bond_outcomes == {True, False}, "the sample must hold bonds and rebounds"
 
 
 def test_impact_conserves_momentum_and_energy(impacts):
@@ -85,10 +85,10 @@ def test_restitution_leaves_the_approach_times_e(impacts):
     for pair, result in zip(pairs, results, strict=True):
         apart = pair["position"] + DT * pair["velocity"]
         n = (apart[1] - apart[0]) / np.linalg.norm(apart[1] - apart[0])
-        gone = (result.state["velocity"][1] - result.state["velocity"][0]) @ n
-        came = (pair["velocity"][0] - pair["velocity"][1]) @ n
-        e = gone / came
-        rounding = 1e-13 * np.abs(pair["velocity"]).max() / came
+        departure = (result.state["velocity"][1] - result.state["velocity"][0]) @ n
+        approach = (pair["velocity"][0] - pair["velocity"][1]) @ n
+        e = departure / approach
+        rounding = 1e-13 * np.abs(pair["velocity"]).max() / approach
         assert -rounding <= e < 1
         assert (e <= rounding) == bool(result.work["bonds"])
 

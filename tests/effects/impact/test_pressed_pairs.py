@@ -36,7 +36,7 @@ def row(number=2, steps=100, gap=-1e-9, speed=1.0, slip=0.0, pull=1e-6, hardness
     )
 
 
-def ran(rows):
+def run_rows(rows):
     results = simulate(rows, worlds=16, capacity=4)
     for result in results:
         assert result.status.ok, result.status.reason
@@ -56,7 +56,9 @@ def total(state, pull=1e-6):
 
 
 def test_a_pressed_pair_collides_once_whatever_the_step():
-    results = ran([row(steps=steps, pull=pull) for steps in (10, 100, 1000) for pull in (1e-9, 1e-6, 1e-4)])
+    results = run_rows(
+        [row(steps=steps, pull=pull) for steps in (10, 100, 1000) for pull in (1e-9, 1e-6, 1e-4)]
+    )
     for result in results:
         assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
         assert result.work["contacts"] >= result.work["steps"] - 2
@@ -65,28 +67,28 @@ def test_a_pressed_pair_collides_once_whatever_the_step():
 
 
 def test_its_energy_is_kept_and_its_heat_that_of_the_impact():
-    for result in ran([row(steps=steps) for steps in (100, 1000)]):
+    for result in run_rows([row(steps=steps) for steps in (100, 1000)]):
         kinetic = MASS
         assert total(result.state) == pytest.approx(total(result.start), abs=1e-7 * kinetic)
-        given = HEAT_CAPACITY * MASS * (result.state["temperature"] - 300).sum()
-        assert given == pytest.approx(kinetic + ONCE, rel=1e-3)
+        warming = HEAT_CAPACITY * MASS * (result.state["temperature"] - 300).sum()
+        assert warming == pytest.approx(kinetic + ONCE, rel=1e-3)
 
 
 def test_a_pair_that_attraction_brings_together_collides_once():
     gaps = (1e-9, 1e-6, 1e-4)
     rows = [row(steps=s, gap=gap, speed=0.0, pull=1e-4, hardness=1e-12) for s in (100, 1000) for gap in gaps]
-    for result in ran(rows):
+    for result in run_rows(rows):
         assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
         assert heat(result) == pytest.approx(1, rel=1e-13)
 
 
 def test_a_pair_that_starts_at_rest_in_contact_never_collides():
-    for result in ran([row(steps=steps, speed=0.0) for steps in (100, 1000)]):
+    for result in run_rows([row(steps=steps, speed=0.0) for steps in (100, 1000)]):
         assert (result.work["impacts"], heat(result)) == (0, 0)
 
 
 def test_a_row_comes_to_rest_whatever_the_step():
-    few, many = ran([row(number=3, steps=steps) for steps in (1000, 10000)])
+    few, many = run_rows([row(number=3, steps=steps) for steps in (1000, 10000)])
     assert 2 <= few.work["impacts"] < 30
     assert heat(many) == pytest.approx(heat(few), rel=0.05)
 
@@ -95,10 +97,10 @@ def test_a_pressed_pair_slides_as_friction_lets_it():
     pull, slip = 1e-4, 0.08
     slowing = 2 * FRICTION * pull / (2 * RADIUS) / MASS * DURATION
     assert 0.5 < slowing / (2 * slip) < 0.8
-    for result in ran([row(steps=s, speed=0.0, slip=slip, pull=pull) for s in (100, 1000)]):
+    for result in run_rows([row(steps=s, speed=0.0, slip=slip, pull=pull) for s in (100, 1000)]):
         assert result.work["impacts"] == 0
-        left = np.ptp(result.state["velocity"], axis=0)[1]
-        assert left == pytest.approx(2 * slip - slowing, rel=0.02)
+        slip_left = np.ptp(result.state["velocity"], axis=0)[1]
+        assert slip_left == pytest.approx(2 * slip - slowing, rel=0.02)
         assert total(result.state, pull) == pytest.approx(
             total(result.start, pull), abs=1e-3 * MASS * slip**2
         )
@@ -114,7 +116,7 @@ STEPPERS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_so_it_is_with_other_steppers(stepper):
-    for result in ran([row(stepper=STEPPERS[stepper](DURATION / steps)) for steps in (100, 1000)]):
+    for result in run_rows([row(stepper=STEPPERS[stepper](DURATION / steps)) for steps in (100, 1000)]):
         assert (result.work["impacts"], result.work["bonds"]) == (1, 1)
         assert result.work["contacts"] >= 90
         assert heat(result) == pytest.approx(1, rel=1e-13)

@@ -58,8 +58,8 @@ def energy(r, m):
 
 def test_forces_are_those_of_the_twin_and_add_up_to_nothing(rng):
     """Nearest images in a periodic box."""
-    made = [magnets(rng, DipoleDipole()) for _ in range(WORLDS)]
-    states = loads(made)
+    scenes = [magnets(rng, DipoleDipole()) for _ in range(WORLDS)]
+    states = loads(scenes)
     for state in states:
         forces = pair_forces(state)
         close(state["force"], forces.sum(axis=1))
@@ -91,8 +91,8 @@ def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
 def test_near_pairs_only(rng):
     """Up to so many radii; also over the pair list, where sizes are unlike."""
     few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 10)))) for _ in range(WORLDS - 1)]
-    made = [*few, magnets(rng, TruncatedDipoleDipole(cutoff=4.0), n=400, sizes=(0.02, 0.1))]
-    for one, state in zip(made, loads(made, capacity=400), strict=True):
+    scenes = [*few, magnets(rng, TruncatedDipoleDipole(cutoff=4.0), n=400, sizes=(0.02, 0.1))]
+    for one, state in zip(scenes, loads(scenes, capacity=400), strict=True):
         forces, radius = pair_forces(state), state["radius"]
         near = 2 * separations(state["position"])[1] <= one.effects[0].cutoff * (radius[:, None] + radius)
         close(state["force"], (near[..., None] * forces).sum(axis=1))
@@ -103,7 +103,7 @@ def test_head_to_tail_attracts_and_side_by_side_repels():
     """F = 6 mu_0 m^2 / (4 pi d^4) together, half of it apart; B16 6.2.4."""
     unit = 3 * MU_0 / (4 * np.pi) * 4.0 / 0.5**4
     for moment, expected in (((2, 0, 0), 2 * unit), ((0, 2, 0), -unit)):
-        made = scene(
+        setup = scene(
             [[1, 1, 1], [1.5, 1, 1]],
             np.zeros((2, 3)),
             (DipoleDipole(),),
@@ -111,7 +111,7 @@ def test_head_to_tail_attracts_and_side_by_side_repels():
             domain=Box(low=(0, 0, 0), high=(SIDE,) * 3),
             quantities={"moment": [moment, moment]},
         )
-        force = loads([made])[0]["force"]
+        force = loads([setup])[0]["force"]
         np.testing.assert_allclose(force, [[expected, 0, 0], [-expected, 0, 0]], rtol=1e-12)
 
 
@@ -155,8 +155,8 @@ def test_two_touching_spheres():
         MutualInducedMoment(susceptibility=chi, tolerance=1e-14, relaxation=relaxation)
         for chi, relaxation in ((0.5, 1.0), (-0.9, 1.0), (20.0, 0.7))
     ]
-    made = [induced(3.0 * pair, b, law, radius=2.5) for law in laws for b in ((0, 0, 1), (1, 0, 0))]
-    for one, state in zip(made, loads(made), strict=True):
+    scenes = [induced(3.0 * pair, b, law, radius=2.5) for law in laws for b in ((0, 0, 1), (1, 0, 0))]
+    for one, state in zip(scenes, loads(scenes), strict=True):
         law, b = one.effects[2], np.array(one.effects[1].constant)
         a = law.susceptibility / (3 + law.susceptibility) * 2.5**3 / 6**3
         factor = 1 / (1 - 2 * a) if b[2] else 1 / (1 + a)
@@ -172,12 +172,12 @@ def test_induced_moments_are_those_of_a_linear_solve_and_forces_the_gradient_of_
     """
     chain = np.array([[0, 0, 0], [1.9, 0.7, 0], [3.5, 1.9, 0.3]])
     places = [chain, *(3 * np.mgrid[:5, :1, :1].reshape(3, -1).T + rng.normal(size=(5, 3)) for _ in range(3))]
-    made = []
+    scenes = []
     for place in places:
         law = MutualInducedMoment(susceptibility=float(rng.uniform(1, 100)), tolerance=1e-14)
         radius = rng.uniform(0.8, 1.0, len(place))
-        made.append(induced(place, vector(rng), law, radius=radius, scale=(0.4, 0.4, 0.7)))
-    for one, state in zip(made, loads(made), strict=True):
+        scenes.append(induced(place, vector(rng), law, radius=radius, scale=(0.4, 0.4, 0.7)))
+    for one, state in zip(scenes, loads(scenes), strict=True):
         r, radius, h = state["position"], state["radius"], 1e-5
         m, _ = solved(one, r, radius)
         close(state["moment"], m, 1e-11)
@@ -193,14 +193,14 @@ def test_langevin_moments_in_each_others_field(rng):
     """Each has the moment that the field at its place gives it, that of the others included; where the field
     is weak it is not that of the sources alone."""
     unit = K_B * 300.0
-    made = []
+    scenes = []
     for strength in (0.1, 1.0, 30.0):
         law = MutualLangevinMoment(temperature=300.0, tolerance=1e-14)
         place = 2.2 * np.mgrid[:3, :2, :1].reshape(3, -1).T + 0.1 * rng.normal(size=(6, 3))
         quantities = {"saturation_moment": 5e7 * rng.uniform(0.5, 1, 6), "domain_moment": unit}
-        made.append(induced(place, strength * np.array([0.6, 0.0, 0.8]), law, quantities=quantities))
+        scenes.append(induced(place, strength * np.array([0.6, 0.0, 0.8]), law, quantities=quantities))
     ratios = []
-    for one, state in zip(made, loads(made), strict=True):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         m = state["moment"]
         own = flux_density(one.effects, state["position"])
         b = own + np.einsum("ijab,jb->ia", dipole_field(state["position"]), m)
@@ -227,8 +227,8 @@ def test_one_who_leaves_the_others_out_says_so_to_the_study_of_cost():
 
 
 def test_only_what_is_needed_is_allocated():
-    made = scene([[0, 0, 0]], [[0, 0, 0]], (DipoleDipole(),))
-    assert fields_beside_the_core(made) == {"moment", "force"}
+    setup = scene([[0, 0, 0]], [[0, 0, 0]], (DipoleDipole(),))
+    assert fields_beside_the_core(setup) == {"moment", "force"}
 
 
 def test_what_is_wrong_is_named():

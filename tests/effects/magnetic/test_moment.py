@@ -32,9 +32,9 @@ def made_of(rng, law, **quantities):
     return cloud(rng, effects, quantities=quantities)
 
 
-def check(made, size):
+def check(scenes, size):
     """Moments of ``size`` along B, and the force of the gradient on them."""
-    for one, state in zip(made, loads(made), strict=True):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         b = flux_density(one.effects, state["position"])
         strength = np.linalg.norm(b, axis=1)
         expected = (size(one.effects[2], state, strength) / strength)[:, None] * b
@@ -44,28 +44,30 @@ def check(made, size):
 
 def test_langevin_moments_of_many_domains(rng):
     """x from 1e-2 to 1e2, for each particle its own domains."""
-    made = []
+    scenes = []
     for _ in range(WORLDS):
         law = LangevinMoment(temperature=float(rng.uniform(100, 500)))
         domains = K_B * law.temperature * 10 ** rng.uniform(-2, 2, 12)
-        made.append(made_of(rng, law, saturation_moment=rng.uniform(0, 2, 12), domain_moment=domains))
+        scenes.append(made_of(rng, law, saturation_moment=rng.uniform(0, 2, 12), domain_moment=domains))
 
     def size(law, state, strength):
         x = state["domain_moment"] * strength / (K_B * law.temperature)
         return state["saturation_moment"] * [langevin(x) for x in x]
 
-    check(made, size)
+    check(scenes, size)
 
 
 def test_induced_moments_are_those_of_magnetised_spheres(rng):
     """V M with M = chi H and H = H_0 - M/3 inside; from a superconductor to iron."""
-    made = [made_of(rng, InducedMoment(susceptibility=chi)) for chi in (-1, -1e-5, 0, 1e-3, 0.5, 3, 1e3, 1e6)]
+    scenes = [
+        made_of(rng, InducedMoment(susceptibility=chi)) for chi in (-1, -1e-5, 0, 1e-3, 0.5, 3, 1e3, 1e6)
+    ]
 
     def size(law, state, strength):
         magnetisation = np.linalg.solve([[1, -law.susceptibility], [1 / 3, 1]], [0, 1])[0] / MU_0
         return 4 / 3 * np.pi * state["radius"] ** 3 * magnetisation * strength
 
-    check(made, size)
+    check(scenes, size)
 
 
 STEPPERS = [
@@ -93,8 +95,8 @@ def test_every_stepper_settles_moments_before_forces(stepper):
         Magnetophoresis(),
     )
     place, speed = np.array([[1.0, 0.5, 0], [-0.2, 0.3, 0]]), np.array([[0.0, 2, 0], [1, 0, 0]])
-    made = scene(place, speed, effects, radius=0.1 ** (7 / 3), mass=k / 4, duration=1.5, stepper=stepper)
-    (result,) = simulate([made], capacity=4)
+    setup = scene(place, speed, effects, radius=0.1 ** (7 / 3), mass=k / 4, duration=1.5, stepper=stepper)
+    (result,) = simulate([setup], capacity=4)
     assert result.status.ok
     r = place * np.cosh(3.0) + speed / 2 * np.sinh(3.0)
     np.testing.assert_allclose(result.state["position"], r, rtol=0, atol=1e-4)

@@ -41,8 +41,8 @@ def twin(law, state):
     return (np.where(near, slope, 0)[..., None] * n).sum(axis=1)
 
 
-def check(made):
-    for one, state in zip(made, loads(made), strict=True):
+def check(scenes):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         law, force = one.effects[0], state["force"]
         expected = twin(law, state)
         assert np.abs(expected).max() > 0
@@ -76,8 +76,8 @@ def test_repulsion_ends_smoothly_at_the_bottom_of_the_well():
     bottom, sigma = 2 ** (1 / 15), 0.2
 
     def force(law, distance):
-        made = scene([[0, 0, 0], [distance, 0, 0]], np.zeros((2, 3)), (law,), radius=0.1, mass=1.0)
-        return loads([made])[0]["force"][1, 0]
+        setup = scene([[0, 0, 0], [distance, 0, 0]], np.zeros((2, 3)), (law,), radius=0.1, mass=1.0)
+        return loads([setup])[0]["force"][1, 0]
 
     hard, well = Mie(epsilon=3.0), Mie(epsilon=3.0, cutoff=10.0)
     assert potential(well, sigma * bottom, sigma) == pytest.approx(-3.0, rel=1e-9)
@@ -90,11 +90,11 @@ def test_repulsion_ends_smoothly_at_the_bottom_of_the_well():
 
 
 def test_it_needs_nothing_and_goes_to_files_and_back():
-    made = scene([[0, 0, 0]], [[0, 0, 0]], (Mie(epsilon=1e-19),))
-    assert fields_beside_the_core(made) == {"force"}
-    again = Scene.from_dict(made.to_dict())
-    assert again.digest() == made.digest()
-    assert again.structure() == made.structure()
+    setup = scene([[0, 0, 0]], [[0, 0, 0]], (Mie(epsilon=1e-19),))
+    assert fields_beside_the_core(setup) == {"force"}
+    again = Scene.from_dict(setup.to_dict())
+    assert again.digest() == setup.digest()
+    assert again.structure() == setup.structure()
 
 
 WRONG = {

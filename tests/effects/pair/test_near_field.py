@@ -48,8 +48,8 @@ def twin(law, state):
     return (size[..., None] * n).sum(axis=1)
 
 
-def check(made):
-    for one, state in zip(made, loads(made), strict=True):
+def check(scenes):
+    for one, state in zip(scenes, loads(scenes), strict=True):
         expected = twin(one.effects[0], state)
         assert np.abs(expected).max() > 0
         close(state["force"], expected)
@@ -94,11 +94,11 @@ def test_exponents(exponents, rng):
 @pytest.mark.slow
 def test_near_pairs_only(rng):
     """Also over the pair list, which a world of more particles than it looks through one by one has."""
-    made = [
+    scenes = [
         cloud(rng, TruncatedNearField(**coefficients(rng), cutoff=rng.uniform(0.4, 0.8)))
         for _ in range(WORLDS)
     ]
-    check(made)
+    check(scenes)
     many = cloud(rng, TruncatedNearField(alpha1=1.0, alpha2=0.5, cutoff=0.15, beta2=3), n=400)
     (state,) = loads([many], capacity=400)
     expected = twin(many.effects[0], state)
@@ -110,8 +110,8 @@ def test_alpha1_attracts_and_alpha2_repels():
     """Two particles side by side; between unlike signs each does the opposite."""
 
     def on_the_left(**options):
-        made = scene([[0, 0, 0], [0.5, 0, 0]], np.zeros((2, 3)), (NearField(**options),), quantities=signs)
-        return loads([made])[0]["force"][0]
+        setup = scene([[0, 0, 0], [0.5, 0, 0]], np.zeros((2, 3)), (NearField(**options),), quantities=signs)
+        return loads([setup])[0]["force"][0]
 
     signs = {}
     np.testing.assert_allclose(on_the_left(alpha1=3.0), [6, 0, 0])
@@ -123,11 +123,11 @@ def test_alpha1_attracts_and_alpha2_repels():
 
 def test_of_charges_it_is_coulombs_law():
     law = NearField(alpha2=COULOMB, strength="charge")
-    made = [
+    scenes = [
         scene([[0, 0, 0], [0, 0.3, 0.4]], np.zeros((2, 3)), (law,), quantities={"charge": charge})
         for charge in ([1e-6, 2e-6], [-1e-6, 2e-6])
     ]
-    like, unlike = loads(made)
+    like, unlike = loads(scenes)
     np.testing.assert_allclose(np.linalg.norm(like["force"], axis=1), COULOMB * 2e-12 / 0.25)
     assert like["force"][0, 1] < 0 < unlike["force"][0, 1]
 
@@ -135,8 +135,8 @@ def test_of_charges_it_is_coulombs_law():
 def test_it_is_in_balance_at_alpha2_over_alpha1():
     """beta = (1, 2): no force at d = alpha2 / alpha1, and the stiffness of Z13 (33) there."""
     law, h = NearField(alpha1=2.0, alpha2=1.0), 1e-6
-    made = [scene([[0, 0, 0], [0.5 + x, 0, 0]], np.zeros((2, 3)), (law,)) for x in (0.0, h, -h)]
-    at, out, back = (state["force"][1, 0] for state in loads(made))
+    scenes = [scene([[0, 0, 0], [0.5 + x, 0, 0]], np.zeros((2, 3)), (law,)) for x in (0.0, h, -h)]
+    at, out, back = (state["force"][1, 0] for state in loads(scenes))
     assert at == pytest.approx(0, abs=1e-14)
     assert (back - out) / (2 * h) == pytest.approx(2.0 * (2.0 / 1.0) ** 2, rel=1e-6)
 
@@ -144,16 +144,16 @@ def test_it_is_in_balance_at_alpha2_over_alpha1():
 def test_the_nearest_image_acts_in_a_periodic_box():
     law = NearField(alpha1=1.0)
     box = Box(low=(0, 0, 0), high=(1, 1, 1))
-    made = scene([[0.1, 0.5, 0.5], [0.9, 0.5, 0.5]], np.zeros((2, 3)), (law,), radius=0.01, domain=box)
-    np.testing.assert_allclose(loads([made])[0]["force"], [[-5, 0, 0], [5, 0, 0]], rtol=1e-12)
+    setup = scene([[0.1, 0.5, 0.5], [0.9, 0.5, 0.5]], np.zeros((2, 3)), (law,), radius=0.01, domain=box)
+    np.testing.assert_allclose(loads([setup])[0]["force"], [[-5, 0, 0], [5, 0, 0]], rtol=1e-12)
 
 
 def test_only_what_is_needed_is_allocated():
     for strength, signed in product(["plain", "mass", "charge"], [False, True]):
         law = NearField(strength=strength, signed=signed)
-        made = scene([[0, 0, 0]], [[0, 0, 0]], (law,))
+        setup = scene([[0, 0, 0]], [[0, 0, 0]], (law,))
         more = ({"charge"} if strength == "charge" else set()) | ({"polarity"} if signed else set())
-        assert fields_beside_the_core(made) == {"force"} | more
+        assert fields_beside_the_core(setup) == {"force"} | more
 
 
 WRONG = {

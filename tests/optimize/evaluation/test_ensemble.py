@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optimize.evaluation.ensemble import Ensemble, EnsembleSettings
-from optimize.evaluation.estimate import settled_after
+from optimize.evaluation.estimate import converged_after
 from optimize.evaluation.runs import start_seed
 from optimize.settings import Settings
 from optimize.storage.cache import Cache
@@ -28,21 +28,21 @@ def twin(values, tolerance, min_starts):
     return None
 
 
-def test_settles_where_the_twin_says():
+def test_it_converges_where_the_twin_says():
     rng = np.random.default_rng(0)
     counts = set()
     for _ in range(500):
         values = rng.normal(1.0, rng.uniform(0.001, 0.3), 40)
         tolerance, least = rng.choice([5e-4, 5e-3, 0.05]), int(rng.integers(1, 8))
-        assert settled_after(values, tolerance, least) == twin(values, tolerance, least)
-        counts.add(settled_after(values, tolerance, least))
+        assert converged_after(values, tolerance, least) == twin(values, tolerance, least)
+        counts.add(converged_after(values, tolerance, least))
     assert len(counts) > 10
-    assert settled_after([0.0, 0.0], 1e-3, 2) == 2
-    assert settled_after([1.0], 1e-3, 1) is None
+    assert converged_after([0.0, 0.0], 1e-3, 2) == 2
+    assert converged_after([1.0], 1e-3, 1) is None
 
 
 @pytest.mark.parametrize("block", [1, 3, 6, 50])
-def test_estimate_is_the_mean_of_the_starts_up_to_the_settled_one_whatever_the_block(tmp_path, block):
+def test_estimate_is_the_mean_of_the_starts_up_to_the_converged_one_whatever_the_block(tmp_path, block):
     evaluator = FakeEvaluator()
     result = ensemble(tmp_path, evaluator, block=block, tolerance=2e-3, min_starts=3, max_starts=60).estimate(
         DESIGNS
@@ -50,14 +50,14 @@ def test_estimate_is_the_mean_of_the_starts_up_to_the_settled_one_whatever_the_b
     for design, (estimate,) in zip(DESIGNS, result, strict=True):
         values = [evaluator.function(design, start_seed(4, k)) for k in range(60)]
         n = twin(values, 2e-3, 3)
-        assert (estimate.starts, estimate.settled) == (n, True)
+        assert (estimate.starts, estimate.converged) == (n, True)
         assert estimate.mean == pytest.approx(np.mean(values[:n]), rel=1e-14)
         assert estimate.std == pytest.approx(np.std(values[:n], ddof=1), rel=1e-12)
         t = {3: 4.302653, 4: 3.182446, 5: 2.776445, 6: 2.570582, 7: 2.446912, 8: 2.364624, 9: 2.306004}[n]
         assert estimate.half_width == pytest.approx(t * estimate.std / math.sqrt(n), rel=1e-6)
 
 
-def test_one_call_for_all_designs_then_only_the_unsettled(tmp_path):
+def test_one_call_for_all_designs_then_only_those_not_converged(tmp_path):
     def function(design, seed):
         return 1.0 if design["x0"] < 0.3 else float(np.random.default_rng(seed).normal(1.0, 0.5))
 
@@ -67,7 +67,7 @@ def test_one_call_for_all_designs_then_only_the_unsettled(tmp_path):
     )
     assert [len(call) for call in evaluator.calls] == [12, 8, 4]
     assert {scene.design["x0"] for scene in evaluator.calls[1]} == {0.9, 0.5}
-    assert [(e.starts, e.settled) for (e,) in result] == [(4, True), (10, False), (10, False)]
+    assert [(e.starts, e.converged) for (e,) in result] == [(4, True), (10, False), (10, False)]
 
 
 def test_common_random_numbers(tmp_path):
@@ -105,13 +105,13 @@ def test_a_failed_start_never_wins_and_is_recorded(tmp_path, bad, reason):
     assert failed.mean == math.inf
     assert not failed.ok
     assert failed.reason == f"start 2 (seed {third}): {reason}"
-    stored = [record for record in run.runs.cache.records() if not record.ok]
-    assert [(record.reason, record.seed, math.isnan(record.fitness)) for record in stored] == [
+    failures = [record for record in run.runs.cache.records() if not record.ok]
+    assert [(record.reason, record.seed, math.isnan(record.fitness)) for record in failures] == [
         (reason, third, True)
     ]
     again = FakeEvaluator(function)
     assert repr(ensemble(tmp_path, again, block=6).estimate(DESIGNS)[1]) == repr((failed,))
-    assert again.ran == []
+    assert again.digests == []
 
 
 def test_infeasible_design_fails_alone(tmp_path):
@@ -131,12 +131,12 @@ def test_nothing_is_evaluated_twice(tmp_path):
     run = ensemble(tmp_path, evaluator)
     first = run.estimate([*DESIGNS, DESIGNS[0]])
     assert first[3] == first[0]
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == run.requested
+    assert len(evaluator.digests) == len(set(evaluator.digests)) == run.requested
     assert run.runs.hits == 0
     other = FakeEvaluator()
     again = ensemble(tmp_path, other)
     assert again.estimate([*DESIGNS, DESIGNS[0]]) == first
-    assert (other.ran, again.runs.evaluations, again.runs.hits) == ([], 0, run.requested)
+    assert (other.digests, again.runs.evaluations, again.runs.hits) == ([], 0, run.requested)
 
 
 @pytest.mark.parametrize("change", ["precision", "problem", "version"])
@@ -152,12 +152,14 @@ def test_what_changes_a_fitness_is_not_reused(tmp_path, change):
 
 
 def test_progress_rises_to_one(tmp_path):
-    seen = []
-    ensemble(tmp_path, FakeEvaluator(), block=2, min_starts=2, tolerance=1e-4).estimate(DESIGNS, seen.append)
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
-    assert len(set(seen)) > 10
-    assert max(seen[:-1]) <= 1.0 + 1e-12
+    fractions = []
+    ensemble(tmp_path, FakeEvaluator(), block=2, min_starts=2, tolerance=1e-4).estimate(
+        DESIGNS, fractions.append
+    )
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert len(set(fractions)) > 10
+    assert max(fractions[:-1]) <= 1.0 + 1e-12
 
 
 def test_finished_evaluations_are_stored_before_the_rest_runs(tmp_path):

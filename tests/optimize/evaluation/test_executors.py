@@ -93,13 +93,13 @@ def same(results, others):
 @pytest.mark.long
 def test_results_are_those_of_one_process_to_the_bit_and_so_are_failures(away, here):
     evaluator, pids = away
-    seen = []
-    results = list(evaluator.evaluate([*SCENES, CROWDED], seen.append))
+    fractions = []
+    results = list(evaluator.evaluate([*SCENES, CROWDED], fractions.append))
     assert len(results) == 10, "each once"
     same(dict(results), here[0])
     assert not dict(results)[9].status.ok
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
     assert len(pids()) == 2
     assert os.getpid() not in pids()
     assert evaluator.settings == {**runtime.current().settings, "backend": runtime.backend()}
@@ -120,20 +120,20 @@ def test_effects_of_the_users_own_act_in_workers(away, own_file):
 
 def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
     law = python_file.load(own_file("own_law.py", LAW))
-    sent = working.packed([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
+    pickled = working.pack_scenes([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
     here = WorkerSettings()
     python_file.unload("own_law")
     with pytest.raises(
         InputError, match=r"^worker \(process .* must be able to import .* --plugin\); received No"
     ):
-        working._unpacked(sent, WorkerSettings())
+        working._unpack_scenes(pickled, WorkerSettings())
     (file,) = here.files
     broken = replace(here, files=(replace(file, text=b"import no_such_module"),))
     with pytest.raises(
         InputError, match=r"^worker \(process .*own_law.py must be .* line 1: ModuleNotFoundError"
     ):
-        working._unpacked(sent, broken)
-    (scene,) = working._unpacked(sent, here)
+        working._unpack_scenes(pickled, broken)
+    (scene,) = working._unpack_scenes(pickled, here)
     assert scene.effects[0].strength == 1e-9
 
 
@@ -142,7 +142,7 @@ def test_scenes_that_cannot_be_sent_are_told_in_a_line():
         pass
 
     with pytest.raises(InputError, match="scene must be made of classes that a worker can import; received"):
-        working.packed([Hidden(**dict(SCENES[0]))])
+        working.pack_scenes([Hidden(**dict(SCENES[0]))])
 
 
 @pytest.mark.long
@@ -271,9 +271,9 @@ def test_error_of_the_program_in_a_worker_is_raised_here(away):
     evaluator, pids = away
     dict(evaluator.evaluate(SCENES))
     before = pids()
-    with pytest.raises(ValueError, match="invalid literal for int") as raised:
+    with pytest.raises(ValueError, match="invalid literal for int") as error_info:
         evaluator._results(evaluator.pool.outcome(evaluator.pool.submit([Unreadable()], WorkerSettings())))
-    assert "in _run_pickled" in raised.value.__notes__[0]
+    assert "in _run_pickled" in error_info.value.__notes__[0]
     dict(evaluator.evaluate(SCENES))
     assert pids() == before
 
@@ -301,10 +301,10 @@ class Doomed:
     workers = 2
 
     def __init__(self):
-        self.sent = []
+        self.units = []
 
     def submit(self, scenes, worker_settings):
-        self.sent.append(tuple(scene.seed for scene in scenes))
+        self.units.append(tuple(scene.seed for scene in scenes))
         future = cf.Future()
         future.set_result([])
         return future
@@ -320,7 +320,7 @@ def test_workers_that_die_of_everything_end_the_search():
     doomed = Doomed()
     with pytest.raises(RunError, match=r"killed; it was the worker number 3 to be lost with the same work"):
         list(Remote(doomed, WorkerSettings()).evaluate(SCENES))
-    assert max(doomed.sent.count(unit) for unit in doomed.sent) == 3
+    assert max(doomed.units.count(unit) for unit in doomed.units) == 3
 
 
 def test_units_of_work():
@@ -469,10 +469,10 @@ def test_one_edited_source_file_makes_another_program(tmp_path, monkeypatch):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     ours = handshake.source.__wrapped__()
 
-    def found(name):
+    def find_spec(name):
         return SimpleNamespace(submodule_search_locations=[str(tmp_path / name)])
 
-    monkeypatch.setattr(handshake, "find_spec", found)
+    monkeypatch.setattr(handshake, "find_spec", find_spec)
     assert handshake.source.__wrapped__() == ours
     with (tmp_path / "tisim" / "effects" / "drag.py").open("a") as file:
         file.write("\n")
@@ -509,10 +509,10 @@ def join(cluster, tmp_path):
         time.sleep(0.05)
 
 
-def without(folder, *gone):
+def without(folder, *names):
     """Packages as of another version: without some modules, and with another number."""
     for name in ("tisim", "optimize", "cases"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", *gone))
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", *names))
     text = folder / "tisim" / "version.py"
     text.write_text(text.read_text().replace(f'"{__version__}"', '"0.0.9"'))
 
@@ -555,7 +555,7 @@ def test_dask_worker_of_another_version_that_comes_later_is_refused(cluster, joi
 
 def test_dask_futures_that_hold_no_answer_are_messages():
     distributed = pytest.importorskip("distributed")
-    for sent, error, message in (
+    for answer, error, message in (
         ([], InputError, r"one that knows what the search is made of \(tisim .*\); received \[\]"),
         (AttributeError("WorkerSettings"), InputError, r"received AttributeError\('WorkerSettings'\)"),
         (
@@ -566,7 +566,7 @@ def test_dask_futures_that_hold_no_answer_are_messages():
         (OSError("closed"), RunError, r"were lost again and again \(closed\)"),
     ):
         future = cf.Future()
-        (future.set_exception if isinstance(sent, BaseException) else future.set_result)(sent)
+        (future.set_exception if isinstance(answer, BaseException) else future.set_result)(answer)
         with pytest.raises(error, match=message):
             dask_cluster.DaskCluster.outcome(None, future)
     cancelled = cf.Future()
@@ -604,8 +604,8 @@ def alive(group):
 def await_end(group):
     """Wait until no process of a group is left; those at work finish the kernel that they are at."""
     ends = time.monotonic() + 600
-    while left := alive(group):
-        assert time.monotonic() < ends, left
+    while pids := alive(group):
+        assert time.monotonic() < ends, pids
         time.sleep(0.02)
 
 

@@ -27,7 +27,7 @@ def test_z04_generation_has_6_parents_6_offspring_8_fresh():
         ranked = sorted(population, key=lambda string: string.fitness.values[0])
         if generation % 4 == 0:
             breeder.recentre(ranked[0])
-        population = breeder.following(population)
+        population = breeder.next_generation(population)
         assert len(population) == 20
         assert population[:6] == ranked[:6]
         assert all(string.fitness.valid for string in population[:6])
@@ -79,22 +79,22 @@ OPTIONS = {
     ("kind", "name"), [(kind, name) for kind, names in OPERATORS.items() for name in names]
 )
 def test_deap_operators_breed_within_the_box(kind, name):
-    chosen = {kind: GeneticOperator(name=name, options=OPTIONS.get(name, {}))}
-    settings = Breeding(breeding="deap", offspring=12, mutation_probability=1.0, **chosen)
+    operators = {kind: GeneticOperator(name=name, options=OPTIONS.get(name, {}))}
+    settings = Breeding(breeding="deap", offspring=12, mutation_probability=1.0, **operators)
     breeder = Breeder(GENES, settings, seed=1)
     population = rated(breeder.first())
-    seen = set()
+    offspring = set()
     for generation in range(6):
         if generation == 3:
             breeder.recentre(min(population, key=lambda string: string.fitness.values[0]))
-        population = breeder.following(population)
+        population = breeder.next_generation(population)
         for string in population[6:]:
             assert isinstance(string, Individual)
             assert not string.fitness.valid
             assert np.all((breeder.box.low <= string) & (string <= breeder.box.high))
-            seen.add(tuple(string))
+            offspring.add(tuple(string))
         rated(population)
-    assert len(seen) > 40, "offspring differ"
+    assert len(offspring) > 40, "offspring differ"
 
 
 def test_callers_random_state_is_untouched():
@@ -102,7 +102,7 @@ def test_callers_random_state_is_untouched():
     np.random.seed(11)  # noqa: NPY002 - the legacy global state is what is being guarded
     before = random.getstate(), np.random.get_state()[1].tolist()  # noqa: NPY002
     breeder = Breeder(GENES, Breeding(breeding="deap"), seed=1)
-    breeder.following(rated(breeder.first()))
+    breeder.next_generation(rated(breeder.first()))
     assert before == (random.getstate(), np.random.get_state()[1].tolist())  # noqa: NPY002
 
 
@@ -112,7 +112,7 @@ def test_callers_random_numbers_do_not_steer_the_search():
         breeder = Breeder(GENES, Breeding(breeding="deap"), seed=1)
         population = rated(breeder.first())
         random.random()
-        return breeder.following(population)
+        return breeder.next_generation(population)
 
     assert strings(1) == strings(2)
 

@@ -6,7 +6,7 @@ import pytest
 from cases import case as catalogue
 from optimize.methods.base import every, find
 from optimize.methods.breeding_settings import Breeding
-from optimize.settings import Settings, followed, proposed
+from optimize.settings import Settings, proposed, without_dependent_options
 from tests.optimize.fake_runs import fake_problem
 from tisim import InputError
 from tisim.cli.scene_arguments import with_changes
@@ -37,10 +37,14 @@ def generations(settings):
     return len(first), len(second), sum(not string.fitness.valid for string in second)
 
 
-def settings_of(usual, method, given):
+def settings_of(usual, method, options):
     """As the command line makes them: --method, --population or --set, on a case."""
-    wishes = {f"options.{name}": value for name, value in given.items()}
-    return Settings(**with_changes(followed(proposed(fake_problem(GENES), usual, method), wishes), wishes))
+    wishes = {f"options.{name}": value for name, value in options.items()}
+    return Settings(
+        **with_changes(
+            without_dependent_options(proposed(fake_problem(GENES), usual, method), wishes), wishes
+        )
+    )
 
 
 def test_the_table_is_of_the_cases_there_are():
@@ -55,11 +59,11 @@ def test_every_population_is_taken_or_refused_for_a_real_reason(case, method):
     unfit, message = REFUSED.get(method, (lambda n: False, None))
     for population in POPULATIONS:
         if unfit(population):
-            with pytest.raises(InputError) as refused:
+            with pytest.raises(InputError) as error_info:
                 settings_of(USUAL[case], method, {"population": population})
-            assert len(str(refused.value).splitlines()) == 1
+            assert len(str(error_info.value).splitlines()) == 1
             expected = message or "population"
-            assert expected.format(population) in str(refused.value)
+            assert expected.format(population) in str(error_info.value)
             continue
         settings = settings_of(USUAL[case], method, {"population": population})
         alone = Settings(method=method, options={"population": population})
@@ -82,7 +86,7 @@ def test_proportions_are_the_published_ones():
 
 
 @pytest.mark.parametrize(
-    ("given", "population", "parents", "bred"),
+    ("options", "population", "parents", "bred"),
     [
         ({"parents": 2}, 20, 2, 2),
         ({"parents": 10}, 20, 10, 10),
@@ -98,14 +102,22 @@ def test_proportions_are_the_published_ones():
         ({"offspring": 12, "breeding": "deap"}, 20, 6, 12),
     ],
 )
-def test_what_is_given_stays_and_the_rest_follows(given, population, parents, bred):
-    breeding = Breeding(**given)
+def test_what_is_given_stays_and_the_rest_follows(options, population, parents, bred):
+    breeding = Breeding(**options)
     assert (breeding.population, breeding.parents, breeding.bred) == (population, parents, bred)
 
 
 def test_parents_alone_leave_the_population_of_the_case():
     settings = settings_of(USUAL["vibration"], None, {"parents": 4})
     assert (settings.options.population, settings.options.parents) == (24, 4)
+
+
+@pytest.mark.parametrize("options", [[8], None, "population", {1: 8}])
+def test_options_are_given_by_name(options):
+    with pytest.raises(
+        InputError, match=r"search\.options must be settings of the method, by name; received"
+    ):
+        Settings(options=options)
 
 
 def test_what_is_no_number_is_told_as_such():
@@ -117,10 +129,10 @@ def test_what_is_no_number_is_told_as_such():
 
 
 @pytest.mark.parametrize("same", [float, str, np.int64, np.float64])
-@pytest.mark.parametrize("given", [{"population": 5}, {"parents": 12}, {"offspring": 12}])
-def test_a_number_is_followed_however_it_is_written(given, same):
+@pytest.mark.parametrize("options", [{"population": 5}, {"parents": 12}, {"offspring": 12}])
+def test_a_number_is_followed_however_it_is_written(options, same):
     """As ``--set search.options.population=5.0``, which a file may also say as text."""
-    assert Breeding(**{name: same(number) for name, number in given.items()}) == Breeding(**given)
+    assert Breeding(**{name: same(number) for name, number in options.items()}) == Breeding(**options)
 
 
 def test_what_is_no_number_is_refused_as_such():

@@ -11,13 +11,14 @@ from cases import case as catalogue
 from optimize.evaluation.runs import start_seed
 from optimize.problem.objective import Objective
 from optimize.report import comparison
-from optimize.report.comparison import FRESH, compare, settings_of
+from optimize.report.comparison import FRESH, compare, plan, settings_of
 from optimize.storage.cache import Cache
 from tests.optimize.drift_case import CASE
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
 from tests.optimize.test_several import OBJECTIVES
 from tisim import InputError
 from tisim.cli.main import main
+from tisim.files import ownership
 
 BASE = {
     "options": {"population": 10, "parents": 4}, "target": 0.1, "patience": 1,
@@ -30,9 +31,9 @@ def noisy(design, seed):
 
 
 def compared(methods, evaluations=120, repeats=3, fresh=8, evaluator=None, cache=None, problem=None):
-    arguments = (BASE, methods, evaluations, repeats, fresh)
+    searches = plan(problem or fake_problem(6), BASE, methods, evaluations, repeats, fresh)
     cache = FakeCache() if cache is None else cache
-    return list(compare(problem or fake_problem(6), *arguments, evaluator or FakeEvaluator(noisy), cache))
+    return list(compare(searches, evaluator or FakeEvaluator(noisy), cache))
 
 
 def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
@@ -45,17 +46,19 @@ def test_equal_runs_and_what_is_found_is_run_again_from_fresh_starts():
     fresh = [start_seed(FRESH, k) for k in range(8)]
     searched = {start_seed(seed, k) for seed in range(3) for k in range(13)}
     assert not searched & set(fresh)
-    assert len(evaluator.ran) == len(set(evaluator.ran)) == sum(f.evaluations for f in results) + 9 * 8
-    seen = {}
-    for record in cache.known.values():
+    assert (
+        len(evaluator.digests) == len(set(evaluator.digests)) == sum(f.evaluations for f in results) + 9 * 8
+    )
+    by_design = {}
+    for record in cache.records_by_key.values():
         if record.seed in fresh:
-            seen.setdefault(tuple(record.design.values()), []).append(record.fitness)
-    assert sorted(np.mean(values) for values in seen.values()) == pytest.approx(
+            by_design.setdefault(tuple(record.design.values()), []).append(record.fitness)
+    assert sorted(np.mean(values) for values in by_design.values()) == pytest.approx(
         sorted(f.fresh.mean for f in results), rel=1e-12
     )
     again = FakeEvaluator(noisy)
     assert compared(["random", "genetic", "cma-es"], evaluator=again, cache=cache) == results
-    assert again.ran == []
+    assert again.digests == []
 
 
 def rows(problem, results):
@@ -66,9 +69,9 @@ def rows(problem, results):
 
 def test_table_ranks_by_the_median_from_fresh_starts():
     results = compared(["random", "genetic"], repeats=5)
-    printed = rows(fake_problem(6), results)
-    heading = next(line for line in printed if line[0] == "method")
-    lines = [line for line in printed if line[0] in ("random", "genetic")]
+    lines_of_table = rows(fake_problem(6), results)
+    heading = next(line for line in lines_of_table if line[0] == "method")
+    lines = [line for line in lines_of_table if line[0] in ("random", "genetic")]
     medians = {}
     for name, searches, _, *numbers in lines:
         mine = [f for f in results if f.method == name]
@@ -81,7 +84,7 @@ def test_table_ranks_by_the_median_from_fresh_starts():
     assert medians["genetic"] < medians["random"]
     assert [line[0] for line in lines] == ["genetic", "random"]
     assert "median" in heading
-    assert printed[0] == ["fitness"], "the objective, above"
+    assert lines_of_table[0] == ["fitness"], "the objective, above"
     large = fake_problem(6, objective=(Objective("height", lambda r: -r.value, "m", maximise=True),))
     turned = compared(["random", "genetic"], repeats=5, problem=large)
     assert [line[0] for line in rows(large, turned) if line[0] in medians] == ["genetic", "random"]
@@ -106,16 +109,28 @@ def test_what_cannot_be_compared_is_refused():
     for arguments, message in (
         ({"methods": ["genetic", "genetic"]}, "methods must be one or more, all different"),
         ({"methods": []}, "methods must be one or more"),
-        ({"methods": ["genetic"], "repeats": 0}, "repeats must be within"),
-        ({"methods": ["genetic"], "fresh": 1}, "fresh starts must be at least 2; received 1"),
-        ({"methods": ["genetic"], "evaluations": 0}, "evaluations must be at least 1"),
+        ({"repeats": 0}, "repeats must be within"),
+        ({"fresh": 1}, "fresh starts must be at least 2; received 1"),
+        ({"evaluations": 0}, "evaluations must be at least 1"),
         ({"methods": ["genetic", "simplex"]}, "method must be one of .*; received 'simplex'"),
-        ({"methods": ["random"], "problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
+        ({"problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
     ):
-        evaluator = FakeEvaluator(noisy)
+        usual = {"methods": ["random"], "evaluations": 9, "repeats": 1, "fresh": 4, "problem": fake_problem()}
         with pytest.raises(InputError, match=message):
-            compared(**arguments, evaluator=evaluator)
-        assert evaluator.ran == []
+            plan(**{**usual, "base": BASE, **arguments})
+
+
+@pytest.mark.parametrize("wrong", [("--methods", "simplex"), ("--repeats", "0"), ("--executor", "nobody")])
+def test_a_comparison_that_cannot_be_leaves_the_files_of_before(tmp_path, monkeypatch, capsys, wrong):
+    monkeypatch.setattr(catalogue, "every", lambda: {CASE.name: CASE})
+    ownership.claim(tmp_path, comparison.COMPARISON_FILES)
+    with Cache(tmp_path / "compare.h5") as cache:
+        cache.put_table("other", {})
+    content = (tmp_path / "compare.h5").read_bytes()
+    with pytest.raises(SystemExit) as exit_:
+        main(["compare", "drift", "--out", str(tmp_path), "--overwrite", *wrong])
+    assert (exit_.value.code, "must be" in capsys.readouterr().err) == (2, True)
+    assert (tmp_path / "compare.h5").read_bytes() == content
 
 
 @pytest.mark.long
@@ -143,13 +158,13 @@ def test_command(tmp_path, monkeypatch, capsys):
             main([*command, "--set", "search.ensemble.max_starts=4", "--fresh-starts", "4", *more])
         assert exit_.value.code == code
         assert message in " ".join(capsys.readouterr().err.split())
-    shown = len(Cache(store))
+    runs_after = len(Cache(store))
     with monkeypatch.context() as patch:
         patch.setattr(comparison, "compare", lambda *arguments: iter(()))
         patch.setattr(comparison, "table", lambda *arguments: "")
         with pytest.raises(SystemExit):
             main([*command, "--overwrite"])
-    assert (shown >= runs, len(Cache(store))) == (True, 0)
+    assert (runs_after >= runs, len(Cache(store))) == (True, 0)
     with pytest.raises(SystemExit) as exit_:
         main(["compare", "drift", "--methods", "simplex"])
     assert exit_.value.code == 2

@@ -53,7 +53,7 @@ def test_csv_holds_all_digits(outcome, tmp_path):
             "b_f/b_0",
             "n_f",
             "starts",
-            "settled",
+            "converged",
         ]
     )
     assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
@@ -81,7 +81,7 @@ def test_derived_columns_reproduce_z04_table_3():
     assert DERIVED["n_f"](0.67708) == pytest.approx(33.6732, abs=2e-3)
 
 
-def printed(outcome, width=80):
+def printed_lines(outcome, width=80):
     """Lines of the table of the best designs, headings to last row."""
     console = Console(width=width, record=True, file=io.StringIO())
     console.print(report.best_table(outcome))
@@ -91,9 +91,9 @@ def printed(outcome, width=80):
 
 
 def test_terminal_table_shows_the_best_designs(outcome):
-    rows = printed(outcome)
+    rows = printed_lines(outcome)
     assert [row[:6].split(" ")[0] for row in rows] == [
-        *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "settle",
+        *("rank", "x0", "x1", "x2", "x3", "Pi", "95", "b_f/b_", "n_f", "starts"), "conver",
     ]  # fmt: skip
     assert rows[0].split() == ["rank", *"123456"]
     assert rows[5].split() == ["Pi", *(f"{string.estimates[0].mean:.4g}" for string in outcome.hall)]
@@ -114,14 +114,14 @@ def agglomerations(number):
 def test_no_row_wraps_on_80_columns(number):
     outcome = agglomerations(number)
     headings = list(best_columns(outcome.problem, outcome.hall))
-    rows = [line for line in printed(outcome) if line]
+    rows = [line for line in printed_lines(outcome) if line]
     blocks = -(-number // 6)
     assert len(rows) == blocks * len(headings)
     for k, row in enumerate(rows):
         heading = headings[k % len(headings)]
         assert row.startswith(heading)
-        shown = min(6, number - 6 * (k // len(headings)))
-        assert len(row.removeprefix(heading).split()) == shown, "the name and all values on one line"
+        places = min(6, number - 6 * (k // len(headings)))
+        assert len(row.removeprefix(heading).split()) == places, "the name and all values on one line"
 
 
 def test_symbols_of_the_table_are_explained_under_it(outcome):
@@ -130,14 +130,14 @@ def test_symbols_of_the_table_are_explained_under_it(outcome):
         console.print(report.notes(outcome))
         return [line.split(": ")[0] for line in console.export_text().splitlines() if ": " in line]
 
-    assert headings(outcome) == ["95 % +-", "starts", "settled"]
+    assert headings(outcome) == ["95 % +-", "starts", "converged"]
     assert headings(agglomerations(2)) == [
         "Pi",
         "b_f / b_0",
         "n_f",
         "95 % +-",
         "starts",
-        "settled",
+        "converged",
         "fresh starts",
     ]
     assert headings(agglomerations(0)) == []
@@ -165,4 +165,4 @@ def test_report_of_failures_and_of_nothing(tmp_path, settings):
     outcome = outcome_of(tmp_path, lambda design, seed: "broken", **settings)
     paths = report.write(outcome, tmp_path / "out")
     assert len(paths["best.csv"].read_text().splitlines()) == 1
-    assert printed(outcome)[0].strip() == "rank"
+    assert printed_lines(outcome)[0].strip() == "rank"

@@ -48,8 +48,8 @@ def test_in_both_hdf5_and_journal_counts_once(path):
     with Cache(path) as cache:
         for number in range(5):
             cache.put(fake_record(number))
-        left = journal_of(path).read_bytes()
-    journal_of(path).write_bytes(left)  # as if killed between replacing the one and emptying the other
+        journal = journal_of(path).read_bytes()
+    journal_of(path).write_bytes(journal)  # as if killed between replacing the one and emptying the other
     assert len(Cache(path)) == 5
     assert (verify(path).duplicates, verify(path).ok) == (5, True)
     assert compact(path) == 5
@@ -212,12 +212,13 @@ def test_a_journal_that_was_cut_says_how_much_was_lost(path, folded):
         size.append(journal_of(path).stat().st_size)
     assert verify(path).ok
     whole = journal_of(path).read_bytes()
-    for end, kept in ((size[4] - 1, 3), (size[3], 3), (size[2] + 5, 2), (0, 0)):
+    for end, intact in ((size[4] - 1, 3), (size[3], 3), (size[2] + 5, 2), (0, 0)):
         journal_of(path).write_bytes(whole[:end])
-        text = f"journal, byte {size[kept]}: {4 - kept} evaluation(s) cut off, {size[4] - size[kept]} bytes"
+        lost_bytes = size[4] - size[intact]
+        text = f"journal, byte {size[intact]}: {4 - intact} evaluation(s) cut off, {lost_bytes} bytes"
         assert verify(path).damaged == [text] if folded or end else True
         with pytest.warns(RuntimeWarning, match=re.escape(text)):
-            assert len(Cache(path)) == folded + kept
+            assert len(Cache(path)) == folded + intact
     journal_of(path).write_bytes(whole[: size[2]])
     with pytest.warns(RuntimeWarning, match=r"2 evaluation\(s\) cut off"):
         cache = Cache(path)

@@ -15,8 +15,8 @@ from tisim.files import atomic
 from tisim.files.atomic import replace_file
 
 
-@pytest.mark.parametrize("kept", [0, 1, 40])
-def test_disk_full_while_appending(path, monkeypatch, kept):
+@pytest.mark.parametrize("room_left", [0, 1, 40])
+def test_disk_full_while_appending(path, monkeypatch, room_left):
     cache = Cache(path)
     cache.put(fake_record(0))
     cache.fold()
@@ -25,8 +25,8 @@ def test_disk_full_while_appending(path, monkeypatch, kept):
     end = journal_of(path).stat().st_size
 
     def full(handle, data, offset):
-        """A disk with room for `kept` more bytes."""
-        room = end + kept - offset
+        """A disk with room for `room_left` more bytes."""
+        room = end + room_left - offset
         if room <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
         return write(handle, bytes(data[:room]), offset)

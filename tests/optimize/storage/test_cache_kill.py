@@ -62,12 +62,15 @@ def test_file_size_limit_is_a_clear_error_and_keeps_what_was_stored(path):
             cache.put(fake_record(number))
     size = path.stat().st_size
     with worker("limited", path, size + 10) as process:
-        put, fold = process.stdout.read().splitlines()
-    stored = int(put.split()[0])
-    assert 0 < stored < 1000
-    assert "cache.h5.journal could not be written: File too large; everything stored before is intact" in put
-    assert f"{30 + stored} fold" in fold
-    assert "cache.h5 could not be written: File too large" in fold
+        put_line, fold_line = process.stdout.read().splitlines()
+    count = int(put_line.split()[0])
+    assert 0 < count < 1000
+    assert (
+        "cache.h5.journal could not be written: File too large; everything stored before is intact"
+        in put_line
+    )
+    assert f"{30 + count} fold" in fold_line
+    assert "cache.h5 could not be written: File too large" in fold_line
     assert verify(path).ok
     assert verify(path).torn == 0
-    assert len(Cache(path)) == 30 + stored
+    assert len(Cache(path)) == 30 + count

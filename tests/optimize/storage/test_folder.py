@@ -8,7 +8,7 @@ import pytest
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from optimize.search_folder import SEARCH_FILES, going_on
+from optimize.search_folder import SEARCH_FILES, resume_or_clear
 from optimize.storage.cache import Cache
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
 from tisim import InputError
@@ -63,8 +63,8 @@ def test_another_search_is_refused_and_the_same_goes_on(optimize, tmp_path):
     code, err = optimize("--seed", 2, "--overwrite", "--resume")
     assert (code, err.strip()) == (2, "--overwrite must be given without --resume; received 'both'")
     code, err = optimize("--seed", 2, "--fresh")
-    lost = "output folder must be without what a search has found (or give --overwrite); received 's'"
-    assert (code, err.strip()) == (2, lost)
+    message = "output folder must be without what a search has found (or give --overwrite); received 's'"
+    assert (code, err.strip()) == (2, message)
     code, err = optimize("--seed", 2, "--overwrite", "--target", 1e9, "--generations", 0)
     assert code == 0
     assert contents(folder)["best.csv"] != first["best.csv"]
@@ -81,7 +81,7 @@ def test_a_search_that_goes_on_is_not_begun_anew_but_may_be_joined(optimize, tmp
                 interrupted.append(scenes)
                 assert optimize()[0] == 0
                 with pytest.raises(InputError, match="without a command that is still at work there"):
-                    going_on(tmp_path / "s", None, overwrite=True)
+                    resume_or_clear(tmp_path / "s", None, overwrite=True)
             return super().evaluate(scenes, progress)
 
     monkeypatch.setattr("optimize.evaluation.executors.BatchEvaluator", Joined)
@@ -159,5 +159,7 @@ def test_best_scene_is_one_that_the_search_has_run(optimize, tmp_path, common):
     seed = tomllib.loads((tmp_path / "s" / "best_scene.toml").read_text())["seed"]
     with (tmp_path / "s" / "best.csv").open() as file:
         best = next(csv.DictReader(file))
-    ran = [record for record in Cache(tmp_path / "s" / "search.h5").records() if record.seed == seed]
-    assert [float(best["x0 (m)"]), float(best["x1 (m)"])] in [list(record.design.values()) for record in ran]
+    records = [record for record in Cache(tmp_path / "s" / "search.h5").records() if record.seed == seed]
+    assert [float(best["x0 (m)"]), float(best["x1 (m)"])] in [
+        list(record.design.values()) for record in records
+    ]

@@ -60,9 +60,9 @@ def test_field_and_gradient_at_the_hard_places(halves, rng):
         rho, z = np.hypot(*places[w].T[:2]), np.abs(places[w][:, 2])
         size = steepness(field, gradient, places[w], half)
         # The place itself is known to rounding only, and so is how far it is from the rim.
-        known = 1e-12 + 4 * 2.3e-16 / np.hypot(rho - 1, z - half)
-        assert (relative(b[w], field) / known).max() < 1
-        assert (np.linalg.norm(slope[w] - gradient, axis=(1, 2)) / size / known).max() < 1
+        rounding = 1e-12 + 4 * 2.3e-16 / np.hypot(rho - 1, z - half)
+        assert (relative(b[w], field) / rounding).max() < 1
+        assert (np.linalg.norm(slope[w] - gradient, axis=(1, 2)) / size / rounding).max() < 1
 
 
 def inclined(ratio, towards, rng):
@@ -99,7 +99,7 @@ def about(body, n, rng):
 def errors_of_inclined(ratios, n, rng):
     """Of field and gradient, as parts of what the docstring allows; a row for each point, for long bodies of
     every way to be magnetised."""
-    found = []
+    errors = []
     for towards in ("along", "nearly along", "across", "anywhere"):
         bodies = [inclined(ratio, towards, rng) for ratio in ratios]
         places = np.array([about(body, n, rng) for body in bodies])
@@ -112,8 +112,8 @@ def errors_of_inclined(ratios, n, rng):
                 size = np.linalg.norm(gradient) + np.linalg.norm(field) / np.hypot(abs(side) + radius, end)
                 allowed = 1e-12 + 1e-15 * radius / np.hypot(side, end)
                 off = np.linalg.norm(b[w, k] - field) / np.linalg.norm(field)
-                found.append([off / allowed, np.linalg.norm(slope[w, k] - gradient) / size / allowed])
-    return np.array(found)
+                errors.append([off / allowed, np.linalg.norm(slope[w, k] - gradient) / size / allowed])
+    return np.array(errors)
 
 
 def test_long_cylinders_in_any_direction(rng):
@@ -215,8 +215,8 @@ def test_against_an_independent_library(rng):
 def test_where_the_library_differs_it_is_the_one_that_is_wrong(rng):
     """At the points where the two are farthest apart, the published formulas side with this field."""
     world, points = one(0.8), rng.normal(size=(3000, 3)) * 5
-    found, expected = fields([world], points[None]), (peer(world, points), peers_gradient(world, points))
-    for k, (ours, theirs, least) in enumerate(zip(found, expected, (1e-13, 1e-8), strict=True)):
+    results, expected = fields([world], points[None]), (peer(world, points), peers_gradient(world, points))
+    for k, (ours, theirs, least) in enumerate(zip(results, expected, (1e-13, 1e-8), strict=True)):
         worst = np.argsort(-relative(ours[0], theirs))[:3]
         true = np.array([field_and_gradient(p, 1.0, 0.8, M)[k] for p in points[worst]])
         assert relative(ours[0][worst], true).max() < 1e-14
@@ -257,8 +257,8 @@ def test_sums_and_turns(rng):
             for c in many.cylinders
         ]
     )
-    found, _ = fields([turned], turn.apply(points[0])[None])
-    np.testing.assert_allclose(found[0], turn.apply(b[0]), rtol=0, atol=1e-12)
+    rotated, _ = fields([turned], turn.apply(points[0])[None])
+    np.testing.assert_allclose(rotated[0], turn.apply(b[0]), rtol=0, atol=1e-12)
 
 
 def test_laws_of_maxwell(rng):
@@ -269,11 +269,11 @@ def test_laws_of_maxwell(rng):
     size = np.linalg.norm(slope, axis=(2, 3))
     assert (np.abs(np.trace(slope, axis1=2, axis2=3)) <= 1e-14 * size).all()
     assert (np.abs(slope - np.swapaxes(slope, 2, 3)).max(axis=(2, 3)) <= 1e-14 * size).all()
-    step, found = 1e-4, np.zeros_like(slope)
+    step, slope_by_difference = 1e-4, np.zeros_like(slope)
     for k, weight in ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)):
         for c in range(3):
-            found[..., c] += weight / step * fields(worlds, points + k * step * np.eye(3)[c])[0]
-    error = np.linalg.norm(found - slope, axis=(2, 3)) / size
+            slope_by_difference[..., c] += weight / step * fields(worlds, points + k * step * np.eye(3)[c])[0]
+    error = np.linalg.norm(slope_by_difference - slope, axis=(2, 3)) / size
     # Near a surface a difference reaches across it.
     assert np.median(error) < 1e-9
     assert np.quantile(error, 0.95) < 1e-5

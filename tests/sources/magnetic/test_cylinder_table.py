@@ -36,9 +36,9 @@ def test_it_is_as_accurate_as_it_says(digits, rng):
     more accurate by a factor of a thousand."""
     points = np.array([around(rng, length) for length in LENGTHS])
     exact = fields([magnet(length) for length in LENGTHS], points)
-    found = fields([magnet(length, digits) for length in LENGTHS], points)
+    tabulated = fields([magnet(length, digits) for length in LENGTHS], points)
     for w, length in enumerate(LENGTHS):
-        (b, slope), (b_true, true) = ((field[w], gradient[w]) for field, gradient in (found, exact))
+        (b, slope), (b_true, true) = ((field[w], gradient[w]) for field, gradient in (tabulated, exact))
         off, size = (np.linalg.norm(m, axis=(1, 2)) for m in (slope - true, true))
         inside = (np.hypot(*points[w].T[:2]) < 1) & (np.abs(points[w][:, 2]) < length / 2)
         of_gradient = off / np.where(inside, steepness(b_true, true, points[w], length / 2), size)

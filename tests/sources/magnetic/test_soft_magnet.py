@@ -41,13 +41,13 @@ def test_energy_is_least_of_all_that_do_not_exceed_saturation(aspect, field):
     def energy(m):
         return (mu_0 / 2 * factors * m**2 - m * b).sum(axis=-1)
 
-    found = np.array(magnetisation((0, 0, 1), 1.0, 2 * aspect, SATURATION, field))
-    assert np.linalg.norm(found) <= SATURATION * (1 + 1e-12)
+    moment = np.array(magnetisation((0, 0, 1), 1.0, 2 * aspect, SATURATION, field))
+    assert np.linalg.norm(moment) <= SATURATION * (1 + 1e-12)
     size, angle = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, np.pi / 2, 1801))
-    tried = SATURATION * size[..., None] * np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
-    least = tried[np.unravel_index(energy(tried).argmin(), size.shape)]
-    assert energy(found) <= energy(least) + 1e-12 * np.abs(energy(least))
-    np.testing.assert_allclose(found, least, atol=0.01 * SATURATION)
+    trials = SATURATION * size[..., None] * np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
+    least = trials[np.unravel_index(energy(trials).argmin(), size.shape)]
+    assert energy(moment) <= energy(least) + 1e-12 * np.abs(energy(least))
+    np.testing.assert_allclose(moment, least, atol=0.01 * SATURATION)
 
 
 def test_what_is_no_magnet_is_refused():

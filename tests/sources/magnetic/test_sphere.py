@@ -23,15 +23,15 @@ def test_field_and_gradient(rng):
     )
     assert relative(b[0], expected).max() < 1e-9
     assert np.median(relative(b[0], expected)) < 1e-13
-    step, found = 1e-5, np.zeros_like(slope)
+    step, slope_by_difference = 1e-5, np.zeros_like(slope)
     for c in range(3):
         for sign in (1, -1):
             ahead = fields([MagneticSpheres(spheres=spheres)], points + sign * step * np.eye(3)[c])[0]
-            found[..., c] += sign * ahead / (2 * step)
+            slope_by_difference[..., c] += sign * ahead / (2 * step)
     distances = [np.linalg.norm(points[0] - s.centre, axis=1) - s.radius for s in spheres]
     clear = (np.abs(distances) > 1e-3).all(axis=0)
     size = np.linalg.norm(slope[0], axis=(1, 2)).max()
-    assert np.linalg.norm((found - slope)[0, clear], axis=(1, 2)).max() < 1e-6 * size
+    assert np.linalg.norm((slope_by_difference - slope)[0, clear], axis=(1, 2)).max() < 1e-6 * size
 
 
 def test_inside_and_at_the_centre():

@@ -89,7 +89,7 @@ def test_without_a_field():
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("arguments", "message"),
     [
         (((0, 0, 0), 1, 1, 1, (0, 0, 1)), "axis of a cylinder must be a direction; received (0, 0, 0)"),
         (((0, 0, 1), 0, 1, 1, (0, 0, 1)), "radius of a cylinder must be greater than 0; received 0"),
@@ -97,7 +97,7 @@ def test_without_a_field():
         (((0, 0, 1), 1, 1, 0, (0, 0, 1)), "saturation magnetisation must be greater than 0; received 0"),
     ],
 )
-def test_what_is_wrong_is_named(given, message):
+def test_what_is_wrong_is_named(arguments, message):
     with pytest.raises(InputError) as fault:
-        magnetisation(*given)
+        magnetisation(*arguments)
     assert str(fault.value) == message

@@ -44,9 +44,9 @@ def test_free_diffusion_is_normal_with_variance_2dt_for_each_radius(together):
     n = 600 if together else MANY
     radius = np.where(np.arange(n) % 2, 4 * RADIUS, RADIUS)
     apart = np.arange(n)[:, None] * [1e-5, 0, 0]
-    made = colloids(apart, together, steps=3, radius=tuple(radius), seed=5)
-    (result,) = run([made])
-    standard = moved(result) / np.sqrt(2 * DIFFUSIVITY * RADIUS / radius * made.duration)[:, None]
+    scene = colloids(apart, together, steps=3, radius=tuple(radius), seed=5)
+    (result,) = run([scene])
+    standard = moved(result) / np.sqrt(2 * DIFFUSIVITY * RADIUS / radius * scene.duration)[:, None]
     for kind in (standard[::2], standard[1::2]):
         check_variance(kind, 1.0)
     assert stats.kstest(standard.ravel(), "norm").pvalue > 1e-6
@@ -72,9 +72,9 @@ def test_sedimentation_at_stokes_velocity_and_shear_without_heat(together):
 
 def test_steps_ahead_are_windows():
     """Of 300 longest steps, of which a launch takes a colloid by itself through many."""
-    made = colloids(np.zeros((1, 3)), steps=300)
-    simulation = compiled(made, 5, 10_000)
-    simulation.load([made])
+    scene = colloids(np.zeros((1, 3)), steps=300)
+    simulation = compiled(scene, 5, 10_000)
+    simulation.load([scene])
     simulation.run(steps=100)
     assert simulation.ahead() == pytest.approx(200, abs=1)
 
@@ -85,9 +85,9 @@ def test_diffusion_in_shear():
     shear, dt, n = 50.0, 1e-3, 40
     (result,) = run([colloids(np.zeros((MANY, 3)), shear=shear, dt=dt, steps=n, seed=3)])
     x, y, _ = moved(result).T
-    left = shear * dt * np.arange(n)
-    check_variance(x, 2 * DIFFUSIVITY * dt * (1 + left**2).sum())
-    expected = 2 * DIFFUSIVITY * dt * left.sum()
+    remaining = shear * dt * np.arange(n)
+    check_variance(x, 2 * DIFFUSIVITY * dt * (1 + remaining**2).sum())
+    expected = 2 * DIFFUSIVITY * dt * remaining.sum()
     sigma = np.std(x * y) / np.sqrt(MANY)
     assert np.mean(x * y) == pytest.approx(expected, abs=SIGMAS * sigma)
     assert expected > 30 * sigma
@@ -97,8 +97,8 @@ def test_equipartition_in_a_trap_with_the_bias_of_eulers_steps():
     """The variance is kT/k / (1 - rate dt/2) at last: off by first order in dt, as it must be."""
     rate, sizes = 100.0, (0.05, 0.2, 1.0)
     place = np.zeros((MANY, 3))
-    made = [colloids(place, trap=rate, dt=a / rate, steps=round(8 / a), seed=7) for a in sizes]
-    for a, result in zip(sizes, run(made), strict=True):
+    scenes = [colloids(place, trap=rate, dt=a / rate, steps=round(8 / a), seed=7) for a in sizes]
+    for a, result in zip(sizes, run(scenes), strict=True):
         check_variance(moved(result), DIFFUSIVITY / rate / (1 - a / 2) * (1 - (1 - a) ** (16 / a)), a)
 
 
@@ -124,9 +124,9 @@ def test_noise_keeps_its_law_where_the_step_depends_on_the_state():
     for some in (noise[short], noise[~short]):
         check_variance(some, 1.0)
     assert stats.kstest(noise.ravel(), "norm").pvalue > 1e-6
-    known = lengths[1:, :, None, None] + 0 * noise[1:]
+    lengths_seen = lengths[1:, :, None, None] + 0 * noise[1:]
     for now in (noise[1:], noise[1:] ** 2 - 1):
-        for past in (noise[:-1], noise[:-1] ** 2, known):
+        for past in (noise[:-1], noise[:-1] ** 2, lengths_seen):
             product = now * (past - past.mean())
             assert abs(product.mean()) < SIGMAS * product.std() / np.sqrt(product.size)
 
@@ -136,8 +136,8 @@ def test_steps_of_its_own_leave_a_particle_the_right_distribution():
     rate = 100.0
     width = np.sqrt(DIFFUSIVITY / rate)
     place = np.zeros((MANY, 3))
-    made = colloids(place, trap=rate, dt=0.1 / rate, steps=50, seed=9, drift=0.02 * width / RADIUS)
-    (result,) = run([made])
+    scene = colloids(place, trap=rate, dt=0.1 / rate, steps=50, seed=9, drift=0.02 * width / RADIUS)
+    (result,) = run([scene])
     assert 5 < result.work["particle_steps"] / MANY / result.work["steps"] < 20
     standard = moved(result) / width
     assert np.mean(standard**2) == pytest.approx(1.0, abs=0.01 + SIGMAS * np.sqrt(2 / standard.size))
@@ -185,7 +185,7 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
     pinned = {"fixed": (np.arange(70) == 40).astype(int)}
     free = [colloids(place, trap=trap, seed=1, **more) for trap in (2.0, 30.0, 300.0, 1e10)]
     scenes = [*free, colloids(place, trap=2.0, quantities=pinned, **more)]
-    found = []
+    runs = []
     for kind in (VectorisedBrownianSteps, IndependentBrownianSteps):
         monkeypatch.setattr(
             brownian, "vectorises", lambda context, kind=kind: kind is VectorisedBrownianSteps
@@ -195,15 +195,15 @@ def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
         simulation.load(scenes)
         simulation.run(steps=7 if kind is VectorisedBrownianSteps else None)
         simulation.run()
-        found.append(simulation.results())
-    for many, single in zip(*found, strict=True):
+        runs.append(simulation.results())
+    for many, single in zip(*runs, strict=True):
         assert many.status == single.status
         # Of a world that fails they depend on how far a launch would have gone.
         assert many.work == single.work or not many.status.ok
         for name, values in many.state.items():
             np.testing.assert_array_equal(values, single.state[name], err_msg=name)
-    assert [result.status.ok for result in found[0]] == [True, True, True, False, True]
-    steps = [result.work["particle_steps"] / (70 * 30) for result in found[0]]
+    assert [result.status.ok for result in runs[0]] == [True, True, True, False, True]
+    steps = [result.work["particle_steps"] / (70 * 30) for result in runs[0]]
     assert steps[0] == 1.0 < steps[1] < 2.0 < steps[2]
     assert steps[4] == 69 / 70
 
@@ -248,24 +248,24 @@ slow = pytest.mark.slow
 def test_same_bits_with_one_thread_and_two(name, tmp_path):
     file = tmp_path / "places.npy"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file), name]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
-    assert done.returncode == 0, done.stderr
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
+    assert completed.returncode == 0, completed.stderr
     np.testing.assert_array_equal(PLACES[name](), np.load(file))
 
 
 @both
 def test_a_checkpoint_goes_on_to_the_same_bits(together, tmp_path):
     place = np.random.default_rng(1).uniform(-1e-6, 1e-6, (40, 3))
-    made = colloids(place, together, trap=200.0, dt=1e-3, steps=30, drift=0.3)
-    simulation = compiled(made, 5, 600 if together else MANY)
+    scene = colloids(place, together, trap=200.0, dt=1e-3, steps=30, drift=0.3)
+    simulation = compiled(scene, 5, 600 if together else MANY)
     ends = []
     for stop in (False, True):
-        simulation.load([made])
+        simulation.load([scene])
         simulation.run(steps=11)
         if stop:
             save(simulation, tmp_path / "c.h5")
             simulation.run(steps=3)
-            simulation.load([made])
+            simulation.load([scene])
             restore(simulation, tmp_path / "c.h5")
         simulation.run()
         ends += simulation.results()
@@ -298,8 +298,8 @@ def test_a_force_that_is_too_steep_is_refused_with_time_and_particle(together):
     """The spring of the second particle asks at once for a step below the shortest; other worlds go on."""
     place = np.array([[1e-9, 0, 0], [-1e-3, 0, 0]])
     limits = {"dt": 1e-3, "steps": 5, "drift": 1.0, "shortest": 1e-6}
-    given = ((1, 1e3), (1e-3, 1e3), ([[0], [1]], 1e158))
-    steep, fine, mad = run([colloids(place * k, together, trap=trap, **limits) for k, trap in given])
+    cases = ((1, 1e3), (1e-3, 1e3), ([[0], [1]], 1e158))
+    steep, fine, mad = run([colloids(place * k, together, trap=trap, **limits) for k, trap in cases])
     assert fine.status.ok, fine.status.reason
     reason = steep.status.reason
     assert "found at t = 0 s: a force so strong that it asks for a step shorter than the shortest" in reason
@@ -313,9 +313,9 @@ def test_overlapping_pair_is_pushed_apart_in_short_steps():
     and by no more than a step of the limit beyond that."""
     overlap, drift, stable = 0.2 * RADIUS, 0.02, 1 / 1.2e9
     pair = np.array([[0.0, 0, 0], [2 * RADIUS - overlap, 0, 0]])
-    made = colloids(pair, True, stiffness=1e-3, dt=300 * stable, steps=20, drift=drift, temperature=0.0,
+    scene = colloids(pair, True, stiffness=1e-3, dt=300 * stable, steps=20, drift=drift, temperature=0.0,
                     shortest=1e-13)  # fmt: skip
-    (result,) = run([made])
+    (result,) = run([scene])
     assert result.status.ok, result.status.reason
     gap = np.linalg.norm(np.diff(result.state["position"], axis=0)) - 2 * RADIUS
     assert -drift * RADIUS < gap < 2 * drift * RADIUS

@@ -74,12 +74,12 @@ def test_tensors_have_no_divergence(hydrodynamics):
     if hydrodynamics == "rotne-prager":
         places += [(1.0, 1.0, 1.2), (1.0, 3.0, 2.7), (1.0, 3.0, 1.5)]
     for one, other, distance in places:
-        found, h = np.zeros(3), 1e-5
+        divergence, h = np.zeros(3), 1e-5
         for b in range(3):
             shift = h * np.eye(3)[b]
             blocks = [TENSORS[hydrodynamics](distance * DIRECTION + x, one, other) for x in (shift, -shift)]
-            found += (blocks[0] - blocks[1])[:, b] / (2 * h)
-        np.testing.assert_allclose(found, 0, atol=1e-9)
+            divergence += (blocks[0] - blocks[1])[:, b] / (2 * h)
+        np.testing.assert_allclose(divergence, 0, atol=1e-9)
 
 
 @noises
@@ -128,16 +128,16 @@ def shifts(scenes, steps):
     simulation = compiled(scenes[0], WORLDS, CAPACITY)
     simulation.load(scenes)
     n = len(scenes[0].particles.position)
-    found, drawn, places = [], [], []
+    shifts_, normals, places = [], [], []
     for _ in range(steps):
         before = simulation.s.read("position")[:, :n]
         simulation.run(steps=1)
         dt = simulation.s.read("dt")[:, None, None]
         shift = simulation.s.read("position")[:, :n] - before - simulation.s.read("velocity")[:, :n] * dt
-        found.append((shift / np.sqrt(2 * dt)).reshape(WORLDS, -1))
-        drawn.append(simulation.s.read("gauss")[:, :n].reshape(WORLDS, -1))
+        shifts_.append((shift / np.sqrt(2 * dt)).reshape(WORLDS, -1))
+        normals.append(simulation.s.read("gauss")[:, :n].reshape(WORLDS, -1))
         places.append(before)
-    return np.array(found), np.array(drawn), np.array(places)
+    return np.array(shifts_), np.array(normals), np.array(places)
 
 
 @tensors
@@ -145,48 +145,52 @@ def test_exact_noise_has_the_covariance_2_d_dt(hydrodynamics):
     """C C^T = D to rounding; and noise that C^-1 takes apart is standard normal, and not correlated."""
     cases = [lattice(k) if hydrodynamics == "oseen" else crowd(k, 10) for k in range(WORLDS)]
     scenes = [make(c, hydrodynamics, dt=1e-6, steps=1000, seed=k) for k, c in enumerate(cases)]
-    found, drawn, places = shifts(scenes, 60)
-    taken = np.zeros_like(found)
+    displacements, normals, places = shifts(scenes, 60)
+    whitened = np.zeros_like(displacements)
     for w, (_, radius) in enumerate(cases):
-        for k in range(len(found)):
+        for k in range(len(displacements)):
             full = HEAT * SOFTNESS * matrix(TENSORS[hydrodynamics], places[k, w], radius)
             factor = np.linalg.cholesky(full)
-            np.testing.assert_allclose(found[k, w], factor @ drawn[k, w], rtol=0, atol=1e-9 * factor.max())
-            taken[k, w] = np.linalg.solve(factor, found[k, w])
-    n = taken.shape[-1]
-    covariance = np.einsum("kwa,kwb->ab", taken, taken) / (taken.size / n)
-    sigma = np.sqrt((1 + np.eye(n)) / (taken.size / n))
+            np.testing.assert_allclose(
+                displacements[k, w], factor @ normals[k, w], rtol=0, atol=1e-9 * factor.max()
+            )
+            whitened[k, w] = np.linalg.solve(factor, displacements[k, w])
+    n = whitened.shape[-1]
+    covariance = np.einsum("kwa,kwb->ab", whitened, whitened) / (whitened.size / n)
+    sigma = np.sqrt((1 + np.eye(n)) / (whitened.size / n))
     assert np.abs((covariance - np.eye(n)) / sigma).max() < SIGMAS
-    assert stats.kstest(taken.ravel(), "norm").pvalue > 1e-6
+    assert stats.kstest(whitened.ravel(), "norm").pvalue > 1e-6
 
 
 @tensors
 def test_fast_noise_is_the_truncated_expansion(hydrodynamics):
     cases = [lattice(k) if hydrodynamics == "oseen" else crowd(k, 10) for k in range(WORLDS)]
     scenes = [make(c, hydrodynamics, "fast", dt=1e-6, steps=1000, seed=k) for k, c in enumerate(cases)]
-    found, drawn, places = shifts(scenes, 2)
+    displacements, normals, places = shifts(scenes, 2)
     for w, (_, radius) in enumerate(cases):
-        for k in range(len(found)):
-            made = expansion(HEAT * SOFTNESS * matrix(TENSORS[hydrodynamics], places[k, w], radius))
-            np.testing.assert_allclose(found[k, w], made @ drawn[k, w], rtol=0, atol=1e-9 * made.max())
+        for k in range(len(displacements)):
+            truncated = expansion(HEAT * SOFTNESS * matrix(TENSORS[hydrodynamics], places[k, w], radius))
+            np.testing.assert_allclose(
+                displacements[k, w], truncated @ normals[k, w], rtol=0, atol=1e-9 * truncated.max()
+            )
 
 
 def off(position, radius):
     """Largest error of the expansion's covariances, of D_ij over sqrt(D_ii D_jj)."""
     full = matrix(rotne_prager, position, radius)
-    made = expansion(full)
+    truncated = expansion(full)
     size = np.sqrt(np.diag(full))
-    return np.abs((made @ made.T - full) / np.outer(size, size)).max()
+    return np.abs((truncated @ truncated.T - full) / np.outer(size, size)).max()
 
 
 def cloud(n, side, seed=0):
     """Unit spheres anywhere in a box, none overlapping."""
-    draw, found = np.random.default_rng(seed), []
-    while len(found) < n:
+    draw, centres = np.random.default_rng(seed), []
+    while len(centres) < n:
         place = draw.uniform(0, side, 3)
-        if all(np.linalg.norm(place - other) > 2 for other in found):
-            found.append(place)
-    return np.array(found), np.ones(n)
+        if all(np.linalg.norm(place - other) > 2 for other in centres):
+            centres.append(place)
+    return np.array(centres), np.ones(n)
 
 
 def test_what_the_expansion_leaves_out():
@@ -195,8 +199,8 @@ def test_what_the_expansion_leaves_out():
     for r, most in ((2.0, 0.025), (3.0, 0.015), (10.0, 0.001)):
         pair = np.array([[0, 0, 0], [r, 0, 0]]), np.ones(2)
         full = matrix(rotne_prager, *pair)
-        made = expansion(full)
-        np.testing.assert_allclose(np.diag(made @ made.T), np.diag(full), rtol=1e-13)
+        truncated = expansion(full)
+        np.testing.assert_allclose(np.diag(truncated @ truncated.T), np.diag(full), rtol=1e-13)
         assert most / 3 < off(*pair) < most
     assert 0.05 < off(*cloud(100, 100.0)) < 0.1
     assert 0.2 < off(*cloud(100, 20.0)) < 0.3
@@ -317,24 +321,24 @@ def test_interaction_does_not_change_where_particles_are_in_equilibrium():
 def test_cost_sets_exact_and_fast_noise_side_by_side():
     """Both noises, each with its length of steps, and no stepper of particles that have inertia; what is
     compared is a statistic."""
-    made = make(lattice(0), trap=20.0)
-    found = methods(made, 1e-4, 1e-6, (1.0, 0.0), ("f64",), 8)
+    scene = make(lattice(0), trap=20.0)
+    methods_ = methods(scene, 1e-4, 1e-6, (1.0, 0.0), ("f64",), 8)
     turned = {
         (type(m.base.stepper), m.base.stepper.noise, *m.accuracy_parameter.orders)
-        for m in found
+        for m in methods_
         if m.accuracy_parameter
     }
     assert {(Brownian, noise, "longest", "drift") for noise in ("exact", "fast")} <= turned
     assert {kind for kind, *_ in turned} == {Brownian}
-    assert [attempt.method.base.stepper.noise for attempt in attempts(found, 0.0)] == ["exact"] * 2
-    assert [quantity.random for quantity in usual(made)] == [True]
+    assert [attempt.method.base.stepper.noise for attempt in attempts(methods_, 0.0)] == ["exact"] * 2
+    assert [quantity.random for quantity in usual(scene)] == [True]
 
 
 def test_matrices_for_which_there_is_no_room_are_refused():
-    made = make((np.zeros((1, 3)), np.array([RADIUS])))
+    scene = make((np.zeros((1, 3)), np.array([RADIUS])))
     capacity = int(np.sqrt(memory() / 4) / 3) + 100
     with pytest.raises(InputError, match=r"memory for diffusion matrices must be within the \d+ GB"):
-        Simulation(made, capacity=capacity)
+        Simulation(scene, capacity=capacity)
 
 
 def test_interaction_in_a_periodic_box_is_refused():

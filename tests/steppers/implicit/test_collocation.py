@@ -24,10 +24,10 @@ EXACT = np.array(driven(DURATION, W, 4.0, 1.5 * PUSH, 2.0))
 
 def equal_steps(dt, stages=5):
     """Steps of one length whatever their error, each solved to the last digits."""
-    return asked(1e3, stages, first=dt, longest=dt, shortest=dt, part=1e-17, most=1.0)
+    return with_error(1e3, stages, first=dt, longest=dt, shortest=dt, part=1e-17, most=1.0)
 
 
-def asked(error, stages=5, **more):
+def with_error(error, stages=5, **more):
     return Collocation(stages=stages, control=StageControl(error=error, sweeps=40, **more))
 
 
@@ -43,13 +43,13 @@ def runs():
     circle = charged(equal_steps(2.0 / W), 2000 * np.pi / W, velocity=(0.6, -0.8, 0.0))
     named = {
         "circle": circle,
-        "long": charged(asked(1e-8, first=10.0, longest=10.0), 1e-2, **stiff),
-        "stuck": charged(asked(1e-8, first=1e-2, longest=1e-2, shortest=1e-2), 1.0, **stiff),
-        "free": charged(asked(1e-8), 1e-2, flux=0.0, velocity=(0.0, 1.0, 0.0)),
-        "rest": charged(asked(1e-8), 1e-2, flux=0.0),
+        "long": charged(with_error(1e-8, first=10.0, longest=10.0), 1e-2, **stiff),
+        "stuck": charged(with_error(1e-8, first=1e-2, longest=1e-2, shortest=1e-2), 1.0, **stiff),
+        "free": charged(with_error(1e-8), 1e-2, flux=0.0, velocity=(0.0, 1.0, 0.0)),
+        "rest": charged(with_error(1e-8), 1e-2, flux=0.0),
     }
     named |= {f"steps {n}": charged(equal_steps(DURATION / n), DURATION, **DRIVEN) for n in ORDER_5}
-    named |= {f"error {e}": charged(asked(e), DURATION, **DRIVEN) for e in ERRORS}
+    named |= {f"error {e}": charged(with_error(e), DURATION, **DRIVEN) for e in ERRORS}
     results = simulate(list(named.values()), worlds=len(named), capacity=1)
     return dict(zip(named, results, strict=True))
 
@@ -105,19 +105,19 @@ def test_the_error_asked_for_is_met_and_costs_work(runs):
 def test_goes_on_from_a_checkpoint_to_the_same_bits(runs, tmp_path):
     """What the next step is predicted from is kept too; and steps asked for are steps taken."""
     assert runs
-    made = [charged(asked(e), DURATION, **DRIVEN) for e in ERRORS[:3]]
-    simulation = compiled(made[0], worlds=len(runs), capacity=1)
+    scenes = [charged(with_error(e), DURATION, **DRIVEN) for e in ERRORS[:3]]
+    simulation = compiled(scenes[0], worlds=len(runs), capacity=1)
 
     def ends():
         simulation.run()
         return [(r.state, r.work, r.time) for r in simulation.results()]
 
-    simulation.load(made)
+    simulation.load(scenes)
     simulation.run(steps=5)
     assert [r.work["steps"] for r in simulation.results()] == [5, 5, 5]
     save(simulation, tmp_path / "c.h5")
     whole = ends()
-    simulation.load(made)
+    simulation.load(scenes)
     restore(simulation, tmp_path / "c.h5")
     for (state, *rest), (expected, *others) in zip(ends(), whole, strict=True):
         assert rest == others
@@ -165,21 +165,21 @@ def cloud(error, size=SIZE):
     image of a neighbour that is nearly as near, as forces would have jumps."""
     rng = np.random.default_rng(5)
     places = np.stack(np.meshgrid([0.5, 1.5], [0.5, 1.5], [0.5, 1.5, 2.5, 3.5]), -1).reshape(-1, 3)
-    made = scene(
+    setup = scene(
         places + rng.uniform(-0.1, 0.1, places.shape),
         rng.normal(0, 1.0, places.shape),
         (NearField(alpha1=0.3, beta1=1, alpha2=0.2, beta2=2),),
         mass=1.0,
-        stepper=asked(error),
+        stepper=with_error(error),
         duration=1.5,
         domain=Box(low=(0.0, 0.0, 0.0), high=(size,) * 3),
     )
-    return made
+    return setup
 
 
-def cloud_by_scipy(made, size=SIZE):
+def cloud_by_scipy(setup, size=SIZE):
     """The same by NumPy's arrays and scipy's DOP853."""
-    r, v = np.asarray(made.particles.position), np.asarray(made.particles.velocity)
+    r, v = np.asarray(setup.particles.position), np.asarray(setup.particles.velocity)
 
     def rates(_, y):
         places, speeds = y.reshape(2, *r.shape)
@@ -190,20 +190,20 @@ def cloud_by_scipy(made, size=SIZE):
         push = (0.3 / distance - 0.2 / distance**2) / distance
         return np.concatenate([speeds.ravel(), (push[..., None] * d).sum(axis=1).ravel()])
 
-    found = solve_ivp(
-        rates, (0, made.duration), np.concatenate([r, v]).ravel(), "DOP853", rtol=1e-10, atol=1e-10
+    solution = solve_ivp(
+        rates, (0, setup.duration), np.concatenate([r, v]).ravel(), "DOP853", rtol=1e-10, atol=1e-10
     )
-    return found.y[:, -1].reshape(2, *r.shape)
+    return solution.y[:, -1].reshape(2, *r.shape)
 
 
 @pytest.mark.slow
 def test_pairs_in_a_box():
     """As by scipy to 1e-6; momentum is kept."""
-    made = cloud(1e-8)
-    (a,) = simulate([made], capacity=16)
+    setup = cloud(1e-8)
+    (a,) = simulate([setup], capacity=16)
     assert a.status.ok
     assert np.abs(a.state["position"] - a.start["position"]).max() > SIZE / 2
-    places, speeds = cloud_by_scipy(made)
+    places, speeds = cloud_by_scipy(setup)
     np.testing.assert_allclose(a.state["velocity"], speeds, atol=1e-6)
     np.testing.assert_allclose((a.state["position"] - places + SIZE / 2) % SIZE - SIZE / 2, 0, atol=1e-6)
     np.testing.assert_allclose(a.state["velocity"].sum(axis=0), a.start["velocity"].sum(axis=0), atol=1e-11)
@@ -213,17 +213,17 @@ def test_pairs_in_a_box():
 def test_lists_and_torques():
     """Short-ranged forces with lists, rejected attempts among them: the same bits on both schedules; and
     grains that turn."""
-    made = with_stepper(shells(SoftShell, np.random.default_rng(3), True), asked(1e-5, first=4e-3))
-    a, b = (simulate([made], capacity=300, schedule=schedule)[0] for schedule in ("world", "particle"))
+    setup = with_stepper(shells(SoftShell, np.random.default_rng(3), True), with_error(1e-5, first=4e-3))
+    a, b = (simulate([setup], capacity=300, schedule=schedule)[0] for schedule in ("world", "particle"))
     assert a.status.ok
     assert a.work == b.work
     np.testing.assert_array_equal(a.state["position"], b.state["position"])
     # What touching grains remember is brought up to date once a step, an error of first order in it.
     apart = []
     for dt in (5e-5, 2.5e-5):
-        made = with_stepper(grains(n=60), equal_steps(dt), duration=0.01)
+        setup = with_stepper(grains(n=60), equal_steps(dt), duration=0.01)
         spins = [
-            simulate([with_stepper(made, stepper)], capacity=160)[0].state["spin"]
+            simulate([with_stepper(setup, stepper)], capacity=160)[0].state["spin"]
             for stepper in (equal_steps(dt), trapezoidal_steps(dt, tolerance=1e-12))
         ]
         apart.append(np.abs(spins[0] - spins[1]).max())

@@ -45,10 +45,10 @@ def test_who_gets_stuck_first_is_named_with_the_time_and_the_force(chunks):
     assert fine.status.ok
     assert "at particle 1" in stuck.status.reason
     assert "by effects.cliff" in stuck.status.reason
-    found = float(stuck.status.reason.split("t = ")[1].split(" s")[0])
-    assert found == pytest.approx(0.3, abs=2e-4)
-    kept = float(stuck.status.reason.rsplit("t = ", 1)[1].split(" s")[0])
-    assert kept <= found
+    fault_time = float(stuck.status.reason.split("t = ")[1].split(" s")[0])
+    assert fault_time == pytest.approx(0.3, abs=2e-4)
+    kept_time = float(stuck.status.reason.rsplit("t = ", 1)[1].split(" s")[0])
+    assert kept_time <= fault_time
     assert np.isfinite(stuck.state["position"]).all()
 
 
@@ -57,9 +57,9 @@ def test_a_step_that_time_does_not_tell_is_not_taken():
     says so, where steps of 1e-20 s would never get there."""
     control = IterationControl(first=1e-20, longest=1e-3, shortest=1e-25)
     stepper, start = Trapezoid(control=control), ([[0.0, 0, 0]], [[1.0, 0, 0]])
-    made = scene(*start, (Cliff(place=0.0),), mass=1.0, stepper=stepper, duration=1e10)
-    simulation = compiled(made, worlds=2, capacity=3)
-    simulation.load([made])
+    setup = scene(*start, (Cliff(place=0.0),), mass=1.0, stepper=stepper, duration=1e10)
+    simulation = compiled(setup, worlds=2, capacity=3)
+    simulation.load([setup])
     simulation.run(steps=1)
     (result,) = simulation.results()
     assert "cannot be solved even at the shortest step, by effects.cliff" in result.status.reason
@@ -70,9 +70,9 @@ def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
     """10000 windows of 1e-4 s, of which two are asked for, and later a thousand."""
     control = IterationControl(first=1e-4, longest=1e-4, shortest=1e-5, tolerance=1e-6)
     start = ([[0.0, 0, 0]], [[1.0, 0, 0]])
-    made = scene(*start, (Cliff(place=5.0),), mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
-    simulation = compiled(made, worlds=2, capacity=3)
-    simulation.load([made])
+    setup = scene(*start, (Cliff(place=5.0),), mass=1.0, stepper=Trapezoid(control=control), duration=1.0)
+    simulation = compiled(setup, worlds=2, capacity=3)
+    simulation.load([setup])
     for steps, ahead in ((2, 9998), (1000, 8998)):
         simulation.run(steps=steps)
         assert simulation.ahead() == pytest.approx(ahead, abs=1)
@@ -81,16 +81,16 @@ def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
 @pytest.mark.slow
 def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bits(tmp_path):
     """A step of the world is a window; in one launch, in small ones, and from a checkpoint: the same bits."""
-    made = charged(accurate(1e-5, longest=1e-2), 2.0, **DRIVEN)
-    simulation = compiled(made, capacity=1)
+    setup = charged(accurate(1e-5, longest=1e-2), 2.0, **DRIVEN)
+    simulation = compiled(setup, capacity=1)
 
     def run(*portions):
-        simulation.load([made])
+        simulation.load([setup])
         for steps in portions:
             simulation.run(steps=steps)
-        taken = simulation.results()[0].work["steps"]
-        assert taken == sum(portions)
-        return taken
+        step_count = simulation.results()[0].work["steps"]
+        assert step_count == sum(portions)
+        return step_count
 
     def end():
         simulation.run()
@@ -106,7 +106,7 @@ def test_steps_asked_for_are_steps_taken_and_a_checkpoint_goes_on_to_the_same_bi
     run(1, 2, 70)
     save(simulation, tmp_path / "c.h5")
     ends.append(end())
-    simulation.load([made])
+    simulation.load([setup])
     restore(simulation, tmp_path / "c.h5")
     ends.append(end())
     for state, counts, when in ends:

@@ -14,20 +14,20 @@ from tisim.effects import Force, Gravity, parameter
 from tisim.steppers import Collocation, ErrorControl, FixedStep, IterationControl, StageControl, Trapezoid
 
 
-def with_stepper(made, stepper, **more):
-    return made.model_copy(update={"stepper": stepper, **more})
+def with_stepper(setup, stepper, **more):
+    return setup.model_copy(update={"stepper": stepper, **more})
 
 
 @pytest.mark.slow
 def test_schedules_agree_and_momentum_is_kept():
     """Rejected attempts and new lists among the iterations: the same bits, momentum to rounding."""
-    made = with_stepper(
+    setup = with_stepper(
         shells(SoftShell, np.random.default_rng(3), True),
         Trapezoid(
             control=IterationControl(first=4e-3, longest=4e-3, shortest=1e-6, tolerance=1e-9, iterations=12)
         ),
     )
-    a, b = (simulate([made], capacity=300, schedule=schedule)[0] for schedule in ("world", "particle"))
+    a, b = (simulate([setup], capacity=300, schedule=schedule)[0] for schedule in ("world", "particle"))
     assert a.status.ok
     assert a.work == b.work
     assert a.work["rejections"] > 3
@@ -115,11 +115,11 @@ def test_what_cannot_be_solved_says_when_who_and_which_force():
 @pytest.mark.slow
 def test_what_cannot_be_solved_together_says_so_too():
     """The same among particles that feel each other: the state is that of the last good step."""
-    made = with_stepper(
+    setup = with_stepper(
         shells(SoftShell, np.random.default_rng(3), True),
         Trapezoid(control=IterationControl(first=0.05, longest=0.05, shortest=0.05)),
     )
-    (result,) = simulate([made], capacity=300)
+    (result,) = simulate([setup], capacity=300)
     assert (
         "cannot be solved even at the shortest step, by effects.soft_shell, at particle"
         in result.status.reason
@@ -150,8 +150,8 @@ def test_the_force_is_that_of_the_time_at_which_the_step_fails(kind):
     )
     place, drift = [[0, 0, 0], [1, 0, 0]], [[1, 0, 0], [1, 0, 0]]
     stepper = kind(control=control)
-    made = scene(place, drift, effects, mass=1.0, stepper=stepper, duration=1.0)
-    (result,) = simulate([made], worlds=1)
+    setup = scene(place, drift, effects, mass=1.0, stepper=stepper, duration=1.0)
+    (result,) = simulate([setup], worlds=1)
     assert "by effects.late, at particle 0" in result.status.reason
     assert 0.4 < float(result.status.reason.split()[4]) <= 0.52
     assert np.isfinite(result.state["velocity"]).all()
@@ -165,9 +165,9 @@ def test_rest_is_no_error():
         [[0, 0, 0]], [[0, 0, 0]], (Trap(stiffness=1.0),), mass=1.0, stepper=Trapezoid(), duration=1e-2
     )
     (rest,) = simulate([still], worlds=1)
-    for found, place in ((result, [1.0, 1e-2, 0]), (rest, [0, 0, 0])):
-        assert found.status.ok
-        np.testing.assert_allclose(found.state["position"][0], place, rtol=0, atol=1e-15)
+    for end, place in ((result, [1.0, 1e-2, 0]), (rest, [0, 0, 0])):
+        assert end.status.ok
+        np.testing.assert_allclose(end.state["position"][0], place, rtol=0, atol=1e-15)
 
 
 def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
@@ -182,8 +182,8 @@ def test_steps_of_the_paper_grow_and_shrink_with_the_iteration():
 @pytest.mark.slow
 def test_time_does_not_drift():
     """A million steps of 1e-6 s end at one second exactly, the place of the oscillator being right."""
-    made = oscillator(equal_steps(1e-6, tolerance=1e-6), duration=1.0)
-    (result,) = simulate([made], worlds=1)
+    setup = oscillator(equal_steps(1e-6, tolerance=1e-6), duration=1.0)
+    (result,) = simulate([setup], worlds=1)
     assert result.time == 1.0
     assert result.work["particle_steps"] == 1_000_000
     assert result.state["position"][0, 0] == pytest.approx(np.cos(2.0), abs=1e-9)
@@ -191,8 +191,8 @@ def test_time_does_not_drift():
 
 def test_linear_terms_in_velocity_are_solved_exactly():
     """The rotation by B converges at w dt = 20, where plain iteration has no chance, and keeps the speed."""
-    made = charged(equal_steps(20.0 / 3.0, tolerance=1e-12), 20.0, velocity=(0.6, -0.8, 0.0))
-    (result,) = simulate([made], worlds=1, capacity=1)
+    setup = charged(equal_steps(20.0 / 3.0, tolerance=1e-12), 20.0, velocity=(0.6, -0.8, 0.0))
+    (result,) = simulate([setup], worlds=1, capacity=1)
     assert result.status.ok
     assert result.work["force_evaluations"] == result.work["particle_steps"]
     assert np.linalg.norm(result.state["velocity"]) == pytest.approx(1.0, rel=1e-12)
@@ -203,10 +203,10 @@ def test_the_force_of_the_last_iterate_but_one_is_good_enough():
     the solved rule, with down to one sum of forces for a step."""
     errors, sums = [], []
     for tolerance in (1e-2, 1e-12):
-        made = charged(
+        setup = charged(
             equal_steps(4.0 / 800, tolerance=tolerance), 4.0, stiffness=8.0, amplitude=1.5, omega=2.0
         )
-        (result,) = simulate([made], worlds=1, capacity=1)
+        (result,) = simulate([setup], worlds=1, capacity=1)
         errors.append(np.linalg.norm(final(result)[:2] - driven(4.0, W, 4.0, 1.5 * PUSH, 2.0)))
         sums.append(result.work["force_evaluations"] / result.work["particle_steps"])
     assert errors[0] == pytest.approx(errors[1], rel=0.01)

@@ -175,11 +175,11 @@ class Impact(PairEvent):
             change, k = ti.cast(1.0, s.real), 0
             while change > self.tolerance(w) and k < self.max_iterations:
                 energy = self.supplied(w, reduced, v_n, smaller, x)
-                lost = self.lost(w, reduced, v_n, v_t, x)
+                loss = self.lost(w, reduced, v_n, v_t, x)
                 softest = ti.cast(ti.math.inf, s.real)
                 for law in ti.static(self.temperature):
-                    t_i = law.temperature(s, w, i, energy + share_i * lost)
-                    t_j = law.temperature(s, w, j, energy + (1.0 - share_i) * lost)
+                    t_i = law.temperature(s, w, i, energy + share_i * loss)
+                    t_j = law.temperature(s, w, j, energy + (1.0 - share_i) * loss)
                     softest = ti.min(self.hardness_at(w, t_i), self.hardness_at(w, t_j))
                 new = self.bonding(w, pressure, softest)
                 change, x, k = ti.abs(new - x), new, k + 1
@@ -219,10 +219,10 @@ class Impact(PairEvent):
             slid -= stopped
         press(s, w, i, -impulse)
         press(s, w, j, impulse)
-        lost = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
+        loss = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
         for law in ti.static(self.temperature):
-            s.temperature[w, i] = law.temperature(s, w, i, lost * m_j / (m_i + m_j))
-            s.temperature[w, j] = law.temperature(s, w, j, lost * m_i / (m_i + m_j))
+            s.temperature[w, i] = law.temperature(s, w, i, loss * m_j / (m_i + m_j))
+            s.temperature[w, j] = law.temperature(s, w, j, loss * m_i / (m_i + m_j))
         ti.atomic_add(s.contacts[w], 1)
 
     @ti.func
@@ -247,16 +247,16 @@ class Impact(PairEvent):
             s.velocity[w, i], s.velocity[w, j] = common, common
         ti.atomic_add(s.impacts[w], 1)
 
-        lost = self.lost(w, reduced, v_n, v_t, x)
-        lost_i, lost_j = lost * m_j / (m_i + m_j), lost * m_i / (m_i + m_j)
+        loss = self.lost(w, reduced, v_n, v_t, x)
+        lost_i, lost_j = loss * m_j / (m_i + m_j), loss * m_i / (m_i + m_j)
         energy = self.supplied(w, reduced, v_n, smaller, x)
         for law in ti.static(self.temperature):
             s.temperature[w, i] = law.temperature(s, w, i, energy + lost_i)
             s.temperature[w, j] = law.temperature(s, w, j, energy + lost_j)
         for law in ti.static(self.supply):
-            given = law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
-            law.book(s, w, i, given)
-            law.book(s, w, j, given)
+            energies = law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
+            law.book(s, w, i, energies)
+            law.book(s, w, j, energies)
         broken = 0
         for law in ti.static(self.fracture):
             broken += law.fracture(s, w, i, lost_i)

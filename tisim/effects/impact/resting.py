@@ -40,8 +40,8 @@ def rests(s, w, i, j, separation):
     # Places and sizes are known to u of themselves: closer than that no pair is known to be apart.
     places = s.position[w, i].norm() + s.position[w, j].norm() + s.radius[w, i] + s.radius[w, j]
     reach = s.radius[w, i] + s.radius[w, j] + 4.0 * ROUNDOFF[s.real] * places
-    given = SHARE * gained.dot(separation) + rounding(s, w, i, j, separation)
-    return before.norm_sqr() <= reach * reach and slip.dot(separation) <= given
+    limit = SHARE * gained.dot(separation) + rounding(s, w, i, j, separation)
+    return before.norm_sqr() <= reach * reach and slip.dot(separation) <= limit
 
 
 @ti.func

@@ -8,7 +8,7 @@ functions of rho and z for the field and three more for its gradient:
 """
 
 from tisim.backend.taichi import ti
-from tisim.sources.magnetic.cylinder_far import far_away
+from tisim.sources.magnetic.cylinder_far import far_field
 
 
 @ti.func
@@ -17,7 +17,7 @@ def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid
     cancellation. ends : closed or tabulated."""
     six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
     if rho * rho + z * z > ends.far * (radius * radius + half * half):
-        six = far_away(rho, z, radius, half, ends.small)
+        six = far_field(rho, z, radius, half, ends.small)
     else:
         six = close_by(rho, z, end, radius, half, ends)
     return six

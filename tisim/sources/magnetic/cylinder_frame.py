@@ -63,12 +63,12 @@ def place(r, centre, lead, rest):
     """
     # r - centre = d + lost, exactly (D. E. Knuth, The Art of Computer Programming, volume 2, 4.2.2).
     d = r - centre
-    taken = r - d
-    lost = (r - (d + taken)) + (taken - centre)
+    subtracted = r - d
+    rounding_error = (r - (d + subtracted)) + (subtracted - centre)
     axis = lead + rest
     along = ti.min(ti.max(d.dot(axis), -LARGEST_PLACE), LARGEST_PLACE)
     foot = ti.cast(ti.cast(along, ti.f32), float)
-    near = (d - foot * lead) + (lost - foot * rest)
+    near = (d - foot * lead) + (rounding_error - foot * rest)
     z = near.dot(axis)
     across = near - z * axis
     rho = across.norm()

@@ -46,7 +46,7 @@ def _numbers(octave: np.ndarray, part: np.ndarray, side: np.ndarray, slant: np.n
     return places[..., 0], out
 
 
-def _made(degree: int, parts: int, slants: int) -> np.ndarray:
+def _coefficients(degree: int, parts: int, slants: int) -> np.ndarray:
     """Coefficients of all cells, (octaves, parts, slants, sides, degree + 1, degree + 1, 6), highest power
     first."""
     x = chebyshev.chebpts1(degree + 1)
@@ -84,7 +84,7 @@ def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
 def _table(digits: int, settings: runtime.Runtime) -> tuple[np.ndarray, tuple[int, int, int]]:
     """The smallest that is accurate to so many digits, (cells, numbers in each), and its grid."""
     for grid in GRIDS:
-        coefficients = _made(*grid)
+        coefficients = _coefficients(*grid)
         if SAFE * _error(coefficients) < 10.0**-digits:
             return coefficients.reshape(-1, 6 * (grid[0] + 1) ** 2), grid
     raise InputError(f"table_digits must be fewer in {runtime.current().precision}; received {digits}")

@@ -19,9 +19,9 @@ class Separate:
         return ()
 
     @ti.func
-    def pushed(self, w, i):
+    def push_velocity(self, w, i):
         """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
-        return self.fluid.pushed(w, i, self.fluid.mobility(w, i))
+        return self.fluid.push_velocity(w, i, self.fluid.mobility(w, i))
 
     @ti.func
     def scattered(self, w, i):
@@ -41,13 +41,13 @@ class BrownianDrift(PerParticle):
         s = self.s
         velocity = 0.0 * s.velocity[w, i]
         if self.fluid.mobile(w, i) > 0:
-            pushed = self.interaction.pushed(w, i)
-            rate = self.control.rate(s, w, i, pushed)
+            push_velocity = self.interaction.push_velocity(w, i)
+            rate = self.control.rate(s, w, i, push_velocity)
             if self.control.hopeless(w, rate):
                 s.fail_by_force(w, fault(rate), i)
             elif rate > s.steepest[w]:
                 ti.atomic_max(s.steepest[w], rate)
-            velocity = self.fluid.flow(w, i, s.time[w]) + pushed
+            velocity = self.fluid.flow(w, i, s.time[w]) + push_velocity
         s.velocity[w, i] = velocity
 
 

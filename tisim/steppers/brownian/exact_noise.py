@@ -47,7 +47,7 @@ class Exact:
         return (8 if self.s.real == ti.f64 else 4) * self.s.worlds * self.rows**2
 
     @ti.func
-    def pushed(self, w, i):
+    def push_velocity(self, w, i):
         """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
         return self.s.velocity[w, i]
 
@@ -89,7 +89,7 @@ class Push(PairSum):
     @ti.func
     def finish(self, w, i, total, t):
         self.s.velocity[w, i] = (
-            self.fluid.pushed(w, i, self.fluid.mobility(w, i)) + self.fluid.softness(w) * total
+            self.fluid.push_velocity(w, i, self.fluid.mobility(w, i)) + self.fluid.softness(w) * total
         )
 
 

@@ -41,7 +41,7 @@ class Fast:
         return (Draw(self.fluid), Couple(self), Weigh(self.fluid))
 
     @ti.func
-    def pushed(self, w, i):
+    def push_velocity(self, w, i):
         """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
         return self.s.velocity[w, i]
 
@@ -67,13 +67,13 @@ class Couple(PairSum):
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
         r, size = separation, self.s.radius[w, j]
         parts = effect.pair(w, i, j, distance)
-        pushed = effect.times(parts, r, self.s.force[w, j])
+        push_velocity = effect.times(parts, r, self.s.force[w, j])
         noise = effect.times(parts, r, ti.sqrt(size) * self.s.gauss[w, j])
         a, b, square = parts[0], parts[1], distance * distance
         along = a + b * square
         total = ti.Vector.zero(self.s.real, self.components)
         for k in ti.static(range(3)):
-            total[k], total[3 + k] = pushed[k], noise[k]
+            total[k], total[3 + k] = push_velocity[k], noise[k]
             # The diagonal of (a I + b r r^T)^2.
             total[6 + k] = size * (a * a + (a + along) * b * r[k] * r[k])
         total[9] = ti.sqrt(size) * (2.0 * a + along)
@@ -85,9 +85,9 @@ class Couple(PairSum):
     def finish(self, w, i, total, t):
         s = self.s
         size = s.radius[w, i]
-        pushed = self.fluid.pushed(w, i, self.fluid.mobility(w, i))
+        push_velocity = self.fluid.push_velocity(w, i, self.fluid.mobility(w, i))
         for k in ti.static(range(3)):
-            s.velocity[w, i][k] = pushed[k] + self.fluid.softness(w) * total[k]
+            s.velocity[w, i][k] = push_velocity[k] + self.fluid.softness(w) * total[k]
             s.coupled_noise[w, i][k] = ti.sqrt(size) * total[3 + k]
             s.coupling_squares[w, i][k] = size * total[6 + k]
         s.coupling[w, i] = ti.sqrt(size) * total[9]

@@ -50,7 +50,7 @@ class Fluid:
         return self.softness(w) / self.s.radius[w, i]
 
     @ti.func
-    def pushed(self, w, i, mobility):
+    def push_velocity(self, w, i, mobility):
         """Velocity that the force on i gives it. m/s."""
         velocity = 0.0 * self.s.velocity[w, i]
         if ti.static(self.forced):

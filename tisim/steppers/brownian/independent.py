@@ -26,9 +26,9 @@ AHEAD = 8
 
 
 @ti.func
-def stepped(s, fluid: ti.template(), w, i, mobility, pushed, t, dt, g):  # type: ignore[valid-type]
+def euler_step(s, fluid: ti.template(), w, i, mobility, push_velocity, t, dt, g):  # type: ignore[valid-type]
     """Velocity of drift, u + F/(6 pi eta R), and where a step leads: by dt times that + sqrt(2 D dt) g."""
-    velocity = fluid.flow(w, i, t) + pushed
+    velocity = fluid.flow(w, i, t) + push_velocity
     width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
     return velocity, s.position[w, i] + (dt * velocity + width * g)
 
@@ -57,7 +57,7 @@ class IndependentBrownianSteps(PerParticle):
         self.registers.load(w, i)
         interval, end = s.own_interval[w, i], s.intervals[w] + s.launch_intervals[w]
         elapsed, carry, before = s.own_elapsed[w, i], s.own_carry[w, i], s.own_steps[w, i]
-        taken, going, short = 0, self.able(w, i), 0
+        attempts, going, short = 0, self.able(w, i), 0
         attempt_limit, cut = s.attempt_limit[w], s.cut[w]
         while going > 0 and interval < end:
             kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
@@ -69,9 +69,9 @@ class IndependentBrownianSteps(PerParticle):
                 if going > 0:
                     kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
                     elapsed, carry, steps, going, over = self.interval(
-                        w, i, interval, kick, elapsed, carry, before, attempt_limit - taken
+                        w, i, interval, kick, elapsed, carry, before, attempt_limit - attempts
                     )
-                    taken += steps - before
+                    attempts += steps - before
                     before = steps
                     if over == 0:
                         short, going = going, 0
@@ -87,7 +87,7 @@ class IndependentBrownianSteps(PerParticle):
         s.own_steps[w, i] = before
         if short > 0:
             ti.atomic_add(s.underway[w], 1)
-        ti.atomic_add(s.particle_steps[w], taken)
+        ti.atomic_add(s.particle_steps[w], attempts)
 
     @ti.func
     def number(self, interval):
@@ -110,16 +110,16 @@ class IndependentBrownianSteps(PerParticle):
         begin = beginning(self.s, self.control, w, interval)
         length = duration(self.s, self.control, w, interval, begin)
         elapsed, carry = start, rounding
-        taken, going, g = before, 1, kick
-        while elapsed < length and going > 0 and taken - before < most:
+        steps, going, g = before, 1, kick
+        while elapsed < length and going > 0 and steps - before < most:
             # An operator may have changed the radius in the last step.
             mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
                 self.force_sum.single_particle(w, i, begin + elapsed)
-            pushed = self.fluid.pushed(w, i, mobility)
-            dt, left = ti.cast(self.control.longest(w), ti.f64), length - elapsed
-            if not self.control.easy(self.own, w, i, pushed):
-                rate = self.control.rate(self.own, w, i, pushed)
+            push_velocity = self.fluid.push_velocity(w, i, mobility)
+            dt, remaining = ti.cast(self.control.longest(w), ti.f64), length - elapsed
+            if not self.control.easy(self.own, w, i, push_velocity):
+                rate = self.control.rate(self.own, w, i, push_velocity)
                 dt = self.control.step(w, rate)
                 if self.control.hopeless(w, rate):
                     self.stop(w, i, fault(rate))
@@ -129,22 +129,24 @@ class IndependentBrownianSteps(PerParticle):
                 step = dt - carry
                 total = elapsed + step
                 carry = (total - elapsed) - step
-                if dt * (1.0 + LITTLE) >= left:
-                    dt, total = left, length
-                if taken > 0:
-                    g = self.fluid.normals(w, i, self.number(interval) + taken)
-                self.move(w, i, mobility, pushed, begin + elapsed, dt, g)
+                if dt * (1.0 + LITTLE) >= remaining:
+                    dt, total = remaining, length
+                if steps > 0:
+                    g = self.fluid.normals(w, i, self.number(interval) + steps)
+                self.move(w, i, mobility, push_velocity, begin + elapsed, dt, g)
                 if self.s.own_fault[w, i] == 0:
                     elapsed = total
-                    taken += 1
+                    steps += 1
                 going = self.able(w, i)
-        return elapsed, carry, taken, going, ti.select(elapsed < length, 0, 1)
+        return elapsed, carry, steps, going, ti.select(elapsed < length, 0, 1)
 
     @ti.func
-    def move(self, w, i, mobility, pushed, t, dt, g):
+    def move(self, w, i, mobility, push_velocity, t, dt, g):
         """A step, and what operators do to it."""
         s, step = self.own, ti.cast(dt, self.s.real)
-        s.velocity[w, i], s.position[w, i] = stepped(s, self.fluid, w, i, mobility, pushed, t, step, g)
+        s.velocity[w, i], s.position[w, i] = euler_step(
+            s, self.fluid, w, i, mobility, push_velocity, t, step, g
+        )
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]

@@ -8,7 +8,7 @@ the same.
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import TILE
-from tisim.steppers.brownian.independent import IndependentBrownianSteps, stepped
+from tisim.steppers.brownian.independent import IndependentBrownianSteps, euler_step
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import beginning
 from tisim.steppers.registers import Registers
@@ -34,12 +34,12 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
     def run(self, w, i):
         s = self.s
         if i % TILE == 0:
-            done = 0
+            finished = 0
             if i + TILE <= s.count[w] and self.level(w, i) > 0:
-                done = self.tile(w, i)
+                finished = self.tile(w, i)
                 for j in range(i, i + TILE):
-                    s.own_interval[w, j] = s.intervals[w] + done
-            if done < s.launch_intervals[w]:
+                    s.own_interval[w, j] = s.intervals[w] + finished
+            if finished < s.launch_intervals[w]:
                 for j in range(i, ti.min(i + TILE, s.count[w])):
                     self.advance(w, j)
 
@@ -61,11 +61,11 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
         place = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         drift = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         force = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
-        intervals, done, halted = ti.cast(s.launch_intervals[w], ti.i32), 0, 0
-        while done < intervals and halted == 0:
-            begin = beginning(s, self.control, w, s.intervals[w] + done)
-            dt = beginning(s, self.control, w, s.intervals[w] + done + 1) - begin
-            number, step = self.number(s.intervals[w] + done), ti.cast(dt, s.real)
+        intervals, finished, halted = ti.cast(s.launch_intervals[w], ti.i32), 0, 0
+        while finished < intervals and halted == 0:
+            begin = beginning(s, self.control, w, s.intervals[w] + finished)
+            dt = beginning(s, self.control, w, s.intervals[w] + finished + 1) - begin
+            number, step = self.number(s.intervals[w] + finished), ti.cast(dt, s.real)
             if not (dt > 0.0):
                 halted = 1
             for lane in range(TILE):
@@ -75,12 +75,14 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                 if ti.static(self.forced):
                     self.lane_force_sum.single_particle(w, i, begin)
                 mobility = self.lane_fluid.mobility(w, i)
-                pushed = self.lane_fluid.pushed(w, i, mobility)
+                push_velocity = self.lane_fluid.push_velocity(w, i, mobility)
                 g = self.lane_fluid.normals(w, i, number)
-                v, r = stepped(self.lane_state, self.lane_fluid, w, i, mobility, pushed, begin, step, g)
+                v, r = euler_step(
+                    self.lane_state, self.lane_fluid, w, i, mobility, push_velocity, begin, step, g
+                )
                 for k in ti.static(range(3)):
                     place[k][lane], drift[k][lane], force[k][lane] = r[k], v[k], f[k]
-                fine = self.able(w, i) > 0 and self.control.easy(s, w, i, pushed)
+                fine = self.able(w, i) > 0 and self.control.easy(s, w, i, push_velocity)
                 fine = fine and r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
                 halted += ti.select(fine, 0, 1)
             if halted == 0:
@@ -90,6 +92,6 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                     s.position[w, i] = self.domain.wrap(w, r)
                     s.velocity[w, i] = ti.Vector([drift[0][lane], drift[1][lane], drift[2][lane]])
                     s.force[w, i] = ti.Vector([force[0][lane], force[1][lane], force[2][lane]])
-                done += 1
-        ti.atomic_add(s.particle_steps[w], done * TILE)
-        return done
+                finished += 1
+        ti.atomic_add(s.particle_steps[w], finished * TILE)
+        return finished

@@ -62,10 +62,10 @@ class StepAttempt(Repeat):
 def length(s, control: ti.template(), w):  # type: ignore[valid-type]
     """Return the length (s, f64) of the next attempt; the last step ends exactly on time."""
     dt = control.step(s, w, s.next_dt[w])
-    left = s.end[w] - s.time_before[w]
+    remaining = s.end[w] - s.time_before[w]
     # A remainder as small as rounding leaves is not worth a step of its own.
-    if dt * (1.0 + 1e-6) >= left:
-        dt = left
+    if dt * (1.0 + 1e-6) >= remaining:
+        dt = remaining
     return dt
 
 

@@ -79,8 +79,8 @@ class JudgeStages(Phase):
         s = self.s
         s.sweeping[w], s.verdict[w] = 0, RETRY
         # One that is only foreseen may be of long ago: it is no reason for a shorter step.
-        known = ti.select(s.sweep[w] > 1 or not solved, contraction, 0.0)
-        factor = self.control.factor(w, known, error, self.order)
+        current_contraction = ti.select(s.sweep[w] > 1 or not solved, contraction, 0.0)
+        factor = self.control.factor(w, current_contraction, error, self.order)
         if solved and self.control.accepts(w, error):
             s.verdict[w], s.last_dt[w] = ACCEPTED, s.dt[w]
         else:

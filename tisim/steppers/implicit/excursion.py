@@ -27,7 +27,7 @@ def excursion_fields(at_end: bool) -> tuple[Field, ...]:
 
 
 @ti.func
-def compared(control: ti.template(), s, w, i, moved, dt):  # type: ignore[valid-type]
+def error_scale(control: ti.template(), s, w, i, moved, dt):  # type: ignore[valid-type]
     """What the error is compared with of a particle that has moved so far in a step of dt (s). m."""
     size, share = moved, ti.cast(1.0, s.real)
     if ti.static(control.at_end):

@@ -77,9 +77,9 @@ class IndependentSteps(PerParticle):
             self.solve.save(w, i)
             verdict = RETRY
             while verdict == RETRY:
-                wanted = self.control.step(s, w, s.own_dt[w, i])
-                last = wanted * (1.0 + LITTLE) >= length - elapsed
-                dt = ti.select(last, length - elapsed, wanted)
+                target = self.control.step(s, w, s.own_dt[w, i])
+                last = target * (1.0 + LITTLE) >= length - elapsed
+                dt = ti.select(last, length - elapsed, target)
                 verdict, k = self.attempt(w, i, begin + elapsed, dt, aim)
                 iterations += k
                 tries += 1
@@ -93,7 +93,7 @@ class IndependentSteps(PerParticle):
                     if ti.static(self.control.at_end):
                         note_excursion(s, w, i, self.solve.step_displacement(w, i, ti.cast(dt, s.real)))
                     # That a step has been cut short says nothing about the next one.
-                    s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, wanted, 0.0), s.real))
+                    s.own_dt[w, i] = ti.max(s.own_dt[w, i], ti.cast(ti.select(last, target, 0.0), s.real))
         return elapsed, carry, verdict, steps, tries, iterations
 
     @ti.func
@@ -128,15 +128,15 @@ class IndependentSteps(PerParticle):
             if solved or k >= self.control.iterations or not (ratio < ti.math.inf):
                 iterating = 0
                 accepted = solved and self.control.accepts(w, off)
-                wanted = dt
+                target = dt
                 # The longest step stays: a branch, as the next step then need not wait for the factor.
                 if not (accepted and self.control.stays(w, dt, aim, ratio, k, off)):
-                    wanted *= self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
+                    target *= self.control.factor(w, aim, ratio, ti.cast(k, ti.f64), off)
                 if accepted:
                     verdict = ACCEPTED
                 else:
-                    wanted = ti.min(wanted, SHORTER * dt)
+                    target = ti.min(target, SHORTER * dt)
                     verdict = ti.select(self.control.hopeless(s, w, dt), HOPELESS, RETRY)
                     solve.restore(w, i)
-                s.own_dt[w, i] = ti.cast(wanted, s.real)
+                s.own_dt[w, i] = ti.cast(target, s.real)
         return verdict, k - 1

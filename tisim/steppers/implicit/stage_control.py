@@ -5,7 +5,7 @@ from __future__ import annotations
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
-from tisim.steppers.implicit.excursion import Per, compared
+from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
 
@@ -63,12 +63,12 @@ class StageControl(ImplicitControl):
     @ti.func
     def scale(self, s, w, i, moved, dt):
         """What the error of a particle that has moved so far in a step of dt (s) is compared with. m."""
-        return compared(self, s, w, i, moved, dt)
+        return error_scale(self, s, w, i, moved, dt)
 
     @ti.func
-    def solved(self, w, left):
+    def solved(self, w, error):
         """Whether sweeps may end, with this much error left."""
-        return left <= ti.cast(self.part(w) * self.error(w), ti.f64)
+        return error <= ti.cast(self.part(w) * self.error(w), ti.f64)
 
     @ti.func
     def accepts(self, w, error):
@@ -78,7 +78,7 @@ class StageControl(ImplicitControl):
     @ti.func
     def factor(self, w, contraction, error, order):
         """What the next step is to be multiplied by: the error falls as dt^order, the contraction as dt^2."""
-        asked = ti.cast(self.error(w), ti.f64)
-        wanted = ti.cast(self.safety(w), ti.f64) * ti.pow(asked, 1.0 / order)
-        by_error = self.limited(w, wanted, ti.pow(error, 1.0 / order))
+        tolerance = ti.cast(self.error(w), ti.f64)
+        target = ti.cast(self.safety(w), ti.f64) * ti.pow(tolerance, 1.0 / order)
+        by_error = self.limited(w, target, ti.pow(error, 1.0 / order))
         return ti.min(by_error, self.limited(w, ti.sqrt(CONTRACTION), ti.sqrt(contraction)))

@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.errors import must
-from tisim.steppers.implicit.excursion import Per, compared
+from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
 
 LEAST_SAFETY = 0.01
@@ -57,10 +57,10 @@ class ImplicitControl(StepControl):
         return max(duration / self.longest, float(growing))
 
     @ti.func
-    def step(self, s, w, wanted):
+    def step(self, s, w, target):
         """The step (s, f64) where this one was wanted; 0 for the first of all."""
         longest = ti.cast(self.longest(w), ti.f64)
-        step = ti.min(ti.select(wanted > 0.0, wanted, ti.cast(self.first(w), ti.f64)), longest)
+        step = ti.min(ti.select(target > 0.0, target, ti.cast(self.first(w), ti.f64)), longest)
         return ti.max(shortest_representable(s, w, self.shortest(w)), step)
 
     @ti.func
@@ -69,12 +69,12 @@ class ImplicitControl(StepControl):
         return dt <= shortest_representable(s, w, self.shortest(w)) * (1.0 + 1e-9)
 
     @ti.func
-    def limited(self, w, wanted, reached):
+    def limited(self, w, target, actual):
         """wanted / reached, between ``least`` and ``most``; the least for a NaN."""
         least, most = ti.cast(self.least(w), ti.f64), ti.cast(self.most(w), ti.f64)
         factor = least
-        if wanted >= least * reached:
-            factor = ti.min(most, wanted / ti.max(reached, wanted / most))
+        if target >= least * actual:
+            factor = ti.min(most, target / ti.max(actual, target / most))
         return factor
 
 
@@ -138,10 +138,10 @@ class IterationControl(ImplicitControl):
     def stays(self, w, dt, aim, change, k, error):
         """Whether a step (s) is the longest that may be and ``factor`` is at least 1, so that the next one is
         as long; without a root to take."""
-        reached = ti.cast(1.0, ti.f64)
+        bound = ti.cast(1.0, ti.f64)
         for _ in range(k):
-            reached *= aim
-        return dt >= ti.cast(self.longest(w), ti.f64) and change <= reached
+            bound *= aim
+        return dt >= ti.cast(self.longest(w), ti.f64) and change <= bound
 
 
 class ErrorControl(IterationControl):
@@ -180,7 +180,7 @@ class ErrorControl(IterationControl):
 
     @ti.func
     def scale(self, s, w, i, moved, dt):
-        return compared(self, s, w, i, moved, dt)
+        return error_scale(self, s, w, i, moved, dt)
 
     @ti.func
     def accepts(self, w, error):
@@ -189,10 +189,10 @@ class ErrorControl(IterationControl):
     @ti.func
     def factor(self, w, aim, change, k, error):
         by_iteration = IterationControl.factor(self, w, aim, change, k, error)
-        wanted = ti.cast(self.safety(w), ti.f64) * ti.sqrt(ti.cast(self.error(w), ti.f64))
-        return ti.min(by_iteration, self.limited(w, wanted, ti.sqrt(error)))
+        target = ti.cast(self.safety(w), ti.f64) * ti.sqrt(ti.cast(self.error(w), ti.f64))
+        return ti.min(by_iteration, self.limited(w, target, ti.sqrt(error)))
 
     @ti.func
     def stays(self, w, dt, aim, change, k, error):
-        wanted = ti.cast(self.safety(w), ti.f64) ** 2 * ti.cast(self.error(w), ti.f64)
-        return error <= wanted and IterationControl.stays(self, w, dt, aim, change, k, error)
+        bound = ti.cast(self.safety(w), ti.f64) ** 2 * ti.cast(self.error(w), ti.f64)
+        return error <= bound and IterationControl.stays(self, w, dt, aim, change, k, error)
