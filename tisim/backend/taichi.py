@@ -9,6 +9,7 @@ import importlib.util
 import os
 import warnings
 
+from tisim.backend import front_end
 from tisim.errors import must
 
 BACKEND = os.environ.get("TISIM_BACKEND", "taichi")
@@ -40,6 +41,7 @@ else:
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.simplefilter("ignore", SyntaxWarning)
         import taichi as ti
+front_end.relieve(ti.__name__)
 
 
 class _Probe:

@@ -1,0 +1,68 @@
+"""The front end of Taichi and of Quadrants, relieved of work that gives the same each time.
+
+Where a class defines a function for kernels, both look up the line of the class in its file to learn that it
+is one; a look at the frame tells. Taichi 1.7.4, which reads a function anew wherever it is called, also looks
+up its source each time, and sets for every expression a text that shows its place, for an error that may
+come. Together that is a third of the time to start a simulation whose kernels lie in the cache. Here what is
+found is remembered, and errors say the same. Quadrants remembers sources by itself.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import sys
+from collections.abc import Callable
+from types import CodeType
+from typing import Any
+
+
+def relieve(package: str) -> None:
+    """Let the front end of ``taichi`` or ``quadrants`` remember what it has found."""
+    kernels: Any = importlib.import_module(f"{package}.lang.kernel_impl")
+    kernels._inside_class = _in_class_body
+    if package == "taichi":
+        kernels.getsourcelines = _by_code(kernels.getsourcelines)
+        kernels.getsourcefile = _by_code(kernels.getsourcefile)
+        texts: Any = importlib.import_module("taichi.lang.ast.ast_transformer_utils").ASTTransformerContext
+        texts.get_pos_info = _by_place(texts.get_pos_info)
+
+
+def _in_class_body(level_of_class_stackframe: int) -> bool:
+    """Return whether what is being decorated is defined in the body of a class; the frame at the level named
+    runs its ``class`` statement, and the one below it the body."""
+    return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
+
+
+def _by_code(look: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return ``look``, asked once for all functions made by one definition."""
+    known: dict[tuple[CodeType, str], Any] = {}
+
+    @functools.wraps(look)
+    def remembered(function: Any) -> Any:
+        code = function.__code__
+        # Codes of two files are equal where they do the same.
+        key = (code, code.co_filename)
+        if key not in known:
+            known[key] = look(function)
+        return known[key]
+
+    return remembered
+
+
+def _by_place(tell: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
+    """Return ``tell``, asked once for each place in a source."""
+    known: dict[tuple[Any, ...], str] = {}
+
+    @functools.wraps(tell)
+    def remembered(context: Any, node: Any) -> str:
+        begin, end = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
+        # The lines as well: a file may have been edited and read again.
+        lines = tuple(context.src[node.lineno - 1 : node.end_lineno])
+        place = (context.file, context.func.func.__name__, context.lineno_offset)
+        key = (*place, lines, type(node), *begin, *end)
+        if key not in known:
+            known[key] = tell(context, node)
+        return known[key]
+
+    return remembered
