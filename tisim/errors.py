@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import numbers
 import reprlib
 from collections.abc import Iterable
 from typing import Any
@@ -52,6 +53,16 @@ def must(condition: bool, what: str, rule: str, received: Any) -> None:
     """Raise ``InputError("<what> must be <rule>; received <received>")`` unless ``condition`` holds."""
     if not condition:
         raise InputError(f"{printable(what)} must be {rule}; received {abbreviated(received)}")
+
+
+def is_whole(value: Any, least: int) -> bool:
+    """Return whether a value is a whole number of Python or NumPy, at least ``least``; a flag is none."""
+    return isinstance(value, numbers.Integral) and not isinstance(value, bool) and int(value) >= least
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a real number, of Python or NumPy; a flag is none."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 def did_you_mean(received: str, known: Iterable[str]) -> str:

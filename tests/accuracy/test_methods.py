@@ -184,7 +184,8 @@ def test_an_accuracy_parameter_is_turned_by_decades_of_error():
 
 
 WRONG = [
-    ({"repeats": 0}, "repeats must be at least 1; received 0"),
+    ({"repeats": 0}, "repeats must be a whole number, at least 1; received 0"),
+    ({"coarser": 1.5}, "coarser must be a whole number of decades; received 1.5"),
     ({"coarser": 1, "finer": -2}, "must be at least 0; received -1"),
     ({"precisions": ("f32",)}, "precisions must be f64 and others"),
     ({"precisions": ("f64", "f16")}, "precision must be f64 or f32; received 'f16'"),

@@ -26,7 +26,7 @@ WRONG = [
     (["vibration", "--without", "warp"], "effect to leave out must be one of"),
     (["vibration", "--error", "0"], "--error must be greater than 0; received 0.0"),
     (["vibration", "--quantity", "speed"], "quantity must be one of positions, centre of gravity; received"),
-    (["vibration", "--repeats", "0"], "repeats must be at least 1; received 0"),
+    (["vibration", "--repeats", "0"], "repeats must be a whole number, at least 1; received 0"),
     (["vibration", "--coarser", "-2"], "coarser + finer must be at least 0; received -2"),
     (["vibration", "--limit", "0"], "limit must be greater than 0; received 0.0"),
     (["vibration", "--budget", "-1"], "budget must be greater than 0; received -60.0"),

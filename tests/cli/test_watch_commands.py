@@ -248,7 +248,7 @@ def test_a_case_draws_its_own_pictures_and_figures(tisim, toml, tmp_path, monkey
 
 def test_wrong_input(tisim, toml, tmp_path):
     for arguments, message in (
-        (["run", toml, "--frames", 0], "frames must be at least 1; received 0"),
+        (["run", toml, "--frames", 0], "frames must be a whole number, at least 1; received 0"),
         (
             ["run", toml, "--frames", 2, "--every", 1],
             "recording must be given frames or every; received 'both'",

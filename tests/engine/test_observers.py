@@ -141,7 +141,10 @@ def test_a_checkpoint_now_and_then(simulation, whole, tmp_path):
     [
         ({"until": -1.0}, "until must be a number of s of simulated time, at least 0; received -1.0"),
         ({"until": float("nan")}, "until must be a number of s of simulated time, at least 0; received nan"),
-        ({"steps": -1}, "steps must be at least 0; received -1"),
+        ({"until": "soon"}, "until must be a number of s of simulated time, at least 0; received 'soon'"),
+        ({"steps": -1}, "steps must be a whole number, at least 0; received -1"),
+        ({"steps": 1.5}, "steps must be a whole number, at least 0; received 1.5"),
+        ({"observers": print}, "observers must be a list of them; received <built-in function print>"),
         ({"observers": [3]}, "an observer must be an Observer or a function of the simulation; received 3"),
         ({"observers": [Observer]}, "an observer must be an Observer or a function"),
     ],
@@ -152,8 +155,23 @@ def test_what_cannot_be_asked_for(simulation, arguments, message):
     assert simulation.fraction() == 0
 
 
-def test_what_is_not_loaded_is_not_run(monkeypatch):
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda sim, path: sim.run(),
+        lambda sim, path: sim.results(),
+        lambda sim, path: sim.state,
+        lambda sim, path: sim.checkpoint(path),
+        lambda sim, path: sim.restore(path),
+    ],
+    ids=["run", "results", "state", "checkpoint", "restore"],
+)
+def test_what_is_not_loaded_is_refused(monkeypatch, tmp_path, use):
     sim = compiled(FLOWS[0], 2, CAPACITY)
     monkeypatch.setattr(sim, "scenes", [])
-    with pytest.raises(InputError, match="simulation must be loaded before it is run; received 'no scene'"):
-        sim.run()
+    monkeypatch.delattr(sim, "monitor", raising=False)
+    with pytest.raises(
+        InputError, match="simulation must be loaded with a scene before that; received 'none'"
+    ):
+        use(sim, tmp_path / "checkpoint.h5")
+    assert not any(tmp_path.iterdir())

@@ -84,4 +84,5 @@ def test_files_and_dotted_keys(rng):
 def test_a_row_that_is_not_there(rng, key, received):
     with pytest.raises(InputError) as fault:
         hung(rng, 2).replace({key: 1.0})
-    assert str(fault.value) == f"{key} must be a setting of this scene; received {received}"
+    rule = "a setting of this scene (effects.springs.springs has rows 0 to 1)"
+    assert str(fault.value) == f"{key} must be {rule}; received {received}"

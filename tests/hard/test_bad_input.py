@@ -275,7 +275,7 @@ def test_a_start_that_does_not_fit_is_refused():
         simulation.load([fits, fits])
     with pytest.raises(InputError, match=r"number of scenes must be 1 to 1; received 0"):
         simulation.load([])
-    with pytest.raises(InputError, match=r"worlds must be at least 1; received 0"):
+    with pytest.raises(InputError, match=r"worlds must be a whole number, at least 1; received 0"):
         Simulation(fits, worlds=0)
     simulation.close()
 

@@ -123,9 +123,14 @@ class TestReplace:
             (
                 "effects.impcat.hardness",
                 1,
-                "effects.impcat.hardness must be a setting of this scene; received 'impcat'",
+                "effects.impcat.hardness must be a setting of this scene (effects has impact, friction, "
+                "heating, cooling); received 'impcat'; did you mean 'impact'?",
             ),
-            ("duration.long", 1, "duration.long must be a setting of this scene; received 'long'"),
+            (
+                "duration.long",
+                1,
+                "duration.long must be a setting of this scene (duration has none); received 'long'",
+            ),
             ("duration", 0, "scene.duration must be greater than 0.0; received 0"),
             ("stepper.control.shortest", "soon", "approach_time.shortest must be a number; received 'soon'"),
             (

@@ -13,7 +13,7 @@ from tisim.accuracy.reference import Truth
 from tisim.accuracy.row import Row, decades, tied
 from tisim.accuracy.runner import Progress, StudyRunner
 from tisim.backend import runtime
-from tisim.errors import RunError, must
+from tisim.errors import RunError, is_whole, must
 from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -51,7 +51,10 @@ class Study:
         limit: float = math.inf,
         require_reference: bool = False,
     ) -> None:
-        must(repeats >= 1, "repeats", "at least 1", repeats)
+        must(isinstance(scene, Scene), "scene", "a Scene", scene)
+        must(is_whole(repeats, 1), "repeats", "a whole number, at least 1", repeats)
+        for name, decades_of_error in (("coarser", coarser), ("finer", finer)):
+            must(is_whole(decades_of_error, -16), name, "a whole number of decades", decades_of_error)
         must(coarser + finer >= 0, "coarser + finer", "at least 0", coarser + finer)
         must(len(precisions) > 0 and precisions[0] == "f64", "precisions", "f64 and others", precisions)
         for precision in precisions:

@@ -14,7 +14,7 @@ from typing import Any
 from tisim.backend import kernel_cache
 from tisim.backend.taichi import BACKEND, check_backend, ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.errors import InputError, must
+from tisim.errors import InputError, is_whole, must
 
 DEVICES = ("cpu", "cuda")
 PRECISIONS = ("f64", "f32")
@@ -42,7 +42,9 @@ class Runtime:
         check_backend()
         must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
         must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
-        must(self.threads >= 0, "threads", "at least 1 (0 for all cores)", self.threads)
+        must(
+            is_whole(self.threads, 0), "threads", "a whole number, at least 1 (0 for all cores)", self.threads
+        )
         must(self.threads <= THREADS, "threads", f"at most {THREADS}", self.threads)
 
     @property

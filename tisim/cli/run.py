@@ -144,8 +144,9 @@ def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
     for name, value in result.measures.items():
         table.add_row(name.replace("_", " "), f"{value:.6g}")
     settings = result.settings
-    threads = f", {settings['threads']} threads" if "threads" in settings else ""
-    table.add_row("device", f"{settings['device']}, {settings['precision']}{threads}")
+    table.add_row("device", f"{settings['device']}, {settings['precision']}")
+    if "threads" in settings:
+        table.add_row("threads", settings["threads"])
     table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")
     table.add_row("written", "\n".join(map(str, paths)))
     return table

@@ -56,10 +56,11 @@ class Observers:
     """All observers of a run, as one."""
 
     def __init__(self, observers: Sequence[Observing]) -> None:
-        """InputError when one is neither an Observer nor a function."""
-        for one in observers:
-            sound = isinstance(one, Observer) or (callable(one) and not isinstance(one, type))
-            must(sound, "an observer", "an Observer or a function of the simulation", one)
+        """Raise InputError unless each of them is an Observer or a function."""
+        must(isinstance(observers, Sequence), "observers", "a list of them", observers)
+        for observer in observers:
+            usable = isinstance(observer, Observer) or (callable(observer) and not isinstance(observer, type))
+            must(usable, "an observer", "an Observer or a function of the simulation", observer)
         self.members = [one if isinstance(one, Observer) else Callback(one) for one in observers]
 
     def observe(self, simulation: Simulation) -> None:

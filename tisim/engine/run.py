@@ -40,7 +40,7 @@ def run(
     """
     if isinstance(scenes, Scene):
         return run([scenes], progress, record)[0]
-    sound = not isinstance(scenes, str) and all(isinstance(scene, Scene) for scene in scenes)
+    sound = isinstance(scenes, Sequence) and all(isinstance(scene, Scene) for scene in scenes)
     must(sound, "scenes", "a Scene or a list of them (Scene.from_toml reads a file)", scenes)
     with runtime.turn:
         if record is None:

@@ -18,7 +18,7 @@ from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import must
+from tisim.errors import is_number, is_whole, must
 from tisim.neighbours import pair_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -41,7 +41,8 @@ class Simulation:
     def __init__(
         self, scene: Scene, worlds: int = 1, capacity: int | None = None, schedule: str | None = None
     ) -> None:
-        must(worlds >= 1, "worlds", "at least 1", worlds)
+        must(isinstance(scene, Scene), "scene", "a Scene", scene)
+        must(is_whole(worlds, 1), "worlds", "a whole number, at least 1", worlds)
         began = time.perf_counter()
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
@@ -109,6 +110,7 @@ class Simulation:
     @property
     def state(self) -> ParticleState:
         """The particles of the one world that is loaded, to be read and written by name between runs, SI."""
+        self._check_loaded()
         must(len(self.scenes) == 1, "simulation", "of one world (or ask states[w])", len(self.scenes))
         return self.states[0]
 
@@ -162,10 +164,10 @@ class Simulation:
         """Run as ``run`` does, a part at a time: yields wherever observers have looked, first before the
         first step."""
         self.s.check()
-        must(len(self.scenes) > 0, "simulation", "loaded before it is run", "no scene")
+        self._check_loaded()
         rule = "a number of s of simulated time, at least 0"
-        must(until is None or until >= 0, "until", rule, until)
-        must(steps is None or steps >= 0, "steps", "at least 0", steps)
+        must(until is None or (is_number(until) and until >= 0), "until", rule, until)
+        must(steps is None or is_whole(steps, 0), "steps", "a whole number, at least 0", steps)
         watching, stop = Observers(observers), np.inf if until is None else until
         self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
         watching.observe(self)
@@ -219,7 +221,8 @@ class Simulation:
         return [int(w) for w in np.flatnonzero(status != WorldStatus.RUNNING)]
 
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
-        """Loaded worlds read back: those asked for, or all of them, in order."""
+        """Return what has become of the loaded worlds: of those asked for, or of all, in order."""
+        self._check_loaded()
         now, good = self.s.snapshot(self.s.columns), self.monitor.good
         counts = {name: now[name] for name in self.s.counters}
         measures = {name: now[name] for e in self.scenes[0].effects for name in e.world_quantities}
@@ -242,6 +245,10 @@ class Simulation:
             )
         return results
 
+    def _check_loaded(self) -> None:
+        """Raise InputError before the first ``load``."""
+        must(len(self.scenes) > 0, "simulation", "loaded with a scene before that", "none")
+
     def _edited(self, w: int) -> dict[str, str]:
         """What has been written to a world besides its scene."""
         return {"edited": "; ".join(self.edits[w])} if self.edits[w] else {}
@@ -253,6 +260,7 @@ class Simulation:
         """
         from tisim.io import checkpoint
 
+        self._check_loaded()
         checkpoint.save(self, path)
 
     def restore(self, path: str | Path) -> None:
@@ -263,6 +271,7 @@ class Simulation:
         """
         from tisim.io import checkpoint
 
+        self._check_loaded()
         checkpoint.restore(self, path)
 
     def close(self) -> None:

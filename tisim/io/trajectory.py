@@ -27,7 +27,7 @@ import numpy as np
 from tisim import version
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
-from tisim.errors import InputError, RunError, must
+from tisim.errors import InputError, RunError, is_number, is_whole, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file, temporary_name
 from tisim.files.growing_hdf5 import GrowingFile
@@ -57,8 +57,13 @@ class Recording:
     def __post_init__(self) -> None:
         received = "both" if self.every is not None else "neither"
         must((self.frames is None) != (self.every is None), "recording", "given frames or every", received)
-        must(self.frames is None or self.frames >= 1, "frames", "at least 1", self.frames)
-        sound = self.every is None or 0 < self.every < np.inf
+        must(
+            self.frames is None or is_whole(self.frames, 1),
+            "frames",
+            "a whole number, at least 1",
+            self.frames,
+        )
+        sound = self.every is None or (is_number(self.every) and 0 < self.every < np.inf)
         must(sound, "every", "above 0 s, and finite", self.every)
 
     def interval(self, scene: Scene) -> float:

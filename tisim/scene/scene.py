@@ -15,7 +15,7 @@ from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.json_text import json_pieces
 from tisim.effects.base import Effect
-from tisim.errors import InputError, abbreviated, must
+from tisim.errors import InputError, abbreviated, did_you_mean, must, printable
 from tisim.files import python_file
 from tisim.scene import plugins
 from tisim.scene.initial_state import Start
@@ -183,10 +183,10 @@ class Scene(Component):
         for key, value in settings.items():
             *path, last = key.split(".")
             place: Any = data
-            for step in path:
-                place = place[_step(place, step, key)]
+            for depth, step in enumerate(path):
+                place = place[_step(place, step, key, ".".join(path[:depth]))]
             # A key that is not there may be one that is left at its default.
-            place[last if isinstance(place, dict) else _step(place, last, key)] = value
+            place[last if isinstance(place, dict) else _step(place, last, key, ".".join(path))] = value
         return type(self).from_dict(data)
 
     def without(self, *names: str) -> Scene:
@@ -215,11 +215,19 @@ def _effect(name: str, values: Any) -> Effect:
     return serialization.from_dict(Effect, {"kind": name, **table, **name_entry}, where)
 
 
-def _step(place: Any, step: str, key: str) -> Any:
-    """The key or number by which a place in plain data is entered; InputError naming the whole ``key``."""
+def _step(place: Any, step: str, key: str, path: str) -> Any:
+    """Return the key or number by which a place in plain data is entered; InputError with the whole ``key``.
+
+    path : dotted name of the place; empty for the scene itself.
+    """
     # Of few digits: Python does not read numbers of some thousand.
     in_list = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
-    must(in_list or (isinstance(place, dict) and step in place), key, "a setting of this scene", step)
+    if not in_list and not (isinstance(place, dict) and step in place):
+        names = list(place) if isinstance(place, dict) else []
+        rows = f"rows 0 to {len(place) - 1}" if isinstance(place, list) and place else "none"
+        rule = f"a setting of this scene ({path or 'the scene'} has {', '.join(names) or rows})"
+        nearest = did_you_mean(step, names)
+        raise InputError(f"{printable(key)} must be {rule}; received {abbreviated(step)}{nearest}")
     return int(step) if in_list else step
 
 
