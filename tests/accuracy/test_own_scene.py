@@ -11,7 +11,7 @@ from tisim import RunError
 from tisim.accuracy import Quantity, Study, reference, storage, study
 from tisim.accuracy.quantity import displacement
 from tisim.accuracy.runner import StudyRunner
-from tisim.accuracy.table import notes
+from tisim.accuracy.table import error_texts, notes
 from tisim.accuracy.timing import OBSERVATIONS, SimulationCache
 from tisim.backend import runtime
 from tisim.effects import Tether
@@ -181,4 +181,8 @@ def test_a_law_that_makes_no_difference_is_called_the_same(verlet_only, monkeypa
     cost_study = study(closed(), **FEW)
     assert [row.same for row in cost_study.line("Tether")] == [False, True]
     assert not any(row.same for row in cost_study.line("Verlet, FixedStep: dt"))
-    assert "no change: the same as of the law that it stands for, but for rounding" in notes(cost_study)
+    below = notes(cost_study)
+    assert "no change: the same as of the law that it stands for, but for rounding" in below
+    assert any(line.startswith("time: the median of the wall seconds; spread: ") for line in below)
+    unknown = any(text.startswith("<") for row in cost_study.rows for text in error_texts(row))
+    assert any(line.startswith("<: ") for line in below) == unknown

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from textwrap import fill
 
 import pytest
 
@@ -33,6 +34,23 @@ def test_on_a_terminal_lines_end_between_words(tisim, monkeypatch):
         assert len(line) <= 80
         words = re.split("  +", line, maxsplit=2)[2].removesuffix(" ...").split()
         assert words == f"{entry.summary} {entry.source}".split()[: len(words)]
+
+
+def test_on_a_terminal_paragraphs_and_equations_fit(tisim, monkeypatch):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERM", "dumb")
+    for name in ("impact", "hertz", "dipole_dipole"):
+        _, out, _ = tisim("effects", name)
+        before = out[: out.index("\n\nSource: ")]
+        assert max(map(len, before.splitlines())) <= 80, name
+        _, _, *paragraphs = before.split("\n\n")
+        for text in paragraphs:
+            if not text.startswith("    "):
+                assert " ".join(text.split()) in " ".join(reference.find(name).kind.__doc__.split())
+                assert text == fill(text, 80)
+        equations = [line for line in before.splitlines() if line.startswith("    ")]
+        assert not {"(3.1)", "force", "(4.12)", "E"} & {line.split(maxsplit=1)[0] for line in equations}
 
 
 @pytest.mark.parametrize("group", ["operators", "sources", "steppers", "step_controls", "pair", "magnetic"])

@@ -15,6 +15,13 @@ from tisim.accuracy.reference import ADVICE, tells_apart
 from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
 
+MEANINGS = (
+    "time: the median of the wall seconds; spread: the longest less the shortest of them",
+    "steps, forces, rejected: the steps, sums of forces and rejected steps of a particle",
+    "best for: the error that no other setting meets in less time",
+)
+"""What the heads of the table stand for."""
+
 
 def table(study: Study) -> RenderableType:
     """Return every setting by method, with its median time, work and errors; for what error it is the
@@ -86,6 +93,10 @@ def truths(study: Study) -> list[str]:
 def notes(study: Study) -> list[str]:
     """Return lines that stand below the table: the true values, and what words in the table mean."""
     lines = truths(study)
+    measured = [row for row in study.rows if row.errors]
+    lines += MEANINGS if measured else []
+    if any(not row.trusted(k) for row in measured for k in range(len(row.errors))):
+        lines.append("<: no more is known of the error than that it is smaller")
     if any(len(rows) > 1 for rows in study.decades().values()):
         lines.append("best for, in brackets: timings do not tell it from the other, which takes less work")
     if not study.complete:

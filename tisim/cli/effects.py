@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
-from textwrap import shorten
+from textwrap import fill, shorten
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -68,6 +69,30 @@ def _fitting(text: str, width: int) -> str:
     return shorten(text, max(width, LEAST_WIDTH), placeholder=" ...")
 
 
+def _fitted(body: str, width: int) -> str:
+    """Return the paragraphs of a docstring in lines of at most so many characters, equations as they stand
+    where they fit."""
+    paragraphs = []
+    for paragraph in body.split("\n\n"):
+        if paragraph.startswith("    "):
+            paragraphs += ["\n".join(_fitted_equation(line, width) for line in paragraph.splitlines())]
+        else:
+            paragraphs += [fill(paragraph, width)]
+    return "\n\n".join(paragraphs)
+
+
+def _fitted_equation(line: str, width: int) -> str:
+    """Return a line of equations; one that is too long is broken between them, or else between words."""
+    if len(line) <= width:
+        return line
+    lines = ["  "]
+    for equation in re.split(" {2,}", line.strip()):
+        if lines[-1].strip() and len(lines[-1]) + 2 + len(equation) > width:
+            lines.append("      ")
+        lines[-1] += f"  {equation}"
+    return "\n".join(fill(one, width, subsequent_indent=" " * 8) for one in lines)
+
+
 def _names(entry: Entry) -> tuple[str, str]:
     return entry.name, entry.kind.__name__
 
@@ -76,7 +101,7 @@ def _describe(entry: Entry) -> RenderableType:
     """Return all that the reference has of one entry."""
     heading = Text.assemble((entry.name, "bold"), f"  {entry.kind.__module__}.{entry.kind.__name__}")
     lines: list[RenderableType] = [heading, "", f"{entry.summary}.", ""]
-    lines += [entry.body, ""] if entry.body else []
+    lines += [_fitted(entry.body, out().width), ""] if entry.body else []
     references = [f"Source: {entry.source}", *(f"    {work}" for work in entry.publications()), ""]
     lines += references if entry.source else []
     if entry.settings:
