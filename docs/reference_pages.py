@@ -1,4 +1,5 @@
-"""Makes the pages of docs/reference from the code: one for each family of parts, and one of the public names.
+"""Makes the pages of docs/reference from the code: one for each part, for each family of them, and one of the
+public names.
 
     python docs/reference_pages.py    writes docs/parts.md anew, the list of all parts with a line each
 
@@ -27,15 +28,17 @@ NAMES = {entry.name for entry in reference.entries()}
 
 
 def write(folder: Path) -> None:
-    """All pages."""
-    folder.mkdir(exist_ok=True)
+    """Write all pages; remove those of parts that are no more."""
     entries = reference.entries()
+    pages = {folder / f"{one.family}/{one.name}.rst": _law(one) for one in entries}
     for name, family in reference.FAMILIES.items():
-        _put(
-            folder / f"{name}.rst",
-            _family(family.title, family.base, [one for one in entries if one.family == name]),
-        )
-    _put(folder / "api.rst", _api({one.kind: one for one in entries}))
+        members = [one for one in entries if one.family == name]
+        pages[folder / f"{name}.rst"] = _family(name, family.title, family.base, members)
+    pages[folder / "api.rst"] = _api({one.kind: one for one in entries})
+    for path, lines in pages.items():
+        _put(path, lines)
+    for path in set(folder.rglob("*.rst")) - set(pages):
+        path.unlink()
 
 
 def parts() -> str:
@@ -59,6 +62,7 @@ def parts() -> str:
 
 def _put(path: Path, lines: Iterable[str]) -> None:
     """Write a page, but not one that is there: Sphinx reads anew what is newer."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     text = "\n".join(lines) + "\n"
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
@@ -120,12 +124,11 @@ def _heading(text: str, line: str) -> list[str]:
     return [text, line * len(text), ""]
 
 
-def _family(title: str, base: type, entries: list[Entry]) -> Iterator[str]:
+def _family(name: str, title: str, base: type, entries: list[Entry]) -> Iterator[str]:
     yield from _heading(title, "=")
     rows = [(f":ref:`{one.name}`", plain(one.summary), plain(one.source)) for one in entries]
     yield from _grid(("name", "what it is", "source"), rows)
-    for entry in entries:
-        yield from _law(entry)
+    yield from (".. toctree::", "   :hidden:", "", *(f"   {name}/{one.name}" for one in entries), "")
     if _home(base) is None:
         yield from _heading("The contract", "-")
         yield from (f".. autoclass:: {base.__module__}.{base.__name__}", "   :members:", "")
@@ -147,10 +150,10 @@ def _grid(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
 
 
 def _law(entry: Entry) -> Iterator[str]:
-    """The section of a part."""
+    """The page of a part."""
     name, module, public = entry.kind.__name__, entry.kind.__module__, _home(entry.kind)
     yield from (f".. _{entry.name}:", "")
-    yield from _heading(entry.name, "-")
+    yield from _heading(entry.name, "=")
     yield from (
         f".. py:class:: {public}.{name}{_call(entry.settings)}",
         f"   :canonical: {module}.{name}",
@@ -193,7 +196,7 @@ def _toml(entry: Entry) -> Iterator[str]:
 
 
 def _api(parts: dict[type, Entry]) -> Iterator[str]:
-    """Every public name: a part links to its section, anything else stands here."""
+    """Every public name: a part links to its page, anything else stands here."""
     yield from _heading("Public names", "=")
     ids: set[int] = set()
     for package in PACKAGES:

@@ -24,13 +24,28 @@ def maker():
 def pages(maker, tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages") / "reference"
     maker.write(folder)
-    return {page.stem: page.read_text(encoding="utf-8") for page in folder.iterdir()}
+    return {
+        str(page.relative_to(folder).with_suffix("")): page.read_text(encoding="utf-8")
+        for page in folder.rglob("*.rst")
+    }
 
 
-def test_there_is_a_page_for_each_family_and_one_of_names(pages):
-    assert set(pages) == {*reference.FAMILIES, "api"}
+def test_there_is_a_page_for_each_part_each_family_and_one_of_names(pages):
+    parts = {f"{entry.family}/{entry.name}" for entry in reference.entries()}
+    assert set(pages) == {*parts, *reference.FAMILIES, "api"}
     index = (DOCS / "index.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^reference/(\w+)$", index, re.M)) == set(pages)
+    assert set(re.findall(r"^reference/(\w+)$", index, re.M)) == set(pages) - parts
+    listed = {
+        name for family in reference.FAMILIES for name in re.findall(r"^   (\w+/\w+)$", pages[family], re.M)
+    }
+    assert listed == parts
+
+
+def test_pages_of_parts_that_are_no_more_are_removed(maker, tmp_path):
+    (tmp_path / "effects").mkdir()
+    (tmp_path / "effects" / "gone.rst").write_text("gone")
+    maker.write(tmp_path)
+    assert not (tmp_path / "effects" / "gone.rst").exists()
 
 
 def test_every_guide_and_case_is_in_the_index():
@@ -40,14 +55,13 @@ def test_every_guide_and_case_is_in_the_index():
     assert pages - {"index"} == listed
 
 
-def test_every_part_has_a_section(pages):
+def test_a_page_says_all_of_its_part(pages):
     for entry in reference.entries():
-        (section,) = re.findall(
-            rf"^\.\. _{entry.name}:\n\n.*?(?=^\.\. _|\Z)", pages[entry.family], re.M | re.S
-        )
-        assert f".{entry.kind.__name__}" in section
+        page = pages[f"{entry.family}/{entry.name}"]
+        assert page.startswith(f".. _{entry.name}:\n\n{entry.name}\n===")
+        assert f".{entry.kind.__name__}" in page
         for one in entry.settings:
-            assert f"``{one.name}``" in section
+            assert f"``{one.name}``" in page
 
 
 def test_public_names_are_all_there(pages):
