@@ -59,13 +59,13 @@ def snapshot(axis: Axes, state: Arrays) -> None:
     """Particles as seen along y, to scale; white those that are single, coloured by chain the others."""
     position, moment, radius = state["position"], state["moment"], float(state["radius"][0])
     chains = labels(len(position), head_to_tail(position, moment, 2 * radius))
-    alone = np.bincount(chains)[chains] == 1
+    single = np.bincount(chains)[chains] == 1
     places = (position - position.mean(axis=0))[:, [0, 2]] / MICRO
     order = np.argsort(-position[:, 1])
     size = np.full(len(position), 2 * radius / MICRO)
     discs = EllipseCollection(size, size, np.zeros(len(position)), units="x", offsets=places[order],
                               offset_transform=axis.transData, edgecolor="0.3", lw=0.4)  # fmt: skip
-    colour = np.ma.masked_array(chains * 7 % 20, alone)[order]
+    colour = np.ma.masked_array(chains * 7 % 20, single)[order]
     discs.set(cmap=colormaps["tab20"].with_extremes(bad="white"), clim=(0, 19), array=colour)
     axis.add_collection(discs)
     axis.autoscale_view()

@@ -122,7 +122,7 @@ def of_capture(repeats: int) -> Iterator[Claim]:
     yield Claim(name, Mean.of(along), least=NO_CAPTURE_BEFORE)
     yield Claim("transverse over longitudinal (B16: almost 2)", Mean.of(across / along), least=1.5)
     by = f"first capture at {DENSE:g} g/mL, sooner by, s, than"
-    for (angle, name), lone in zip(ORIENTATIONS.items(), alone(repeats), strict=True):
+    for (angle, name), lone in zip(ORIENTATIONS.items(), without_interaction(repeats), strict=True):
         late, soon = first_captures[angle, DILUTE], first_captures[angle, DENSE]
         yield Claim(f"{name}: {by} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
         than = f"{name}: {by} of particles that feel nothing of each other"
@@ -131,7 +131,7 @@ def of_capture(repeats: int) -> Iterator[Claim]:
     yield Claim(name, Mean.of(across - first_captures[90.0, DENSEST]), least=0.0)
 
 
-def alone(repeats: int) -> list[np.ndarray]:
+def without_interaction(repeats: int) -> list[np.ndarray]:
     """Times of the first capture (s) of as many particles that feel nothing of each other, by angle."""
     setting = {**CAPTURE, "hydrodynamics": "none", "duration": 1.5, "concentration": DENSE}
     scenes = [

@@ -38,8 +38,8 @@ def constants(scene: Scene) -> dict[str, float] | None:
     It does where nothing but pair forces and PeakDisplacement is added to the array of Z13, in a constant
     field along z and one along x that oscillates, and all particles, alike, begin at rest at their anchors.
     """
-    alone = (e for e in scene.effects if not isinstance(e, PairForce | PeakDisplacement))
-    have: dict[type, Any] = {type(effect): effect for effect in alone}
+    single_effects = (e for e in scene.effects if not isinstance(e, PairForce | PeakDisplacement))
+    have: dict[type, Any] = {type(effect): effect for effect in single_effects}
     if have.keys() != {Lorentz, ElectricField, MagneticField, Tether} or not isinstance(scene.domain, Open):
         return None
     field, flux, k = have[ElectricField], have[MagneticField], have[Tether].stiffness
@@ -64,12 +64,12 @@ def _alike_at_rest(start: Arrays) -> bool:
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Where every particle is, and where their centre of gravity."""
     described = constants(scene) is not None
-    alone = described and not any(isinstance(effect, PairForce) for effect in scene.effects)
+    independent = described and not any(isinstance(effect, PairForce) for effect in scene.effects)
 
     def alike(result: Result) -> np.ndarray:
         return np.tile(exact(result), (len(result.start["mass"]), 1))
 
     return (
-        Quantity("positions", displacement, alike if alone else None, returns=True),
+        Quantity("positions", displacement, alike if independent else None, returns=True),
         Quantity("centre of gravity", centre, exact if described else None, returns=True),
     )

@@ -29,8 +29,8 @@ def check() -> Iterator[Check]:
     pair = float(np.sqrt(ATTRACTION * (ATTRACTION / REPULSION) ** 2 / MASS))
     yield Check("sqrt(alpha_1 (alpha_1/alpha_2)^2/m), 1/s", pair, 87.404, 1e-3)
     yield Check("product of the two resonances, k/m, 1/s^2", slow * fast, STIFFNESS / MASS, 1e-9)
-    alone = run([scene(r, "none", duration=0.05, sites=1, observed=True) for r in RATIOS])
-    yield Check("one particle, 0.05 s, all of Fig. 3: off by", deviation(alone), 0.0, 1e-3)
+    single = run([scene(r, "none", duration=0.05, sites=1, observed=True) for r in RATIOS])
+    yield Check("one particle, 0.05 s, all of Fig. 3: off by", deviation(single), 0.0, 1e-3)
     some = (0.1, 0.8, 1.8)
     fine = {"stepper": Collocation(control=StageControl(error=1e-6))}
     cloud = run([scene(r, duration=0.05).model_copy(update=fine) for r in some])

@@ -12,7 +12,7 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 from tisim.components.component import Checked
 from tisim.errors import must
 
-_UNFIT = {
+_UNSUITABLE = {
     **dict.fromkeys(("selRoulette", "selStochasticUniversalSampling"), "favours large fitness values"),
     **dict.fromkeys(
         ("selNSGA2", "selNSGA3", "selNSGA3WithMemory", "selSPEA2", "selTournamentDCD"),
@@ -38,9 +38,9 @@ class GeneticOperator(Checked):
         names = [
             name
             for name in dir(tools)
-            if name.startswith(prefix) and callable(getattr(tools, name)) and name not in _UNFIT
+            if name.startswith(prefix) and callable(getattr(tools, name)) and name not in _UNSUITABLE
         ]
-        why = f" ({self.name} {_UNFIT[self.name]})" if self.name in _UNFIT else ""
+        why = f" ({self.name} {_UNSUITABLE[self.name]})" if self.name in _UNSUITABLE else ""
         must(self.name in names, "operator name", f"one of {', '.join(names)}{why}", self.name)
         signature = inspect.signature(function)
         arity = {"sel": 2, "cx": 2, "mut": 1}[prefix]

@@ -78,7 +78,7 @@ def test_kernels_are_kept_after_a_kill_and_nothing_warns(folder):
     kernels = [path for path in folder.rglob("*") if path.suffix in (".tic", ".qdc")]
     assert len(kernels) > 5
     # Now there is something to read: who starts while another process writes waits, however long that takes.
-    with kernel_cache.alone():
+    with kernel_cache.exclusive_access():
         leave_lock(age=0.0)
         waits = begin(QUEUES + SCRIPT)
         assert waits.stdout.readline() == "ready\n"

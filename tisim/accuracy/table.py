@@ -15,7 +15,7 @@ from tisim.accuracy.reference import ADVICE, tells_apart
 from tisim.accuracy.row import Row
 from tisim.console import TERMINAL_WIDTH
 
-MEANINGS = (
+HEADINGS = (
     "time: the median of the wall seconds; spread: the longest less the shortest of them",
     "steps, forces, rejected: the steps, sums of forces and rejected steps of a particle",
     "best for: the error that no other setting meets in less time",
@@ -94,7 +94,7 @@ def notes(study: Study) -> list[str]:
     """Return lines that stand below the table: the true values, and what words in the table mean."""
     lines = truths(study)
     measured = [row for row in study.rows if row.errors]
-    lines += MEANINGS if measured else []
+    lines += HEADINGS if measured else []
     if any(not row.trusted(k) for row in measured for k in range(len(row.errors))):
         lines.append("<: no more is known of the error than that it is smaller")
     if any(len(rows) > 1 for rows in study.decades().values()):

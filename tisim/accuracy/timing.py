@@ -40,11 +40,13 @@ class Timed:
         steps, sums, rejections = 0.0, 0.0, 0.0
         for result in self.results:
             n, stepper = len(result.start["mass"]), result.scene.stepper
-            alone, evaluations = stepper.independent(result.scene.effects), stepper.evaluations
+            independent, evaluations = stepper.independent(result.scene.effects), stepper.evaluations
             steps += result.work["particle_steps"] / n
-            sums += evaluations(result.work, n, alone)
+            sums += evaluations(result.work, n, independent)
             # A rejection is of those that a sum of forces is of: of one particle, or of all.
-            rejections += evaluations(dict.fromkeys(result.work, result.work.get("rejections", 0)), n, alone)
+            rejections += evaluations(
+                dict.fromkeys(result.work, result.work.get("rejections", 0)), n, independent
+            )
         starts = len(self.results)
         return steps / starts, sums / starts, rejections / starts
 

@@ -1,10 +1,10 @@
-"""The front end of Taichi and of Quadrants, relieved of work that gives the same each time.
+"""The front end of Taichi and of Quadrants is relieved of work that gives the same each time.
 
 Where a class defines a function for kernels, both look up the line of the class in its file to learn that it
-is one; a look at the frame tells. Taichi 1.7.4, which reads a function anew wherever it is called, also looks
-up its source each time, and sets for every expression a text that shows its place, for an error that may
-come. Together that is a third of the time to start a simulation whose kernels lie in the cache. Here what is
-found is remembered, and errors say the same. Quadrants remembers sources by itself.
+is one, though the frame of the caller says so. Taichi 1.7.4, which reads a function anew wherever it is
+called, also looks up its source each time, and sets for every expression a text that shows its place, for an
+error that may come. Together that is a third of the time to start a simulation whose kernels lie in the
+cache. Here what is found is remembered, and errors say the same. Quadrants remembers sources by itself.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ def _in_class_body(level_of_class_stackframe: int) -> bool:
     return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
-def _by_code(look: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return ``look``, asked once for all functions made by one definition."""
+def _by_code(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return ``look_up`` with a memory, so that it is called once for all functions of one definition."""
     known: dict[tuple[CodeType, str], Any] = {}
 
-    @functools.wraps(look)
+    @functools.wraps(look_up)
     def remembered(function: Any) -> Any:
         code = function.__code__
         # Codes of two files are equal where they do the same.
         key = (code, code.co_filename)
         if key not in known:
-            known[key] = look(function)
+            known[key] = look_up(function)
         return known[key]
 
     return remembered
 
 
-def _by_place(tell: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
-    """Return ``tell``, asked once for each place in a source."""
+def _by_place(describe: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
+    """Return ``describe`` with a memory, so that it is called once for each place in a source."""
     known: dict[tuple[Any, ...], str] = {}
 
-    @functools.wraps(tell)
+    @functools.wraps(describe)
     def remembered(context: Any, node: Any) -> str:
         begin, end = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
         # The lines as well: a file may have been edited and read again.
@@ -62,7 +62,7 @@ def _by_place(tell: Callable[[Any, Any], str]) -> Callable[[Any, Any], str]:
         place = (context.file, context.func.func.__name__, context.lineno_offset)
         key = (*place, lines, type(node), *begin, *end)
         if key not in known:
-            known[key] = tell(context, node)
+            known[key] = describe(context, node)
         return known[key]
 
     return remembered

@@ -32,16 +32,16 @@ QUEUE = "tisim.lock"
 
 
 def lock() -> Path:
-    """Where Taichi's lock is, when it is held."""
+    """Return the path of Taichi's lock, which is there while a process holds it."""
     variable, name = LOCKS[BACKEND]
     return Path(os.environ.get(variable) or ti.lang.impl.default_cfg().offline_cache_file_path) / name
 
 
 def options() -> dict[str, str]:
-    """What the compiler is to be told of the folder for kernels: nothing, or another one.
+    """Return the options of the compiler that name the folder for kernels; none where that is its own one.
 
-    It stops where it may not look into its folder. A process that may not gets one of its own, which goes
-    with it.
+    The compiler stops where it may not enter its folder. A process that may not gets a temporary one, which
+    is removed when the process ends.
     """
     folder = lock().parent
     with suppress(OSError):
@@ -64,8 +64,9 @@ def unlock() -> None:
 
 
 @contextmanager
-def alone() -> Iterator[None]:
-    """While this lasts, no other process of tisim reads or writes the kernels on disk.
+def exclusive_access() -> Iterator[None]:
+    """Keep all other processes of tisim from reading or writing the kernels on disk, for as long as this
+    lasts.
 
     Where the folder cannot be written, or the system has no locks, there is no waiting.
     """

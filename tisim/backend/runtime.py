@@ -110,7 +110,7 @@ def _start(requested: Runtime) -> None:
     _current, _generation = None, _generation + 1
     try:
         # Taichi announces the device on standard output, where results go.
-        with kernel_cache.alone(), contextlib.redirect_stdout(io.StringIO()):
+        with kernel_cache.exclusive_access(), contextlib.redirect_stdout(io.StringIO()):
             ti.init(
                 arch=ti.cuda if requested.device == "cuda" else ti.cpu,
                 default_fp=requested.real,
@@ -137,7 +137,7 @@ def _compile_first():
 
 def _stop() -> None:
     """Stop Taichi at the end of the process, which has it write down what it has compiled."""
-    with kernel_cache.alone():
+    with kernel_cache.exclusive_access():
         ti.reset()
 
 

@@ -72,8 +72,8 @@ def cost(
         bool,
         typer.Option(
             "--quick",
-            help="A look: stop a decade above what the scene asks for, time once, and give up where the "
-            "reference does not tell settings apart.",
+            help="A quick estimate: stop a decade above what the scene asks for, time once, and give up "
+            "where the reference does not tell settings apart.",
         ),
     ] = False,
     anyway: Annotated[
@@ -196,7 +196,7 @@ def _whole_numbers(text: str) -> tuple[int, ...]:
 
 
 def _measure(study: Study, out_folder: Path) -> bool:
-    """Run, with progress told and rows on the disk as they come; return False when Ctrl-C has stopped it."""
+    """Run a study, show its progress and store its rows as they come; return False after Ctrl-C."""
     from tisim.accuracy import storage
     from tisim.cli.cost_progress import CostProgress
 
@@ -206,12 +206,12 @@ def _measure(study: Study, out_folder: Path) -> bool:
             progress.running(fraction, what)
             ctrl_c.check()
 
-        def keep() -> None:
+        def store_rows() -> None:
             storage.write(study, out_folder)
             progress.finished()
 
         try:
-            study.run(report, keep)
+            study.run(report, store_rows)
         except KeyboardInterrupt:
             if ctrl_c.forced:
                 raise

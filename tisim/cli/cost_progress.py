@@ -1,4 +1,4 @@
-"""How a study of costs goes, on standard error: its reference, then each setting as it becomes known."""
+"""The progress of a study of costs is shown on standard error: its reference, then each setting."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from tisim.accuracy import Row, Study
 
 LEAST_FRACTION = 0.02
-"""So much of a study must be done before the time that is left is told."""
+"""So much of a study must be done before the time that is left is shown."""
 
 
 class CostProgress:
-    """A bar on a terminal. Elsewhere, where a bar would be seen at its end only, a line for each setting."""
+    """Progress is a bar on a terminal; elsewhere, where a bar would be seen at its end only, a line for each
+    setting."""
 
     def __init__(self, study: Study) -> None:
         self.study, self.console = study, err()
@@ -25,7 +26,7 @@ class CostProgress:
         self.bar.disable = not self.console.is_terminal
         self.task = self.bar.add_task("", total=1.0)
         self.began, self.fraction, self.what = time.monotonic(), 0.0, ""
-        # What an earlier study has left is not told again, but for what its reference is good for.
+        # What an earlier study has left is not shown again, but for what its reference is good for.
         self.rows, self.truths = len(study.rows), 0
 
     def __enter__(self) -> CostProgress:

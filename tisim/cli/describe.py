@@ -1,4 +1,4 @@
-"""The commands ``cases``, ``explain``, ``check`` and ``doctor`` tell of cases, a scene and the machine."""
+"""The commands ``cases``, ``explain``, ``check`` and ``doctor`` describe cases, a scene and the machine."""
 
 from __future__ import annotations
 

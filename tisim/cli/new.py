@@ -29,13 +29,13 @@ FORCES = ("pair", "external")
 
 What = Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(USES)}.")]
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the file NAME.py, such as soft_shell.")]
-Sort = Annotated[
+Kind = Annotated[
     str | None,
     typer.Option("--kind", help="Of an effect: pair (between two particles; default) or external (on each)."),
 ]
 
 
-def new(what: What, name: Name, kind: Sort = None) -> None:
+def new(what: What, name: Name, kind: Kind = None) -> None:
     """Write NAME.py with a part of scenes, a case or an inverse problem that runs, and test_NAME.py.
 
     Beside an effect, operator, source or stepper stands NAME.toml, a scene with it. Files that are there

@@ -18,10 +18,10 @@ from tisim.scene.scene import Scene
 if TYPE_CHECKING:
     from tisim.io.trajectory import Trajectory
 
-SLOTS = 300_000
-"""Particles of all worlds of a batch together; keeps its memory to some hundred MB."""
-KEPT = 8
-"""Compiled simulations kept for later calls."""
+BATCH_PARTICLES = 300_000
+"""The largest number of particles of all worlds of a batch, which bounds its memory to some hundred MB."""
+IDLE_SIMULATIONS = 8
+"""The largest number of compiled simulations that are kept for later calls."""
 SPARE, WASTE = 4096, 8
 """A kept simulation serves where it has room for at most so many particles, or so many times what is needed:
 all of its room is loaded and looked at."""
@@ -38,10 +38,11 @@ def share(progress: Progress, finished_parts: int, parts: int) -> Progress:
 
 
 class Batches:
-    """Scenes to results. Scenes of one structure (effects, options, domain, stepper) run side by side.
+    """Batches make results of scenes: those of one structure (effects, options, domain, stepper) run side by
+    side.
 
-    limit : most worlds of a batch. A world is yielded when it has ended, while others go on, so that whoever
-    keeps results loses little when stopped.
+    limit : the largest number of worlds of a batch. A world is yielded when it has ended, while others go on,
+    so that whoever keeps results loses little when stopped.
     """
 
     def __init__(self, limit: int = 256) -> None:
@@ -93,26 +94,27 @@ class Batches:
 
     @contextmanager
     def _simulation(self, scenes: Sequence[Scene]) -> Iterator[Simulation]:
-        """A compiled simulation for scenes of one structure, which is nobody else's meanwhile."""
+        """Yield a compiled simulation for scenes of one structure, which nobody else uses meanwhile."""
         capacity = max(scene.capacity() for scene in scenes)
-        worlds = max(1, min(len(scenes), self.limit, SLOTS // capacity))
+        worlds = max(1, min(len(scenes), self.limit, BATCH_PARTICLES // capacity))
         simulation = self._reusable(scenes[0].structure(), worlds, capacity)
         if simulation is None:
             _renew()
             capacity = rounded(capacity)
-            worlds = max(1, min(rounded(worlds), self.limit, SLOTS // capacity))
+            worlds = max(1, min(rounded(worlds), self.limit, BATCH_PARTICLES // capacity))
             simulation = Simulation(scenes[0], worlds, capacity)
         try:
             yield simulation
         finally:
             with _lock:
                 self._idle.append(simulation)
-                old, self._idle = self._idle[:-KEPT], self._idle[-KEPT:]
+                old, self._idle = self._idle[:-IDLE_SIMULATIONS], self._idle[-IDLE_SIMULATIONS:]
             for each in old:
                 each.close()
 
     def _reusable(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
-        """The smallest kept simulation that serves, taken out of those kept; None where there is none."""
+        """Return the smallest idle simulation that serves, taken out of the idle ones; None where none
+        does."""
         most = max(SPARE, WASTE * worlds * capacity)
         with _lock:
             self._idle = [each for each in self._idle if each.s.alive]

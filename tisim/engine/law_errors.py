@@ -1,4 +1,4 @@
-"""What is wrong with a law that cannot be compiled, in a line of its author's file.
+"""A law that cannot be compiled is reported in one line, which names the line of its author's file.
 
 Taichi compiles a law when a scene is first run, and shows every place from the loop of a step down to the
 fault.
@@ -19,28 +19,28 @@ PLACE = re.compile(r'File "(.+?)", line (\d+), in (\w+):')
 
 
 @contextmanager
-def in_a_line() -> Iterator[None]:
+def reported_in_a_line() -> Iterator[None]:
     """Raise InputError, naming file and line, where a law outside of this package cannot be compiled."""
     try:
         yield
     except InputError:
         raise
     except Exception as error:
-        said = str(error)
-        places = PLACE.findall(said)
+        message = str(error)
+        places = PLACE.findall(message)
         file, line, function = places[-1] if places else ("", "", "")
         if not places or PACKAGE in Path(file).parents:
             raise
-        what = " ".join(said.strip().splitlines()[-1].split())
+        what = " ".join(message.strip().splitlines()[-1].split())
         where = f"{file}, line {line}, in {_owner(file, int(line))}{function},"
         raise InputError(f"{where} must be what Taichi can compile; received {what}") from error
 
 
 def _owner(file: str, line: int) -> str:
-    """The class that a line of a file stands in, and a dot; nothing outside of one."""
-    found = [
+    """Return the class that a line of a file stands in, and a dot; nothing outside of one."""
+    classes = [
         node.name
         for node in ast.walk(ast.parse(Path(file).read_text(encoding="utf-8")))
         if isinstance(node, ast.ClassDef) and node.lineno <= line <= (node.end_lineno or line)
     ]
-    return f"{found[-1]}." if found else ""
+    return f"{classes[-1]}." if classes else ""

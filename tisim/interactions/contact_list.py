@@ -60,7 +60,8 @@ class ContactList:
 
     @ti.func
     def overflow(self, w):
-        """Stop a world, and blame no particle: whose pair is one too many is up to the order of threads."""
+        """Stop a world, and name no failing particle: whose pair is one too many is up to the order of
+        threads."""
         ti.atomic_max(self.s.failed[w], WorldStatus.CONTACT_OVERFLOW)
 
 

@@ -56,8 +56,8 @@ class Scene(Component):
         labels = [effect.label for effect in self.effects]
         for kind, label in zip(present, labels, strict=True):
             must(labels.count(label) == 1, f"effects.{label}", "given once", labels.count(label))
-            alone = (kind.repeatable and not kind.world_quantities) or present.count(kind) == 1
-            must(alone, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
+            allowed = (kind.repeatable and not kind.world_quantities) or present.count(kind) == 1
+            must(allowed, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
             for required_kinds in kind.requires:
                 must(
                     any(issubclass(other, required_kinds) for other in present),

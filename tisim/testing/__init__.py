@@ -1,4 +1,4 @@
-"""What a test of one's own law, operator or stepper asks of it, given a scene that has it.
+"""Assertions for tests of one's own laws, operators and steppers, given a scene that has them.
 
     from tisim.testing import assert_contracts
 
@@ -6,7 +6,7 @@
         assert_contracts(scene)
 
 Each function raises AssertionError, and names what breaks the contract of tisim/effects/base.py or
-tisim/steppers/base.py. The scene should have particles that meet; few will do, and some steps.
+tisim/steppers/base.py. The scene should have particles that meet; a few particles and steps are enough.
 """
 
 import lazy_loader

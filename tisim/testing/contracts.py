@@ -1,4 +1,4 @@
-"""All that a scene can be held to at once."""
+"""One assertion holds a scene to all that the contracts promise."""
 
 from tisim.scene.scene import Scene
 from tisim.testing.fields import assert_fields

@@ -1,4 +1,4 @@
-"""Whether effects declare the fields that they read or write."""
+"""Effects must declare the particle fields that they read or write."""
 
 import itertools
 from typing import Any
@@ -20,12 +20,13 @@ def assert_fields(scene: Scene) -> None:
     """Assert that every effect of a scene declares the particle fields that it reads or writes.
 
     A field that another effect happens to declare would be there in this scene, and missing in the next.
-    Fields of the effects that it requires, or takes hold of in ``connect``, are there whenever it is, and so
-    are ``force`` and ``torque`` for one that asks first whether there are any.
+    Fields of the effects that it requires, or refers to in ``connect``, are there whenever it is; ``force``
+    and ``torque`` it may read where it checks first whether they exist.
     """
-    with allocated(scene) as made:
-        for effect in made.assembly.effects:
-            view = _Declared(made.s, _known(effect, made.assembly.effects))
+    with allocated(scene) as allocation:
+        effects = allocation.assembly.effects
+        for effect in effects:
+            view = _DeclaredState(allocation.s, _related(effect, effects))
             try:
                 _Hooks(view, effect).compile(0)
             except Exception as error:
@@ -37,19 +38,21 @@ def assert_fields(scene: Scene) -> None:
                 ) from error
 
 
-def _known(effect: Bound[Effect], peers: Peers) -> list[Bound[Effect]]:
-    """An effect, and all those that it, or one of these, requires or has taken hold of."""
-    found = [effect]
-    for one in found:
-        held = [value if isinstance(value, tuple) else (value,) for value in vars(one).values()]
-        known = {id(value) for value in (*peers.of(*one.data.requires), *itertools.chain.from_iterable(held))}
-        found += [other for other in peers if id(other) in known and other not in found]
-    return found
+def _related(effect: Bound[Effect], peers: Peers) -> list[Bound[Effect]]:
+    """Return an effect, and all those that it, or one of these, requires or refers to."""
+    related = [effect]
+    # The list grows while it is gone through.
+    for member in related:
+        attributes = [value if isinstance(value, tuple) else (value,) for value in vars(member).values()]
+        required = peers.of(*member.data.requires)
+        ids = {id(value) for value in (*required, *itertools.chain.from_iterable(attributes))}
+        related += [other for other in peers if id(other) in ids and other not in related]
+    return related
 
 
 @ti.data_oriented
-class _Declared:
-    """A state as an effect may see it: with the particle fields that it and those it knows declare."""
+class _DeclaredState:
+    """The state as an effect may see it has the particle fields that it and its related effects declare."""
 
     def __init__(self, s: State, effects: list[Bound[Effect]]) -> None:
         self.s = s
@@ -75,9 +78,9 @@ class _Declared:
 
 @ti.data_oriented
 class _Hooks:
-    """All that an effect does to particles, compiled and never run."""
+    """All hooks of an effect that read or write particles are compiled, and never run."""
 
-    def __init__(self, view: _Declared, effect: Bound[Effect]) -> None:
+    def __init__(self, view: _DeclaredState, effect: Bound[Effect]) -> None:
         self.s = view
         self.single = offered(effect, "force", "torque", "velocity_jacobian")
         self.reach = offered(effect, "reach")

@@ -1,4 +1,4 @@
-"""Whether a scene is the same with cell lists as with a look at all pairs."""
+"""A scene must come to the same end with cell lists as with a check of all pairs."""
 
 import numpy as np
 
@@ -11,12 +11,13 @@ NO_LISTS = 2**30
 
 
 def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
-    """Assert that a scene comes to the same end, to rounding, with cell lists and with a look at all pairs.
+    """Assert that a scene comes to the same end, to rounding, with cell lists and with a check of all pairs.
 
     It does not where a law has too short a ``reach``, or where a stepper or an operator moves particles and
-    does not say how far. The scene must have steps that do not depend on which pairs are looked at.
+    does not say how far. The lengths of its steps must not depend on which pairs are checked.
 
-    simulation : one of two worlds that has been compiled for the structure of the scene.
+    simulation : a simulation of two worlds that is compiled for the structure of the scene; one is made
+    unless it is given.
     """
     control = scene.stepper.control
     must(not control.watches_pairs, "step control", "one that does not look at pairs", control.kind())
@@ -34,18 +35,20 @@ def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
 
 
 def _assert_equal(simulation: Simulation, when: str) -> None:
-    """Assert that two worlds are the same, to rounding that steps have had time to magnify."""
-    listed, everyone = simulation.results()
-    a, b = len(listed.state["mass"]), len(everyone.state["mass"])
-    assert a == b, f"{when} there must be {b} particles as with a look at all pairs; received {a} with lists"
-    for name, values in everyone.state.items():
-        others, start = listed.state[name], everyone.start.get(name)
+    """Assert that the worlds with and without lists agree, to rounding that steps have had time to
+    magnify."""
+    with_lists, all_pairs = simulation.results()
+    received, expected = len(with_lists.state["mass"]), len(all_pairs.state["mass"])
+    rule = f"{when} there must be {expected} particles as with a check of all pairs"
+    assert received == expected, f"{rule}; received {received} with lists"
+    for name, values in all_pairs.state.items():
+        others, start = with_lists.state[name], all_pairs.start.get(name)
         precision = np.finfo(values.dtype).eps if values.dtype.kind == "f" else 0.0
         moved = values - start if start is not None and start.shape == values.shape else values
         allowed = np.sqrt(precision) * np.abs(moved).max(initial=0.0)
         allowed += 100 * precision * np.abs(values).max(initial=0.0)
         off = np.abs(values - others).max(initial=0.0)
         assert off <= allowed, (
-            f"{name} {when} must be with lists what it is with a look at all pairs, within {allowed:g}; "
+            f"{name} {when} must be with lists what it is with a check of all pairs, within {allowed:g}; "
             f"received one that is off by {off:g}"
         )

@@ -1,4 +1,4 @@
-"""Whether short-ranged laws are 0 beyond their reach."""
+"""Short-ranged laws must be 0 beyond their reach."""
 
 from typing import Any
 
@@ -17,49 +17,49 @@ from tisim.worlds.state import State
 
 WITHIN = 0.9
 FARTHER = (1.001, 1.1, 2.0, 10.0, 100.0)
-"""Distances of two centres at which a law is tried, over that of its reach."""
-SHARES = np.array([1.0, 1 / 2, 1 / 3])
-"""Radii that a law is tried with, one particle after another, over those of the scene."""
+"""A law is evaluated at these distances of two centres, relative to the distance of its reach."""
+RADIUS_FACTORS = np.array([1.0, 1 / 2, 1 / 3])
+"""A law is also evaluated with the radii of the scene times these factors, one particle after another."""
 
 
 @in_taichi_thread
 def assert_reach(scene: Scene) -> dict[str, float]:
     """Assert that each short-ranged law does nothing to two particles that are farther apart than its reach.
 
-    It is tried with the radii of the scene, and with others, equal and unequal, along the line between each
-    two particles; derived quantities are taken to be 1. Returns for each such law, by its name, the size of
-    the most that it does nearer than that (N or N m, or of the quantity which it sets): where this is 0, the
-    scene shows nothing of it.
+    It is evaluated with the radii of the scene, and with others, equal and unequal, along the line between
+    each two particles; derived quantities are taken to be 1. The return value has, for each such law by its
+    name, the largest value within its reach (N or N m, or in the unit of the quantity that it sets): where
+    this is 0, the scene shows nothing of the law.
     """
-    most: dict[str, float] = {}
+    largest: dict[str, float] = {}
     start = scene.particles.arrays(scene.domain, scene.seed)
-    shares = SHARES[np.arange(len(start["radius"])) % len(SHARES)]
-    with allocated(scene) as made:
-        s = made.s
+    factors = np.resize(RADIUS_FACTORS, len(start["radius"]))
+    with allocated(scene) as allocation:
+        s = allocation.s
         check_start(s.fields, scene, start)
-        made.table.write([parts(scene)])
+        allocation.table.write([parts(scene)])
         s.fill({f.name: laid_out(f, [start], 1, s.capacity) for f in s.fields})
         s.fill(world_columns([scene], [start], 1))
-        s.fill({effect.data.quantity: 1.0 for effect in made.assembly.effects.of(DerivedQuantity)})
-        for effect in made.assembly.effects.of(Pairwise):
+        s.fill({effect.data.quantity: 1.0 for effect in allocation.assembly.effects.of(DerivedQuantity)})
+        for effect in allocation.assembly.effects.of(Pairwise):
             if effect.data.short_ranged:
-                tried, label = _Distances(s, effect), effect.data.label
-                for radius in (start["radius"], start["radius"] * shares):
+                samples, label = _Distances(s, effect), effect.data.label
+                for radius in (start["radius"], start["radius"] * factors):
                     s.write("radius", np.resize(radius, (1, s.capacity)))
-                    sizes = tried.sizes()
-                    most[label] = max(most.get(label, 0.0), float(sizes[..., 0].max()))
+                    sizes = samples.sizes()
+                    largest[label] = max(largest.get(label, 0.0), float(sizes[..., 0].max()))
                     for i, j, k in np.argwhere(sizes[..., 1:] != 0)[:1]:
                         raise AssertionError(
                             f"{label} must be 0 between particles farther apart than its reach; received "
                             f"{sizes[i, j, k + 1]:g} on particle {i} by {j}, of radii {radius[i]:g} and "
-                            f"{radius[j]:g} m, at {tried.factors[k + 1]:.3g} of that distance"
+                            f"{radius[j]:g} m, at {samples.factors[k + 1]:.3g} of that distance"
                         )
-    return most
+    return largest
 
 
 @ti.data_oriented
 class _Distances:
-    """How much a short-ranged law would do to each pair of the first world, at some distances."""
+    """This kernel evaluates a short-ranged law for each pair of the first world, at some distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         names = ("pair_force", "pair_torque", "influence")
@@ -68,15 +68,15 @@ class _Distances:
         at = 1.0 + 1e3 * float(np.finfo(np.float64 if s.real == ti.f64 else np.float32).eps)
         self.factors = (WITHIN, at, *FARTHER)
         self.number = len(self.factors)
-        # In memory: a loop over constants would compile the law for each of them.
+        # In a field: a loop over constants would compile the law for each of them.
         self.factor, self.size, builder = ti.field(ti.f64), ti.field(s.real), ti.FieldsBuilder()
-        builder.dense(ti.i, len(self.factors)).place(self.factor)
-        builder.dense(ti.ijk, (s.capacity, s.capacity, len(self.factors))).place(self.size)
+        builder.dense(ti.i, self.number).place(self.factor)
+        builder.dense(ti.ijk, (s.capacity, s.capacity, self.number)).place(self.size)
         Tree(builder)
         self.factor.from_numpy(np.array(self.factors))
 
     def sizes(self) -> np.ndarray:
-        """Sizes of what is done to a particle by another at a distance, with these three indices."""
+        """Return the sizes of the law by index of the particle, of the other one and of the distance."""
         self.measure()
         return self.size.to_numpy()
 

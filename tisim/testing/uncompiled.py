@@ -1,4 +1,4 @@
-"""The memory of a scene, of which nothing is compiled but what a check asks for."""
+"""A scene gets its memory on the device, and nothing of it is compiled but what an assertion needs."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ from tisim.worlds.bound import Bound
 
 @contextmanager
 def allocated(scene: Scene) -> Iterator[Allocation]:
-    """The memory of one world, and the bound parts of its scene, for a while."""
+    """Yield the fields of one world and the bound parts of its scene; free the memory at the end."""
     with collected() as trees:
         made = allocate(scene, 1, scene.capacity())
         try:
@@ -24,6 +24,6 @@ def allocated(scene: Scene) -> Iterator[Allocation]:
 
 
 def offered(effect: Bound[Effect], *names: str) -> tuple[Callable[..., Any], ...]:
-    """The methods of these names that an effect defines, where its contract leaves them empty."""
+    """Return those methods of these names that an effect defines, and its contract leaves empty."""
     data = effect.data
     return tuple(getattr(effect, name) for name in names if hasattr(data, name) and data.offers(name))

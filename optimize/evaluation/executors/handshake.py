@@ -55,15 +55,15 @@ def source() -> str:
 def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
     """InputError that names both sides unless they are the same."""
     differ = [name for name in {**ours, **theirs} if ours.get(name) != theirs.get(name)]
-    must(not differ, who, f"of {_listing(ours, differ)}, as the search is", _listing(theirs, differ))
+    must(not differ, who, f"of {_versions_of(ours, differ)}, as the search is", _versions_of(theirs, differ))
 
 
 def stranger(answer: object, who: str) -> InputError:
     """The error for a worker that cannot even say what it is: it has sent something else."""
     ours = program()
-    rule = f"one that knows what the search is made of ({_listing(ours, ours)})"
+    rule = f"one that knows what the search is made of ({_versions_of(ours, ours)})"
     return InputError(f"{who} must be {rule}; received {shorten(repr(answer), 200)}")
 
 
-def _listing(program: Mapping[str, str], names: Iterable[str]) -> str:
+def _versions_of(program: Mapping[str, str], names: Iterable[str]) -> str:
     return ", ".join(f"{name} {program.get(name, 'unknown')}" for name in names)

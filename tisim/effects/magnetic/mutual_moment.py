@@ -21,12 +21,12 @@ class MutualMoment(SelfConsistentQuantity, Moment):
     """
 
     contract: ClassVar[bool] = True
-    alone: ClassVar[type[Moment]]
+    independent_law: ClassVar[type[Moment]]
     """The law of a particle that the others do not magnetise."""
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        options = {name: getattr(self, name) for name in self.alone.model_fields}
-        return (self.alone(**options), *super().approximations(extent))
+        options = {name: getattr(self, name) for name in self.independent_law.model_fields}
+        return (self.independent_law(**options), *super().approximations(extent))
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
@@ -51,7 +51,7 @@ class MutualInducedMoment(MutualMoment, InducedMoment):
     Source: L21 Eqs (2.6), (4.12).
     """
 
-    alone = InducedMoment
+    independent_law = InducedMoment
 
 
 class MutualLangevinMoment(MutualMoment, LangevinMoment):
@@ -66,4 +66,4 @@ class MutualLangevinMoment(MutualMoment, LangevinMoment):
     Source: B16 Eq. (6.22), L21 (2.6).
     """
 
-    alone = LangevinMoment
+    independent_law = LangevinMoment

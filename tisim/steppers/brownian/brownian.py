@@ -84,8 +84,8 @@ class Brownian(Stepper):
         must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
-        alone = all(single(effect) or _one_by_one(effect) for effect in effects)
-        return alone and self.hydrodynamics == "none"
+        separate = all(single(effect) or _one_by_one(effect) for effect in effects)
+        return separate and self.hydrodynamics == "none"
 
     def countable(self, effects: Sequence[Effect]) -> float:
         # Where each takes its own, the noise of a step is numbered by 32 bits of its interval.

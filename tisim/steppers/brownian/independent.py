@@ -22,7 +22,8 @@ OWN_BROWNIAN_FIELDS = (
 """Where a particle is on its way, after how many steps in its interval, and what has stopped it: a status of
 the world, or 0."""
 AHEAD = 8
-"""Windows for which the noise of the first step, mostly the only one, is drawn at once: in vectors."""
+"""Synchronisation intervals for which the noise of the first step, mostly the only one, is drawn at once: in
+vectors."""
 
 
 @ti.func
