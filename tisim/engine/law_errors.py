@@ -19,7 +19,7 @@ PLACE = re.compile(r'File "(.+?)", line (\d+), in (\w+):')
 
 
 @contextmanager
-def reported_in_a_line() -> Iterator[None]:
+def in_a_line() -> Iterator[None]:
     """Raise InputError, naming file and line, where a law outside of this package cannot be compiled."""
     try:
         yield

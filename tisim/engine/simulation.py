@@ -62,7 +62,7 @@ class Simulation:
         self.program = Program(self.s, self.assembly.step, self.schedule)
         self.first = Program(self.s, self.assembly.first, self.schedule)
         self.s.write("status", WorldStatus.ENDED)
-        with law_errors.reported_in_a_line():
+        with law_errors.in_a_line():
             self.program.compile()
             if self.first.items:
                 self.first.compile()
