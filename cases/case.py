@@ -58,7 +58,7 @@ class Size:
 
 
 def size_named(name: str, sizes: Mapping[str, Size]) -> Size:
-    """A size by name; InputError when there is none of that name."""
+    """Return a size by name; InputError when there is none of that name."""
     must(name in sizes, "size", f"one of {', '.join(sizes)}", name)
     return sizes[name]
 
@@ -104,11 +104,11 @@ class Case:
     figures: Callable[[str, Progress], Mapping[str, Figure | str]] | None = None
 
     def size(self, name: str) -> Size:
-        """A size by name; InputError when there is none of that name."""
+        """Return a size by name; InputError when there is none of that name."""
         return size_named(name, self.sizes)
 
     def inverse(self, size: str, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
-        """The inverse problem (its first variant for None), and the settings of its search.
+        """Return the inverse problem (its first variant for None), and the settings of its search.
 
         InputError when the case has none, or not of that size.
         """
@@ -125,6 +125,6 @@ class Case:
 
 
 def every() -> dict[str, Case]:
-    """All cases by their names."""
+    """Return all cases by their names."""
     modules = (importlib.import_module(f"cases.{m.name}") for m in pkgutil.iter_modules(cases.__path__))
     return {module.CASE.name: module.CASE for module in modules if hasattr(module, "CASE")}

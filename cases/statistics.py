@@ -19,11 +19,11 @@ class Mean:
 
     @classmethod
     def of(cls, runs: ArrayLike) -> Mean:
-        """The mean of two runs or more, its interval by Student's t."""
+        """Return the mean of two runs or more, its interval by Student's t."""
         return cls(float(np.mean(np.asarray(runs, float))), float(half_width(runs)))
 
     def over(self, other: Mean) -> Mean:
-        """The ratio of two independent means, to first order in their errors."""
+        """Return the ratio of two independent means, to first order in their errors."""
         ratio = self.value / other.value
         return Mean(ratio, abs(ratio) * float(np.hypot(self.half / self.value, other.half / other.value)))
 

@@ -128,5 +128,6 @@ def _deviation(recorded: list[float], now: list[float]) -> float:
 
 
 def _platform() -> str:
-    """What may change the last bits of exp and pow, and so of a chaotic trajectory, on the same settings."""
+    """Return what may change the last bits of exp and pow, and so of a chaotic trajectory, on the same
+    settings."""
     return " ".join((platform.system(), platform.machine(), *platform.libc_ver()))

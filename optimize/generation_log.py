@@ -15,7 +15,7 @@ from optimize.problem.problem import Problem
 def statistics(
     problem: Problem, population: Sequence[Individual], hall: Sequence[Individual]
 ) -> dict[str, Any]:
-    """The columns of Outcome.logbook that tell of fitness; values of the objectives, not costs."""
+    """Return the columns of Outcome.logbook that tell of fitness; values of the objectives, not costs."""
     best = [
         min((s.fitness.values[k] for s in hall), default=math.inf) for k in range(len(problem.objectives))
     ]
@@ -32,5 +32,5 @@ def statistics(
 
 
 def best_of(label: str) -> str:
-    """Heading of the best value of one of several objectives."""
+    """Return the heading of the best value of one of several objectives."""
     return f"best {label}"

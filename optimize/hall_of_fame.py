@@ -38,7 +38,7 @@ class Hall:
 
 
 def compromise(front: list[Individual]) -> Individual:
-    """The design of a front nearest to the best of each objective, the front's ranges taken as 1."""
+    """Return the design of a front nearest to the best of each objective, the front's ranges taken as 1."""
     costs = np.array([string.fitness.values for string in front])
     span = np.ptp(costs, axis=0)
     distance = np.linalg.norm((costs - costs.min(axis=0)) / np.where(span > 0, span, 1.0), axis=1)

@@ -35,7 +35,7 @@ def search(
     on_generation: Callable[[Progress], None] | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Outcome:
-    """Look for the problem's best design, or its front, over its genome.
+    """Search for the problem's best design, or its front, over its genome.
 
     on_generation is called after each generation, on_progress as evaluations finish. After each generation
     settings, versions, logbook and hall of fame are in the cache file, below Outcome.name.

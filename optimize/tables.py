@@ -13,10 +13,10 @@ from optimize.problem.problem import Problem
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
-    """Z04 tables 1 to 3 in one: rank, every gene in its unit, each objective with the half-width of its 95 %
-    confidence interval, the derived columns of the problem, starts, whether their mean converged; the same
-    from fresh starts where the designs have been confirmed. Heading -> values, best first; of several
-    objectives the front along the first, the best of that first.
+    """Return the columns of Z04's tables 1 to 3 in one: rank, every gene in its unit, each objective with the
+    half-width of its 95 % confidence interval, the derived columns of the problem, starts, whether their mean
+    converged; the same from fresh starts where the designs have been confirmed. Heading -> values, best
+    first; of several objectives the front along the first, the best of that first.
     """
     estimates = [string.estimates for string in hall]
     number = "front" if problem.several else "rank"
@@ -48,7 +48,8 @@ def _objectives(
 
 
 def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:
-    """The logbook and the derived values of each generation's best. Heading -> values by generation."""
+    """Return the logbook and the derived values of each generation's best. Heading -> values by
+    generation."""
     columns = {name: list(logbook.select(name)) for name in (logbook[0] if logbook else {})}
     for heading, function in problem.derived.items() if columns else ():
         columns[heading] = [float(function(best)) for best in columns["best"]]

@@ -7,7 +7,7 @@ from tisim.accuracy import Quantity
 
 
 def mean_radius(result: Result) -> float:
-    """The mean radius of the grains at the end, m."""
+    """Return the mean radius of the grains at the end, m."""
     return float(result.state["radius"].mean())
 
 

@@ -70,7 +70,7 @@ def restitution(speed: np.ndarray, initial: float, final: float) -> np.ndarray:
 
 
 def onset(happened: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> float:
-    """Where in low..high something begins to happen, to rounding; a batch narrows it thirty times."""
+    """Return where in low..high something begins to happen, to rounding; a batch narrows it thirty times."""
     while True:
         points = np.linspace(low, high, 32)
         first = int(np.argmax(happened(points)))
@@ -134,8 +134,8 @@ def closed_forms() -> Iterator[Check]:
 
 
 def energy(result: Result) -> tuple[float, float]:
-    """The energy of a flow at the start and the end, J: kinetic, thermal, radiated and fracture energy, less
-    what reaction and deformation work have supplied."""
+    """Return the energy of a flow at the start and the end, J: kinetic, thermal, radiated and fracture
+    energy, less what reaction and deformation work have supplied."""
     capacity = next(e for e in result.scene.effects if isinstance(e, Heating)).heat_capacity
 
     def energy_of_grains(s: Arrays) -> float:
@@ -168,6 +168,6 @@ def conservation() -> Iterator[Check]:
 
 
 def check() -> Iterator[Check]:
-    """The closed forms, then the conservation laws."""
+    """Yield the closed forms, then the conservation laws."""
     yield from closed_forms()
     yield from conservation()

@@ -49,7 +49,7 @@ def cost(result: Result) -> float:
 
 
 def problem(size: str = "default", variant: str = "paper") -> Problem:
-    """The inverse problem of Z04 section 7: the flow whose grains grow the most."""
+    """Return the inverse problem of Z04 section 7: the flow whose grains grow the most."""
     must(variant in SURFACE_ENERGY, "variant", f"one of {', '.join(SURFACE_ENERGY)}", variant)
     settings = size_named(size, SIZES).scene
     edge, energy = settings["grains"] ** (1 / 3), SURFACE_ENERGY[variant]

@@ -51,7 +51,7 @@ SIZES = {
 
 
 def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: float = DURATION) -> Scene:
-    """The flow of a design from one random start."""
+    """Return the flow of a design from one random start."""
     radius = design["length_ratio"] * HALF_SIDE / grains ** (1 / 3)
     v = design["relative_velocity"]
     return Scene(
@@ -78,5 +78,5 @@ def scene(design: Mapping[str, float], seed: int, grains: int = 1000, duration: 
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The flow of the paper's best string."""
+    """Return the flow of the paper's best string."""
     return scene(BEST, seed, **size_named(size, SIZES).scene)

@@ -67,7 +67,8 @@ class BlastHistory:
         )
 
     def dense(self, k: int) -> bool:
-        """Whether frames of a particle are so near in time that a line may join them: 8 a circle or more."""
+        """Return whether frames of a particle are so near in time that a line may join them: 8 a circle or
+        more."""
         v = self.velocities[:, k, 1] + 1j * self.velocities[:, k, 2]
         return bool(np.median(np.abs(np.angle(v[1:] * v[:-1].conj()))) < np.pi / 4)
 
@@ -89,7 +90,7 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 
 def sequence(chosen: Sequence[Frame]) -> Figure:
-    """The cloud from its start on, all on one scale, as in Z16 figures 5 to 9."""
+    """Return the cloud from its start on, all on one scale, as in Z16 figures 5 to 9."""
     figure = empty(10.4, 7.2)
     square = common([frame.arrays for frame in chosen], NO_BOX)
     axes = figure.subplots(2, 3)
@@ -188,7 +189,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> Figure:
-    """The clouds at the end on one scale, and their half axes and contacts in time."""
+    """Return the clouds at the end on one scale, and their half axes and contacts in time."""
     figure = empty(11.6, 6.4)
     grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
     square = common([frame.arrays for frame in ends.values()], NO_BOX)

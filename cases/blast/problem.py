@@ -36,7 +36,7 @@ def field(design: Mapping[str, float]) -> np.ndarray:
 
 
 def scene(design: Mapping[str, float], seed: int, number: int = blast.NUMBER) -> Scene:
-    """The blast without interaction in the field of a design, until DURATION.
+    """Return the blast without interaction in the field of a design, until DURATION.
 
     In steps of 5 ms: of the circle itself they miss 1 part in 1000 at most, (w dt)^2/12.
     """
@@ -59,7 +59,8 @@ def start(number: int, starts: int = 8) -> float:
 
 
 def problem(size: str = "default", variant: str = "ellipsoid", goal: np.ndarray | None = None) -> Problem:
-    """The field that gives an ellipsoid of second moments ``goal`` (m^2, (3, 3)); by default TARGET_FLUX."""
+    """Return the field that gives an ellipsoid of second moments ``goal`` (m^2, (3, 3)); by default
+    TARGET_FLUX."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
     number = int(size_named(size, blast.SIZES).scene.get("number", blast.NUMBER))
     target = ellipsoid(TARGET_FLUX, DURATION, start(number)) if goal is None else goal

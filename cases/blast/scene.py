@@ -98,7 +98,7 @@ def scene(
     seed: int = 0,
     **control: Any,
 ) -> Scene:
-    """The blast. flux : along x, or of shape (3,), T. A smaller number has the same speed and density.
+    """Return the blast. flux : along x, or of shape (3,), T. A smaller number has the same speed and density.
 
     ``control`` goes to the papers' step control.
     """
@@ -126,5 +126,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The blast of a size, from the random start of a seed."""
+    """Return the blast of a size, from the random start of a seed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -40,7 +40,7 @@ Row = tuple[Settings, Sequence[Result]]
 
 
 def figures(progress: Progress) -> Mapping[str, Figure | str]:
-    """The files capture.png and capture.csv: captured fractions by angle, size and aspect ratio."""
+    """Return the files capture.png and capture.csv: captured fractions by angle, size and aspect ratio."""
     angles: list[Settings] = [
         {"nanometres": n, "angle": a, "aspect": 20.0, "part": part}
         for n in (75, 212) for part in ("top", "side") for a in ANGLES
@@ -147,7 +147,7 @@ def bars(
 
 
 def table(rows: Sequence[Row]) -> str:
-    """What is captured at the end, as CSV."""
+    """Return what is captured at the end, as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["radius_nm", "angle_deg", "aspect", "part", "repeats", "captured", "half_width_95"])

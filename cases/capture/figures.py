@@ -30,7 +30,7 @@ BEYOND = 2.5e-3
 
 
 def cylinder(scene: Scene) -> Cylinder:
-    """The one cylinder of a scene."""
+    """Return the one cylinder of a scene."""
     return next(e for e in scene.effects if isinstance(e, MagneticCylinders)).cylinders[0]
 
 
@@ -159,7 +159,8 @@ def pull(scene: Scene, points: np.ndarray) -> np.ndarray:
 
 
 def capture_volume(scene: Scene) -> float:
-    """The volume in which the cylinder draws a particle with LEAST_FORCE or more, over its own (B16 6.4.1).
+    """Return the volume in which the cylinder draws a particle with LEAST_FORCE or more, over its own (B16
+    6.4.1).
 
     From the middles of cells, SPACE along each side of a box that reaches BEYOND the cylinder.
     """

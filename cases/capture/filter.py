@@ -75,7 +75,7 @@ class Filter:
         return self.aspect * DIAMETER
 
     def magnetisation(self) -> Vector:
-        """The magnetisation of the fibres, A/m."""
+        """Return the magnetisation of the fibres, A/m."""
         if self.magnetisation_angle is not None:
             return _in_plane(SATURATION_MAGNETISATION, self.magnetisation_angle)
         field = _in_plane(self.flux, self.field_angle)
@@ -143,5 +143,5 @@ def _row(count: int, pitch: float) -> np.ndarray:
 
 
 def _in_plane(size: float, angle: float) -> Vector:
-    """A vector of a size at an angle (degrees) to z, in the xz plane."""
+    """Return a vector of a size at an angle (degrees) to z, in the xz plane."""
     return size * float(np.sin(np.radians(angle))), 0.0, size * float(np.cos(np.radians(angle)))

@@ -59,7 +59,7 @@ MEANINGS = {
 
 
 def captured(result: Result) -> float:
-    """The fraction of the particles that is caught."""
+    """Return the fraction of the particles that is caught."""
     return float((result.state["captured_by"] >= 0).mean())
 
 
@@ -70,8 +70,8 @@ def throughput(result: Result) -> float:
 
 
 def problem(size: str = "default", variant: str = "fraction") -> Problem:
-    """The filter that catches the largest fraction of FLOW_SPEED and FILTER_RADIUS: "fraction", of soft
-    steel, or "hard", of magnets with a direction of their own. "throughput": the front of fraction and
+    """Return the filter that catches the largest fraction of FLOW_SPEED and FILTER_RADIUS: "fraction", of
+    soft steel, or "hard", of magnets with a direction of their own. "throughput": the front of fraction and
     throughput, where speed and radius are free too. Of size "default" only."""
     must(variant in GENES, "variant", f"one of {', '.join(GENES)}", variant)
     fraction = Objective("captured", captured, maximise=True)
@@ -90,7 +90,7 @@ def problem(size: str = "default", variant: str = "fraction") -> Problem:
 
 
 def details(design: Mapping[str, float], result: Result) -> dict[str, float]:
-    """What the best filter is like, in the terms of B16."""
+    """Return what the best filter is like, in the terms of B16."""
     best = Filter(**design)
     m = np.asarray(best.magnetisation())
     return {
@@ -103,7 +103,8 @@ def details(design: Mapping[str, float], result: Result) -> dict[str, float]:
 
 
 def caught(result: Result) -> Figure:
-    """The channel from the side and as the flow sees it: fibres, and where particles began and ended."""
+    """Return the channel from the side and as the flow sees it: fibres, and where particles began and
+    ended."""
     figure = empty(10.4, 6.6)
     side, front = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 4.0))
     state, start = result.state, result.start

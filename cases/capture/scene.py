@@ -58,12 +58,12 @@ SIZES = {
 
 
 def axis(angle: float) -> Vector:
-    """The axis of a cylinder at an angle (degrees) to the field, which is along x."""
+    """Return the axis of a cylinder at an angle (degrees) to the field, which is along x."""
     return float(np.cos(np.radians(angle))), 0.0, float(np.sin(np.radians(angle)))
 
 
 def fibre(along: Vector, aspect: float, flux: Vector = (FLUX, 0.0, 0.0)) -> Cylinder:
-    """A saturated cylinder of length over diameter ``aspect`` at the origin, in a field (T)."""
+    """Return a saturated cylinder of length over diameter ``aspect`` at the origin, in a field (T)."""
     radius, length = DIAMETER / 2, aspect * DIAMETER
     m = magnetisation(along, radius, length, SATURATION_MAGNETISATION, flux)
     return Cylinder(axis=along, radius=radius, length=length, magnetisation=m)

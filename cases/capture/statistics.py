@@ -50,36 +50,37 @@ def grouped(scenes: Sequence[Scene], repeats: int, progress: Progress | None = N
 
 
 def fraction(state: Arrays, time: float = np.inf) -> float:
-    """The fraction of the particles that is captured by a time (s)."""
+    """Return the fraction of the particles that is captured by a time (s)."""
     at = state["captured_at"]
     return float(((at >= 0) & (at <= time)).mean())
 
 
 def fractions(group: Sequence[Result], time: float = np.inf) -> np.ndarray:
-    """The captured fraction by a time (s) of each start."""
+    """Return the captured fraction by a time (s) of each start."""
     return np.array([fraction(result.state, time) for result in group])
 
 
 def mean(group: Sequence[Result], time: float = np.inf) -> Mean:
-    """The captured fraction by a time (s), the mean over repeats."""
+    """Return the captured fraction by a time (s), the mean over repeats."""
     return Mean.of(fractions(group, time))
 
 
 def isotropic(by_angle: np.ndarray) -> np.ndarray:
-    """The mean over directions that are all equally likely, of each start, from those at ANGLES, (angles,
-    starts): weights sin(alpha)."""
+    """Return the mean over directions that are all equally likely, of each start, from those at ANGLES,
+    (angles, starts): weights sin(alpha)."""
     weights = np.sin(np.radians(ANGLES))
     weights[[0, -1]] /= 2
     return np.average(by_angle, axis=0, weights=weights)
 
 
 def even(by_angle: np.ndarray) -> np.ndarray:
-    """The mean over angles that are all equally likely, as over the curves of B16 Fig. 6.7, of each start."""
+    """Return the mean over angles that are all equally likely, as over the curves of B16 Fig. 6.7, of each
+    start."""
     return by_angle.mean(axis=0)
 
 
 def check(repeats: int = CHECK_REPEATS) -> Iterator[Check | Claim]:
-    """What B16 concludes of one cylinder, each with its confidence interval."""
+    """Yield what B16 concludes of one cylinder, each with its confidence interval."""
     yield from of_orientation(repeats)
     yield from of_aspect(repeats)
     yield from of_size(repeats)

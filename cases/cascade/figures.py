@@ -126,7 +126,7 @@ def of_ratio(axis: Axes, times_of: Times) -> None:
 
 
 def ratio(times_of: Times, one: Cascade) -> Mean:
-    """The time to 90 % of a cascade over that of the optimal one."""
+    """Return the time to 90 % of a cascade over that of the optimal one."""
     best = times_of[replace(one, orientation="optimal")]
     return Mean.of(time_to(CAPTURED_SHARE, times_of[one])).over(Mean.of(time_to(CAPTURED_SHARE, best)))
 

@@ -45,7 +45,7 @@ class Cascade:
     number: int = capture.NUMBER
 
     def angle(self, generator: np.random.Generator) -> float:
-        """The angle of the next cylinder to the field, degrees."""
+        """Return the angle of the next cylinder to the field, degrees."""
         uniform = generator.uniform()
         return {
             "optimal": 90.0,
@@ -54,7 +54,7 @@ class Cascade:
         }[self.orientation]
 
     def scene(self, number: int, generator: np.random.Generator) -> Scene:
-        """The stage of ``number`` particles about the next cylinder."""
+        """Return the stage of ``number`` particles about the next cylinder."""
         scene = capture.scene(
             nanometres=self.nanometres,
             angle=self.angle(generator),
@@ -76,6 +76,6 @@ class Cascade:
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The first stage of the cascade of a size."""
+    """Return the first stage of the cascade of a size."""
     one = Cascade(**size_named(size, SIZES).scene)
     return one.scene(one.number, np.random.default_rng(seed))

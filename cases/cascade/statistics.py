@@ -25,7 +25,7 @@ Means = dict[Cascade, Mean]
 
 
 def means(cascades: Sequence[Cascade], repeats: int) -> Means:
-    """The mean time to 90 % (s) of each cascade."""
+    """Return the mean time to 90 % (s) of each cascade."""
     times_of = captured_at(cascades, repeats)
     return {
         one: Mean.of(time_to(CAPTURED_SHARE, times)) for one, times in zip(cascades, times_of, strict=True)
@@ -33,7 +33,8 @@ def means(cascades: Sequence[Cascade], repeats: int) -> Means:
 
 
 def check(repeats: int = CHECK_REPEATS) -> Iterator[Claim]:
-    """The random cascade beside the optimal one, and the length of a stage; with confidence intervals."""
+    """Yield the random cascade beside the optimal one, and the length of a stage; with confidence
+    intervals."""
     bases = [Cascade(n, STAGE[n], "optimal", gap=gap) for gap in GAPS for n in PUBLISHED_TIMES]
     short = [replace(base, aspect=5 / 3) for base in bases[:2]]
     cascades = [replace(one, orientation=how) for one in bases for how in ORIENTATIONS]

@@ -9,7 +9,8 @@ from tisim.accuracy.quantity import usual
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """How long chains are, and how far particles get; before some tenths of a second nothing is caught."""
+    """Return how long chains are, and how far particles get; before some tenths of a second nothing is
+    caught."""
     return (
         Quantity("mean chain", lambda result: chain(result.state, result.state["moment"]), random=True),
         *usual(scene),

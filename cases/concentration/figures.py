@@ -137,7 +137,7 @@ def captured_figure(curves: Curves) -> Figure:
 
 
 def table(curves: Curves) -> str:
-    """The captured fractions in time as CSV."""
+    """Return the captured fractions in time as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["angle_deg", "g_per_mL", "time_s", "touched", "held"])

@@ -90,7 +90,8 @@ def scene(
     coarse: float = 1.0,
     seed: int = 0,
 ) -> Scene:
-    """A cube of particles at c g/mL, ``distance`` (m) beyond the end of a cylinder at an angle (degrees).
+    """Return a cube of particles at c g/mL, ``distance`` (m) beyond the end of a cylinder at an angle
+    (degrees).
 
     coarse : noise and forces move a particle so many times as far in a step.
     """
@@ -133,5 +134,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """A sample of a size, from the random start of a seed."""
+    """Return a sample of a size, from the random start of a seed."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -62,7 +62,7 @@ def _alike_at_rest(start: Arrays) -> bool:
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Where every particle is, and where their centre of gravity."""
+    """Return where every particle is, and where their centre of gravity."""
     described = constants(scene) is not None
     independent = described and not any(isinstance(effect, PairForce) for effect in scene.effects)
 

@@ -34,6 +34,6 @@ def response(t: Numbers, w: Numbers, k_m: Numbers, push: Numbers, omega: Numbers
 
 
 def resonances(w: float, k_m: float) -> tuple[float, float]:
-    """The two angular frequencies (1/s) at which ``response`` grows without bound."""
+    """Return the two angular frequencies (1/s) at which ``response`` grows without bound."""
     root = np.sqrt(w**2 / 4 + k_m)
     return float(root - abs(w) / 2), float(root + abs(w) / 2)

@@ -109,7 +109,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
 
 
 def table(*sweeps: tuple[str, Sweep]) -> str:
-    """The largest displacements of all sweeps as CSV."""
+    """Return the largest displacements of all sweeps as CSV."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["particles", "duration_s", "omega_1_s", "omega_over_w", "peak_m", "closed_form_m"])

@@ -45,24 +45,24 @@ def scene(design: Mapping[str, float], drive: float = DRIVE, duration: float = D
 
 
 def displacement(result: Result) -> float:
-    """The largest displacement of the centre of gravity, m."""
+    """Return the largest displacement of the centre of gravity, m."""
     return result.measures["peak_displacement"]
 
 
 def closed_form(design: Mapping[str, float], drive: float = DRIVE, duration: float = DURATION) -> float:
-    """The largest displacement of a design in closed form, without a run, m."""
+    """Return the largest displacement of a design in closed form, without a run, m."""
     w, k_m = CHARGE * design["flux"] / MASS, design["stiffness"] / MASS
     return peak(duration, w, k_m, CHARGE * FIELD / MASS, drive)
 
 
 def nearest(design: Mapping[str, float], drive: float = DRIVE) -> float:
-    """The resonance of a design that is nearest to the drive, 1/s."""
+    """Return the resonance of a design that is nearest to the drive, 1/s."""
     both = resonances(CHARGE * design["flux"] / MASS, design["stiffness"] / MASS)
     return min(both, key=lambda omega: abs(np.log(omega / drive)))
 
 
 def problem(size: str = "default", variant: str = "resonate") -> Problem:
-    """The field and binder that answer DRIVE the most ("resonate") or the least ("avoid") in DURATION.
+    """Return the field and binder that answer DRIVE the most ("resonate") or the least ("avoid") in DURATION.
 
     Of size "default" only: a search runs one particle.
     """
@@ -83,7 +83,7 @@ def problem(size: str = "default", variant: str = "resonate") -> Problem:
 
 
 def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
-    """The design's resonance beside the drive, and its response beside the closed form."""
+    """Return the design's resonance beside the drive, and its response beside the closed form."""
     slow, fast = resonances(CHARGE * design["flux"] / MASS, design["stiffness"] / MASS)
     return {
         "drive frequency, 1/s": DRIVE,

@@ -81,7 +81,7 @@ def drive(scene: Scene) -> float:
 
 
 def vertex(x: np.ndarray, y: np.ndarray) -> float:
-    """Where the parabola through three points has its summit."""
+    """Return where the parabola through three points has its summit."""
     a, b, _ = np.polyfit(x - x[1], y, 2)
     return float(x[1] - b / (2 * a))
 
@@ -110,7 +110,8 @@ class CentreOfGravityHistory:
 
     @classmethod
     def of(cls, trajectory: Frames) -> CentreOfGravityHistory:
-        """The history of a trajectory at even times, between frames by the cubic of places and velocities."""
+        """Return the history of a trajectory at even times, between frames by the cubic of places and
+        velocities."""
         series = history(trajectory)
         x, v = (a[:, 0] + 1j * a[:, 1] for a in (series.shift, series.drift))
         even = np.linspace(series.time[0], series.time[-1], len(series.time))
@@ -137,7 +138,8 @@ class CentreOfGravityHistory:
         return omega[order], lines[order]
 
     def beat_period(self) -> float:
-        """The period of the speed, s: its square is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two circles.
+        """Return the period of the speed, s: its square is A^2 + B^2 - 2 A B cos(|Omega - omega| t) for two
+        circles.
 
         It is that of the highest line of its spectrum below half of the fast resonance.
         """

@@ -82,8 +82,8 @@ def scene(
     longest: float = 1e-4,
     observed: bool = False,
 ) -> Scene:
-    """The array, driven at Omega = ratio w, w that of the paper's B. ``error`` is asked of a step, over the
-    displacement in it. observed : keep the largest displacement of the centre of gravity."""
+    """Return the array, driven at Omega = ratio w, w that of the paper's B. ``error`` is asked of a step,
+    over the displacement in it. observed : keep the largest displacement of the centre of gravity."""
     return Scene(
         name="vibration",
         particles=Cloud(
@@ -109,5 +109,5 @@ def scene(
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """The array of a size; nothing in it is random."""
+    """Return the array of a size; nothing in it is random."""
     return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -44,7 +44,7 @@ class EnsembleSettings(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.ensemble.block=2``."""
+        """Return the name of these settings in messages, as in ``--set search.ensemble.block=2``."""
         return "search.ensemble"
 
     @model_validator(mode="after")
@@ -83,13 +83,14 @@ class Ensemble:
 
     @property
     def requested(self) -> int:
-        """How many different runs have been requested."""
+        """The number of different runs that have been requested."""
         return self.runs.evaluations + self.runs.hits
 
     def estimate(
         self, designs: Sequence[Design], progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...] | None]:
-        """The estimates of each design, in order; None where the budget was spent before its first block.
+        """Return the estimates of each design, in order; None where the budget was spent before its first
+        block.
 
         progress is called with the finished fraction, never decreasing. A design with any failed start has
         cost +inf.
@@ -165,7 +166,8 @@ class Ensemble:
     def confirm(
         self, designs: Sequence[Design], progress: Report | None = None
     ) -> list[tuple[FitnessEstimate, ...]]:
-        """The estimates of each design from `confirm` starts that no other has used; the budget is not asked.
+        """Return the estimates of each design from `confirm` starts that no other has used; the budget is not
+        asked.
 
         A winner has won by being good and by being lucky in its starts; this is without the luck.
         """
@@ -200,7 +202,8 @@ class Ensemble:
 
 
 def _beats(one: Sample, other: Sample) -> bool:
-    """Whether one is better in every objective, its 95 % confidence interval of the difference above 0."""
+    """Return whether one is better in every objective, its 95 % confidence interval of the difference above
+    0."""
     n = min(one.used, other.used)
     if n < 2:
         return False

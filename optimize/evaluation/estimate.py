@@ -35,7 +35,7 @@ class FitnessEstimate:
 
     @classmethod
     def of(cls, values: Sequence[float], converged: bool) -> FitnessEstimate:
-        """From the fitness of each start; at least one."""
+        """Return the estimate from the fitness of each start; at least one."""
         n = len(values)
         mean = float(np.cumsum(values)[-1] / n)  # summed as in converged_after, to the last bit
         std = float(np.std(values, ddof=1)) if n > 1 else math.nan
@@ -44,7 +44,8 @@ class FitnessEstimate:
 
 
 def converged_after(values: ArrayLike, tolerance: float, min_starts: int) -> int | None:
-    """The least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04 Eq. 8.1).
+    """Return the least number of starts n = E + 1 >= min_starts with |mean_n - mean_E| < TOL |mean_n| (Z04
+    Eq. 8.1).
 
     values : shape (starts,) or (starts, objectives); of several objectives each must meet it at once.
     Two equal means count as converged, also when both are zero. None if there is no such n in values.

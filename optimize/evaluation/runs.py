@@ -43,7 +43,8 @@ class Evaluator(Protocol):
 
 
 def start_seed(seed: int, start: int, design: Mapping[str, float] | None = None) -> int:
-    """Seed (0 .. 2^31 - 1) of a start: a function of (seed, start), and of the design if one is given."""
+    """Return the seed (0 .. 2^31 - 1) of a start: a function of (seed, start), and of the design if one is
+    given."""
     entropy = [seed, start]
     if design is not None:
         entropy.append(int.from_bytes(hashlib.sha256(canonical(dict(design))).digest()[:8], "little"))

@@ -41,11 +41,11 @@ class SearchMethod(ABC):
 
     @abstractmethod
     def __init__(self, genes: int, objectives: int, options: Any, seed: int) -> None:
-        """InputError for options that cannot work on a genome of so many genes."""
+        """Raise InputError for options that cannot work on a genome of so many genes."""
 
     @abstractmethod
     def ask(self) -> list[Individual]:
-        """The strings of the next generation."""
+        """Return the strings of the next generation."""
 
     @abstractmethod
     def tell(self, population: list[Individual], hall: Sequence[Individual]) -> None:
@@ -53,7 +53,7 @@ class SearchMethod(ABC):
 
 
 def every() -> dict[str, type[SearchMethod]]:
-    """All search methods by their names."""
+    """Return all search methods by their names."""
     by_name: dict[str, type[SearchMethod]] = {}
     for entry in pkgutil.iter_modules(methods.__path__):
         module = importlib.import_module(f"{methods.__name__}.{entry.name}")
@@ -68,7 +68,7 @@ def every() -> dict[str, type[SearchMethod]]:
 
 
 def find(name: str) -> type[SearchMethod]:
-    """A method by name; InputError naming the known ones when there is none."""
+    """Return a method by name; InputError naming the known ones when there is none."""
     by_name = every()
     must(isinstance(name, str) and name in by_name, "method", f"one of {', '.join(by_name)}", name)
     return by_name[name]

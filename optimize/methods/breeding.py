@@ -40,7 +40,7 @@ class Breeder:
             self._rehearse(genes)
 
     def first(self) -> list[Individual]:
-        """Z04 step 1: a population of random strings."""
+        """Return, as Z04 step 1, a population of random strings."""
         return self._fresh(self.settings.population)
 
     def next_generation(self, population: Sequence[Individual]) -> list[Individual]:
@@ -108,7 +108,7 @@ class Breeder:
 def mate_z04(
     first: Sequence[float], second: Sequence[float], rng: np.random.Generator
 ) -> tuple[Individual, Individual]:
-    """Z04 step 4: two offspring phi A + (1 - phi) B.
+    """Return two offspring, as in Z04 step 4: phi A + (1 - phi) B.
 
     A fresh weight 0 <= phi <= 1 for every component of both. first, second : shape (genes,).
     Each component of an offspring lies between its parents'.

@@ -33,7 +33,7 @@ class GeneticOperator(Checked):
     options: dict[str, Any] = Field(default_factory=dict)
 
     def function(self, prefix: str) -> Any:
-        """The function in deap.tools. InputError unless the name and the arguments fit."""
+        """Return the function in deap.tools. InputError unless the name and the arguments fit."""
         function: Any = getattr(tools, self.name, None)
         names = [
             name
@@ -60,7 +60,7 @@ class GeneticOperator(Checked):
         return function
 
     def bound(self, prefix: str) -> tuple[Any, dict[str, Any]]:
-        """The function and all its keyword arguments, bounds of the unit cube included."""
+        """Return the function and all its keyword arguments, bounds of the unit cube included."""
         function = self.function(prefix)
         names = inspect.signature(function).parameters
         return function, {
@@ -98,12 +98,12 @@ class Breeding(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.options.population=30``."""
+        """Return the name of these settings in messages, as in ``--set search.options.population=30``."""
         return "search.options"
 
     @property
     def bred(self) -> int:
-        """How many offspring there are in a generation."""
+        """The number of offspring in a generation."""
         if self.offspring is not None:
             return self.offspring
         return min(self.parents, self.population - self.parents) // 2 * 2
@@ -111,7 +111,7 @@ class Breeding(Checked):
     @model_validator(mode="before")
     @classmethod
     def _following(cls, data: dict[str, Any]) -> dict[str, Any]:
-        """What the numbers that are given make of those that are not."""
+        """Return what the numbers that are given make of those that are not."""
         population, parents, offspring = (
             _whole(data.get(name)) for name in ("population", "parents", "offspring")
         )
@@ -148,7 +148,8 @@ class Breeding(Checked):
 
 
 def _whole(value: Any) -> int | None:
-    """The whole number that a field makes of a value, say of 8.0 or "8"; None where it will refuse it."""
+    """Return the whole number that a field makes of a value, say of 8.0 or "8"; None where it will refuse
+    it."""
     try:
         return _WHOLE.validate_python(value)
     except ValidationError:
@@ -156,6 +157,6 @@ def _whole(value: Any) -> int | None:
 
 
 def proportional(population: int) -> int:
-    """How many parents go with a population: the even number nearest to Z04's part of it, 6 of 20; one where
-    that is none."""
+    """Return how many parents go with a population: the even number nearest to Z04's part of it, 6 of 20; one
+    where that is none."""
     return 2 * round(population * PARENTS / POPULATION / 2) or 1

@@ -28,7 +28,7 @@ class CmaOptions(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.options.sigma=0.2``."""
+        """Return the name of these settings in messages, as in ``--set search.options.sigma=0.2``."""
         return "search.options"
 
 
@@ -73,5 +73,5 @@ class CmaEs(SearchMethod):
 
 
 def reflected(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points, shape (strings, genes), with what lies outside 0..1 reflected at 0 and 1."""
+    """Return points, shape (strings, genes), with what lies outside 0..1 reflected at 0 and 1."""
     return 1 - np.abs(1 - np.mod(points, 2))

@@ -12,7 +12,7 @@ from optimize.evaluation.estimate import FitnessEstimate
 
 @cache
 def minimised(objectives: int) -> type:
-    """The DEAP fitness of so many costs."""
+    """Return the DEAP fitness of so many costs."""
     return type(f"Minimised{objectives}", (base.Fitness,), {"weights": (-1.0,) * objectives})
 
 

@@ -32,7 +32,7 @@ class Nsga2Options(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.options.population=60``."""
+        """Return the name of these settings in messages, as in ``--set search.options.population=60``."""
         return "search.options"
 
     @model_validator(mode="after")

@@ -19,7 +19,7 @@ class RandomSearchOptions(Checked):
 
     @classmethod
     def kind(cls) -> str:
-        """As in ``--set search.options.population=30``."""
+        """Return the name of these settings in messages, as in ``--set search.options.population=30``."""
         return "search.options"
 
 

@@ -45,11 +45,11 @@ class Gene:
 
     @property
     def label(self) -> str:
-        """Name and unit as a table heading."""
+        """The name and the unit, as a table heading."""
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
     def decode(self, u: float) -> float:
-        """Physical value at u in 0..1; exactly low at 0 and high at 1."""
+        """Return the physical value at u in 0..1; exactly low at 0 and high at 1."""
         if self.scale == "log":
             value = self.low * (self.high / self.low) ** u
         else:
@@ -76,7 +76,8 @@ class Genome:
         return tuple(gene.name for gene in self.genes)
 
     def decode(self, u: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
-        """Design in physical units of a point u, shape (genes,), of the unit cube. InputError outside it."""
+        """Return the design in physical units of a point u, shape (genes,), of the unit cube. InputError
+        outside it."""
         point = np.asarray(u, dtype=float)
         must(point.shape == (len(self),), "unit-cube point", f"of shape ({len(self)},)", point.shape)
         must(bool(np.all((point >= 0) & (point <= 1))), "unit-cube point", "within 0..1", point.tolist())
@@ -92,7 +93,7 @@ class SearchBox:
 
     @classmethod
     def full(cls, genes: int) -> SearchBox:
-        """The whole unit cube of that many genes."""
+        """Return the whole unit cube of that many genes."""
         return cls(np.zeros(genes), np.ones(genes))
 
     @property
@@ -100,11 +101,11 @@ class SearchBox:
         return self.high - self.low
 
     def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """A point drawn uniformly, shape (genes,)."""
+        """Return a point drawn uniformly, shape (genes,)."""
         return np.clip(self.low + rng.random(len(self.low)) * self.width, self.low, self.high)
 
     def recentre(self, best: ArrayLike, factor: float) -> SearchBox:
-        """The box shrunk by factor (0 < factor <= 1) around best, shifted to stay in the unit cube.
+        """Return the box shrunk by factor (0 < factor <= 1) around best, shifted to stay in the unit cube.
 
         The new box contains best but may reach beyond the old one, so an optimum that an earlier box cut
         off can still be found. Z04 section 8: every four generations the search domain was restricted and

@@ -36,5 +36,5 @@ class Objective:
 
     @property
     def label(self) -> str:
-        """Name and unit as a heading."""
+        """The name and the unit, as a heading."""
         return f"{self.name} ({self.unit})" if self.unit else self.name

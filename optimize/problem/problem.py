@@ -66,7 +66,7 @@ class Problem:
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """All of them; a bare function is one, minimised."""
+        """All objectives; a bare function is one, to be minimised."""
         if callable(self.objective):
             return (Objective(self.symbol, self.objective),)
         return tuple(self.objective)
@@ -79,9 +79,10 @@ class Problem:
 
     @property
     def several(self) -> bool:
-        """More than one objective: there is a front, and not one best."""
+        """Whether there is more than one objective, and so a front and not one best."""
         return len(self.objectives) > 1
 
     def costs(self, values: Sequence[float]) -> tuple[float, ...]:
-        """The objectives' values with the sign that makes all of them to be minimised, and back again."""
+        """Return the objectives' values with the sign that makes all of them to be minimised, and back
+        again."""
         return tuple(o.sign * value for o, value in zip(self.objectives, values, strict=True))

@@ -1,4 +1,4 @@
-"""What is in a cache file, in a few lines."""
+"""The evaluations and searches in a cache file are summarised in a few lines."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from optimize.storage.record import Record
 from tisim.console import plain_table
 
 MAX_REASONS = 5
-"""So many reasons of failures are spelled out."""
+"""The largest number of failures whose reasons are spelled out."""
 
 
 def summary(path: str | Path) -> RenderableType:
-    """The evaluations in a cache file by problem, its searches, and why evaluations failed.
+    """Return tables of the evaluations in a cache file by problem, of its searches, and of why some failed.
 
     InputError if there is no such file.
     """

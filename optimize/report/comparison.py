@@ -1,4 +1,4 @@
-"""Search methods side by side: the same problem, the same number of runs, several searches of each."""
+"""Search methods are compared on one problem at the same number of runs, with several searches of each."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def claim(folder: Path, fresh: bool | None, overwrite: bool) -> Iterator[bool]:
 
 
 def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, Any]) -> None:
-    """InputError when the file in the folder is of a comparison on another problem; methods, their settings
-    and numbers of runs may be others. evaluator : the settings of the evaluator."""
+    """Raise InputError when the file in the folder is of a comparison on another problem; methods, their
+    settings and numbers of runs may be others. evaluator : the settings of the evaluator."""
     for attributes in searches(cache).values():
         old = json.loads(attributes["identity"])
         requested = {**identity(problem, Settings(), evaluator), "search": old["search"]}
@@ -73,7 +73,8 @@ def check(folder: Path, cache: Cache, problem: Problem, evaluator: Mapping[str, 
 def settings_of(
     problem: Problem, base: Mapping[str, Any], method: str, evaluations: int, repeat: int
 ) -> Settings:
-    """The settings of one search: the case's with another method, stopped by the number of runs alone."""
+    """Return the settings of one search: the case's with another method, stopped by the number of runs
+    alone."""
     search_table = proposed(problem, base, method)
     for rule in ("target", "patience", "wall_clock_s"):
         search_table.pop(rule, None)
@@ -150,8 +151,8 @@ def _result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble
 
 
 def table(problem: Problem, results: Sequence[MethodResult]) -> Table:
-    """A line for each method, the best median first: the best of its searches from fresh starts, and what the
-    searches themselves held it for.
+    """Return a table with a line for each method, the best median first: the best of its searches from fresh
+    starts, and what the searches themselves held it for.
     """
     (objective,) = problem.objectives
     meaning = problem.meanings.get(objective.name, "")
@@ -175,7 +176,7 @@ def table(problem: Problem, results: Sequence[MethodResult]) -> Table:
 
 
 def as_csv(problem: Problem, results: Sequence[MethodResult]) -> bytes:
-    """A line for each search, all digits."""
+    """Return a CSV file with a line for each search and all digits."""
     (objective,) = problem.objectives
     text = io.StringIO(newline="")
     writer = csv.writer(text)

@@ -1,4 +1,4 @@
-"""How a search went: fitness by generation (Z04 figure 4)."""
+"""The convergence of a search is drawn as fitness by generation (Z04 figure 4)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
 
 def convergence_figure(outcome: Outcome) -> Figure:
-    """Best and mean fitness against generation, and below it the problem's first derived value of the best.
+    """Draw best and mean fitness against generation, and below it the problem's first derived value of the
+    best.
 
     Dotted lines mark the generations after which the search box was moved. Where the best design has
     been run again from fresh starts, that stands at the end: the curve is better by the luck of a winner.
@@ -95,6 +96,6 @@ def _finish(axes: NDArray[Any]) -> None:
 
 
 def _plottable(values: list[float]) -> np.ndarray:
-    """Generations without a successful design leave a gap."""
+    """Return values to draw, in which generations without a successful design leave a gap."""
     array = np.array(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

@@ -12,7 +12,7 @@ from tisim.console import progress_bar
 
 
 class Display:
-    """Shows the progress of a search of a problem; used as a context manager.
+    """A display shows the progress of a search of a problem; it is a context manager.
 
     Pass ``generation`` and ``step`` to ``optimize.search.search`` as on_generation and on_progress.
     """
@@ -35,12 +35,12 @@ class Display:
         self.bar.__exit__(kind, error, trace)
 
     def step(self, where: Progress) -> None:
-        """Some more evaluations are done."""
+        """Show that some more evaluations are done."""
         completed = where.generation + where.fraction
         self.bar.update(self.task, completed=completed, generation=where.generation)
 
     def generation(self, where: Progress) -> None:
-        """A generation is done."""
+        """Show that a generation is done, and its best design where that is new."""
         self.step(where)
         best = self._best(where)
         self.bar.update(self.task, best=best.split("  ")[0])

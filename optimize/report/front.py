@@ -1,4 +1,4 @@
-"""The front of several objectives, drawn: what is given up of one for more of another.
+"""The front of several objectives is drawn: what is given up of one for more of another.
 
 Of many designs that were estimated from few starts, the luckiest lie beyond the front, which is known from
 more. So only those that have had as many starts as the front are drawn as what is known, with their
@@ -28,8 +28,8 @@ Estimates = tuple[FitnessEstimate, ...]
 
 
 def front_figure(outcome: Outcome) -> Figure:
-    """A panel for each pair of objectives: the front with 95 % confidence intervals, from fresh starts where
-    there are any; behind it other designs; and the compromise (Outcome.best).
+    """Draw a panel for each pair of objectives: the front with 95 % confidence intervals, from fresh starts
+    where there are any; behind it other designs; and the compromise (Outcome.best).
     """
     pairs = list(combinations(range(len(outcome.problem.objectives)), 2))
     figure = empty(5.6 * len(pairs), 5.0)
@@ -45,7 +45,8 @@ def front_figure(outcome: Outcome) -> Figure:
 
 
 def others(outcome: Outcome) -> tuple[list[Estimates], list[Estimates]]:
-    """Designs outside the front: from as many starts as the median design of the front, and from fewer."""
+    """Return the designs outside the front: those estimated from as many starts as the median design of the
+    front, and from fewer."""
     front = {tuple(string) for string in outcome.hall}
     enough = np.median([string.estimates[0].starts for string in outcome.hall] or [1])
     good = [e for genes, e in outcome.estimates.items() if e[0].ok and genes not in front]
@@ -85,7 +86,7 @@ def _panel(axis: Axes, outcome: Outcome, x: int, y: int) -> None:
 def _bars(
     axis: Axes, outcome: Outcome, estimates: Sequence[Estimates], of: tuple[int, int], colour: str, label: str
 ) -> None:
-    """Points with their intervals where they have had several starts."""
+    """Draw points, with their intervals where they have had several starts."""
     means, widths = _values(outcome, estimates)
     unsure = bool(widths.any())
     axis.errorbar(
@@ -97,7 +98,8 @@ def _bars(
 
 
 def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarray, np.ndarray]:
-    """Means of the objectives and half-widths of their intervals, 0 where unknown; (designs, objectives)."""
+    """Return means of the objectives and half-widths of their intervals, 0 where unknown; each of shape
+    (designs, objectives)."""
     many = len(outcome.problem.objectives)
     means = [outcome.problem.costs([e.mean for e in of_all]) for of_all in estimates]
     widths = [[e.half_width for e in of_all] for of_all in estimates]
@@ -105,7 +107,7 @@ def _values(outcome: Outcome, estimates: Sequence[Estimates]) -> tuple[np.ndarra
 
 
 def _starts(estimates: Iterable[Estimates]) -> str:
-    """How many starts they had: "1 start" or "4 to 30 starts"."""
+    """Return how many starts they had: "1 start" or "4 to 30 starts"."""
     numbers = [of_all[0].starts for of_all in estimates]
     low, high = min(numbers), max(numbers)
     many = f"{low}" if low == high else f"{low} to {high}"

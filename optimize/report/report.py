@@ -1,4 +1,4 @@
-"""What a finished search shows: a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
+"""A finished search is reported as a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from tisim.files.atomic import replace_file
 
 
 def best_table(outcome: Outcome) -> RenderableType:
-    """The best designs for the terminal: a column per design, genes in their units, fitness with its 95 %
-    interval, derived values. In several tables where they would not fit on TERMINAL_WIDTH columns side by
-    side. Of a front as many as the hall of fame has places, spread along it.
+    """Return the best designs for the terminal: a column per design, genes in their units, fitness with its
+    95 % interval, derived values. In several tables where they would not fit on TERMINAL_WIDTH columns side
+    by side. Of a front as many as the hall of fame has places, spread along it.
     """
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
@@ -49,7 +49,7 @@ def best_table(outcome: Outcome) -> RenderableType:
 
 
 def notes(outcome: Outcome) -> RenderableType:
-    """What the headings of ``best_table`` stand for, a line each; nothing where there is no design."""
+    """Return what the headings of ``best_table`` stand for, a line each; nothing where there is no design."""
     problem, ensemble = outcome.problem, outcome.settings.ensemble
     if not outcome.hall:
         return Group()
@@ -64,12 +64,12 @@ def notes(outcome: Outcome) -> RenderableType:
 
 
 def _spread(number: int, places: int) -> list[int]:
-    """At most so many places in a row of that number, the first and the last among them."""
+    """Return at most so many places in a row of that number, the first and the last among them."""
     return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})
 
 
 def details_table(details: Mapping[str, float]) -> RenderableType:
-    """What the run of the best design shows, for the terminal."""
+    """Return what the run of the best design shows, for the terminal."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, show_header=False)
     for name, value in details.items():
         table.add_row(name, _text(value))
@@ -77,7 +77,7 @@ def details_table(details: Mapping[str, float]) -> RenderableType:
 
 
 def details_csv(details: Mapping[str, float]) -> bytes:
-    """What the run of the best design shows as CSV, all digits."""
+    """Return what the run of the best design shows as CSV, all digits."""
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(["quantity", "value"])
@@ -90,7 +90,7 @@ def _widest(rows: Sequence[Sequence[str]]) -> int:
 
 
 def best_csv(outcome: Outcome) -> bytes:
-    """The best designs as CSV, all digits, one column per heading of best_columns."""
+    """Return the best designs as CSV, all digits, one column per heading of best_columns."""
     columns = best_columns(outcome.problem, outcome.hall)
     text = io.StringIO(newline="")
     writer = csv.writer(text)
@@ -122,14 +122,14 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
 
 
 def figure_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
-    """A figure as the bytes of a file of that kind."""
+    """Return a figure as the bytes of a file of that kind."""
     file = io.BytesIO()
     figure.savefig(file, format=kind, **options)
     return file.getvalue()
 
 
 def _text(value: Any) -> str:
-    """Four digits; 1.5e8 and not 1.5e+08, which is two columns more."""
+    """Return a number with four digits, as 1.5e8 and not 1.5e+08, which is two columns more."""
     if not isinstance(value, float):
         return str(value)
     digits, power, exponent = f"{value:.4g}".partition("e")

@@ -9,14 +9,15 @@ from scipy.spatial import cKDTree
 
 
 def near(position: np.ndarray, reach: float) -> np.ndarray:
-    """The pairs (i < j) of positions (n, 3), m, at most ``reach`` (m) apart, sorted; shape (pairs, 2)."""
+    """Return the pairs (i < j) of positions (n, 3), m, at most ``reach`` (m) apart, sorted; shape (pairs,
+    2)."""
     pairs = cKDTree(position).query_pairs(reach, output_type="ndarray").reshape(-1, 2)
     return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def head_to_tail(position: np.ndarray, moment: np.ndarray, diameter: float, share: float = 0.5) -> np.ndarray:
-    """The pairs (i < j) of equal spheres of a diameter (m) at positions (n, 3), m, whose dipoles (n, 3) bind
-    them by ``share`` or more of what two of them bind at contact, head to tail; shape (pairs, 2).
+    """Return the pairs (i < j) of equal spheres of a diameter (m) at positions (n, 3), m, whose dipoles (n,
+    3) bind them by ``share`` or more of what two of them bind at contact, head to tail; shape (pairs, 2).
 
     U_ij / U_contact = (D/d)^3 (3 (e_i.n)(e_j.n) - e_i.e_j) / 2, e the unit vectors of the moments, so that a
     pair is bound by where it lies, whatever the size of the moments. Side by side no pair is.
@@ -32,7 +33,8 @@ def head_to_tail(position: np.ndarray, moment: np.ndarray, diameter: float, shar
 
 
 def labels(number: int, pairs: np.ndarray) -> np.ndarray:
-    """The cluster that each of ``number`` particles is in, as ``pairs`` (n, 2) bind them; shape (number,).
+    """Return the cluster that each of ``number`` particles is in, as ``pairs`` (n, 2) bind them; shape
+    (number,).
 
     Numbered from 0; a particle that is bound to none is a cluster of its own.
     """
@@ -41,5 +43,5 @@ def labels(number: int, pairs: np.ndarray) -> np.ndarray:
 
 
 def mean_size(number: int, pairs: np.ndarray) -> float:
-    """The mean number of particles per cluster, singles included: 1 where nothing is bound."""
+    """Return the mean number of particles per cluster, singles included: 1 where nothing is bound."""
     return float(number / (labels(number, pairs).max() + 1))

@@ -99,13 +99,13 @@ def rate_of(backend: str) -> float | None:
 
 
 def llvm_version() -> str:
-    """The version of the LLVM inside the backend, or "unknown"."""
+    """Return the version of the LLVM inside the backend, or "unknown"."""
     version = getattr(ti._lib.core, "get_llvm_target_support", None)
     return str(version()) if version else "unknown"
 
 
 def processor() -> dict[str, str]:
-    """The first processor of /proc/cpuinfo; its name only where there is none."""
+    """Return the first processor of /proc/cpuinfo; its name only where there is none."""
     info = Path("/proc/cpuinfo")
     if not info.is_file():
         return {"model name": platform.processor() or platform.machine()}
@@ -115,7 +115,7 @@ def processor() -> dict[str, str]:
 
 
 def processor_support(cpu: dict[str, str], llvm: str) -> str:
-    """Whether an LLVM knows a processor, as a sentence."""
+    """Return whether an LLVM knows a processor, as a sentence."""
     try:
         vendor, family, model = cpu["vendor_id"], int(cpu["cpu family"]), int(cpu["model"])
         major = int(llvm.split(".")[0])
@@ -130,7 +130,7 @@ def processor_support(cpu: dict[str, str], llvm: str) -> str:
 
 
 def findings() -> list[Finding]:
-    """The report. Takes some seconds; starts nothing in this process but looks at CUDA."""
+    """Return the report. Takes some seconds; starts nothing in this process but looks at CUDA."""
     cpu, llvm = processor(), llvm_version()
     report = [
         Finding("backend", runtime.backend(), f"LLVM {llvm}"),
@@ -164,7 +164,7 @@ def _advice(rates: dict[str, float | None]) -> Finding:
 
 
 def _cuda() -> bool:
-    """Whether a CUDA driver is there that a kernel could run on."""
+    """Return whether a CUDA driver is there that a kernel could run on."""
     return any(Path(device).exists() for device in ("/dev/nvidia0", "/dev/dxg")) and ti._lib.core.with_cuda()
 
 

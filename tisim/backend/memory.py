@@ -68,13 +68,13 @@ class Tree:
 
 
 def in_use() -> set[Tree]:
-    """All trees whose memory is there."""
+    """Return all trees whose memory is there."""
     return {tree for tree in _live if tree.alive}
 
 
 @contextmanager
 def collected() -> Iterator[list[Tree]]:
-    """The trees that are made meanwhile, in a list; where anything is raised, they are gone."""
+    """Yield the trees that are made meanwhile, in a list; where anything is raised, they are gone."""
     trees: list[Tree] = []
     _collecting.append(trees)
     try:
@@ -93,7 +93,7 @@ def tree_count() -> int:
 
 
 def needs_restart() -> bool:
-    """Whether so many trees have been made that Taichi should be started anew."""
+    """Return whether so many trees have been made that Taichi should be started anew."""
     return _tree_counts[runtime.generation()] >= MAX_TREES_PER_START
 
 

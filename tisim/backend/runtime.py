@@ -147,7 +147,7 @@ def restart() -> None:
 
 
 def current() -> Runtime:
-    """The running settings; starts the defaults (cpu, f64, all cores) on first use."""
+    """Return the running settings; starts the defaults (cpu, f64, all cores) on first use."""
     return _current or init()
 
 

@@ -55,7 +55,7 @@ DEVICE_FUNCTION: type = type(_Probe.__dict__["function"])
 
 
 def is_device_function(value: object) -> bool:
-    """Whether this is a function decorated with ``ti.func``."""
+    """Return whether this is a function decorated with ``ti.func``."""
     return bool(getattr(value, f"_is_{ti.__name__}_function", False))
 
 

@@ -29,7 +29,8 @@ _thread = ThreadPoolExecutor(1, "taichi", _begin)
 
 
 def in_taichi_thread(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that runs in Taichi's thread, and returns or raises in the caller's what it does there.
+    """Return a function that runs in Taichi's thread, and returns or raises in the caller's what it does
+    there.
 
     Whatever makes, fills, reads or destroys fields, or calls a kernel, must be in such a function.
     """

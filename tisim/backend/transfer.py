@@ -54,7 +54,7 @@ class Exchange:
         }
 
     def read(self) -> dict[str, np.ndarray]:
-        """Every field as an array of its full shape."""
+        """Return every field as an array of its full shape."""
         buffers = self._buffers()
         self._launch(True, buffers)
         return self._views(buffers)
@@ -73,7 +73,7 @@ class Exchange:
 
     @ti.func
     def _at(self, shape: ti.template(), where):  # type: ignore[valid-type]
-        """The place of an entry in an array of this shape."""
+        """Return the place of an entry in an array of this shape."""
         at = where[0]
         for axis in ti.static(range(1, len(shape))):
             at = at * shape[axis] + where[axis]

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def three_digits(value: float) -> float:
-    """What a study sets a setting to, rounded so that people can read it."""
+    """Return what a study sets a setting to, rounded so that people can read it."""
     return float(f"{value:.3g}")
 
 
@@ -31,7 +31,7 @@ class AccuracyParameter:
         self.orders, self.converges = orders, converges
 
     def turned(self, part: Part, decades: float) -> Part:
-        """The part with settings for an error that is so many decades larger; itself for 0.
+        """Return the part with settings for an error that is so many decades larger; itself for 0.
 
         Settings are rounded to three digits. InputError when the part cannot have them.
         """

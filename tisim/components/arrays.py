@@ -13,14 +13,15 @@ from tisim.components.component import Vector
 
 
 def frozen(values: Any, kind: type | None = None) -> np.ndarray:
-    """A copy that is not writeable."""
+    """Return a copy that is not writeable."""
     array = np.array(values, dtype=kind)
     array.flags.writeable = False
     return array
 
 
 def equal(a: Any, b: Any) -> bool:
-    """Whether two values are the same: numbers, tables or lists of them, or arrays, also beside lists."""
+    """Return whether two values are the same: numbers, tables or lists of them, or arrays, also beside
+    lists."""
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         return a.keys() == b.keys() and all(equal(value, b[key]) for key, value in a.items())
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
@@ -29,7 +30,7 @@ def equal(a: Any, b: Any) -> bool:
 
 
 def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
-    """An array of as many rows as are given, from such an array or from what makes the list."""
+    """Return an array of as many rows as are given, from such an array or from what makes the list."""
 
     def validated(value: Any, as_list: Callable[[Any], Any]) -> np.ndarray:
         if isinstance(value, np.ndarray):

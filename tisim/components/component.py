@@ -52,12 +52,12 @@ class Checked(BaseModel):
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:
-        """What messages call the one that is made of these values."""
+        """Return what messages call the one that is made of these values."""
         return cls.kind()
 
     @classmethod
     def kind(cls) -> str:
-        """The name of this class in files and messages: snake_case."""
+        """Return the name of this class in files and messages: snake_case."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
 
@@ -92,7 +92,7 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def named(cls, kind: Any, where: str) -> type[Self]:
-        """The subclass of this name; InputError naming ``where`` and the known names otherwise."""
+        """Return the subclass of this name; InputError naming ``where`` and the known names otherwise."""
         known = cls.known()
         rule = f"one of {', '.join(sorted(known))} (of your own: give --plugin FILE.py, or import it first)"
         must(isinstance(kind, str) and kind in known, where, rule, kind)
@@ -100,12 +100,13 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def known(cls) -> dict[str, type[Self]]:
-        """Every part made after this contract that has been imported, by name; itself too if it is none."""
+        """Return every part made after this contract that has been imported, by name; itself too if it is
+        none."""
         return {kind.kind(): kind for kind in cls.kinds()}
 
     @classmethod
     def kinds(cls) -> Iterator[type[Self]]:
-        """Every part made after this contract, but those of a file of which another version has been
+        """Yield every part made after this contract, but those of a file of which another version has been
         loaded."""
         for kind in (cls, *_descendants(cls)):
             if not kind.__dict__.get("contract") and not python_file.is_superseded(kind):
@@ -149,7 +150,7 @@ class Component(AccuracyHints, Checked):
             yield name, size
 
     def values(self) -> list[float]:
-        """The numbers of ``columns()`` in order, vectors spread out; SI units."""
+        """Return the numbers of ``columns()`` in order, vectors spread out; SI units."""
         spread: list[float] = []
         for name, _, size in self.parameters():
             value = getattr(self, name)
@@ -157,7 +158,8 @@ class Component(AccuracyHints, Checked):
         return spread
 
     def structure(self) -> tuple[Any, ...]:
-        """What is compiled in: class, every option that is not a per-world parameter, room for lists."""
+        """Return what is compiled in: class, every option that is not a per-world parameter, room for
+        lists."""
         varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
         fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
         return (type(self), *fixed, *((name, room(len(getattr(self, name)))) for name, _ in self.lists()))
@@ -211,7 +213,7 @@ def option(text: str, default: Any = ..., **rules: Any) -> Any:
 
 
 def _bounded(info: FieldInfo) -> bool:
-    """Whether the rules of a number say how large it may be."""
+    """Return whether the rules of a number say how large it may be."""
     return any(hasattr(rule, "le") or hasattr(rule, "lt") for rule in info.metadata)
 
 

@@ -23,21 +23,21 @@ class Domain(Component):
         return None, None
 
     def joined(self) -> bool:
-        """Whether opposite faces are joined."""
+        """Return whether opposite faces are joined."""
         return False
 
     def periodic(self) -> bool:
-        """Whether particles see each other across joined faces."""
+        """Return whether particles see each other across joined faces."""
         return False
 
     @ti.func
     def wrap(self, w, r):
-        """The place inside the domain of a particle that has moved to r. m."""
+        """Return the place inside the domain of a particle that has moved to r. m."""
         return r
 
     @ti.func
     def lost(self, w, r):
-        """Whether r is so far out that rounding has taken its place inside."""
+        """Return whether r is so far out that rounding has taken its place inside."""
         return 0
 
     @ti.func

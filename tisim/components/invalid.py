@@ -14,13 +14,13 @@ from tisim.errors import InputError, abbreviated, printable
 
 
 def unit_of(info: FieldInfo) -> str:
-    """The unit that ``parameter`` declares, or an empty string."""
+    """Return the unit that ``parameter`` declares, or an empty string."""
     extra = info.json_schema_extra
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
 
 def text_of(info: FieldInfo) -> str:
-    """What a parameter or option is, as declared, or an empty string."""
+    """Return what a parameter or option is, as declared, or an empty string."""
     return info.description or ""
 
 
@@ -84,7 +84,7 @@ def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, F
 
 
 def _meaning(info: FieldInfo) -> str:
-    """What a parameter is, and its unit; in brackets."""
+    """Return what a parameter is, and its unit; in brackets."""
     what = ", ".join(filter(None, (text_of(info), unit_of(info))))
     return f" ({what})" if what else ""
 
@@ -94,6 +94,6 @@ def _is_choice(part: int | str) -> bool:
 
 
 def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:
-    """What a part says of itself; a row of a list, which row it is."""
+    """Return what a part says of itself; a row of a list, which row it is."""
     row = bool(loc) and isinstance(loc[-1], int)
     return [f"{name}.{line.partition('.')[2]}" if row else line for line in text.splitlines()]

@@ -20,7 +20,7 @@ PLAIN = 1e-4, 1e16
 
 
 def json_pieces(value: Any) -> Iterator[str]:
-    """The text of ``json.dumps(value, sort_keys=True)``, where arrays stand for their lists."""
+    """Yield the text of ``json.dumps(value, sort_keys=True)``, where arrays stand for their lists."""
     if isinstance(value, np.ndarray):
         yield from _array(value)
     elif isinstance(value, Mapping):
@@ -44,7 +44,7 @@ def _array(array: np.ndarray) -> Iterator[str]:
 
 
 def _rows(array: np.ndarray) -> str:
-    """The shortest decimals that are these numbers."""
+    """Return the shortest decimals that are these numbers."""
     numbers = np.asarray(array, float)
     size = np.abs(numbers)
     other = ((size < PLAIN[0]) & (size > 0)) | (size >= PLAIN[1])

@@ -28,7 +28,7 @@ FINE = 1e-3
 
 
 def limits(unit: str) -> tuple[float, float]:
-    """The least and the largest magnitude of a quantity of this unit that is not 0."""
+    """Return the least and the largest magnitude of a quantity of this unit that is not 0."""
     return (LEAST, MOST) if unit in ("m", "kg") else NORMAL
 
 

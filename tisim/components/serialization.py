@@ -24,7 +24,7 @@ def load(package: ModuleType) -> None:
 
 
 def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
-    """A copy of a table whose keys are text; InputError naming ``where`` for anything else."""
+    """Return a copy of a table whose keys are text; InputError naming ``where`` for anything else."""
     must(isinstance(data, Mapping), where, what, data)
     for key in data:
         must(isinstance(key, str), f"a key of {where}", "text", key)
@@ -32,7 +32,7 @@ def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
 
 
 def from_dict(base: type[Part], data: Any, where: str) -> Part:
-    """The part that ``data["kind"]`` names; its other keys are its parameters."""
+    """Return the part that ``data["kind"]`` names; its other keys are its parameters."""
     values = table(data, where)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
@@ -49,7 +49,7 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
 
 
 def _part(annotation: Any) -> type[Component] | None:
-    """The kind of part that a field holds, also where it may hold none."""
+    """Return the kind of part that a field holds, also where it may hold none."""
     kinds = [
         t for t in (get_args(annotation) or (annotation,)) if isinstance(t, type) and issubclass(t, Component)
     ]
@@ -86,12 +86,12 @@ def toml(data: Mapping[str, Any], path: str = "") -> str:
 
 
 def _tables(value: Any) -> bool:
-    """Whether it is a list of tables."""
+    """Return whether it is a list of tables."""
     return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
 
 
 def inline(value: Any) -> str:
-    """A value as TOML on one line."""
+    """Return a value as TOML on one line."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{_key(key)} = {inline(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
@@ -101,7 +101,7 @@ def inline(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    """A key of a table: in quotes unless all of it is letters of ASCII, digits, - and _."""
+    """Return a key of a table: in quotes unless all of it is letters of ASCII, digits, - and _."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else inline(name)
 
 
@@ -111,7 +111,7 @@ _DEEP = re.compile(rf"""(?<![\w."'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{64}}"""
 
 
 def parse(text: str) -> dict[str, Any]:
-    """The table that TOML text holds; ValueError or RecursionError where it cannot be read."""
+    """Return the table that TOML text holds; ValueError or RecursionError where it cannot be read."""
     # tomllib takes a time that grows as the square of the parts of a key: minutes for some ten thousand.
     if _DEEP.search(text):
         raise RecursionError("a key of too many parts")
@@ -119,7 +119,8 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
-    """The table that TOML text holds; InputError naming ``what`` and ``source`` where it is not TOML."""
+    """Return the table that TOML text holds; InputError naming ``what`` and ``source`` where it is not
+    TOML."""
     try:
         return parse(text)
     except RecursionError:

@@ -146,7 +146,7 @@ _all: weakref.WeakSet[Batches] = weakref.WeakSet()
 
 
 def rounded(number: int) -> int:
-    """The next number up whose binary digits are all 0 after the first three.
+    """Return the next number up whose binary digits are all 0 after the first three.
 
     A size is compiled in: so scenes of like sizes share what is compiled, in this process and in those that
     find it on the disk.

@@ -104,7 +104,7 @@ def explain(scene: Scene) -> Explanation:
 
 
 def known_effects() -> list[type[Effect]]:
-    """Every effect of the package, by name."""
+    """Return every effect of the package, by name."""
     kinds_by_family = (
         reference.FAMILIES[family].kinds().values() for family in ("effects", "operators", "sources")
     )
@@ -167,7 +167,7 @@ def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, 
 
 
 def render(explanation: Explanation) -> RenderableType:
-    """The explanation for a terminal."""
+    """Return the explanation for a terminal."""
     head = Text.assemble(
         (explanation.name, "bold"),
         f": {explanation.particles} particles, room for {explanation.capacity}; {explanation.precision}; "

@@ -83,7 +83,7 @@ def _real() -> type:
 
 
 def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> np.ndarray:
-    """A field of all worlds: what each start says of it, else its default; ids count from 0."""
+    """Return a field of all worlds: what each start says of it, else its default; ids count from 0."""
     copied, number = (f.default, 0) if isinstance(f.default, str) else (None, f.default or 0)
     kind = np.int32 if f.integer else np.float64 if f.double else _real()
     column: np.ndarray = np.full(f.shape(worlds, capacity), number, dtype=kind)
@@ -95,7 +95,8 @@ def laid_out(f: Field, starts: Sequence[Arrays], worlds: int, capacity: int) -> 
 
 
 def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int) -> dict[str, Any]:
-    """What is not 0 of the worlds' own quantities at a start, by name; worlds without a scene have ended."""
+    """Return what is not 0 of the worlds' own quantities at a start, by name; worlds without a scene have
+    ended."""
     empty = worlds - len(scenes)
     counts = np.array([len(start["mass"]) for start in starts] + [0] * empty)
     frames = [np.average(start["velocity"], axis=0, weights=start["mass"]) for start in starts]

@@ -79,7 +79,7 @@ class ParticleState(Mapping[str, np.ndarray]):
 
 
 def _numbers(name: str, values: Any, whole: bool) -> np.ndarray:
-    """An array of floats; InputError unless these are numbers."""
+    """Return an array of floats; InputError unless these are numbers."""
     try:
         array = np.asarray(values)
     except ValueError:

@@ -60,7 +60,7 @@ class Family:
     place: str
 
     def kinds(self) -> dict[str, type[Component]]:
-        """Those known, by name."""
+        """Return those known, by name."""
         plugins.load_parts()
         serialization.load(packing)
         narrower = tuple(one.base for one in FAMILIES.values() if one.base in self.base.__subclasses__())
@@ -116,7 +116,7 @@ class Entry:
     toml: str
 
     def publications(self) -> list[str]:
-        """The works that its source cites in short, in full."""
+        """Return the works that its source cites in short, in full."""
         return [f"{short}: {work}" for short, work in PUBLICATIONS.items() if short in self.source]
 
 
@@ -151,7 +151,7 @@ def find(name: str) -> Entry:
 
 
 def describe(kind: type[Component], family: str) -> Entry:
-    """The entry of a part."""
+    """Return the entry of a part."""
     effect = kind if issubclass(kind, Effect) else Effect
     wanted = {need if isinstance(need, str) else need.name for need in effect.fields}
     declared = resolve_fields(effect.fields)
@@ -208,7 +208,7 @@ def _setting(name: str, info: FieldInfo) -> Declaration:
 
 
 def _rule(info: FieldInfo) -> str:
-    """What a value must be, beside what its unit says."""
+    """Return what a value must be, beside what its unit says."""
     choices = [one for t in (info.annotation, *get_args(info.annotation)) for one in _choices(t)]
     if choices:
         return " or ".join(choices)
@@ -224,7 +224,7 @@ def _choices(annotation: Any) -> list[str]:
 
 
 def shown(value: object) -> str:
-    """A value as people read it."""
+    """Return a value as people read it."""
     if isinstance(value, Component):
         return value.kind()
     if isinstance(value, tuple):
@@ -235,19 +235,19 @@ def shown(value: object) -> str:
 
 
 def summary(kind: type) -> str:
-    """The first sentence of the docstring, without its source."""
+    """Return the first sentence of the docstring, without its source."""
     return re.split(r"\s*\((?=[A-Z]\d\d)|\.\s|\.$", " ".join(_docstring(kind)[0].split("\n\n")[0].split()))[0]
 
 
 def _body(kind: type) -> str:
-    """The docstring but for its first sentence and its source."""
+    """Return the docstring but for its first sentence and its source."""
     first, *rest = _docstring(kind)[0].split("\n\n")
     opening = " ".join(first.split())[len(summary(kind)) :].lstrip(". ")
     return "\n\n".join(part for part in (opening, *rest) if part)
 
 
 def source(kind: type) -> str:
-    """What the docstring names as source; else the first work that its module cites in brackets."""
+    """Return what the docstring names as source; else the first work that its module cites in brackets."""
     if found := _docstring(kind)[1]:
         return found
     module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
@@ -256,6 +256,6 @@ def source(kind: type) -> str:
 
 
 def _docstring(kind: type) -> tuple[str, str]:
-    """The docstring of a class itself: what stands before its source, and the source."""
+    """Return the docstring of a class itself: what stands before its source, and the source."""
     text, _, named = inspect.cleandoc(kind.__doc__ or "").partition("Source: ")
     return text.strip(), " ".join(named.split()).removesuffix(".")

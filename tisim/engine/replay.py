@@ -47,7 +47,7 @@ class Replay:
             self.base, self.saved_at = self.whole(), time.perf_counter()
 
     def whole(self) -> Image:
-        """An image of worlds as they are, or as they were, where a step is under way."""
+        """Return an image of worlds as they are, or as they were, where a step is under way."""
         image = self.simulation.s.image()
         waiting = image["underway"] > 0
         if waiting.any():
@@ -108,7 +108,7 @@ class Replay:
         return self.simulation.s.image()
 
     def _image_after(self, image: Image, worlds: np.ndarray, steps: int) -> Image:
-        """What an image becomes when only these worlds take a number of steps."""
+        """Return what an image becomes when only these worlds take a number of steps."""
         image["status"][:] = WorldStatus.ENDED
         image["status"][worlds] = WorldStatus.RUNNING
         image["goal"] = image["steps"] + steps

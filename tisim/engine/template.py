@@ -14,12 +14,12 @@ from tisim.effects.base import Effect
 
 
 def toml(kind: type[Component], place: str, named: bool) -> str:
-    """The table ``[place]`` of a part, and those within it. named : whether it says its kind."""
+    """Return the table ``[place]`` of a part, and those within it. named : whether it says its kind."""
     return "\n".join(_lines(kind, place, named))
 
 
 def fields(kind: type[Component]) -> dict[str, FieldInfo]:
-    """What a table says of a part; the name of an effect is that of its table."""
+    """Return what a table says of a part; the name of an effect is that of its table."""
     infos = dict(kind.model_fields)
     if issubclass(kind, Effect):
         del infos["name"]
@@ -27,7 +27,7 @@ def fields(kind: type[Component]) -> dict[str, FieldInfo]:
 
 
 def _lines(kind: type[Component], place: str, named: bool, row: bool = False) -> Iterator[str]:
-    """The lines of a table of a scene file with all settings of a part, and of the tables within it."""
+    """Yield the lines of a table of a scene file with all settings of a part, and of the tables within it."""
     yield f"[[{place}]]" if row else f"[{place}]"
     if named:
         yield f'kind = "{kind.kind()}"'
@@ -46,7 +46,7 @@ def _lines(kind: type[Component], place: str, named: bool, row: bool = False) ->
 
 
 def example(info: FieldInfo) -> Any:
-    """The default of a setting, or a value that will do where it has none."""
+    """Return the default of a setting, or a value that will do where it has none."""
     default = None if info.is_required() else info.get_default(call_default_factory=True)
     if default is not None:
         return default

@@ -105,7 +105,7 @@ def _length(word):
 
 @ti.func
 def _direction(word):
-    """A point on the unit circle, to some 11 digits: in the first quadrant by 30 bits, then two signs.
+    """Return a point on the unit circle, to some 11 digits: in the first quadrant by 30 bits, then two signs.
 
     cos and sin of pi/4 + x by the series of x.
     """

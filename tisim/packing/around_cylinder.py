@@ -43,7 +43,7 @@ class RandomAroundCylinder(Placement):
         return axis
 
     def volume(self) -> float:
-        """The volume of the part, m^3."""
+        """Return the volume of the part, m^3."""
         outer = np.pi * (self.radius + self.thickness) ** 2
         side = (outer - np.pi * self.radius**2) * self.length
         return float((self.part != "top") * side + (self.part != "side") * 2 * outer * self.thickness)
@@ -96,7 +96,7 @@ class RandomAroundCylinder(Placement):
 
 
 def _without_overlaps(points: np.ndarray, distance: float) -> np.ndarray:
-    """The points (m) without those nearer than a distance (m) to one that comes before."""
+    """Return the points (m) without those nearer than a distance (m) to one that comes before."""
     free = np.ones(len(points), bool)
     for i, j in sorted(cKDTree(points).query_pairs(distance)):
         free[j] &= not free[i]

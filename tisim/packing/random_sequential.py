@@ -130,7 +130,7 @@ def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
 
 
 def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
-    """The first centres, found by trying places in all of the region."""
+    """Return the first centres, found by trying places in all of the region."""
     # Cells at least a diameter wide, so that overlaps are found in the 27 cells around.
     dims = np.clip(np.floor(region.side / (2.0 * radius)), 1, MAX_CELLS).astype(int)
     heads = np.full(int(np.prod(dims)), -1, dtype=np.int32)

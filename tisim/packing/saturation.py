@@ -80,7 +80,8 @@ class _Voids:
         return places[self._first_come(places)]
 
     def _first_come(self, places: np.ndarray) -> np.ndarray:
-        """Which places are taken when each, in turn, is taken if no earlier one is within a diameter."""
+        """Return which places are taken when each, in turn, is taken if no earlier one is within a
+        diameter."""
         accepted = np.ones(len(places), dtype=bool)
         if len(places):
             pairs = self._tree(places).query_pairs(self.diameter, output_type="ndarray")
@@ -114,7 +115,7 @@ class _Voids:
         self.index = np.concatenate(children)
 
     def _outside(self, index: np.ndarray, tree: cKDTree) -> np.ndarray:
-        """The voxels that the nearest centre of a tree does not cover."""
+        """Return the voxels that the nearest centre of a tree does not cover."""
         middle = (index + 0.5) * self.step
         distance, nearest = tree.query(middle, distance_upper_bound=self.diameter)
         close = np.flatnonzero(np.isfinite(distance))
@@ -122,14 +123,14 @@ class _Voids:
         return np.delete(index, close[covered], axis=0)
 
     def _is_covered(self, middle: np.ndarray, centre: np.ndarray) -> np.ndarray:
-        """Whether all of a voxel lies within a diameter of a centre: its farthest corner does."""
+        """Return whether all of a voxel lies within a diameter of a centre: its farthest corner does."""
         apart = np.abs(middle - centre)
         if self.box is not None:
             apart = np.minimum(apart, np.abs(self.box - apart))
         return np.asarray(((apart + self.step / 2) ** 2).sum(axis=-1) < self.diameter**2)
 
     def _in_ball(self, index: np.ndarray) -> np.ndarray:
-        """The voxels that reach into the region, where it is a ball."""
+        """Return the voxels that reach into the region, where it is a ball."""
         if not self.region.ball:
             return index
         gap = np.maximum(np.abs((index + 0.5) * self.step - self.region.reach) - self.step / 2, 0.0)

@@ -50,7 +50,7 @@ def cloud(result: Result) -> Figure:
 def start_and_end(
     states: tuple[Arrays, Arrays], times: tuple[float, float], scene: Scene, last: str = "end"
 ) -> Figure:
-    """Two states (at times in s) side by side on one scale, seen from one side without perspective.
+    """Draw two states (at times in s) side by side on one scale, seen from one side without perspective.
 
     last : what the second is called.
 
@@ -72,13 +72,13 @@ def start_and_end(
 
 
 def caption(state: Arrays, time: float) -> str:
-    """Time (s), number and mean radius of the grains."""
+    """Return time (s), number and mean radius of the grains."""
     n, mean = len(state["radius"]), float(state["radius"].mean())
     return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}, mean radius {si(mean, 'm')}"
 
 
 def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = None) -> None:
-    """What the colours mean: beside axes, or in a place of its own."""
+    """Draw what the colours mean: beside axes, or in a place of its own."""
     at = {"ax": beside, "shrink": 0.72, "pad": 0.01} if place is None else {"cax": place}
     bar = figure.colorbar(ScalarMappable(norm, HEAT), **at)
     bar.set_label("temperature (K)")
@@ -86,7 +86,8 @@ def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = Non
 
 
 def temperatures(states: Sequence[Arrays]) -> Normalize | None:
-    """Scale of temperature over all states; logarithmic when it spans much; None where one has none."""
+    """Return the scale of temperature over all states; logarithmic when it spans much; None where one has
+    none."""
     if any("temperature" not in state for state in states):
         return None
     values = np.concatenate([state["temperature"] for state in states])
@@ -100,25 +101,25 @@ def temperatures(states: Sequence[Arrays]) -> Normalize | None:
 
 
 def _project(points: np.ndarray) -> np.ndarray:
-    """Right, up and towards the viewer, for points of shape (n, 3). m."""
+    """Return the coordinates right, up and towards the viewer for points of shape (n, 3). m."""
     return np.asarray(points) @ PROJECTION
 
 
 def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
-    """Corners of the box as seen, shape (8, 3); none in open space. m."""
+    """Return the corners of the box as seen, shape (8, 3); none in open space. m."""
     if low is None or high is None:
         return np.empty((0, 3))
     return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
 def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
-    """A ``view`` that all states are seen in."""
+    """Return a ``view`` that all states are seen in."""
     both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
     return view(both, box)
 
 
 def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
-    """Left, bottom and side of a square that holds all grains and the box. m."""
+    """Return left, bottom and side of a square that holds all grains and the box. m."""
     projected, radius = _project(state["position"]), state["radius"][:, None]
     low = np.vstack([projected - radius, box]).min(axis=0)[:2]
     high = np.vstack([projected + radius, box]).max(axis=0)[:2]
@@ -146,13 +147,13 @@ def panel(
 
 
 def gravity(scene: Scene) -> np.ndarray:
-    """Acceleration of all gravity in a scene, m/s^2; 0 where there is none."""
+    """Return the acceleration of all gravity in a scene, m/s^2; 0 where there is none."""
     accelerations = [effect.acceleration for effect in scene.effects if isinstance(effect, Gravity)]
     return np.sum([(0.0, 0.0, 0.0), *accelerations], axis=0)
 
 
 def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray, share: float = 0.07) -> None:
-    """The axes of space in the lower right of a panel, and the direction of gravity where there is some.
+    """Draw the axes of space in the lower right of a panel, and the direction of gravity where there is some.
 
     share : of the panel's side, the length of an arrow.
     """
@@ -171,7 +172,8 @@ def directions(axis: Axes, square: tuple[float, float, float], fall: np.ndarray,
 
 
 def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: float) -> np.ndarray:
-    """Shaded spheres, hidden where another is in front. RGBA, shape (pixels, pixels, 4) / 2."""
+    """Return an image of shaded spheres, hidden where another is in front. RGBA, shape (pixels, pixels, 4) /
+    2."""
     scale = PIXELS / side
     depth = np.full((PIXELS, PIXELS), -np.inf)
     image = np.zeros((PIXELS, PIXELS, 4))
@@ -198,7 +200,7 @@ def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: f
 
 
 def _edges(axis: Axes, corners: np.ndarray) -> None:
-    """The twelve edges of the box; those that meet in its farthest corner run behind the grains."""
+    """Draw the twelve edges of the box; those that meet in its farthest corner run behind the grains."""
     farthest = int(np.argmin(corners[:, 2]))
     for a, b in itertools.combinations(range(8), 2):
         if bin(a ^ b).count("1") == 1:

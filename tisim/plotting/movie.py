@@ -58,12 +58,13 @@ def movie(
 
 
 def while_drawn(path: Path) -> str:
-    """What the file is called while it is not whole; its end says what it is to those who write it."""
+    """Return what the file is called while it is not whole; its end says what it is to those who write it."""
     return f"{path.stem}.new{path.suffix}"
 
 
 def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
-    """What writes such a file; InputError when there is no movie to make, or nothing to make it with."""
+    """Return what writes such a file; InputError when there is no movie to make, or nothing to make it
+    with."""
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
     must(len(frames) > 1, "file", "one with 2 frames or more", f"{len(frames)} frames")
     if path.suffix == ".mp4":
@@ -75,7 +76,7 @@ def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
 
 
 def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:
-    """Scale of temperature, and the farthest reaches of the cloud, over all frames."""
+    """Return the scale of temperature, and the farthest reaches of the cloud, over all frames."""
     position, radius, heat = [], [], []
     for frame in frames:
         arrays = frame.arrays

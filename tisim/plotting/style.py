@@ -26,21 +26,22 @@ WIDE = 30.0
 
 
 def empty(width: float, height: float, pad: float | None = None) -> Figure:
-    """An empty figure, inches; ``pad``: room above and below its axes, inches."""
+    """Return an empty figure, inches; ``pad``: room above and below its axes, inches."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=pad), facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
 
 def plain(axis: Axes) -> None:
-    """Axes below and on the left only, a light grid behind what is drawn."""
+    """Leave axes below and on the left only, and a light grid behind what is drawn."""
     axis.spines[["top", "right"]].set_visible(False)
     axis.grid(color="0.92", lw=0.8)
     axis.set_axisbelow(True)
 
 
 def letters(panels: Iterable[Axes], size: float = 10) -> None:
-    """(a), (b), ... before the titles of a figure's panels, at their left edges; size: of type, points."""
+    """Write (a), (b), ... before the titles of a figure's panels, at their left edges; size: of type,
+    points."""
     for letter, axis in zip(ascii_lowercase, panels, strict=False):
         title = f"({letter}) {axis.get_title()}".rstrip()
         axis.set_title("")
@@ -48,12 +49,12 @@ def letters(panels: Iterable[Axes], size: float = 10) -> None:
 
 
 def legend_beside(axis: Axes) -> None:
-    """A legend off the data, at the right of the panel."""
+    """Put a legend off the data, at the right of the panel."""
     axis.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def legend_above(axis: Axes, columns: int = 3) -> None:
-    """A legend off the data, above the panel at its right."""
+    """Put a legend off the data, above the panel at its right."""
     axis.legend(
         frameon=False, fontsize=8, ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 1.0),
         borderaxespad=0.1,
@@ -61,7 +62,7 @@ def legend_above(axis: Axes, columns: int = 3) -> None:
 
 
 def si(value: float, unit: str) -> str:
-    """A value with a prefix: 0.01 s is 10 ms."""
+    """Return a value with a prefix: 0.01 s is 10 ms."""
     power = _power(value)
     return f"{value / 10.0**power:.3g} {PREFIXES[power]}{unit}"
 
@@ -78,21 +79,22 @@ def quantity(axis: Axis, name: str, unit: str) -> None:
 
 
 def superscripts(text: str) -> str:
-    """Units as they are printed: "m^3/s" is "m³/s"."""
+    """Return units as they are printed: "m^3/s" is "m³/s"."""
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), text)
 
 
 def scale_of(values: np.ndarray) -> str:
-    """The scale of an axis for values: "log" where they span decades and are positive, else "linear"."""
+    """Return the scale of an axis for values: "log" where they span decades and are positive, else
+    "linear"."""
     wide = values.size and values.min() > 0 and values.max() > WIDE * values.min()
     return "log" if wide else "linear"
 
 
 def _power(value: float) -> int:
-    """Power of ten of the prefix of a value."""
+    """Return the power of ten of the prefix of a value."""
     return int(np.clip(_thousands(value), min(PREFIXES), max(PREFIXES)))
 
 
 def _thousands(value: float) -> int:
-    """The power of a thousand, as one of ten, that leaves a value at least 1 and below 1000."""
+    """Return the power of a thousand, as one of ten, that leaves a value at least 1 and below 1000."""
     return 3 * int(np.floor(np.log10(abs(value) * (1 + 1e-12)) / 3)) if value else 0

@@ -34,7 +34,7 @@ class TimeSeries:
 
 
 def history(frames: Frames) -> TimeSeries:
-    """The time series of all frames, each of which is read once."""
+    """Return the time series of all frames, each of which is read once."""
     energy, centre, drift, number = [], [], [], []
     for frame in frames:
         mass, velocity = frame.arrays["mass"].astype(float), frame.arrays["velocity"].astype(float)
@@ -47,7 +47,7 @@ def history(frames: Frames) -> TimeSeries:
 
 
 def clouds(frames: Frames) -> Figure:
-    """First and last frame side by side. InputError when there is none."""
+    """Draw the first and the last frame side by side. InputError when there is none."""
     must(len(frames) > 0, "file", "one with a frame", "one with none yet")
     first, last = frames[0], frames[-1]
     states, times = (first.arrays, last.arrays), (first.time, last.time)
@@ -55,14 +55,15 @@ def clouds(frames: Frames) -> Figure:
 
 
 def mark_missing(figure: Figure, frames: Frames) -> Figure:
-    """The figure, with what frames are missing below it where the run has not reached its end."""
+    """Return the figure, with what frames are missing below it where the run has not reached its end."""
     if frames.missing:
         figure.supxlabel(frames.missing, fontsize=10, color=AXIS_COLOURS[1])
     return figure
 
 
 def quantities(frames: Frames) -> Figure:
-    """Kinetic energy, centre of gravity and number of particles against time; InputError for under 2 frames.
+    """Draw kinetic energy, centre of gravity and number of particles against time; InputError for under 2
+    frames.
 
     Where particles re-enter through opposite faces, the centre of gravity jumps with them; its velocity is
     drawn instead. A number of particles that stays the same is written above.

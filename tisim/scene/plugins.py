@@ -45,7 +45,8 @@ def load_parts() -> None:
 
 
 def versions() -> dict[str, str]:
-    """A checksum of the file of each plugin, by its name: of those loaded, and of packages installed."""
+    """Return a checksum of the file of each plugin, by its name: of those loaded, and of packages
+    installed."""
     own = {f"plugin {file.name}": file.checksum[:12] for file in python_file.loaded_files()}
     return own | installed()
 

@@ -177,8 +177,8 @@ class Scene(Component):
         return serialization.toml(self.to_dict())
 
     def replace(self, settings: Mapping[str, Any]) -> Scene:
-        """A copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a list
-        by number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
+        """Return a copy with dotted keys changed, such as ``{"effects.impact.hardness": 3e5}``; rows of a
+        list by number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
         data = self.to_dict()
         for key, value in settings.items():
             *path, last = key.split(".")
@@ -206,7 +206,7 @@ def _table(effect: Effect) -> dict[str, Any]:
 
 
 def _effect(name: str, values: Any) -> Effect:
-    """The effect of a table; the name of the table is its own, and its kind unless it has one."""
+    """Return the effect of a table; the name of the table is its own, and its kind unless it has one."""
     where = f"effects.{name}"
     table = serialization.table(values, where)
     own = table.pop("name", None)

@@ -12,7 +12,7 @@ RULE = "batch, processes:N or dask://HOST:PORT"
 
 
 def evaluator_named(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Evaluator:
-    """The evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
+    """Return the evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
 
     "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
     "dask://host:port": the workers of the Dask scheduler there (needs the extra ``dask``), or

@@ -114,8 +114,8 @@ class DaskCluster:
 
 
 def _client(address: str) -> Client:
-    """The client of the scheduler at the address. Where the address is none, nothing is begun that Dask could
-    not end."""
+    """Return the client of the scheduler at the address. Where the address is none, nothing is begun that
+    Dask could not end."""
     try:
         from distributed import Client, Security
         from distributed.comm import parse_host_port

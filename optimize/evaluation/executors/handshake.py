@@ -21,7 +21,7 @@ PACKAGES = ("tisim", "optimize", "cases")
 
 
 def program() -> dict[str, str]:
-    """What decides the bits of a result beside the scene, the precision and the device.
+    """Return what decides the bits of a result beside the scene, the precision and the device.
 
     Starts are drawn by NumPy and SciPy; ``sum`` of Python 3.12 rounds in another way than that of 3.11; other
     processors have other mathematical functions.
@@ -41,7 +41,7 @@ def program() -> dict[str, str]:
 
 @cache
 def source() -> str:
-    """The first 12 digits of a SHA-256 of all source files: a version may have been edited."""
+    """Return the first 12 digits of a SHA-256 of all source files: a version may have been edited."""
     digest = hashlib.sha256()
     for package in PACKAGES:
         spec = find_spec(package)
@@ -53,13 +53,13 @@ def source() -> str:
 
 
 def agree(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> None:
-    """InputError that names both sides unless they are the same."""
+    """Raise an InputError that names both sides unless they are the same."""
     differ = [name for name in {**ours, **theirs} if ours.get(name) != theirs.get(name)]
     must(not differ, who, f"of {_versions_of(ours, differ)}, as the search is", _versions_of(theirs, differ))
 
 
 def stranger(answer: object, who: str) -> InputError:
-    """The error for a worker that cannot even say what it is: it has sent something else."""
+    """Return the error for a worker that cannot even say what it is: it has sent something else."""
     ours = program()
     rule = f"one that knows what the search is made of ({_versions_of(ours, ours)})"
     return InputError(f"{who} must be {rule}; received {shorten(repr(answer), 200)}")

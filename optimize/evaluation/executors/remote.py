@@ -34,8 +34,8 @@ class Pool(Protocol):
         ...
 
     def outcome(self, future: cf.Future[Answer]) -> Answer:
-        """The answer of a finished future. Lost when its worker is gone and it must be sent again, RunError
-        when that would be no use.
+        """Return the answer of a finished future. Lost when its worker is gone and it must be sent again,
+        RunError when that would be no use.
         """
         ...
 
@@ -96,7 +96,7 @@ class Remote:
                 progress(finished_scenes / len(scenes))
 
     def _results(self, answer: Answer) -> list[Result]:
-        """What a worker has found. Its error if it failed, InputError if it is of another program."""
+        """Return what a worker has found. Its error if it failed, InputError if it is of another program."""
         ours = handshake.program() if answer.error else self.worker_settings.made_by
         handshake.agree(ours, answer.made_by, answer.worker)
         if answer.error:
@@ -109,7 +109,8 @@ class Remote:
 
 
 def units(scenes: Sequence[Scene], workers: int) -> list[list[int]]:
-    """Indices of the scenes of each unit of work: scenes of one structure, which run side by side."""
+    """Return the indices of the scenes of each unit of work: scenes of one structure, which run side by
+    side."""
     groups: dict[Any, list[int]] = {}
     for index, scene in enumerate(scenes):
         groups.setdefault(scene.structure(), []).append(index)

@@ -67,7 +67,8 @@ _evaluator: list[BatchEvaluator] = []
 
 
 def pack_scenes(scenes: Sequence[Scene]) -> bytes:
-    """Scenes as they are sent: a worker imports the files that define their parts before it reads them."""
+    """Return scenes as they are sent: a worker imports the files that define their parts before it reads
+    them."""
     try:
         return pickle.dumps(scenes)
     except (pickle.PicklingError, AttributeError) as error:
@@ -77,7 +78,7 @@ def pack_scenes(scenes: Sequence[Scene]) -> bytes:
 
 
 def run(scenes: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
-    """The answer of a worker whose share of the cores that is."""
+    """Return the answer of a worker whose share of the cores that is."""
     return _answered(_work.submit(_run, scenes, worker_settings, share))
 
 
@@ -146,7 +147,8 @@ def _end_unless_sent(answer_sent: cf.Future[None]) -> None:
 
 
 def _portable(error: BaseException) -> BaseException:
-    """The error as it can be sent; one that is not for people with where in the worker it was raised."""
+    """Return the error as it can be sent; one that is not for people with where in the worker it was
+    raised."""
     if isinstance(error, (InputError, RunError)):
         return error
     trace = "".join(traceback.format_exception(error))
