@@ -149,7 +149,7 @@ class Drift(PerParticle):
 
 
 @pytest.mark.long
-def test_a_stepper_that_does_not_say_so_is_told():
+def test_a_stepper_that_does_not_say_so_is_reported():
     with pytest.raises(AssertionError, match=r"^position at the end must be with lists what it"):
         assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
 
@@ -197,7 +197,7 @@ def two(*effects, **quantities):
         (TooFarIfUnequal(), "on particle 0 by 1, of radii 1 and 0.5 m, at 1 of that distance"),
     ],
 )
-def test_a_force_beyond_its_reach_is_told(law, said):
+def test_a_force_beyond_its_reach_is_reported(law, said):
     with pytest.raises(AssertionError, match=f"^{law.kind()} must be 0 between particles farther .*{said}"):
         assert_reach(two(law))
 
@@ -230,7 +230,7 @@ class ChargeOfOthers(Force):
         return s.charge[w, i] * s.velocity[w, i]
 
 
-def test_a_field_that_only_others_declare_is_told():
+def test_a_field_that_only_others_declare_is_reported():
     effects = (MagneticField(), Lorentz(), ChargeOfOthers())
     with pytest.raises(
         AssertionError, match=r"^charge_of_others.fields must name 'charge', which it reads or writes"

@@ -291,7 +291,7 @@ def test_a_picture_of_large_errors_is_not_blank():
     assert low < 1e5 < high
 
 
-def test_nothing_found_is_told_in_words():
+def test_nothing_found_is_reported_in_words():
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = [row("good", 1.0, 1e-3, 1e-4)]
     with pytest.raises(RunError) as error:

@@ -240,7 +240,7 @@ def test_what_does_not_fit_the_budget_is_left_out(verlet_only):
         study(oscillator(), (UNKNOWN,), precisions=("f64",), budget=1e-6)
 
 
-def test_nothing_to_compare_is_told(verlet_only):
+def test_nothing_to_compare_is_reported(verlet_only):
     still = Quantity("place across", lambda result: displacement(result)[:, 1])
     with pytest.raises(InputError, match=r"place across must be other than zero at the end; received 0.0"):
         study(oscillator(), (still,), precisions=("f64",), coarser=0)

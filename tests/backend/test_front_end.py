@@ -17,7 +17,7 @@ def decorated(function):
     return function
 
 
-def test_a_function_of_a_class_is_told_from_others():
+def test_a_function_of_a_class_is_distinguished_from_others():
     class Law:
         @decorated
         def force(self):

@@ -37,7 +37,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG, ids=[" ".join(w[0][:2]) for w in WRONG])
-def test_wrong_input_is_told_and_nothing_written(tisim, tmp_path, arguments, message):
+def test_wrong_input_is_reported_and_nothing_written(tisim, tmp_path, arguments, message):
     code, out, err = tisim("cost", *arguments)
     assert code == 2
     assert message in " ".join(err.split())

@@ -110,9 +110,9 @@ def test_resume(tisim, toml, tmp_path, monkeypatch, press_ctrl_c, compiled_once,
     whole = (folder / name).read_bytes()
     shutil.copytree(folder, backup)
     gone_on = 0
-    for mishap, must_be_told in damages(folder / name, whole):
+    for mishap, must_be_reported in damages(folder / name, whole):
         other = [path.name for path in backup.iterdir() if path.name != name]
-        if is_refusal(tisim(*command, "--resume"), must_be_told, mishap):
+        if is_refusal(tisim(*command, "--resume"), must_be_reported, mishap):
             names = {path.name for path in folder.iterdir()}
             assert names == {path.name for path in backup.iterdir()}, mishap
             assert all((folder / one).read_bytes() == (backup / one).read_bytes() for one in other), mishap
@@ -158,10 +158,12 @@ def test_what_draws_and_copies(tisim, tmp_path, monkeypatch, command, name):
     monkeypatch.setattr("tisim.plotting.time_series.start_and_end", lambda *arguments: empty(2.0, 2.0))
     path = damage.KINDS[name].make(tmp_path)
     whole = path.read_bytes()
-    for mishap, must_be_told in damages(path, whole):
+    for mishap, must_be_reported in damages(path, whole):
         words = [str(path) if word == "FILE" else word for word in command]
         if is_refusal(
-            tisim(*words, "--" + ("to" if command[0] == "movie" else "out"), "m/x.gif"), must_be_told, mishap
+            tisim(*words, "--" + ("to" if command[0] == "movie" else "out"), "m/x.gif"),
+            must_be_reported,
+            mishap,
         ):
             assert list(tmp_path.rglob("*.new*")) == [], mishap
 

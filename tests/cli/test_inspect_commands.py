@@ -98,6 +98,10 @@ def test_where_there_is_nothing_to_draw_yet_that_is_said(tisim, tmp_path):
     for name in ("front.png", "convergence.png"):
         (tmp_path / "s" / name).touch()
     assert tisim("plot", "s") == (2, "", f"{message} s/convergence.png, s/front.png\n")
+    (tmp_path / "c").mkdir()
+    for name in ("cost.h5", "cost.png"):
+        (tmp_path / "c" / name).touch()
+    assert tisim("plot", "c") == (2, "", f"{message.replace('search', 'study of costs')} c/cost.png\n")
     (tmp_path / "out" / "checkpoint.h5").touch()
     assert tisim("plot", "out") == (2, "", f"{rule} only the checkpoint of an unfinished run\n")
 

@@ -28,7 +28,7 @@ def listener():
 
 
 @pytest.mark.parametrize(("number", "code"), ASKED)
-def test_signal_is_told_at_once_and_raised_at_a_good_moment(number, code):
+def test_signal_is_reported_at_once_and_raised_at_a_good_moment(number, code):
     calls = []
     with Interrupt(lambda: calls.append(1)) as interrupt_:
         interrupt_.check()

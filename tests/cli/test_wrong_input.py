@@ -66,7 +66,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG, ids=[" ".join(w[0][:2]) for w in WRONG])
-def test_wrong_input_is_told_and_nothing_written(tisim, impacts, tmp_path, arguments, message):
+def test_wrong_input_is_reported_and_nothing_written(tisim, impacts, tmp_path, arguments, message):
     code, out, err = tisim(*(impacts if a == "FLOW" else a for a in arguments))
     assert code == 2
     assert message in err
@@ -116,7 +116,7 @@ def number_options():
 
 
 @pytest.mark.parametrize(("command", "option"), list(number_options()))
-def test_a_word_for_a_number_is_told_in_one_form(tisim, command, option):
+def test_a_word_for_a_number_is_refused_in_one_form(tisim, command, option):
     code, out, err = tisim(command, "FLOW", option, "many")
     assert (code, out) == (2, "")
     assert re.fullmatch(rf"{option} must be a (whole )?number.*; received 'many'\n", err)

@@ -109,7 +109,7 @@ def test_a_device_is_refused():
         regular_file.content(regular_file.Path("/dev/null"))
 
 
-def test_a_lock_that_is_never_given_back_is_told(tmp_path, monkeypatch):
+def test_a_lock_that_is_never_given_back_is_reported(tmp_path, monkeypatch):
     path = tmp_path / "lock"
     monkeypatch.setattr(atomic, "LOCK_TIMEOUT", 0.05)
     with locked(path, exclusive=False):

@@ -167,7 +167,7 @@ def test_what_is_no_file_of_ours_is_refused(no_file, read):
 
 
 @pytest.mark.parametrize("name", ["result.h5", "trajectory.h5", "an older trajectory.h5"])
-def test_files_of_versions_without_checksums_are_told_from_those_of_others(tmp_path, name):
+def test_files_of_versions_without_checksums_are_distinguished_from_those_of_others(tmp_path, name):
     """As they were: a result without its checksum; trajectories of HDF5's first and third superblock."""
     path = tmp_path / "t.h5"
     if name == "result.h5":

@@ -204,7 +204,7 @@ def test_killed_while_it_is_made_it_is_not_there(tmp_path, monkeypatch):
     assert not (tmp_path / "t.h5").exists()
 
 
-def test_a_folder_that_takes_no_file_is_told_before_anything_runs(tmp_path):
+def test_a_folder_that_takes_no_file_is_reported_before_anything_runs(tmp_path):
     (tmp_path / "t.h5").mkdir()
     with pytest.raises(InputError, match="trajectory must be a file that can be written; received"):
         Trajectory(Recording(tmp_path / "t.h5", frames=9), [STILL])

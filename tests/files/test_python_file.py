@@ -59,7 +59,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("text", FAULTS)
-def test_what_cannot_be_imported_is_told_in_a_line(own_file, text):
+def test_what_cannot_be_imported_is_reported_in_a_line(own_file, text):
     path = own_file("faulty.py", text)
     with pytest.raises(InputError) as fault:
         python_file.load(path)

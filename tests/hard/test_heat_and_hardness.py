@@ -44,7 +44,7 @@ def coupled(speed, iterations=200, q=3000.0, alpha=3e4, c=HEAT_CAPACITY, **more)
 
 
 @pytest.mark.slow
-def test_iterations_across_the_bond_threshold_settle():
+def test_iterations_across_the_bond_threshold_converge():
     """A fine scan of speeds through the threshold: each impact settles, within its bound of iterations."""
     speeds = np.linspace(1.0, 40.0, 300)
     results = simulate([coupled(v) for v in speeds], worlds=300, capacity=2)

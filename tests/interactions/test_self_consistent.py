@@ -213,7 +213,7 @@ class Potential(SelfConsistentQuantity):
 
 
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-def test_a_number_settles_too_and_without_any_force(schedule):
+def test_a_number_converges_too_and_without_any_force(schedule):
     """Two at distance d: phi = 1/(1 - strength/d). Nothing in the scene needs a force, so there is none."""
     effects = (Potential(strength=0.1, tolerance=1e-14),)
     setup = scene([[0.0, 0, 0], [1.0, 0, 0]], [[0.0, 0, 0], [0.5, 0, 0]], effects, dt=0.1, steps=10)

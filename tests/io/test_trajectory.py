@@ -314,7 +314,7 @@ def test_whatever_a_killed_run_has_finished_can_be_read(tmp_path):
         (lambda path: every_frame(Path(__file__)), "file must be a trajectory.h5 or result.h5 of a run"),
     ],
 )
-def test_wrong_wishes_are_told(tmp_path, make, message):
+def test_wrong_recordings_are_refused(tmp_path, make, message):
     with pytest.raises(InputError, match=message):
         make(tmp_path)
 

@@ -132,7 +132,7 @@ def test_log_and_report(outcome, tmp_path):
     assert imread(paths["front.png"]).std() > 0.01
 
 
-def test_designs_of_few_starts_are_told_from_those_that_are_known(outcome):
+def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outcome):
     """The front from 9 starts, others from 3 and 9."""
 
     def design(gain, starts):

@@ -157,7 +157,7 @@ def test_a_movie_has_all_frames_and_they_differ(file, tmp_path):
     assert all(np.abs(a - b).max() > 100 for a, b in itertools.pairwise(pictures))
 
 
-def test_what_a_movie_misses_is_told_in_whole_and_covers_nothing(file, tmp_path, monkeypatch):
+def test_what_a_movie_misses_is_reported_in_whole_and_covers_nothing(file, tmp_path, monkeypatch):
     """In the narrowest picture, with numbers of all digits."""
     pages = []
 

@@ -79,7 +79,7 @@ def test_an_installed_package_offers_its_effects(installed):
     assert "laws_of_a_package" in plugins.python_file.module_checksums(type(setup.effects[0]))
 
 
-def test_an_installed_package_that_is_broken_is_told_in_a_line(installed):
+def test_an_installed_package_that_is_broken_is_reported_in_a_line(installed):
     installed("broken_laws", "import no_such_module\n")
     message = r"^plugin laws of broken_laws must be importable; received ModuleNotFoundError: No module named"
     with pytest.raises(InputError, match=message):

@@ -47,7 +47,7 @@ def test_more_steps_than_can_be_counted_are_refused(stepper, duration, steps):
     assert str(refused.value).endswith(f"received {duration!r}")
 
 
-def test_colloids_by_themselves_number_their_windows_with_32_bits():
+def test_colloids_by_themselves_number_their_intervals_with_32_bits():
     """More of them would have the noise of the first again."""
     assert straight("brownian", False, 1.0, 2.0**32).duration == 2.0**32
     with pytest.raises(

@@ -30,6 +30,8 @@ File = Annotated[
         help="A run's folder, or its trajectory.h5 or result.h5.", metavar="FILE", callback=nameable
     ),
 ]
+OTHER_FOLDERS = {"search.h5": "a search", "cost.h5": "a study of costs"}
+"""Files of folders that have pictures of their own and no frames, and whose folders they are."""
 World = Annotated[int, typer.Option(help="Which world of a batch, from 0.")]
 IntoFolder = Annotated[
     Path | None,
@@ -173,11 +175,12 @@ def _trajectory_file(path: Path) -> Path:
             return file
     unfinished = regular_file.exists(path / "checkpoint.h5")
     why = ", with only the checkpoint of an unfinished run" if unfinished else ", with neither"
-    if regular_file.exists(path / "search.h5"):
-        pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
-        raise InputError(
-            f"folder must be that of a run; received that of a search, whose pictures are: {pictures}"
-        )
+    for name, what in OTHER_FOLDERS.items():
+        if regular_file.exists(path / name):
+            pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
+            raise InputError(
+                f"folder must be that of a run; received that of {what}, whose pictures are: {pictures}"
+            )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
 
 

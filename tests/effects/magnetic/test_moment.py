@@ -85,7 +85,7 @@ STEPPERS = [
 
 
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_every_stepper_settles_moments_before_forces(stepper):
+def test_every_stepper_solves_moments_before_forces(stepper):
     """In B = (y, x, 0), T, a moment of k B is pulled by k r in the plane: r = r_0 cosh wt + v_0/w sinh wt,
     w^2 = k/m. At the end the moment is that of the place; with Boris' stepper, of half a step before."""
     k = 4 * np.pi / MU_0 * 0.4 * 1e-7

@@ -118,7 +118,7 @@ def test_effects_of_the_users_own_act_in_workers(away, own_file):
             )
 
 
-def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
+def test_what_a_worker_cannot_import_is_reported_in_a_line(own_file):
     law = python_file.load(own_file("own_law.py", LAW))
     pickled = working.pack_scenes([SCENES[0].model_copy(update={"effects": (law.Pull(strength=1e-9),)})])
     here = WorkerSettings()
@@ -137,7 +137,7 @@ def test_what_a_worker_cannot_import_is_told_in_a_line(own_file):
     assert scene.effects[0].strength == 1e-9
 
 
-def test_scenes_that_cannot_be_sent_are_told_in_a_line():
+def test_scenes_that_cannot_be_sent_are_reported_in_a_line():
     class Hidden(Scene):
         pass
 

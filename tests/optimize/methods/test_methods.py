@@ -47,7 +47,7 @@ def worth(strings, function=quiet):
     return sorted((s for s in strings if not s.failed), key=lambda s: s.fitness.values)
 
 
-def test_methods_are_found_by_looking():
+def test_methods_are_found_in_their_package():
     assert METHODS == ["cma-es", "genetic", "nsga2", "random", "restart"]
 
 

@@ -120,7 +120,7 @@ def test_options_are_given_by_name(options):
         Settings(options=options)
 
 
-def test_what_is_no_number_is_told_as_such():
+def test_what_is_no_number_is_reported_as_such():
     for wrong in ("many", [8], None, 2.5):
         with pytest.raises(InputError, match=r"search\.options\.population must be a whole number; received"):
             Breeding(population=wrong)

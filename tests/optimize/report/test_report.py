@@ -64,7 +64,7 @@ def test_csv_holds_all_digits(outcome, tmp_path):
         assert float(row["n_f"]) == pytest.approx(float(row["b_f/b_0"]) ** 3)
 
 
-def test_a_full_disk_is_told_and_keeps_the_old_files(outcome, tmp_path, monkeypatch):
+def test_a_full_disk_is_reported_and_keeps_the_old_files(outcome, tmp_path, monkeypatch):
     old = {name: path.read_bytes() for name, path in report.write(outcome, tmp_path).items()}
 
     def full(handle, data, offset):

@@ -150,7 +150,7 @@ def test_missing_file_is_refused(path):
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_damaged_seal_does_not_open_the_door_to_a_damaged_structure(path):
+def test_a_damaged_checksum_does_not_open_the_door_to_a_damaged_structure(path):
     """HDF5 may hang on one; whatever is behind its end, it gets only what is whole."""
     with Cache(path) as cache:
         for number in range(5):
@@ -184,7 +184,7 @@ NO_RECORDS = {
 
 
 @pytest.mark.parametrize("payload", NO_RECORDS.values(), ids=NO_RECORDS)
-def test_a_whole_frame_that_is_no_record_is_told_and_left_out(path, payload):
+def test_a_whole_frame_that_is_no_record_is_reported_and_left_out(path, payload):
     assert payload != fake_record(7).payload()
     journal_of(path).write_bytes(
         b"".join(map(frame, (fake_record(0).payload(), payload, fake_record(1).payload())))

@@ -101,7 +101,7 @@ def looked_at(folder):
 
 @pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
-def test_a_damaged_file_is_told_in_one_line_and_left_as_it_is(command, tmp_path, damage, words):
+def test_a_damaged_file_is_reported_in_one_line_and_left_as_it_is(command, tmp_path, damage, words):
     name = "compare.h5" if words[0] == "compare" else "search.h5"
     path = tmp_path / "s" / name
     with Cache(path) as cache:
