@@ -70,7 +70,7 @@ def test_sedimentation_at_stokes_velocity_and_shear_without_heat(together):
     np.testing.assert_allclose(result.state["position"], expected, rtol=0, atol=1e-17)
 
 
-def test_steps_ahead_are_windows():
+def test_steps_ahead_are_intervals():
     """Of 300 longest steps, of which a launch takes a colloid by itself through many."""
     scene = colloids(np.zeros((1, 3)), steps=300)
     simulation = compiled(scene, 5, 10_000)
@@ -178,7 +178,7 @@ class Pinned(Force):
     ids=["open", "box"],
 )
 def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
-    """To the bit: where all take a window in one step, where some do not, where some are fixed, and where a
+    """To the bit: where all take an interval in one step, where some do not, where some are fixed, and where a
     force is too steep; in a flow, and also in portions."""
     place = np.random.default_rng(2).uniform(-1e-6, 1e-6, (70, 3))
     more = {"dt": 1e-3, "steps": 30, "drift": 0.3, "domain": domain, "shear": 5.0, "extra": (Pinned(),)}
