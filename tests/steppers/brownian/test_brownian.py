@@ -178,8 +178,8 @@ class Pinned(Force):
     ids=["open", "box"],
 )
 def test_many_at_once_are_those_one_by_one(domain, monkeypatch):
-    """To the bit: where all take an interval in one step, where some do not, where some are fixed, and where a
-    force is too steep; in a flow, and also in portions."""
+    """To the bit: where all take an interval in one step, where some do not, where some are fixed, and where
+    a force is too steep; in a flow, and also in portions."""
     place = np.random.default_rng(2).uniform(-1e-6, 1e-6, (70, 3))
     more = {"dt": 1e-3, "steps": 30, "drift": 0.3, "domain": domain, "shear": 5.0, "extra": (Pinned(),)}
     pinned = {"fixed": (np.arange(70) == 40).astype(int)}
