@@ -68,6 +68,10 @@ class GeneticOperator(Checked):
         } | self.options
 
 
+DEAP_OPTIONS = ("select", "mate", "mutate", "crossover_probability", "mutation_probability")
+"""The names of the settings of a generation that Z04's breeding does not use."""
+
+
 class Breeding(Checked):
     """Composition of a generation. Defaults are Z04 section 8; of population, parents and offspring, what is
     not given follows what is, in the proportions that Z04 has (20, 6 and 6).
@@ -141,6 +145,10 @@ class Breeding(Checked):
                 f"<= parents = {self.parents} (two for each pair)",
                 self.bred,
             )
+            for name in DEAP_OPTIONS:
+                value = getattr(self, name)
+                unused = value == type(self).model_fields[name].get_default()
+                must(unused, f"search.options.{name}", "left out unless breeding is deap", value)
         else:
             for operator, prefix in ((self.select, "sel"), (self.mate, "cx"), (self.mutate, "mut")):
                 operator.function(prefix)

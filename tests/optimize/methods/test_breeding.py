@@ -143,6 +143,14 @@ def test_callers_random_numbers_do_not_steer_the_search():
             "parents . offspring must be <= population = 20; received 30",
         ),
         ({"population": 8, "parents": 8}, "parents must be < population = 8; received 8"),
+        (
+            {"breeding": "z04", "mutate": {"name": "mutNothing"}},
+            "search.options.mutate must be left out unless breeding is deap",
+        ),
+        (
+            {"breeding": "z04", "mutation_probability": 0.2},
+            "search.options.mutation_probability must be left out unless breeding is deap; received 0.2",
+        ),
         ({"offspring": 3, "breeding": "z04"}, "even"),
         ({"offspring": 8, "parents": 6, "breeding": "z04"}, "two for each pair"),
         ({"population": 0}, "search.options.population must be at least 2; received 0"),
