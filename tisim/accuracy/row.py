@@ -33,8 +33,7 @@ class Row:
     of a particle, the mean over particles and starts.
     errors : for each quantity the error, and how far that may be off; both relative.
     failed : why there is no result, or nothing; of a run that was stopped as it took too long ``seconds`` is
-    the limit. same : whether it is a law that makes no difference here to
-    the one it stands for.
+    the limit. same : whether it is a cheaper law that makes no difference here to the law it stands for.
     """
 
     method: str
