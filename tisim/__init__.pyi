@@ -8,6 +8,9 @@ from . import (
     effects as effects,
 )
 from . import (
+    geometry as geometry,
+)
+from . import (
     operators as operators,
 )
 from . import (

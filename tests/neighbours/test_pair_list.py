@@ -148,10 +148,8 @@ def test_every_near_pair_is_offered_once_by_its_larger_member(rng, domain):
             near = near_pairs(state["position"], state["radius"], domain, min(horizon, 10.0))
             missed = near - set(zip(owner.tolist(), other.tolist(), strict=True))
             assert not missed, f"{where}: missed {sorted(missed)[:5]}"
-        cells = in_taichi_thread(simulation.assembly.neighbour_list.dims.to_numpy)()[: len(scenes)].prod(
-            axis=1
-        )
-        assert (cells <= simulation.assembly.neighbour_list.max_cells).all(), "cells beyond their memory"
+        cells = in_taichi_thread(simulation.assembly.lists.near.dims.to_numpy)()[: len(scenes)].prod(axis=1)
+        assert (cells <= simulation.assembly.lists.near.max_cells).all(), "cells beyond their memory"
         simulation.run(steps=1)
         assert (simulation.s.read("status")[: len(scenes)] == 0).all()
     # A cell list is worth having: the equal cloud does not look at all its pairs.

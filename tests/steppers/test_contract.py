@@ -64,7 +64,7 @@ class Judge(Phase):
 
     def __init__(self, context) -> None:
         self.s, self.tolerance = context.s, context.stepper.tolerance
-        self.neighbour_list, self.lists = context.neighbour_list, bool(context.update_lists)
+        self.lists, self.listed = context.neighbour_lists, bool(context.update_lists)
 
     @ti.func
     def run(self, w, _k):
@@ -72,8 +72,8 @@ class Judge(Phase):
         s.corrections[w] += 1
         s.unsolved[w] = ti.select(s.largest_change[w] > self.tolerance(w), 1.0, 0.0)
         s.largest_change[w] = 0.0
-        if ti.static(self.lists):
-            self.neighbour_list.stale[w] = 1
+        if ti.static(self.listed):
+            self.lists.invalidate(w)
 
 
 class Iteration(Repeat):

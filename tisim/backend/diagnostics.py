@@ -42,7 +42,7 @@ FIRST_LLVM = {
 
 @dataclass(frozen=True)
 class Finding:
-    """A line of the report. note : what to make of it, or empty."""
+    """A finding is a line of the report. note : what to make of it, or empty."""
 
     name: str
     value: str
@@ -69,7 +69,7 @@ def _pairs(
 
 
 def pair_rate() -> float:
-    """Pairs per second of a 1/r^2 force between all pairs: f64, one core, the running backend."""
+    """Return the pairs per second of a 1/r^2 force between all pairs: f64, one core, the running backend."""
     runtime.init("cpu", "f64", 1)
     x, y, z = np.random.Generator(np.random.Philox(1)).random((3, BENCHMARK_PARTICLES))
     f = np.zeros(BENCHMARK_PARTICLES)
@@ -130,7 +130,7 @@ def processor_support(cpu: dict[str, str], llvm: str) -> str:
 
 
 def findings() -> list[Finding]:
-    """Return the report. Takes some seconds; starts nothing in this process but looks at CUDA."""
+    """Return the report. This takes some seconds, and starts nothing in this process but looks at CUDA."""
     cpu, llvm = processor(), llvm_version()
     report = [
         Finding("backend", runtime.backend(), f"LLVM {llvm}"),

@@ -21,14 +21,15 @@ from tisim.errors import InputError, RunError
 from tisim.files.atomic import locked
 
 STALE = 60.0
-"""s, longer than any process holds a lock."""
+"""This time (s) is longer than any process holds a lock."""
 LOCKS = {
     "taichi": ("TI_OFFLINE_CACHE_FILE_PATH", "ticache.lock"),
     "quadrants": ("QD_OFFLINE_CACHE_FILE_PATH", "kernel_compilation_manager/qdcache.lock"),
 }
-"""The variable that names another folder, and the lock in it."""
+"""These are, for each package, the variable that names another folder for its kernels, and the lock in it."""
 QUEUE = "tisim.lock"
-"""The file that processes of tisim queue at, in the same folder: the system frees it when one dies."""
+"""This is the file that processes of tisim queue at, in the same folder: the system frees it when one
+dies."""
 
 
 def lock() -> Path:

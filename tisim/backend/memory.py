@@ -23,18 +23,18 @@ MAX_TREES_PER_START = 300
 hundred kB to each tree, and takes longer to compile the more there are."""
 
 _tree_counts: Counter[int] = Counter()
-"""Trees that have been made, by the start of Taichi."""
+"""This counts the trees that have been made, by the start of Taichi."""
 _collecting: list[list[Tree]] = []
 _live: weakref.WeakSet[Tree] = weakref.WeakSet()
 _lost: deque[tuple[Any, int]] = deque()
-"""Trees whose owner has been forgotten without ``destroy``, each with the start of Taichi it belongs to. A
-list, as the garbage collector may come at any time and in any thread."""
+"""These are the trees whose owner has been forgotten without ``destroy``, each with the start of Taichi it
+belongs to. It is a list, as the garbage collector may come at any time and in any thread."""
 
 
 class Tree:
-    """Fields that have been placed in one builder, in device memory from now on.
+    """A tree is fields that have been placed in one builder, in device memory from now on.
 
-    RunError where too many are in use.
+    RunError is raised where too many are in use.
     """
 
     @in_taichi_thread
@@ -57,7 +57,8 @@ class Tree:
 
     @property
     def alive(self) -> bool:
-        """Whether the memory is there: not destroyed, nor gone with a Taichi that has been started anew."""
+        """Return whether the memory is there: not destroyed, nor gone with a Taichi that has been started
+        anew."""
         return self._forget.alive and self.generation == runtime.generation()
 
     @in_taichi_thread
@@ -88,7 +89,7 @@ def collected() -> Iterator[list[Tree]]:
 
 
 def tree_count() -> int:
-    """Trees that have been made in this process."""
+    """Return the number of trees that have been made in this process."""
     return _tree_counts.total()
 
 

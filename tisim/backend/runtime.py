@@ -19,12 +19,12 @@ from tisim.errors import InputError, is_whole, must
 DEVICES = ("cpu", "cuda")
 PRECISIONS = ("f64", "f32")
 THREADS = 1024
-"""The most threads that Taichi is asked for; it makes them all, whether there are cores for them or not."""
+"""Taichi is asked for at most so many threads; it makes them all, whether there are cores for them or not."""
 
 
 @dataclass(frozen=True)
 class Runtime:
-    """Where and how kernels run.
+    """A runtime says where and how kernels run.
 
     device : "cpu" or "cuda".
     precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
@@ -49,36 +49,37 @@ class Runtime:
 
     @property
     def real(self) -> Any:
-        """The Taichi type of a particle quantity."""
+        """Return the Taichi type of a particle quantity."""
         return ti.f64 if self.precision == "f64" else ti.f32
 
     @property
     def settings(self) -> dict[str, str]:
-        """What decides the last bits of a result beside the scene: precision and kind of device."""
+        """Return what decides the last bits of a result beside the scene: precision and kind of device."""
         return {"precision": self.precision, "device": self.device}
 
     @property
     def described(self) -> dict[str, str]:
-        """What a run ran on: the settings, and CPU threads, which change no bit."""
+        """Return what a run ran on: the settings, and CPU threads, which change no bit."""
         return {**self.settings, **({"threads": str(self.threads)} if self.device == "cpu" else {})}
 
 
 turn = threading.RLock()
-"""Held by ``tisim.run``, studies of accuracy and searches in this process, each from its start to its end,
-and while settings change: calls of several threads take turns, and one that is made from within another, such
-as from its progress, goes ahead."""
+"""This lock is held by ``tisim.run``, studies of accuracy and searches in this process, each from its start
+to its end, and while settings change: calls of several threads take turns, and one that is made from within
+another, such as from its progress, goes ahead."""
 
 _current: Runtime | None = None
 _generation = 0
 
 
 def cores() -> int:
-    """CPU cores this process may use."""
+    """Return the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory() -> int:
-    """Memory of this machine, bytes; where the system does not say, as much as a number of bytes can be."""
+    """Return the memory of this machine, bytes; where the system does not say, as much as a number of bytes
+    can be."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (ValueError, OSError, AttributeError):
@@ -120,6 +121,8 @@ def _start(requested: Runtime) -> None:
                 # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
                 # times as long to compile; LLVM optimises the same code afterwards.
                 cfg_optimization=False,
+                # A step of many phases is unrolled on purpose, without a warning.
+                unrolling_limit=0,
                 **kernel_cache.options(),
             )
             _compile_first()
@@ -132,7 +135,7 @@ def _start(requested: Runtime) -> None:
 
 @ti.kernel
 def _compile_first():
-    """Nothing: with the first kernel that it compiles, Taichi reads those on the disk."""
+    """Do nothing: with the first kernel that it compiles, Taichi reads those on the disk."""
 
 
 def _stop() -> None:
@@ -147,15 +150,15 @@ def restart() -> None:
 
 
 def current() -> Runtime:
-    """Return the running settings; starts the defaults (cpu, f64, all cores) on first use."""
+    """Return the running settings; start the defaults (cpu, f64, all cores) on first use."""
     return _current or init()
 
 
 def generation() -> int:
-    """Counts the starts: compiled objects of an earlier generation must not be touched."""
+    """Return the number of starts: compiled objects of an earlier generation must not be touched."""
     return _generation
 
 
 def backend() -> str:
-    """Name and version of the kernel compiler."""
+    """Return name and version of the kernel compiler."""
     return f"{BACKEND} {'.'.join(str(part) for part in ti.__version__[:3])}"

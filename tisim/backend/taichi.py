@@ -13,11 +13,11 @@ from tisim.backend import front_end
 from tisim.errors import must
 
 BACKEND = os.environ.get("TISIM_BACKEND", "taichi")
-"""The package that compiles the kernels: ``"taichi"`` or ``"quadrants"``."""
+"""This package compiles the kernels: ``"taichi"`` or ``"quadrants"``."""
 
 
 def check_backend() -> None:
-    """InputError unless TISIM_BACKEND names one of the two packages, and it is installed.
+    """Raise InputError unless TISIM_BACKEND names one of the two packages, and it is installed.
 
     The import goes on with Taichi, so that this is said in a line where the runtime or a command starts.
     """
@@ -51,7 +51,8 @@ class _Probe:
 
 
 DEVICE_FUNCTION: type = type(_Probe.__dict__["function"])
-"""The type of a method decorated with ``ti.func`` (the packages differ); validated models let it pass."""
+"""This is the type of a method decorated with ``ti.func`` (the packages differ); validated models let it
+pass."""
 
 
 def is_device_function(value: object) -> bool:

@@ -25,7 +25,7 @@ def _divide(entries: tuple[Any, ...]) -> tuple[tuple[Any, ...], ...]:
 
 @ti.data_oriented
 class Exchange:
-    """The copies of some fields, scalar or of vectors, by their names."""
+    """An exchange makes the copies of some fields, scalar or of vectors, by their names."""
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
         kinds, sizes, placed = list(TYPES), dict.fromkeys(TYPES, 0), []
@@ -45,7 +45,7 @@ class Exchange:
         self.groups = tuple((shape, _divide(entries)) for shape, entries in groups)
 
     def _buffers(self) -> tuple[np.ndarray, ...]:
-        """One for each type. No array may be empty."""
+        """Return one array for each type. None of them may be empty."""
         return tuple(np.empty(max(1, self.sizes[dtype]), kind) for dtype, kind in TYPES.items())
 
     def _views(self, buffers: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
@@ -88,7 +88,7 @@ class Exchange:
         i32: ti.types.ndarray(),  # type: ignore[valid-type]
         i64: ti.types.ndarray(),  # type: ignore[valid-type]
     ):
-        """From the fields to the arrays where it reads, else from the arrays to the fields."""
+        """Copy from the fields to the arrays where ``reads``, else from the arrays to the fields."""
         for group in ti.static(self.groups):
             for where in ti.grouped(group[1][0][0][1]):
                 at = self._at(group[0], where)

@@ -17,7 +17,7 @@ Part = TypeVar("Part", bound="Component")
 
 
 class AccuracyParameter:
-    """Settings of a part that together ask for an error, each with its order.
+    """An accuracy parameter groups settings of a part that together ask for an error, each with its order.
 
     ``AccuracyParameter(error=1)``; ``AccuracyParameter(dt=2)``: the error goes as dt^2;
     ``AccuracyParameter(longest=2, tolerance=1)``: two settings turned together. A part lists its own in
@@ -33,7 +33,7 @@ class AccuracyParameter:
     def turned(self, part: Part, decades: float) -> Part:
         """Return the part with settings for an error that is so many decades larger; itself for 0.
 
-        Settings are rounded to three digits. InputError when the part cannot have them.
+        Settings are rounded to three digits. Raise InputError when the part cannot have them.
         """
         if decades == 0:
             return part

@@ -53,6 +53,6 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
 
 
 Rows = Annotated[np.ndarray, _schema(Annotated[tuple[Vector, ...], Field(min_length=1)], (3,))]
-"""Shape (n, 3), at least one row."""
+"""Rows are an array of shape (n, 3), with at least one row."""
 Numbers = Annotated[np.ndarray, _schema(tuple[float, ...], ())]
-"""Shape (n,); a single number is one of one."""
+"""Numbers are an array of shape (n,); a single number is one of one."""

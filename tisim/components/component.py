@@ -23,7 +23,7 @@ from tisim.errors import InputError, must
 from tisim.files import python_file
 
 Vector = tuple[float, float, float]
-"""Three Cartesian components."""
+"""A vector has three Cartesian components."""
 
 
 def _encodable(text: str) -> str:
@@ -33,13 +33,14 @@ def _encodable(text: str) -> str:
 
 
 Text = Annotated[str, AfterValidator(_encodable)]
-"""Text that a file can hold: without halves of surrogate pairs."""
+"""A text can be held by a file: it is without halves of surrogate pairs."""
 LEAST_ROWS = 32
-"""Rows that there is room for in every list."""
+"""Every list has room for at least this many rows."""
 
 
 class Checked(BaseModel):
-    """Plain data that is right or refused (InputError): frozen, no unknown keys, no NaN, no infinity."""
+    """Checked data is plain and either right or refused (InputError): frozen, no unknown keys, no NaN, no
+    infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -62,7 +63,7 @@ class Checked(BaseModel):
 
 
 class Component(AccuracyHints, Checked):
-    """A part of a scene."""
+    """A component is a part of a scene."""
 
     model_config = ConfigDict(ignored_types=(DEVICE_FUNCTION,))
 
@@ -87,12 +88,13 @@ class Component(AccuracyHints, Checked):
 
     @property
     def label(self) -> str:
-        """What files and messages call it."""
+        """Return what files and messages call it."""
         return self.called(vars(self))
 
     @classmethod
     def named(cls, kind: Any, where: str) -> type[Self]:
-        """Return the subclass of this name; InputError naming ``where`` and the known names otherwise."""
+        """Return the subclass of this name; raise InputError naming ``where`` and the known names
+        otherwise."""
         known = cls.known()
         rule = f"one of {', '.join(sorted(known))} (of your own: give --plugin FILE.py, or import it first)"
         must(isinstance(kind, str) and kind in known, where, rule, kind)
@@ -113,7 +115,7 @@ class Component(AccuracyHints, Checked):
                 yield kind
 
     def parts(self) -> Iterator[Component]:
-        """Itself and the parts that it is made of, also those in lists."""
+        """Yield the part itself and the parts that it is made of, also those in lists."""
         yield self
         for name in type(self).model_fields:
             value = getattr(self, name)
@@ -126,7 +128,7 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def parameters(cls) -> Iterator[tuple[str, FieldInfo, int]]:
-        """Name, declaration and number of components of each parameter that may differ per world."""
+        """Yield name, declaration and number of components of each parameter that may differ per world."""
         for name, info in cls.model_fields.items():
             if info.annotation in (float, float | None):
                 yield name, info, 1
@@ -135,8 +137,8 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def lists(cls) -> Iterator[tuple[str, type[Component]]]:
-        """Name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a world may
-        have any number of them."""
+        """Yield name, and kind of row, of each parameter that is a list of parts, ``tuple[Row, ...]``; a
+        world may have any number of them."""
         for name, info in cls.model_fields.items():
             row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
             if rest == [...] and isinstance(row, type) and issubclass(row, Component):
@@ -144,8 +146,8 @@ class Component(AccuracyHints, Checked):
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
-        """Name and number of components of what kernels read of each world: the parameters, and what a part
-        makes of them besides."""
+        """Yield name and number of components of what kernels read of each world: the parameters, and what a
+        part makes of them besides."""
         for name, _, size in cls.parameters():
             yield name, size
 
@@ -165,18 +167,19 @@ class Component(AccuracyHints, Checked):
         return (type(self), *fixed, *((name, room(len(getattr(self, name)))) for name, _ in self.lists()))
 
     def lookups(self) -> dict[str, np.ndarray]:
-        """Numbers that a kernel looks up, the same in every world, ``self.NAME[i, j]``; made for what is
-        compiled, so of the options that are no parameters. By name, of shape (rows, columns)."""
+        """Return the numbers that a kernel looks up, the same in every world, ``self.NAME[i, j]``; they are
+        made for what is compiled, so of the options that are no parameters. They go by name, with shape
+        (rows, columns)."""
         return {}
 
     contract: ClassVar[bool] = False
-    """Set by a class that is no part of a scene itself, only what parts are made after."""
+    """A class sets this if it is no part of a scene itself, only what parts are made after."""
     requires: ClassVar[tuple[type[Component], ...]] = ()
-    """Effects without which this one means nothing."""
+    """These are the effects without which this one means nothing."""
     excludes: ClassVar[tuple[type[Component], ...]] = ()
-    """Effects that cannot be in a scene with this one."""
+    """These are the effects that cannot be in a scene with this one."""
     incompatible_controls: ClassVar[tuple[str, ...]] = ()
-    """Kinds of step control that do not see what this effect needs them to."""
+    """These kinds of step control do not see what this effect needs them to."""
 
 
 def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
@@ -218,5 +221,6 @@ def _bounded(info: FieldInfo) -> bool:
 
 
 def room(rows: int) -> int:
-    """Rows that a world's table has room for, so that scenes with lists of like lengths run as one batch."""
+    """Return how many rows a world's table has room for, so that scenes with lists of like lengths run as one
+    batch."""
     return max(LEAST_ROWS, 1 << (rows - 1).bit_length())

@@ -14,7 +14,7 @@ from tisim.components.accuracy_parameter import AccuracyParameter
 
 
 class AccuracyHints(BaseModel):
-    """Hints of any part of a scene.
+    """These are the hints that any part of a scene gives.
 
     accuracy_parameters : its settings that trade accuracy for time.
     """
@@ -23,7 +23,7 @@ class AccuracyHints(BaseModel):
 
 
 class LawHints(AccuracyHints):
-    """Hints of an effect."""
+    """These are the hints that an effect gives."""
 
     def approximations(self, extent: float) -> tuple[Any, ...]:
         """Return cheaper laws to try in its place, the coarsest first, for particles that are up to
@@ -32,7 +32,7 @@ class LawHints(AccuracyHints):
 
 
 class StepperHints(AccuracyHints):
-    """Hints of a stepper."""
+    """These are the hints that a stepper gives."""
 
     @classmethod
     def alternatives(cls, effects: Sequence[Any], dt: float) -> tuple[Self, ...]:

@@ -14,12 +14,12 @@ from tisim.errors import must
 
 
 class Domain(Component):
-    """Unbounded space; the contract of a domain."""
+    """This is unbounded space, and the contract of a domain."""
 
     contract: ClassVar[bool] = True
 
     def bounds(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Corners in m, shape (3,) each; None where there are none."""
+        """Return the corners in m, shape (3,) each; None where there are none."""
         return None, None
 
     def joined(self) -> bool:
@@ -32,7 +32,7 @@ class Domain(Component):
 
     @ti.func
     def wrap(self, w, r):
-        """Return the place inside the domain of a particle that has moved to r. m."""
+        """Return the place (m) inside the domain of a particle that has moved to r."""
         return r
 
     @ti.func
@@ -42,22 +42,22 @@ class Domain(Component):
 
     @ti.func
     def separation(self, w, a, b):
-        """Vector from a to b as contacts and forces see it. m."""
+        """Return the vector (m) from a to b as contacts and forces see it."""
         return b - a
 
     @ti.func
     def nearest(self, w, a, b):
-        """Shortest vector from a to b, across joined faces where there are any. m."""
+        """Return the shortest vector (m) from a to b, across joined faces where there are any."""
         return b - a
 
     @ti.func
     def origin(self, w):
-        """Lower corner, where the domain is a box. m."""
+        """Return the lower corner (m), where the domain is a box."""
         return ti.Vector([0.0, 0.0, 0.0])
 
     @ti.func
     def side(self, w):
-        """Sides, where the domain is a box. m."""
+        """Return the sides (m), where the domain is a box."""
         return ti.Vector([0.0, 0.0, 0.0])
 
 

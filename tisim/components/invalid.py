@@ -50,13 +50,14 @@ _RULES = {
 
 
 FAULTS = 10
-"""Faults that a message lists, a line for each."""
+"""A message lists this many faults, a line for each."""
 _CHOICE = re.compile(r"int|float|tuple\[.*\]")
-"""What pydantic adds to the place of a fault, for each type that would have done."""
+"""Pydantic adds this to the place of a fault, for each type that would have done."""
 
 
 def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, FieldInfo]) -> str:
-    """One line per fault of a pydantic report, "X must be Y; received Z". ``fields``: those of the part."""
+    """Return one line per fault of a pydantic report, "X must be Y; received Z". ``fields``: those of the
+    part."""
     lines: dict[str, list[str]] = {}
     received: dict[str, str] = {}
     for fault in invalid.errors(include_url=False):

@@ -14,9 +14,9 @@ import numpy as np
 from pydantic_core import to_json
 
 ROWS_PER_PIECE = 1 << 10
-"""Rows of an array in a piece."""
+"""A piece holds this many rows of an array."""
 PLAIN = 1e-4, 1e16
-"""Magnitudes that Python and pydantic write alike, without an exponent."""
+"""Python and pydantic write these magnitudes alike, without an exponent."""
 
 
 def json_pieces(value: Any) -> Iterator[str]:

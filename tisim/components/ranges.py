@@ -14,17 +14,17 @@ import numpy as np
 from tisim.errors import must
 
 LEAST, MOST = 1e-100, 1e100
-"""Magnitudes of lengths (m) and of masses (kg) that are not 0."""
+"""Lengths (m) and masses (kg) that are not 0 have magnitudes between these."""
 NORMAL = float(np.finfo(np.float64).tiny), float(np.finfo(np.float64).max)
-"""Magnitudes of the normal numbers of double precision."""
+"""The normal numbers of double precision have magnitudes between these."""
 WHOLE = 2**31
-"""Bound of the whole numbers and exponents that are compiled into kernels."""
+"""This bounds the whole numbers and exponents that are compiled into kernels."""
 PARTICLES = 10**8
-"""The most particles that a start can have."""
+"""A start can have this many particles at most."""
 BYTES = 300
-"""Memory that a particle takes, at least, with its fields and lists; bytes."""
+"""A particle takes at least this much memory, in bytes, with its fields and lists."""
 FINE = 1e-3
-"""Part of a radius that rounding may shift the centres of a packing by: they are then apart and even."""
+"""Rounding may shift the centres of a packing by this part of a radius: they are then apart and even."""
 
 
 def limits(unit: str) -> tuple[float, float]:
@@ -33,7 +33,7 @@ def limits(unit: str) -> tuple[float, float]:
 
 
 def check_magnitude(what: str, unit: str, value: float | tuple[float, ...]) -> None:
-    """InputError unless a quantity, or its largest component, is 0 or within the limits of its unit."""
+    """Raise InputError unless a quantity, or its largest component, is 0 or within the limits of its unit."""
     least, most = limits(unit)
     size = max(map(abs, value)) if isinstance(value, tuple) else abs(value)
     rule = f"0, or of a magnitude of {least:.4g} to {most:.4g} {unit}".rstrip()
@@ -41,12 +41,12 @@ def check_magnitude(what: str, unit: str, value: float | tuple[float, ...]) -> N
 
 
 def check_direction(what: str, axis: tuple[float, float, float]) -> None:
-    """InputError unless the length of an axis can be divided by, as its square can."""
+    """Raise InputError unless the length of an axis can be divided by, as its square can."""
     must(LEAST <= math.hypot(*axis) <= MOST, what, "a direction", axis)
 
 
 def check_memory(what: str, number: int, bytes_each: float = BYTES) -> None:
-    """InputError unless this machine has memory for a number of things; raised before any is allocated."""
+    """Raise InputError, before any is allocated, unless this machine has memory for a number of things."""
     from tisim.backend import runtime
 
     there = runtime.memory()
@@ -55,8 +55,8 @@ def check_memory(what: str, number: int, bytes_each: float = BYTES) -> None:
 
 
 def check_resolved(what: str, places: np.ndarray, radius: float) -> None:
-    """InputError unless rounding of the largest coordinate (m) is well below a radius (m). Further from the
-    origin, spheres that are packed would lie in one place.
+    """Raise InputError unless rounding of the largest coordinate (m) is well below a radius (m). Further from
+    the origin, spheres that are packed would lie in one place.
     """
     farthest = float(np.abs(places).max(initial=0.0))
     step = float(np.spacing(farthest))

@@ -24,7 +24,7 @@ def load(package: ModuleType) -> None:
 
 
 def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
-    """Return a copy of a table whose keys are text; InputError naming ``where`` for anything else."""
+    """Return a copy of a table whose keys are text; raise InputError naming ``where`` for anything else."""
     must(isinstance(data, Mapping), where, what, data)
     for key in data:
         must(isinstance(key, str), f"a key of {where}", "text", key)
@@ -57,7 +57,7 @@ def _part(annotation: Any) -> type[Component] | None:
 
 
 def to_dict(part: Component, named: bool = True, arrays: bool = False) -> dict[str, Any]:
-    """Kind and parameters of a part and of those that it is made of, without what is left at None.
+    """Return kind and parameters of a part and of those that it is made of, without what is left at None.
 
     arrays : whether arrays stay what they are; otherwise they become lists.
     """
@@ -72,7 +72,7 @@ def to_dict(part: Component, named: bool = True, arrays: bool = False) -> dict[s
 
 
 def toml(data: Mapping[str, Any], path: str = "") -> str:
-    """TOML text of nested tables of numbers, text, flags and lists."""
+    """Return the TOML text of nested tables of numbers, text, flags and lists."""
     tables = {key for key, value in data.items() if isinstance(value, Mapping) or _tables(value)}
     lines = [f"{_key(key)} = {inline(value)}" for key, value in data.items() if key not in tables]
     text = "\n".join(lines) + "\n" if lines else ""
@@ -107,7 +107,7 @@ def _key(name: str) -> str:
 
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _DEEP = re.compile(rf"""(?<![\w."'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{64}}""")
-"""A dotted key of more parts than any scene has."""
+"""This is a dotted key of more parts than any scene has."""
 
 
 def parse(text: str) -> dict[str, Any]:
@@ -119,7 +119,7 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def read_toml(text: str, what: str, source: str) -> dict[str, Any]:
-    """Return the table that TOML text holds; InputError naming ``what`` and ``source`` where it is not
+    """Return the table that TOML text holds; raise InputError naming ``what`` and ``source`` where it is not
     TOML."""
     try:
         return parse(text)

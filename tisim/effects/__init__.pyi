@@ -31,12 +31,15 @@ from .base import (
 from .contact.bond import ContactBond as ContactBond
 from .contact.dissipation import ContactDissipation as ContactDissipation
 from .contact.friction import ContactFriction as ContactFriction
+from .contact.granular import GranularContact as GranularContact
 from .contact.hertz import Hertz as Hertz
+from .contact.hertz_mindlin import HertzMindlin as HertzMindlin
 from .contact.normal import NormalContact as NormalContact
 from .contact.power_law import Contact as Contact
 from .contact.power_law import ContactLaw as ContactLaw
 from .contact.softening import ContactSoftening as ContactSoftening
 from .contact.surface import SurfaceContact as SurfaceContact
+from .contact.walls import Walls as Walls
 from .external.drag import (
     ChowDrag as ChowDrag,
 )

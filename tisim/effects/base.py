@@ -14,8 +14,9 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
    back. Of several effects of one kind they are summed, as all write the same.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
-   are summed in scene order. What touching pairs remember of each other (``memory``) is handed to them, and
-   changed by ``remember`` only, once a step.
+   are summed in scene order. What near pairs remember of each other (``memory``) is handed to
+   ``interaction``, which returns it brought up to date, together with the force; what a particle remembers
+   of a force, such as that of walls, is brought up to date in ``load``, where that is told to.
 6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
    ``requires_source`` the quantities of which a scene must have at least one source.
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field
@@ -44,7 +45,7 @@ What Taichi asks of a method with ``ti.func``:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -101,7 +102,7 @@ class Effect(LawHints, Component):
 
     @classmethod
     def called(cls, data: Mapping[str, Any]) -> str:
-        """Its name; its kind unless one is given."""
+        """Return the name in the data of an effect; its kind unless one is given."""
         return str(data.get("name") or cls.kind())
 
     def required_fields(self) -> tuple[str | Field, ...]:
@@ -148,6 +149,21 @@ class Force(Effect):
         return 0.0 * s.velocity[w, i]
 
     @ti.func
+    def load(self, s, w, i, t, dt, commit):
+        """Return force (N) and torque (N m) on particle i together; ``dt`` (s) have gone by since what i
+        remembers, in the fields of ``memory_fields``, was brought up to date; it now is, if ``commit``."""
+        return self.force(s, w, i, t), self.torque(s, w, i, t)
+
+    def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
+        """Return the fields in which particles remember what it has done to them, given all effects of the
+        scene; by default none. A bound force finds them with ``remembers``."""
+        return ()
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        """Return attributes to set on its bound object, chosen among the fields of the state."""
+        return {}
+
+    @ti.func
     def velocity_jacobian(self, s, w, i, t):
         """Return the derivatives of ``force``: [a, b] that of component a by component b of the velocity of
         i, in N s/m.
@@ -159,7 +175,7 @@ class Force(Effect):
 
 
 class Pairwise(Effect):
-    """The contract of what is summed over pairs.
+    """This is the contract of what is summed over pairs.
 
     short_ranged : whether it is zero where the gap between surfaces is wider than ``reach``; it is then
     summed over the pair list, otherwise over all pairs.
@@ -172,9 +188,8 @@ class Pairwise(Effect):
     def reach(self, s, w, i):
         """Return the widest gap (m) between surfaces at which it acts between i and a particle no larger.
 
-        A pair is looked for by its larger particle, so it is the reach of that one that counts, whatever the
-        smaller one would return. Small worlds look at all pairs, where one too short does no harm:
-        ``assert_reach`` of tisim/testing tells.
+        Of a pair it is the reach of the larger particle that counts, whatever the smaller one would return.
+        ``assert_reach`` of tisim/testing tells whether it is long enough.
         """
         return 0.0
 
@@ -184,9 +199,10 @@ class PairForce(Pairwise):
 
         pair_force(i, j) = -pair_force(j, i)
 
-    memory : values that a pair remembers while it touches, for short-ranged forces; a bound effect reads
-        them with ``self.past.recall(s, w, i, j)``, a vector, and zero for a pair that has just met.
-        One of the two keeps it: ``self.past.sign(s, w, i, j)`` is 1 when that is i, and -1 when it is j.
+    Most laws define ``pair_force``, and ``pair_torque`` where they turn particles. A short-ranged law whose
+    force, torques and memory belong together, such as that of a contact, defines ``interaction`` instead.
+
+    memory : values that a pair remembers while it is within ``reach``, zero for a pair that has just met.
     """
 
     contract: ClassVar[bool] = True
@@ -208,14 +224,18 @@ class PairForce(Pairwise):
         return 0.0 * separation
 
     @ti.func
-    def touching(self, s, w, i, j, separation, distance):
-        """Return whether the pair has something to remember; what it knows is forgotten when it has not."""
-        return distance <= s.radius[w, i] + s.radius[w, j]
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        """Return the force on i by j (N), the torques on i and on j about their centres (N m), and what the
+        pair remembers from now on, given what it did, ``past``, and that ``dt`` (s) have gone by since.
 
-    @ti.func
-    def remember(self, s, w, i, j, separation, distance, past, dt):
-        """Return what the pair knows after a further dt (s), given ``past``; i is the one who keeps it."""
-        return past
+        It is asked of every listed pair within ``reach``, once: i is the one of lower id, and what is
+        remembered is as i sees it. ``past`` is a vector of ``memory`` values, or of one 0 where there are
+        none, which is returned as it came.
+        """
+        force = self.pair_force(s, w, i, j, separation, distance, t)
+        turn = self.pair_torque(s, w, i, j, separation, distance, t)
+        back = self.pair_torque(s, w, j, i, -separation, distance, t)
+        return force, turn, back, past
 
 
 class DerivedQuantity(Effect):

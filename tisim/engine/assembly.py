@@ -8,14 +8,25 @@ from typing import Any
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, Effect, Force, PairEvent, PairForce, SelfConsistentQuantity
 from tisim.interactions.collision_rounds import Rounds
-from tisim.interactions.contact_history import ContactHistory, UpdateContactHistory, memory_fields
 from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts, FindContactsAgain
+from tisim.interactions.contact_memory import ContactMemory, memory_fields
 from tisim.interactions.failure_attribution import FailureAttribution
-from tisim.interactions.force_sum import FORCE, TORQUE, SumForces, SumForcesAgain, SumTrialForces, turning
-from tisim.interactions.rearrangement import Rearrange
+from tisim.interactions.force_sum import (
+    FORCE,
+    TORQUE,
+    SumForces,
+    SumForcesAgain,
+    SumForcesAtStart,
+    SumTrialForces,
+    turning,
+)
+from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, PairTerms, fuse, sum_phases
+from tisim.interactions.pair_chunks import PairChunks
+from tisim.interactions.rearrangement import Rearrange, StoreBefore
 from tisim.interactions.self_consistent import SelfConsistentSolver, solver
 from tisim.neighbours.cell_list import list_phases
-from tisim.neighbours.full_list import FullNeighbourList
+from tisim.neighbours.half_list import HalfList, ListSizes
+from tisim.neighbours.lists import NeighbourLists
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper
@@ -29,7 +40,7 @@ from tisim.worlds.state import State
 
 
 def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Field, str]:
-    """What a scene of these needs beyond the core -> the part that needs it, in order."""
+    """Return what a scene of these needs beyond the core -> the part that needs it, in order."""
     needed: list[tuple[str | Field, str]] = []
     if any(isinstance(effect, Force | PairForce) for effect in effects):
         needed.append((FORCE, "forces"))
@@ -39,6 +50,8 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
         needed += [(need, effect.label) for need in effect.required_fields()]
         if isinstance(effect, PairForce):
             needed += [(field, effect.label) for field in memory_fields(effect)]
+        if isinstance(effect, Force):
+            needed += [(field, effect.label) for field in effect.memory_fields(effects)]
     wanted = stepper.fields(turning(effects), stepper.independent(effects))
     needed += [(need, stepper.kind()) for need in wanted]
     users: dict[str | Field, list[str]] = {}
@@ -48,14 +61,20 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
 
 
 def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[str, ...]:
-    """Names of the ``counters``, ``world_quantities`` or ``flags`` that the parts of a scene declare, each
-    once."""
+    """Return the names of the ``counters``, ``world_quantities`` or ``flags`` that the parts of a scene
+    declare, each once."""
     parts: tuple[Any, ...] = (*effects, stepper, stepper.control)
     return tuple(dict.fromkeys(name for part in parts for name in getattr(part, what, ())))
 
 
+def picks_pairs(effects: Sequence[Effect], stepper: Stepper) -> bool:
+    """Return whether all sums over pairs are over listed ones."""
+    pairwise = [effect for effect in effects if isinstance(effect, PairForce | SelfConsistentQuantity)]
+    return bool(pairwise) and not stepper.all_pairs and all(effect.short_ranged for effect in pairwise)
+
+
 class Assembly:
-    """What a step of a scene consists of.
+    """An assembly is what a step of a scene consists of.
 
     step : the items of a step. first : those that prepare the first one.
     failure_attribution : finds the force that has stopped a world.
@@ -69,36 +88,46 @@ class Assembly:
         stepper: Bound[Stepper],
         domain: Bound[Domain],
         control: Bound[StepControl],
+        sizes: ListSizes,
     ) -> None:
         self.s, self.domain, self.effects = s, domain, effects
         events, operators = effects.of(PairEvent), effects.of(Operator)
         short_ranged = tuple(e for e in effects.of(PairForce, SelfConsistentQuantity) if e.data.short_ranged)
         surveyed = bool(events) or control.data.watches_pairs
-        listed = surveyed or bool(short_ranged)
-        self.neighbour_list = near = NeighbourList(s, domain, short_ranged) if listed else None
-        self.full_list = FullNeighbourList(near) if near and short_ranged else None
+        near = NeighbourList(s, domain) if surveyed else None
+        self.pairs = self._listed(short_ranged, sizes) if short_ranged else None
+        self.lists = NeighbourLists(s, near, self.pairs) if near or self.pairs else None
         contacts = ContactList(s, domain, events) if surveyed else None
         self.derived_solvers = tuple(
-            solver(s, effect, domain, self.full_list) for effect in effects.of(DerivedQuantity)
+            solver(s, effect, domain, self.pairs) for effect in effects.of(DerivedQuantity)
         )
-        lists = self.full_list.phases() if self.full_list else list_phases(near) if near else ()
+        for force in effects.of(Force):
+            for name, value in force.data.remembers(s).items():
+                setattr(force, name, value)
+        components = 6 if turning([effect.data for effect in effects]) else 3
+        listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
+        self.left = PairTerms(self.pairs, components) if self.pairs and listed else None
+        pairs = self.pairs.phases() if self.pairs else ()
+        events_lists = list_phases(near) if near else ()
+        lists = (*events_lists, *pairs)
+        force_sum = self._sum(SumForces)
         context = StepContext(
             s=s,
             effects=effects,
             stepper=stepper,
             control=control,
             domain=domain,
-            neighbour_list=near,
+            neighbour_lists=self.lists,
             independent=stepper.data.independent([effect.data for effect in effects]),
             update_lists=lists,
-            update_history=self._history(),
+            advance_memory=self._advance(force_sum, pairs),
             sum_forces=self._summed(SumForces),
             sum_trial_forces=self._summed(SumTrialForces),
-            force_sum=self._sum(SumForces),
+            force_sum=force_sum,
         )
         self.failure_attribution = FailureAttribution(context.force_sum)
         own: Step = stepper.data.step(context)
-        step, first = [*own.items], [*lists, *context.sum_forces]
+        step, first = fuse(own.items), [*lists, *self._summed(SumForcesAtStart)]
         if near and contacts:
             survey = FindContacts(near, contacts, control)
             step += [ClearContacts(contacts), survey]
@@ -106,18 +135,21 @@ class Assembly:
         if events and contacts:
             step += [Rounds(contacts)]
         if events or operators:
-            step += [Rearrange(s, domain, operators, near)]
+            if self.pairs and self.pairs.memories:
+                step += [StoreBefore(self.pairs, operators)]
+            step += [Rearrange(s, domain, operators, self.lists)]
             if near and contacts and control.data.watches_pairs:
                 step += [*lists, FindContactsAgain(near, contacts, control)]
             if context.sum_forces:
                 step += [*lists, *self._summed(SumForcesAgain)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
-        pairs = "impacts, step control"
+        sudden, steady = "impacts, step control", "short-ranged forces"
         beside = (
-            (near, "pair list", pairs if surveyed else "short-ranged forces"),
-            (self.full_list, "other half of the pair list", "short-ranged forces"),
-            (contacts, "contact list", pairs),
+            (near, "neighbour list", sudden),
+            (contacts, "contact list", sudden),
+            (self.pairs, "pair list", steady),
+            (self.left, "forces between chunks", steady),
         )
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),
@@ -131,14 +163,29 @@ class Assembly:
                 quantity = one.effect.data
                 yield Buffer(one, f"sweeps of {quantity.quantity}", quantity.label)
 
-    def _history(self) -> tuple[UpdateContactHistory, ...]:
-        """Give each effect with a memory what it reads it with, and bring it up to date."""
-        updates = []
-        for effect in self.effects.of(PairForce):
-            if memory_fields(effect.data) and self.full_list:
-                effect.past = ContactHistory(self.s, effect.data)
-                updates.append(UpdateContactHistory(self.s, self.domain, effect, self.full_list))
-        return tuple(updates)
+    def _listed(self, laws: tuple[Bound[Any], ...], sizes: ListSizes) -> PairChunks:
+        """Return the pairs of these laws, and set what each law remembers of them."""
+        memories = []
+        for law in laws:
+            if isinstance(law.data, PairForce) and memory_fields(law.data):
+                law.past = ContactMemory(self.s, law)
+                memories.append(law.past)
+        pairs = PairChunks(HalfList(self.s, self.domain, laws, sizes), tuple(memories))
+        if memories:
+            self.s.before_reading.append(pairs.store_memory)
+        return pairs
+
+    def _advance(self, force_sum: SumForces, pairs: tuple[Item, ...]) -> tuple[Item, ...]:
+        """Bring up to date what pairs and particles remember, where there is anything.
+
+        Of pairs that are listed at the end of the step: the last trial state need not be so near to it.
+        """
+        items: list[Item] = []
+        if self.pairs and self.pairs.memories and self.left:
+            items += [*pairs, AdvancePairs(force_sum, self.left)]
+        if any(force.data.offers("load") for force in self.effects.of(Force)):
+            items.append(AdvanceParticles(force_sum))
+        return tuple(items)
 
     def _summed(self, kind: type[SumForces]) -> tuple[Item, ...]:
         """Set derived quantities, then sum the forces."""
@@ -146,8 +193,8 @@ class Assembly:
         for part in self.derived_solvers:
             items += part.phases(again=kind.conditional, trial=kind.trial)
         if self.effects.of(Force, PairForce):
-            items.append(self._sum(kind))
+            items += sum_phases(self._sum(kind), self.left)
         return tuple(items)
 
     def _sum(self, kind: type[SumForces]) -> SumForces:
-        return kind(self.s, self.domain, self.effects, self.full_list, self.derived_solvers)
+        return kind(self.s, self.domain, self.effects, self.pairs, self.derived_solvers)

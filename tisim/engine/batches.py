@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from tisim.io.trajectory import Trajectory
 
 BATCH_PARTICLES = 300_000
-"""The largest number of particles of all worlds of a batch, which bounds its memory to some hundred MB."""
+"""All worlds of a batch have this many particles at most, which bounds its memory to some hundred MB."""
 IDLE_SIMULATIONS = 8
-"""The largest number of compiled simulations that are kept for later calls."""
+"""At most this many compiled simulations are kept for later calls."""
 SPARE, WASTE = 4096, 8
 """A kept simulation serves where it has room for at most so many particles, or so many times what is needed:
 all of its room is loaded and looked at."""
@@ -141,7 +141,7 @@ class Batches:
 
 
 _lock = threading.Lock()
-"""Held while a simulation changes hands."""
+"""This lock is held while a simulation changes hands."""
 _all: weakref.WeakSet[Batches] = weakref.WeakSet()
 
 

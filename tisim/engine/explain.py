@@ -19,12 +19,12 @@ from tisim.scene.scene import Scene
 from tisim.worlds.fields import CORE
 
 ROWS_SHOWN = 3
-"""Rows of a list that are shown."""
+"""This many rows of a list are shown."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """An effect, the domain or the step control of a scene.
+    """A part is an effect, the domain or the step control of a scene.
 
     name : in files. summary : one line. source : where the law is from. parameters : name, value, unit and
     text of each.
@@ -38,7 +38,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Memory:
-    """Something allocated for one world of the scene. bytes : its size. why : which parts need it."""
+    """This memory is allocated for one world of the scene. bytes : its size. why : which parts need it."""
 
     name: str
     bytes: int
@@ -47,7 +47,7 @@ class Memory:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A scene, as one world of it is compiled.
+    """An explanation describes a scene, as one world of it is compiled.
 
     particles, capacity : at the start, and room for. steps : that a run takes at least. memory : every
     allocation, fields first. phases : of a step, in order; those with * are repeated until nothing waits.
@@ -74,7 +74,7 @@ class Explanation:
 
 
 def explain(scene: Scene) -> Explanation:
-    """Compose the scene under the running settings, look at it, and give its memory back. Runs nothing."""
+    """Compose the scene under the running settings, look at it, and give its memory back; run nothing."""
     simulation = Simulation(scene)
     try:
         memory = tuple(_memory(simulation, scene))
@@ -151,7 +151,7 @@ def _what(kind: type[Component], values: tuple[tuple[str, str, str, str], ...] =
 
 
 def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, str]]:
-    """(name, value, unit, text) of each parameter; of a long list, of its first rows."""
+    """Yield (name, value, unit, text) of each parameter; of a long list, of its first rows."""
     lists = dict(spec.lists())
     for name, info in type(spec).model_fields.items():
         value = getattr(spec, name)

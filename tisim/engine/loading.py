@@ -17,7 +17,8 @@ from tisim.worlds.status import NO_ONE, WorldStatus
 
 
 def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
-    """InputError unless the start gives what the scene needs and no more, of the right shape, in its domain.
+    """Raise InputError unless the start gives what the scene needs and no more, of the right shape, in its
+    domain.
 
     A quantity that effects share, such as temperature, may be given to a scene that has no use for it.
     """
@@ -58,7 +59,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
 
 
 def check_field(f: Field, values: np.ndarray, n: int) -> None:
-    """InputError unless values of n particles have the shape and the range of a field."""
+    """Raise InputError unless values of n particles have the shape and the range of a field."""
     must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
     rounded: np.ndarray
     with np.errstate(over="ignore"):

@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tisim.backend.memory import collected
+from tisim.backend.thread import in_taichi_thread
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import Status
+from tisim.worlds.finite import FiniteCheck
 from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
@@ -26,11 +29,16 @@ REASONS: dict[int, str] = {
     WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",
     WorldStatus.FORCE_TOO_STEEP: "a force so strong that it asks for a step shorter than the shortest",
     WorldStatus.NOT_POSITIVE_DEFINITE: "the diffusion matrix is not positive definite",
+    WorldStatus.LIST_OVERFLOW: "more near pairs than their list has room for",
 }
 
 
+LARGE = 4096
+"""From this many particles of all worlds on it takes longer to copy them than to ask a kernel about them."""
+
+
 class Monitor:
-    """The last good state of a loaded batch, and what has gone wrong in it.
+    """A monitor holds the last good state of a loaded batch, and what has gone wrong in it.
 
     good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
         between two steps; those of the last good step, where a world has failed.
@@ -38,22 +46,48 @@ class Monitor:
     """
 
     def __init__(self, simulation: Simulation, image: Image | None = None) -> None:
-        """``image`` : where the simulation has been put, or where it was before the step under way, when that
-        is not its start."""
+        """Begin to watch. ``image`` : where the simulation has been put, or where it was before the step
+        under way, when that is not its start."""
         self.simulation, self.s = simulation, simulation.s
         self.replay = Replay(simulation, image)
         names = (*self._names(), "time", "count")
-        self.good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
+        self._good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
+        self._behind = np.zeros(self.s.worlds, bool)
         self.faults: dict[int, tuple[float, str]] = {}
+        # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
+        shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
+        large = self.s.worlds * self.s.capacity >= LARGE
+        self.check = self._device_check() if large and shared_clock else None
+
+    @in_taichi_thread
+    def _device_check(self) -> FiniteCheck:
+        with collected() as trees:
+            check = FiniteCheck(self.s)
+        self.simulation.trees += trees
+        return check
+
+    @property
+    def good(self) -> Image:
+        """Read what is good from the device, where it has gone on since."""
+        if self._behind.any():
+            behind, self._behind = self._behind, np.zeros_like(self._behind)
+            now = self.s.snapshot(self._good)
+            for name, good_values in self._good.items():
+                good_values[behind] = now[name][behind]
+        return self._good
 
     def check_worlds(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
-        now = self._snapshot()
+        now = self._snapshot() if self.check is None else self.s.snapshot(self.s.columns)
+        finite = self._finite(now) if self.check is None else (now["failed"] == 0) & self.check.worlds()
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
-        wrong = ~self._finite(now) | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
-        undecided = ~wrong & (now["underway"] == 0)
-        for name, good_values in self.good.items():
-            good_values[undecided] = now[name][undecided]
+        wrong = ~finite | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
+        known = ~wrong & (now["underway"] == 0)
+        if self.check is None:
+            for name, good_values in self._good.items():
+                good_values[known] = now[name][known]
+        else:
+            self._behind |= known
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))
@@ -68,7 +102,8 @@ class Monitor:
     def _stop(self, worlds: np.ndarray) -> None:
         """Put worlds that have failed where they were last good, from where a step fails again: so a
         checkpoint holds that too, and why they have failed is found once more when it is restored."""
-        live = self.s.image()
+        live, sizes = self.s.image(), self.simulation.list_sizes()
+        goals, overflowed = live["goal"].copy(), live["failed"][worlds] == WorldStatus.LIST_OVERFLOW
         try:
             good = self.replay.last_good(worlds, self._finite)
             if (self.s.read("failing_effect") == ASKED).any():
@@ -78,35 +113,46 @@ class Monitor:
                 values[worlds] = good[name][worlds]
             failed = then["failed"][worlds]
             live["status"][worlds] = np.where(failed > 0, failed, WorldStatus.NOT_FINITE)
+            # Nothing is wrong with a world whose list is too short: it goes on with a longer one. On the way
+            # there once more lists are made at other times, and may overflow where none did, or not at all.
+            again = failed == WorldStatus.LIST_OVERFLOW
+            crowded = worlds[again | (overflowed & self._finite(then)[worlds])]
+            ended = live["time"][crowded] >= live["end"][crowded]
+            live["status"][crowded] = np.where(ended, WorldStatus.ENDED, WorldStatus.RUNNING)
+            live["failed"][crowded] = 0
+            live["failing_particle"][crowded], live["goal"][crowded] = NO_ONE, goals[crowded]
         finally:
             self.simulation.put(live)
-        for w in map(int, worlds):
+        if len(crowded):
+            self.simulation.grow_lists(sizes.joined(self.simulation.list_sizes()))
+        for w in map(int, np.setdiff1d(worlds, crowded)):
             self.faults[w] = float(then["time"][w]), self._fault(w, then)
-        for name, good_values in self.good.items():
+        self._behind[worlds] = False
+        for name, good_values in self._good.items():
             good_values[worlds] = good[name][worlds]
 
     def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
-        """Each quantity with the live particles, (worlds, capacity), of which it is not finite."""
+        """Yield each quantity with the live particles, (worlds, capacity), of which it is not finite."""
         live = np.arange(self.s.capacity) < now["count"][:, None]
         for f in self.s.reported:
             yield f.name, live & ~np.isfinite(now[f.name].reshape(*live.shape, -1)).all(axis=2)
 
     def _finite(self, now: Image) -> np.ndarray:
-        """Whether no step has failed and every quantity is finite, by world."""
+        """Return whether no step has failed and every quantity is finite, by world."""
         finite = now["failed"] == 0
         for _, broken in self._not_finite(now):
             finite &= ~broken.any(axis=1)
         return finite
 
     def status(self, w: int, code: int) -> Status:
-        """How a world whose status field holds ``code`` has ended, or that it runs."""
+        """Return how a world whose status field holds ``code`` has ended, or that it runs."""
         if w in self.faults:
             when, why = self.faults[w]
             return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
         return Status(code == WorldStatus.ENDED, REASONS[code])
 
     def _fault(self, w: int, then: Image) -> str:
-        """What is wrong with a world: what the kernels have recorded of it, or what is not finite."""
+        """Return what is wrong with a world: what the kernels have recorded of it, or what is not finite."""
         code = int(then["failed"][w])
         if code == 0:
             for name, broken in self._not_finite(then):

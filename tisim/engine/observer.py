@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Observer:
-    """The contract of an observer.
+    """This is the contract of an observer.
 
     1. ``observe`` is called before the first step of a run, then about four times a second, whenever a world
        has come to its pause, and after the last step; never within a step.
@@ -29,8 +29,8 @@ class Observer:
     """
 
     def pause(self, simulation: Simulation) -> float | np.ndarray:
-        """When worlds are to wait for this observer next, s: one number for all, or one for each that is
-        loaded; never by default."""
+        """Return when worlds are to wait for this observer next, s: one number for all, or one for each that
+        is loaded; never by default."""
         return np.inf
 
     def observe(self, simulation: Simulation) -> None:
@@ -39,11 +39,11 @@ class Observer:
 
 
 Observing = Observer | Callable[["Simulation"], object]
-"""An observer, or a plain function of the simulation, which no world waits for."""
+"""An observer, or a plain function of the simulation, may look at a run; no world waits for a function."""
 
 
 class Callback(Observer):
-    """A plain function as an observer."""
+    """A callback lets a plain function be an observer."""
 
     def __init__(self, function: Callable[[Simulation], object]) -> None:
         self.function = function
@@ -53,7 +53,7 @@ class Callback(Observer):
 
 
 class Observers:
-    """All observers of a run, as one."""
+    """These are all observers of a run, as one."""
 
     def __init__(self, observers: Sequence[Observing]) -> None:
         """Raise InputError unless each of them is an Observer or a function."""
@@ -69,7 +69,8 @@ class Observers:
             member.observe(simulation)
 
     def pauses(self, simulation: Simulation, until: float) -> np.ndarray:
-        """When each world waits next, s, shape (worlds,): at ``until``, or before it for an observer."""
+        """Return when each world waits next, s, shape (worlds,): at ``until``, or before it for an
+        observer."""
         pauses = np.full(simulation.worlds, until)
         n = len(simulation.scenes)
         if not self.members or n == 0:

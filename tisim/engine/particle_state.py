@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 class ParticleState(Mapping[str, np.ndarray]):
-    """The live particles of a loaded world: arrays of shape (n,) or (n, 3), SI, by the names of its fields.
+    """A particle state holds the live particles of a loaded world: arrays of shape (n,) or (n, 3), SI, by the
+    names of its fields.
 
     The arrays are those of a Result at this moment, and are not writeable: ``state["velocity"] = 2.0 *
     state["velocity"]`` writes. What is written must be finite and what a start may be, for the particles that
@@ -37,7 +38,7 @@ class ParticleState(Mapping[str, np.ndarray]):
 
     @property
     def time(self) -> float:
-        """The time (s) that the world has come to."""
+        """Return the time (s) that the world has come to."""
         return float(self._simulation.monitor.good["time"][self._world])
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -79,7 +80,7 @@ class ParticleState(Mapping[str, np.ndarray]):
 
 
 def _numbers(name: str, values: Any, whole: bool) -> np.ndarray:
-    """Return an array of floats; InputError unless these are numbers."""
+    """Return an array of floats; raise InputError unless these are numbers."""
     try:
         array = np.asarray(values)
     except ValueError:

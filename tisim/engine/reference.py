@@ -22,6 +22,7 @@ from tisim.components.invalid import text_of, unit_of
 from tisim.effects.base import Effect
 from tisim.engine import template
 from tisim.errors import InputError, abbreviated, did_you_mean
+from tisim.geometry.shape import Shape
 from tisim.operators.base import Operator
 from tisim.packing.placement import Placement
 from tisim.scene import plugins
@@ -44,12 +45,12 @@ PUBLICATIONS = {
     "L21": "T. Leps, Simulation of magnetic granular media using open source soft sphere DEM, thesis, "
     "University of Maryland (2021)",
 }
-"""The works that docstrings cite in short."""
+"""These are the works that docstrings cite in short."""
 
 
 @dataclass(frozen=True)
 class Family:
-    """Parts of one sort.
+    """A family holds the parts of one sort.
 
     title : for people. base : what they are made after. place : the table of a scene file that holds one,
     with ``NAME`` for its name where that is the key; elsewhere the name is the table's ``kind``.
@@ -72,6 +73,7 @@ FAMILIES = {
     "effects": Family("Effects", Effect, "effects.NAME"),
     "sources": Family("Sources", Source, "effects.NAME"),
     "bodies": Family("Bodies of magnetic sources", Body, ""),
+    "shapes": Family("Shapes of walls", Shape, ""),
     "operators": Family("Operators", Operator, "effects.NAME"),
     "steppers": Family("Steppers", Stepper, "stepper"),
     "step_controls": Family("Step controls", StepControl, "stepper.control"),
@@ -80,12 +82,13 @@ FAMILIES = {
     "pulses": Family("Pulses", Pulse, "particles.pulse"),
     "domains": Family("Domains", Domain, "domain"),
 }
-"""The families by name."""
+"""These are the families by name."""
 
 
 @dataclass(frozen=True)
 class Declaration:
-    """A parameter or option. rule : what it must be. default : as people read it; "" where there is none."""
+    """A declaration is that of a parameter or option. rule : what it must be. default : as people read it; ""
+    where there is none."""
 
     name: str
     unit: str
@@ -96,7 +99,7 @@ class Declaration:
 
 @dataclass(frozen=True)
 class Entry:
-    """All that the code says of a part.
+    """An entry is all that the code says of a part.
 
     summary : one sentence; body : the rest of its docstring, without the source. fields : (name, unit) of the
     particle fields that it may need; needs : what else a scene must have. gives : what it counts and
@@ -142,7 +145,8 @@ def groups() -> dict[str, list[Entry]]:
 
 
 def find(name: str) -> Entry:
-    """Return the entry of a part by name; InputError with the known ones, and the nearest, for no part."""
+    """Return the entry of a part by name; raise InputError with the known ones, and the nearest, for no
+    part."""
     known = names()
     if name not in known:
         rule, nearest = f"one of {', '.join(sorted(known))}", did_you_mean(name, (*known, *groups()))
@@ -196,7 +200,8 @@ def _suiting(control: Any) -> list[str]:
 
 
 def settings(kind: type[Checked]) -> tuple[Declaration, ...]:
-    """Its parameters and options, in order, but for the name of an effect, which is that of its table."""
+    """Return its parameters and options, in order, but for the name of an effect, which is that of its
+    table."""
     shown = template.fields(kind) if issubclass(kind, Component) else kind.model_fields
     return tuple(_setting(name, info) for name, info in shown.items())
 

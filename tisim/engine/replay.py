@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 Image = dict[str, np.ndarray]
 EVERY = 10.0
-"""Wall time (s) between images of the whole state, from which worlds can go on."""
+"""This wall time (s) passes between images of the whole state, from which worlds can go on."""
 
 
 class Replay:
-    """Where the worlds of a loaded simulation can be run once more from: an image of them, or their start.
+    """A replay runs the worlds of a loaded simulation once more, from an image of them or from their start.
 
     base : the image, of every world between two steps; None for the start, of which none is made, as most
         runs are short and none fails.
@@ -62,7 +62,8 @@ class Replay:
         return image
 
     def last_good(self, worlds: np.ndarray, sound: Callable[[Image], np.ndarray]) -> Image:
-        """Bring worlds to where they fail, and the others nowhere; an image that has their last good steps.
+        """Bring worlds to where they fail, and the others nowhere; return an image that has their last good
+        steps.
 
         worlds : indices. sound : whether all is well, for each world of an image. A world in which something
         is wrong from the start is left there.

@@ -10,7 +10,8 @@ from tisim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Status:
-    """How a world ended. ``ok`` when it reached its end; else ``reason`` says when, where and what."""
+    """A status says how a world ended. ``ok`` when it reached its end; else ``reason`` says when, where and
+    what."""
 
     ok: bool
     reason: str

@@ -30,7 +30,7 @@ def run(
 def run(
     scenes: Scene | Sequence[Scene], progress: Progress | None = None, record: Recording | None = None
 ) -> Result | list[Result]:
-    """Run a scene, or many as one batch; returns its Result, or theirs in order.
+    """Run a scene, or many as one batch; return its Result, or theirs in order.
 
     progress : called about four times a second with the finished fraction, 0..1. record : a trajectory to
     write, such as ``Recording("flow.h5", frames=100)``; it does not change the results.

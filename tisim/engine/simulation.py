@@ -12,7 +12,8 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine import law_errors
-from tisim.engine.allocation import allocate, parts
+from tisim.engine.allocation import Allocation, parts
+from tisim.engine.assembly import Assembly
 from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
@@ -20,18 +21,19 @@ from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
 from tisim.errors import is_number, is_whole, must
 from tisim.neighbours import pair_list
+from tisim.neighbours.half_list import ListSizes
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.program import Nest, Program
 from tisim.worlds.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
-"""Wall time between looks at progress, at Ctrl-C and at whether every quantity is finite; steps of all
-particles together before the first look."""
+"""The first is the wall time (s) between looks at progress, at Ctrl-C and at whether every quantity is
+finite; the second is the number of steps of all particles together before the first look."""
 
 
 class Simulation:
-    """Compiled for the structure of a scene, a number of worlds and a capacity of particles.
+    """A simulation is compiled for the structure of a scene, a number of worlds and a capacity of particles.
 
     scene : any scene of the structure; its values do not matter here.
     schedule : "world" or "particle" (see program.py), or None to choose by device and size.
@@ -56,17 +58,42 @@ class Simulation:
     def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
         """Place all fields, which are returned, and compile the kernels of a step."""
         with collected() as trees:
-            made = allocate(scene, worlds, capacity)
-        self.s, self.table, self.assembly = made.s, made.table, made.assembly
+            self.allocation = Allocation(scene, worlds, capacity)
+        self.s, self.table = self.allocation.s, self.allocation.table
         self.schedule = schedule or self._choose(capacity)
+        self.s.write("status", WorldStatus.ENDED)
+        self._compile()
+        return trees
+
+    def _compile(self) -> None:
+        """Compile the kernels of a step; no world may be running."""
         self.program = Program(self.s, self.assembly.step, self.schedule)
         self.first = Program(self.s, self.assembly.first, self.schedule)
-        self.s.write("status", WorldStatus.ENDED)
         with law_errors.in_a_line():
             self.program.compile()
             if self.first.items:
                 self.first.compile()
-        return trees
+
+    @property
+    def assembly(self) -> Assembly:
+        """Return what a step consists of."""
+        return self.allocation.assembly
+
+    def list_sizes(self) -> ListSizes:
+        """Return sizes in which the lists of pairs last made would have room."""
+        pairs = self.assembly.pairs
+        return pairs.half_list.wanted() if pairs else ListSizes()
+
+    @in_taichi_thread
+    def grow_lists(self, sizes: ListSizes) -> None:
+        """Make lists of pairs of these sizes, and compile the step anew for them."""
+        image = self.s.image()
+        self.s.write("status", WorldStatus.ENDED)
+        with collected() as trees:
+            self.allocation.assemble(sizes)
+        self.trees += trees
+        self._compile()
+        self.put(image)
 
     def _choose(self, capacity: int) -> str:
         if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):
@@ -77,8 +104,8 @@ class Simulation:
         return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
 
     def load(self, scenes: Scene | Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
-        """Put one scene in each of the first worlds, or one in the first; the others stay empty. No
-        compilation.
+        """Put one scene in each of the first worlds, or one in the first; the others stay empty. Nothing is
+        compiled.
 
         starts : ``particles.arrays`` of each scene, where the caller has made them already.
         Raises InputError when a scene is of another structure, or larger than the capacity.
@@ -109,18 +136,26 @@ class Simulation:
 
     @property
     def state(self) -> ParticleState:
-        """The particles of the one world that is loaded, to be read and written by name between runs, SI."""
+        """Return the particles of the one world that is loaded, to be read and written by name between runs,
+        SI."""
         self._check_loaded()
         must(len(self.scenes) == 1, "simulation", "of one world (or ask states[w])", len(self.scenes))
         return self.states[0]
 
     @property
     def states(self) -> list[ParticleState]:
-        """The particles of each loaded world, in order, to be read and written by name between runs, SI."""
+        """Return the particles of each loaded world, in order, to be read and written by name between runs,
+        SI."""
         return [ParticleState(self, w) for w in range(len(self.scenes))]
 
     def begin(self) -> None:
         """Put every world at its start, with all that its first step takes."""
+        self._begin()
+        while (self.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
+            self.grow_lists(self.list_sizes())
+            self._begin()
+
+    def _begin(self) -> None:
         self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
         # What worlds wait for, and how they look for pairs, is asked of them by others, and stays.
         asked = ("pause_time", "goal", "listed_above")
@@ -136,9 +171,9 @@ class Simulation:
         self.forget_lists()
 
     def forget_lists(self) -> None:
-        """Pair lists are made anew before they are used again."""
-        if self.assembly.neighbour_list is not None:
-            self.assembly.neighbour_list.forget()
+        """Have pair lists made anew before they are used again."""
+        if self.assembly.lists is not None:
+            self.assembly.lists.forget()
 
     def run(
         self,
@@ -199,15 +234,16 @@ class Simulation:
         return bool((going & (now["time"] < until)).any())
 
     def fraction(self) -> float:
-        """Part of the simulated time that is done, the mean over worlds; 1 for a world that has failed."""
+        """Return the part of the simulated time that is done, the mean over worlds; 1 for a world that has
+        failed."""
         n = len(self.scenes)
         now = self.s.snapshot(("status", "time", "reached", "end"))
         fractions = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
         return float(np.where(now["status"][:n] != WorldStatus.RUNNING, 1.0, fractions).mean())
 
     def ahead(self) -> float:
-        """Steps before the world that has most of them, if they go on as long as its last one; those that it
-        takes at least where there was none."""
+        """Return the steps before the world that has most of them, if they go on as long as its last one;
+        those that it takes at least where there was none."""
         n = len(self.scenes)
         running = self.s.read("status")[:n] == WorldStatus.RUNNING
         remaining, dt = (self.s.read("end") - self.s.read("time"))[:n], self.s.read("dt")[:n]
@@ -216,7 +252,7 @@ class Simulation:
         return float(np.where(running, np.ceil(steps), 0.0).max())
 
     def ended(self) -> list[int]:
-        """The loaded worlds that run no more, for good or ill."""
+        """Return the loaded worlds that run no more, for good or ill."""
         status = self.s.read("status")[: len(self.scenes)]
         return [int(w) for w in np.flatnonzero(status != WorldStatus.RUNNING)]
 
@@ -250,11 +286,11 @@ class Simulation:
         must(len(self.scenes) > 0, "simulation", "loaded with a scene before that", "none")
 
     def _edited(self, w: int) -> dict[str, str]:
-        """What has been written to a world besides its scene."""
+        """Return what has been written to a world besides its scene."""
         return {"edited": "; ".join(self.edits[w])} if self.edits[w] else {}
 
     def checkpoint(self, path: str | Path) -> None:
-        """Write where all worlds are to a file, in place of any before; RunError when the disk is full.
+        """Write where all worlds are to a file, in place of any before; raise RunError when the disk is full.
 
         A simulation of the same scenes goes on from there to the same bits (``restore``).
         """
@@ -266,8 +302,8 @@ class Simulation:
     def restore(self, path: str | Path) -> None:
         """Go back, or on, to where a checkpoint of the same scenes, which are loaded, was written.
 
-        InputError when the file is none, is cut short or damaged, or is of other scenes, another precision or
-        another capacity; everything is then as it was.
+        Raise InputError when the file is none, is cut short or damaged, or is of other scenes, another
+        precision or another capacity; everything is then as it was.
         """
         from tisim.io import checkpoint
 

@@ -17,7 +17,7 @@ except ImportError:
     fcntl = None  # type: ignore[assignment]
 
 LOCK_TIMEOUT = 60.0
-"""s, longer than any process at work holds a lock; one that is stopped holds it for good."""
+"""This time, in s, is longer than any process at work holds a lock; one that is stopped holds it for good."""
 
 
 @contextlib.contextmanager
@@ -27,7 +27,7 @@ def locked(path: Path, *, exclusive: bool, timeout: float | None = None) -> Iter
     timeout : s, to wait for another holder; LOCK_TIMEOUT unless given.
     It yields a handle of the file; of its folder, to a reader where no lock file is and none can be made.
     A lock file stays behind on purpose: removing it would let two processes lock two different files.
-    InputError where it cannot be had, RunError when another process holds it for longer.
+    Raise InputError where it cannot be had, RunError when another process holds it for longer.
     """
     if fcntl is None:
         raise InputError("the system must have POSIX file locks (Linux, macOS); received one without fcntl")
@@ -72,7 +72,7 @@ def append_at(path: Path, end: int, data: bytes) -> int:
     """Cut the file at byte end, write data there and flush it to the disk; return the new end.
 
     If the disk is full, the file is cut at end again and RunError raised: what was there before is whole.
-    InputError when something that is no file is in its place.
+    Raise InputError when something that is no file is in its place.
     """
     try:
         handle = open_descriptor(path, os.O_RDWR | os.O_CREAT)
@@ -98,8 +98,8 @@ def replace_file(path: Path, data: bytes) -> None:
     """Put data in the place of path so that path is, at every instant, the old file or a new one, whole.
 
     Writers of one path take turns: one name serves for the unfinished file, and a killed writer's is reused.
-    RunError if the disk is full; path is then the old file. InputError when something that is no file has the
-    unfinished one's name; a link in the place of path is replaced itself, not what it points to.
+    Raise RunError if the disk is full; path is then the old file. Raise InputError when something that is no
+    file has the unfinished one's name; a link in the place of path is replaced itself, not what it points to.
     """
     new = path.with_name(temporary_name(path.name))
     try:
@@ -123,8 +123,8 @@ def temporary_name(name: str) -> str:
 def replacing(path: Path, new: Path) -> Iterator[None]:
     """Let the caller write ``new``, an empty file at first; at the end put it in the place of path.
 
-    RunError if the disk is full; path is then the old file, and nothing unfinished is left. InputError when
-    something that is no file is in the place of ``new``.
+    Raise RunError if the disk is full; path is then the old file, and nothing unfinished is left. Raise
+    InputError when something that is no file is in the place of ``new``.
     """
     try:
         _create_empty(new)

@@ -22,14 +22,14 @@ from tisim.files.framing import MAGIC, frame, scan
 from tisim.files.superblock import SIGNATURE
 
 OLDER_VERSION = "an older version has written it, whose files h5py still reads"
-"""Text of messages about a file that is of tisim but has no checksum."""
+"""Messages say this about a file that is of tisim but has no checksum."""
 
 
 @contextlib.contextmanager
 def create_file(path: Path) -> Iterator[h5py.File]:
     """Yield a new HDF5 file in memory; at the end give it its checksum and put it in the place of path.
 
-    RunError when it cannot be written; path is then what it was.
+    Raise RunError when it cannot be written; path is then what it was.
     """
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
@@ -39,7 +39,8 @@ def create_file(path: Path) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_file(path: Path, what: str, kind: str, rule: str = "a file of tisim") -> Iterator[h5py.File]:
-    """Yield a file that ``create_file`` has written. InputError unless it is there, whole and of this kind.
+    """Yield a file that ``create_file`` has written. Raise InputError unless it is there, whole and of this
+    kind.
 
     kind : its attribute ``format``. what, rule : what it is called in messages, and what it must be.
     """
@@ -49,7 +50,8 @@ def open_file(path: Path, what: str, kind: str, rule: str = "a file of tisim") -
 
 
 def read_image(path: Path, what: str, rule: str) -> bytes:
-    """Return the HDF5 file that was given to ``with_checksum``; InputError unless it is there and whole.
+    """Return the HDF5 file that was given to ``with_checksum``; raise InputError unless it is there and
+    whole.
 
     what, rule : what it is called in messages, and what it must be.
     """

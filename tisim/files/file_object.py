@@ -7,7 +7,8 @@ import os
 
 
 class Seekable(io.RawIOBase):
-    """Subclasses say where the file ends, and access it from ``_position`` (bytes). It owns the handle."""
+    """A seekable file owns its handle. Subclasses say where the file ends, and access it from ``_position``
+    (bytes)."""
 
     def __init__(self, handle: int) -> None:
         self._handle, self._position = handle, 0

@@ -16,7 +16,7 @@ _HEAD = struct.Struct("<4sII")
 
 @dataclass(frozen=True)
 class Scan:
-    """The frames that were found in a sequence of bytes.
+    """A scan holds the frames that were found in a sequence of bytes.
 
     payloads : those of the whole frames, in order; end : byte offset after the last whole frame.
     damaged : byte offsets where whole frames follow something that is none: not a torn tail but damage.

@@ -16,7 +16,8 @@ from tisim.files.atomic import locked
 
 LOCK = ".tisim.lock"
 AT_WORK_TIMEOUT = 1.0
-"""s, far longer than it takes to see whether a folder is in use, for which the lock is held as well."""
+"""This time, in s, is far longer than it takes to see whether a folder is in use, for which the lock is held
+as well."""
 
 
 def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
@@ -28,7 +29,7 @@ def check(folder: Path, timeout: float = AT_WORK_TIMEOUT) -> None:
 
 @contextmanager
 def acquire(folder: Path, *, exclusive: bool = True, timeout: float = AT_WORK_TIMEOUT) -> Iterator[None]:
-    """Hold the lock of a folder, which exists; InputError where another process holds it.
+    """Hold the lock of a folder, which exists; raise InputError where another process holds it.
 
     exclusive : False to share it with those who only read. timeout : to wait for the other one, s.
     """

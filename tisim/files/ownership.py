@@ -20,14 +20,14 @@ from tisim.files.superblock import SIGNATURE
 
 MARKER = ".tisim"
 NAMES_SHOWN = 5
-"""The largest number of names of files that a message spells out."""
+"""A message spells out this many names of files at most."""
 _HEAD = 1 << 20
-"""The first bytes of an HDF5 file, in which its attributes are: their number."""
+"""The attributes of an HDF5 file lie within this many bytes of its beginning."""
 
 
 @dataclass(frozen=True)
 class LegacyFiles:
-    """The names of files that version 0.1.0 left in a folder.
+    """These are the names of files that version 0.1.0 left in a folder.
 
     main : those from which it could resume or draw; where there is one but no marker, these and the others
     are of tisim's writing.
@@ -94,7 +94,8 @@ def check_all(folder: Path, overwrite: bool = False) -> None:
 def claim(folder: Path, names: Iterable[str], overwrite: bool = False) -> None:
     """Make the folder, and mark it: from now on files of these names are of tisim's writing.
 
-    InputError when one would replace another's file (see ``check``), or the folder cannot be written to.
+    Raise InputError when one would replace another's file (see ``check``), or the folder cannot be written
+    to.
     """
     claimed = list(names)
     check(folder, claimed, overwrite)

@@ -22,12 +22,12 @@ from typing import Any
 from tisim.errors import InputError, abbreviated, must, printable
 
 OWN_PACKAGES = frozenset({"tisim", "optimize", "cases"})
-"""Packages whose version says what they compute."""
+"""These packages have a version that says what they compute."""
 
 
 @dataclass(frozen=True)
 class PythonFile:
-    """A Python file that was read.
+    """This is a Python file that was read.
 
     name : under which it is imported. path : where it was read. text : its bytes.
     """
@@ -55,8 +55,8 @@ _names: set[str] = set()
 def load(path: str | Path) -> ModuleType:
     """Import a file under its own name, without .py; a file that has not changed since is not run again.
 
-    InputError in one line when there is no such file, it cannot be imported (which line, and why), or another
-    module has its name.
+    Raise InputError in one line when there is no such file, it cannot be imported (which line, and why), or
+    another module has its name.
     """
     file_path = Path(path)
     must(file_path.suffix == ".py" and "." not in file_path.stem, "Python file", "named NAME.py", str(path))
@@ -68,7 +68,8 @@ def load(path: str | Path) -> ModuleType:
 
 
 def install(file: PythonFile) -> ModuleType:
-    """Import a text under a name, in place of any other text that had it. InputError when it cannot be."""
+    """Import a text under a name, in place of any other text that had it. Raise InputError when it cannot
+    be."""
     # Taichi reads the source of what it compiles; without a time, it is not looked for on the disk.
     lines = file.text.decode(errors="replace").splitlines(keepends=True)
     linecache.cache[file.path] = (len(file.text), None, lines, file.path)

@@ -30,8 +30,8 @@ _WRITING = os.O_WRONLY | os.O_RDWR
 def open_descriptor(path: Path, flags: int) -> int:
     """Return a file descriptor of the file of this name; flags : those of os.open.
 
-    InputError unless it is a regular file that may be opened, and one to be written to has no other name (a
-    hard link). Other errors (no such file, a full disk) are those of os.open.
+    Raise InputError unless it is a regular file that may be opened, and one to be written to has no other
+    name (a hard link). Other errors (no such file, a full disk) are those of os.open.
     """
     _check_name(path)
     try:
@@ -51,7 +51,7 @@ def open_descriptor(path: Path, flags: int) -> int:
 def file_status(path: Path) -> os.stat_result | None:
     """Return the os.stat_result of the file of this name, None where there is none.
 
-    InputError unless it is a regular file; see ``open_descriptor``.
+    Raise InputError unless it is a regular file; see ``open_descriptor``.
     """
     _check_name(path)
     try:
@@ -67,18 +67,21 @@ def file_status(path: Path) -> os.stat_result | None:
 
 
 def exists(path: Path) -> bool:
-    """Return whether anything of this name exists, links followed; InputError where that is forbidden."""
+    """Return whether anything of this name exists, links followed; raise InputError where that is
+    forbidden."""
     return _stat_following_links(path) is not None
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a folder of this name exists, links followed; InputError where that is forbidden."""
+    """Return whether a folder of this name exists, links followed; raise InputError where that is
+    forbidden."""
     info = _stat_following_links(path)
     return info is not None and stat.S_ISDIR(info.st_mode)
 
 
 def target(path: Path) -> Path:
-    """Return the path that a path leads to, links followed; InputError where no file can have its name."""
+    """Return the path that a path leads to, links followed; raise InputError where no file can have its
+    name."""
     _check_name(path)
     return Path(os.path.realpath(path))
 
@@ -105,7 +108,7 @@ def _stat_following_links(path: Path) -> os.stat_result | None:
 def content(path: Path, most: int = -1) -> bytes | None:
     """Return the bytes of a file, at most ``most`` from its beginning; None where there is none.
 
-    InputError unless it is a regular file that can be read; see ``open_descriptor``.
+    Raise InputError unless it is a regular file that can be read; see ``open_descriptor``.
     """
     try:
         with os.fdopen(open_descriptor(path, os.O_RDONLY), "rb") as file:

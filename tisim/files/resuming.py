@@ -15,7 +15,8 @@ from tisim.errors import must
 def resumes(
     folder: Path, command: str, resumable: bool, results: str, fresh: bool | None, overwrite: bool
 ) -> bool:
-    """Return whether a command resumes what is in its folder; InputError where it may not, nor begin anew.
+    """Return whether a command resumes what is in its folder; raise InputError where it may not, nor begin
+    anew.
 
     command : what it makes, for messages, such as "run". resumable : whether there is something to resume.
     results : in words, what would be lost by beginning anew; empty where that is nothing. fresh : True for

@@ -15,9 +15,9 @@ from tisim.files.file_object import Seekable
 from tisim.files.superblock import SIZE, file_end, superblock
 
 _END_OUT_OF_REACH = 1 << 62
-"""End of the file that HDF5 is given, bytes: beyond that of any file."""
+"""HDF5 is given this end of the file, in bytes: it lies beyond that of any file."""
 READ_ATTEMPTS = 100
-"""Largest number of times that a block is read, as HDF5 does it for files that it knows to be written."""
+"""A block is read at most so many times, as HDF5 does it for files that it knows to be written."""
 
 
 class SharedFile(Seekable):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import struct
 
 _LAYOUT = struct.Struct("<8sBBBBQQQQI")
-"""Signature, version, bytes of an offset and of a length, marks of a writer, base address, address of the
-extension, end of the file, address of the root group, checksum."""
+"""A superblock holds these in order: signature, version, bytes of an offset and of a length, marks of a
+writer, base address, address of the extension, end of the file, address of the root group, checksum."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""The bytes with which every HDF5 file begins."""
+"""Every HDF5 file begins with these bytes."""
 SIZE = _LAYOUT.size
-"""Length of a superblock, bytes."""
+"""A superblock is this many bytes long."""
 
 
 def superblock(block: bytes, end: int) -> bytes:

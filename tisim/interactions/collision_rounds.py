@@ -26,7 +26,7 @@ from tisim.worlds.program import Phase, Repeat
 
 
 class PerContact(Phase):
-    """A loop over the contacts of this step."""
+    """This phase loops over the contacts of this step."""
 
     def __init__(self, contacts: ContactList) -> None:
         self.c, self.s, self.extent = contacts, contacts.s, contacts.capacity
@@ -37,7 +37,7 @@ class PerContact(Phase):
 
 
 class OpenContacts(PerContact):
-    """Forget earlier bids."""
+    """This phase forgets earlier bids."""
 
     @ti.func
     def run(self, w, k):
@@ -46,7 +46,7 @@ class OpenContacts(PerContact):
 
 
 class Bid(PerContact):
-    """Every waiting pair bids for both its particles."""
+    """In this phase every waiting pair bids for both its particles."""
 
     @ti.func
     def run(self, w, k):
@@ -57,7 +57,7 @@ class Bid(PerContact):
 
 
 class Resolve(PerContact):
-    """A pair that holds both its particles is resolved, if its event is still due."""
+    """This phase resolves a pair that holds both its particles, if its event is still due."""
 
     @ti.func
     def run(self, w, k):
@@ -77,7 +77,7 @@ class Resolve(PerContact):
 
 
 class Rounds(Repeat):
-    """Rounds of bidding until no pair waits."""
+    """This item repeats rounds of bidding until no pair waits."""
 
     def __init__(self, contacts: ContactList) -> None:
         super().__init__((OpenContacts(contacts), Bid(contacts), Resolve(contacts)))

@@ -13,13 +13,14 @@ from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
 CONTACTS_PER_PARTICLE = 8
-"""Room for pairs that overlap. Spheres that only touch, of any sizes, touch fewer than 14.93 others in the
-mean, and make half as many pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339)."""
+"""There is room for this many pairs that overlap, for each particle. Spheres that only touch, of any sizes,
+touch fewer than 14.93 others in the mean, and make half as many pairs (G. Kuperberg and O. Schramm, Math.
+Res. Lett. 1 (1994) 339)."""
 
 
 @ti.data_oriented
 class ContactList:
-    """The pairs of this step in which something falls due."""
+    """A contact list holds the pairs of this step in which something falls due."""
 
     def __init__(self, s: State, domain: Bound[Domain], events: tuple[Bound[PairEvent], ...]) -> None:
         self.s, self.domain, self.events = s, domain, events
@@ -36,7 +37,7 @@ class ContactList:
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
-        """Device memory, in bytes."""
+        """Return the device memory, in bytes."""
         return self.s.worlds * (16 * self.capacity + 8 * self.s.capacity + 12)
 
     @ti.func
@@ -66,7 +67,7 @@ class ContactList:
 
 
 class ClearContacts(Phase):
-    """Empty the list before a survey: a step that has failed has left it as it was."""
+    """This phase empties the list before a survey: a step that has failed has left it as it was."""
 
     def __init__(self, contacts: ContactList) -> None:
         self.c = contacts
@@ -79,7 +80,7 @@ class ClearContacts(Phase):
 
 
 class FindContacts(PerParticle):
-    """Look at every near pair: enter those in contact, and ask the control about all."""
+    """This phase looks at every near pair: it enters those in contact, and asks the control about all."""
 
     def __init__(self, neighbour_list: NeighbourList, contacts: ContactList, control: Bound[Any]) -> None:
         super().__init__(neighbour_list.s)
@@ -88,7 +89,7 @@ class FindContacts(PerParticle):
 
     @ti.func
     def enter(self, w, i, j, separation):
-        """Enter a pair in which something falls due; 1 when it overlaps."""
+        """Enter a pair in which something falls due; return 1 when it overlaps."""
         due = ti.cast(-1.0, self.s.real)
         for event in ti.static(self.contacts.events):
             due = ti.max(due, event.contact(self.s, w, i, j, separation))
@@ -112,7 +113,7 @@ class FindContacts(PerParticle):
 
 
 class FindContactsAgain(FindContacts):
-    """After events: look at every near pair once more, for the control only."""
+    """After events, this phase looks at every near pair once more, for the control only."""
 
     conditional = True
 

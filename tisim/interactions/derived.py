@@ -35,7 +35,8 @@ def _same(vector):
 
 @ti.data_oriented
 class DerivedSolver:
-    """A quantity that follows from what a particle is and where: nothing of the others, and no memory."""
+    """A derived solver sets a quantity that follows from what a particle is and where: it needs nothing of
+    the others, and no memory."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
         self.s, self.effect = s, effect
@@ -50,19 +51,20 @@ class DerivedSolver:
         self.size = _length if vector else _magnitude
 
     def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
-        """Set it; ``again``, only in worlds where events have changed who is where; ``trial``, in a state
-        that may be far from any solution: what is not finite is then left to the forces to show."""
+        """Return the phases that set the quantity; ``again``, only in worlds where events have changed who is
+        where; ``trial``, in a state that may be far from any solution: what is not finite is then left to the
+        forces to show."""
         return ((SetDerivedAgain if again else SetDerived)(self, trial),)
 
     @ti.func
     def set(self, s, w, i, t):
-        """Set that of particle i, as it is in s."""
+        """Set the quantity of particle i, as the particle is in s."""
         nothing = self.unpacked(ti.Vector.zero(self.s.real, self.components))
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
 
 class SetDerived(PerParticle):
-    """value_i = response(0)."""
+    """This phase sets value_i = response(0)."""
 
     def __init__(self, solver: DerivedSolver, trial: bool) -> None:
         super().__init__(solver.s)
@@ -83,7 +85,7 @@ class SetDerived(PerParticle):
 
 
 class SetDerivedAgain(SetDerived):
-    """Set it anew in worlds where events have changed who is where."""
+    """This phase sets the quantity anew in worlds where events have changed who is where."""
 
     conditional: ClassVar[bool] = True
 

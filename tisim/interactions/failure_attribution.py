@@ -13,7 +13,7 @@ from tisim.worlds.status import ASKED
 
 @ti.data_oriented
 class FailureAttribution:
-    """Names the force that has stopped each world of a batch that failed by one."""
+    """A failure attribution names the force that has stopped each world of a batch that failed by one."""
 
     def __init__(self, summed: SumForces) -> None:
         self.s, self.summed = summed.s, summed

@@ -6,7 +6,7 @@ The order in which a particle adds up the others is that of their indices all th
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
@@ -14,13 +14,14 @@ from tisim.worlds.program import PerParticle
 
 if TYPE_CHECKING:
     from tisim.components.domain import Domain
-    from tisim.neighbours.full_list import FullNeighbourList
+    from tisim.interactions.pair_chunks import PairChunks
     from tisim.worlds.bound import Bound
     from tisim.worlds.state import State
 
 TILE = 32
-"""Particles of a tile. Measured best of 8 to 128 with AVX-512: the sums of more do not fit the registers, and
-loops over fewer are unrolled before they are vectorised. From 96 on some kernels are not vectorised."""
+"""A tile has this many particles. It measured best of 8 to 128 with AVX-512: the sums of more do not fit the
+registers, and loops over fewer are unrolled before they are vectorised. From 96 on some kernels are not
+vectorised."""
 
 
 MANY = 1000
@@ -29,23 +30,27 @@ launches cost a step 0.2 ms, as much as the pairs of 400)."""
 
 
 class PairSum(PerParticle):
-    """For each particle a sum over the others: all of them, or those near enough to be listed.
+    """A pair sum is, for each particle, a sum over the others: all of them, then those near enough to be
+    listed.
 
     A subclass says what the sum begins with, in ``start``, what one other contributes, in ``term``, and what
-    becomes of it, in ``finish``; ``components`` is its length.
+    becomes of it, in ``finish``; ``components`` is its length. Where pairs are listed it also says where the
+    sum is kept meanwhile, in ``put`` and ``get``, and what a pair gives to both, in ``terms_of_pair``;
+    ``commits`` says whether what pairs remember is brought up to date with the sum.
     """
 
     components: int = 3
+    commits: ClassVar[bool] = False
 
     def __init__(
         self,
         s: "State",
         domain: "Bound[Domain]",
         effects: Sequence[Any],
-        full_list: "FullNeighbourList | None",
+        pairs: "PairChunks | None",
     ) -> None:
         super().__init__(s)
-        self.domain, self.full_list = domain, full_list
+        self.domain, self.pairs = domain, pairs
         self.long_ranged = tuple(e for e in effects if not e.short_ranged)
         self.short_ranged = tuple(e for e in effects if e.short_ranged)
         # A tile may reach past the particles alive, but not past the slots that there are.
@@ -55,17 +60,36 @@ class PairSum(PerParticle):
 
     @ti.func
     def start(self, w, i, t):
-        """What the sum of i begins with; a vector of ``components``."""
+        """Return what the sum of i begins with; a vector of ``components``."""
         return ti.Vector.zero(self.s.real, self.components)
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        """What j contributes to the sum of i; a vector of ``components``."""
+        """Return what j contributes to the sum of i; a vector of ``components``."""
         return ti.Vector.zero(self.s.real, self.components)
 
     @ti.func
     def finish(self, w, i, total, t):
         """Make use of the sum of i."""
+
+    @ti.func
+    def put(self, w, i, total):
+        """Keep the sum of i so far."""
+
+    @ti.func
+    def get(self, w, i):
+        """Return the sum of i so far."""
+        return ti.Vector.zero(self.s.real, self.components)
+
+    @ti.func
+    def terms_of_pair(self, w, m, i, j, separation, distance, t):
+        """Return what listed pair m gives to the sums of i and of j; i has the lower id."""
+        nothing = ti.Vector.zero(self.s.real, self.components)
+        return nothing, nothing
+
+    @ti.func
+    def out_of_reach(self, w, m):
+        """Take note that listed pair m is farther apart than any law reaches."""
 
     @ti.func
     def run(self, w, i):
@@ -78,7 +102,16 @@ class PairSum(PerParticle):
             if ti.static(len(self.long_ranged) > 0):
                 for j in range(self.s.count[w]):
                     total += self.of(self.long_ranged, w, i, j, t)
-            self.finish(w, i, self.with_near(total, w, i, t), t)
+            self.close(w, i, total, t)
+
+    @ti.func
+    def close(self, w, i, total, t):
+        """End the sum of i over all others: keep it for the listed pairs, or finish it where there are
+        none."""
+        if ti.static(len(self.short_ranged) > 0):
+            self.put(w, i, total)
+        else:
+            self.finish(w, i, total, t)
 
     @ti.func
     def tile(self, w, begin, t):
@@ -107,19 +140,11 @@ class PairSum(PerParticle):
             total = ti.Vector.zero(self.s.real, self.components)
             for c in ti.static(range(self.components)):
                 total[c] = sums[c][i - first]
-            self.finish(w, i, self.with_near(total, w, i, t), t)
-
-    @ti.func
-    def with_near(self, total, w, i, t):
-        """``total`` and the terms of those that are near."""
-        if ti.static(len(self.short_ranged) > 0):
-            for k in range(self.full_list.size(w, i)):
-                total += self.of(self.short_ranged, w, i, self.full_list.candidate(w, i, k), t)
-        return total
+            self.close(w, i, total, t)
 
     @ti.func
     def of(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
-        """Terms of j for i; none of itself."""
+        """Return the terms of j for i; none of itself."""
         total = ti.Vector.zero(self.s.real, self.components)
         if i != j:
             total = self.terms(effects, w, i, j, t)
@@ -127,7 +152,7 @@ class PairSum(PerParticle):
 
     @ti.func
     def terms(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
-        """Terms of j for i, which are not the same."""
+        """Return the terms of j for i, which are not the same."""
         d = self.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
         distance = d.norm()
         total = self.term(effects[0], w, i, j, d, distance, t)

@@ -4,24 +4,41 @@ from typing import Any
 
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.neighbours.pair_list import NeighbourList
+from tisim.interactions.pair_chunks import PairChunks, StoreMemory
+from tisim.neighbours.lists import NeighbourLists
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Phase
 from tisim.worlds.state import State
 
 
+class StoreBefore(StoreMemory):
+    """Before indices move, this phase stores what pairs remember with the particles."""
+
+    def __init__(self, pairs: PairChunks, operators: tuple[Bound[Any], ...]) -> None:
+        super().__init__(pairs)
+        self.always = any(operator.data.offers("world") for operator in operators)
+
+    @ti.func
+    def when(self, w):
+        due = self.p.unsaved[w]
+        if ti.static(not self.always):
+            due = ti.min(due, self.s.changed[w])
+        return due
+
+
 class Rearrange(Phase):
-    """Let operators act on the world as a whole, and fill the slots of removed particles from the end."""
+    """This phase lets operators act on the world as a whole, and fills the slots of removed particles from
+    the end."""
 
     def __init__(
         self,
         s: State,
         domain: Bound[Domain],
         operators: tuple[Bound[Any], ...],
-        neighbour_list: NeighbourList | None,
+        lists: NeighbourLists | None,
     ) -> None:
         self.s, self.domain = s, domain
-        self.neighbour_list, self.lists = neighbour_list, neighbour_list is not None
+        self.lists, self.listed = lists, lists is not None
         self.operators = tuple(operator for operator in operators if operator.data.offers("world"))
 
     @ti.func
@@ -53,5 +70,5 @@ class Rearrange(Phase):
             s.count[w] = count
             s.changed[w] = 0
             s.events[w] = 1
-            if ti.static(self.lists):
-                self.neighbour_list.stale[w] = 1
+            if ti.static(self.listed):
+                self.lists.invalidate(w)

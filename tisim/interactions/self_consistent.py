@@ -10,19 +10,21 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, SelfConsistentQuantity
 from tisim.interactions.derived import DerivedSolver
+from tisim.interactions.listed_pairs import PairTerms, sum_phases
+from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
-from tisim.neighbours.full_list import FullNeighbourList
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
 ROUNDING_UNITS = 4.0
-"""Changes of so many units in the last place are none: sweeps in f32 may go on with them for ever."""
+"""Changes of so many units in the last place count as none: sweeps in f32 may go on with them for ever."""
 
 
 class SelfConsistentSolver(DerivedSolver):
-    """A quantity that particles give each other: the values of the next sweep, and whether there is one.
+    """A self-consistent solver finds a quantity that particles give each other: the values of the next sweep,
+    and whether there is one.
 
     changes : the largest of a particle in this sweep, the last, and the one before.
     """
@@ -32,10 +34,12 @@ class SelfConsistentSolver(DerivedSolver):
         s: State,
         effect: Bound[Any],
         domain: Bound[Domain],
-        full_list: FullNeighbourList | None,
+        pairs: PairChunks | None,
     ) -> None:
         super().__init__(s, effect)
-        self.domain, self.full_list = domain, full_list
+        self.domain, self.pairs = domain, pairs
+        listed = pairs is not None and effect.data.short_ranged
+        self.left = PairTerms(pairs, self.components) if pairs and listed else None
         self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
         self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
         self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
@@ -49,13 +53,14 @@ class SelfConsistentSolver(DerivedSolver):
         return ((BeginSweepsAgain if again else BeginSweeps)(self), SweepUntilConverged(self, trial))
 
     def bytes(self) -> int:
-        """Device memory, in bytes."""
+        """Return the device memory, in bytes."""
         real = 8 if self.s.real == ti.f64 else 4
-        return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12)
+        left = self.left.bytes() if self.left else 0
+        return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12) + left
 
 
 class BeginSweeps(PerParticle):
-    """There must be a sweep, from the last values, or from nothing where they have been lost."""
+    """This phase asks for a sweep, from the last values, or from nothing where they have been lost."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         super().__init__(solver.s)
@@ -74,7 +79,7 @@ class BeginSweeps(PerParticle):
 
 
 class BeginSweepsAgain(BeginSweeps):
-    """Begin sweeps in worlds where events have changed who is where."""
+    """This phase begins sweeps in worlds where events have changed who is where."""
 
     conditional: ClassVar[bool] = True
 
@@ -84,10 +89,11 @@ class BeginSweepsAgain(BeginSweeps):
 
 
 class SweepUntilConverged(Repeat):
-    """Sweeps of a world until it has converged."""
+    """This item repeats sweeps of a world until it has converged."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
-        super().__init__((JacobiSweep(solver, trial), TakeSweep(solver, trial), JudgeSweep(solver)))
+        sweep = sum_phases(JacobiSweep(solver, trial), solver.left)
+        super().__init__((*sweep, TakeSweep(solver, trial), JudgeSweep(solver)))
         self.solver = solver
 
     @ti.func
@@ -96,16 +102,30 @@ class SweepUntilConverged(Repeat):
 
 
 class JacobiSweep(PairSum):
-    """next_i = (1 - a) value_i + a response(sum_j influence(value_j))."""
+    """This sweep sets next_i = (1 - a) value_i + a response(sum_j influence(value_j))."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
-        super().__init__(solver.s, solver.domain, (solver.effect,), solver.full_list)
+        super().__init__(solver.s, solver.domain, (solver.effect,), solver.pairs)
         self.solver, self.effect, self.trial = solver, solver.effect, trial
         self.components = solver.components
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
         return self.solver.packed(effect.influence(self.s, w, i, j, separation, distance, t))
+
+    @ti.func
+    def put(self, w, i, total):
+        self.solver.next[w, i] = self.solver.unpacked(total)
+
+    @ti.func
+    def get(self, w, i):
+        return self.solver.packed(self.solver.next[w, i])
+
+    @ti.func
+    def terms_of_pair(self, w, m, i, j, separation, distance, t):
+        here = self.term(self.effect, w, i, j, separation, distance, t)
+        there = self.term(self.effect, w, j, i, -separation, distance, t)
+        return here, there
 
     @ti.func
     def finish(self, w, i, total, t):
@@ -120,7 +140,8 @@ class JacobiSweep(PairSum):
 
     @ti.func
     def check(self, w, i, size):
-        """What is not finite in the first sweep never was; what becomes so has not converged."""
+        """Fail a world by what is not finite: in the first sweep it never was finite; what becomes so later
+        has not converged."""
         # Not below infinity: also true of NaN.
         if not (size < ti.math.inf):
             if self.solver.sweeps[w] == 0:
@@ -130,7 +151,7 @@ class JacobiSweep(PairSum):
 
 
 class TakeSweep(PerParticle):
-    """The new values take the place of the old, and are compared with them."""
+    """This phase puts the new values in the place of the old, and compares the two."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s)
@@ -165,7 +186,7 @@ def fail_to_converge(s, w, i, effect: ti.template()):  # type: ignore[valid-type
 
 
 class JudgeSweep(Phase):
-    """One sweep more, or none."""
+    """This phase decides on one sweep more, or none."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         self.solver = solver
@@ -185,11 +206,11 @@ class JudgeSweep(Phase):
 
 
 def solver(
-    s: State, effect: Bound[DerivedQuantity], domain: Bound[Domain], full_list: FullNeighbourList | None
+    s: State, effect: Bound[DerivedQuantity], domain: Bound[Domain], pairs: PairChunks | None
 ) -> DerivedSolver:
     """Return what solves for the quantity of an effect."""
     return (
-        SelfConsistentSolver(s, effect, domain, full_list)
+        SelfConsistentSolver(s, effect, domain, pairs)
         if isinstance(effect.data, SelfConsistentQuantity)
         else DerivedSolver(s, effect)
     )

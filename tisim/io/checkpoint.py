@@ -43,7 +43,7 @@ def _identity(simulation: Simulation) -> dict[str, Any]:
 def save(simulation: Simulation, path: str | Path) -> None:
     """Write a checkpoint of a loaded simulation that is between two steps.
 
-    At every instant, path is what it was before or the whole new file. RunError when the disk is full.
+    At every instant, path is what it was before or the whole new file. Raise RunError when the disk is full.
     """
     simulation.s.check()
     with checksum.create_file(Path(path)) as file:
@@ -61,7 +61,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The particles of each world at the time of a checkpoint.
+    """A snapshot holds the particles of each world at the time of a checkpoint.
 
     times : s, shape (worlds,). steps : number taken until then, shape (worlds,). states : for each world the
     arrays of its live particles by field name, SI; shape (n,) or (n, 3).
@@ -75,7 +75,7 @@ class Snapshot:
 def snapshot(path: str | Path) -> Snapshot:
     """Return the particles that a checkpoint holds; where a step is under way, those from before that step.
 
-    InputError when the file is no checkpoint, or is cut short or damaged.
+    Raise InputError when the file is no checkpoint, or is cut short or damaged.
     """
     with checksum.open_file(Path(path), "checkpoint", CHECKPOINT_FORMAT) as file:
         group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
@@ -88,7 +88,7 @@ def snapshot(path: str | Path) -> Snapshot:
 def restore(simulation: Simulation, path: str | Path) -> None:
     """Bring a simulation, loaded with the same scenes, to where the checkpoint was saved.
 
-    InputError when the file is no checkpoint, is cut short or damaged, or is of other scenes, another
+    Raise InputError when the file is no checkpoint, is cut short or damaged, or is of other scenes, another
     precision or another capacity; the simulation is then as it was.
     """
     simulation.s.check()

@@ -18,9 +18,9 @@ from tisim.scene.initial_state import Arrays
 
 FORMATS = ("vtk", "xyz", "h5md")
 _OVITO_NAMES = {"position": "pos", "velocity": "velo"}
-"""Names of quantities in OVITO, by their names here."""
+"""OVITO has names of its own for these quantities; the keys are their names here."""
 _VERTEX = 1
-"""Number of the VTK cell type that has one point."""
+"""This is the number of the VTK cell type that has one point."""
 _VTK_TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 
 
@@ -31,7 +31,7 @@ def export(
 
     kind : "vtk", a .pvd with the times and a .vtu for each frame; "xyz", one extended XYZ file; "h5md", the
     file again, once all of it has been found undamaged. A world of several has its number in the name.
-    progress : called with the finished fraction, 0..1. InputError for another format, or no such file.
+    progress : called with the finished fraction, 0..1. Raise InputError for another format, or no such file.
     """
     check(file, kind)
     if kind == "h5md":
@@ -58,7 +58,7 @@ def check(file: Path, kind: str) -> None:
 
 
 def _first_frame(file: Path) -> Frame:
-    """Return the first frame of the first world that has one; InputError where none has."""
+    """Return the first frame of the first world that has one; raise InputError where none has."""
     for world in range(world_count(file)):
         with frames(file, world) as trajectory:
             if len(trajectory):

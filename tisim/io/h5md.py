@@ -25,12 +25,13 @@ from tisim.worlds.fields import Field
 
 VERSION = (1, 1)
 ABSENT = -1
-"""Id of an entry that is no particle; its other values are not-a-number, or 0 where they are integers."""
+"""This id is that of an entry that is no particle; its other values are not-a-number, or 0 where they are
+integers."""
 ASCII = h5py.string_dtype("ascii")
 CHUNK = 1 << 16
-"""Number of particles of a frame that are stored, and compressed, together."""
+"""This many particles of a frame are stored, and compressed, together."""
 CHUNK_ROWS = 1024
-"""Number of frames whose times and checksums are stored together."""
+"""Times and checksums of this many frames are stored together."""
 SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
 
 
@@ -120,7 +121,7 @@ def write_scene(file: h5py.File, name: str, text: str) -> None:
 
 
 def read_scene(file: h5py.File, name: str) -> str:
-    """Return the TOML that ``write_scene`` has written; InputError when it is damaged."""
+    """Return the TOML that ``write_scene`` has written; raise InputError when it is damaged."""
     dataset = file[f"{SCENES}/{name}"]
     text = dataset[:].tobytes()
     intact = zlib.crc32(text) == dataset.attrs["crc32"]

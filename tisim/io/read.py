@@ -22,9 +22,9 @@ from tisim.scene.scene import Scene
 READABLE = (
     "the folder of a run, result.h5, trajectory.h5, checkpoint.h5, cost.h5, versions.json or scene as TOML"
 )
-"""The files that ``read`` reads, as messages list them."""
+"""These are the files that ``read`` reads, as messages list them."""
 SEARCH_FORMAT = "tisim evaluations 1"
-"""Format of a search.h5, which a room above defines; a test holds them together."""
+"""This is the format of a search.h5, which a room above defines; a test holds them together."""
 
 
 def read(path: str | Path) -> Any:
@@ -36,7 +36,7 @@ def read(path: str | Path) -> Any:
     - A cost.h5: the rows of a study, a list of ``tisim.accuracy`` Rows.
     - A scene as TOML: a ``Scene``. A versions.json: a dict.
 
-    InputError when it is anything else, is not there, or is damaged.
+    Raise InputError when it is anything else, is not there, or is damaged.
     """
     must(isinstance(path, str | os.PathLike), "path", "text or a pathlib.Path", path)
     file_path = Path(path)

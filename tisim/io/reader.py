@@ -26,20 +26,20 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 TIME_ROUNDING = 1e-9
-"""Fraction of a duration by which the sum of its steps may fall short of it."""
+"""The sum of the steps of a duration may fall short of it by this fraction."""
 RESULT = "tisim run 1"
-"""Format of a result.h5."""
+"""This is the format of a result.h5."""
 FILE_READ_ATTEMPTS, RETRY_PAUSE = 5, 0.01
-"""Largest number of times that a file is read while it looks damaged, as it may be half written, and the
-time between them, s."""
+"""A file is read at most so many times while it looks damaged, as it may be half written, with so much time,
+in s, between them."""
 Clock = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Steps, times (s) and checksums of the frames of a trajectory."""
+"""A clock holds steps, times (s) and checksums of the frames of a trajectory."""
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The particles at a time.
+    """A frame holds the particles at a time.
 
     time : s. step : number of steps that the run has taken. arrays : by field name, shape (n,) or (n, 3), SI.
     """
@@ -56,7 +56,7 @@ class Frames:
     """
 
     def __init__(self, file: _RetryingFile, world: str | None) -> None:
-        """world : the name of its group; None in a result.h5."""
+        """Take the frames of a world. world : the name of its group; None in a result.h5."""
         self._file, self._world = file, world
 
     @cached_property
@@ -129,7 +129,7 @@ class Frames:
 def frames(path: str | Path, world: int = 0) -> Iterator[Frames]:
     """Yield the frames of a world in a trajectory, or in a result.h5 (its start and end).
 
-    The run may be going on, or have been killed. InputError when there is no such file or world.
+    The run may be going on, or have been killed. Raise InputError when there is no such file or world.
     """
     with _open_file(Path(path)) as file:
         names = file.read(_world_groups)
@@ -155,7 +155,7 @@ def refuse_damage() -> Iterator[None]:
 
 
 class _RetryingFile:
-    """It reads an HDF5 file through ``source``, and reads it again where it looks damaged."""
+    """A retrying file reads an HDF5 file through ``source``, and reads it again where it looks damaged."""
 
     def __init__(self, source: io.IOBase) -> None:
         self._source = source
@@ -164,7 +164,7 @@ class _RetryingFile:
     # HDF5 calls ``source``, in which no signal may be raised: HDF5 would swallow it.
     @defer_signals()
     def read(self, extract: Callable[[h5py.File], T]) -> T:
-        """Return what ``extract`` takes from the file; InputError where that is damaged.
+        """Return what ``extract`` takes from the file; raise InputError where that is damaged.
 
         A writer that comes between two reads of one structure leaves HDF5 with what looks like damage; then
         HDF5 begins anew.

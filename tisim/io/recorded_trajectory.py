@@ -66,15 +66,15 @@ class RecordedWorld(Sequence[Frame]):
 
 
 class RecordedTrajectory(RecordedWorld):
-    """The file of a trajectory. With a single world it is the sequence of its frames; with several, each of
-    ``worlds`` is one.
+    """This is the file of a trajectory. With a single world it is the sequence of its frames; with several,
+    each of ``worlds`` is one.
 
     Without ``with``, the file is opened for each thing asked for, or once for a loop. While a ``with`` lasts
     it stays open, and has the frames that it had then.
     """
 
     def __init__(self, path: str | Path) -> None:
-        """InputError when there is no such file."""
+        """Raise InputError when there is no such file."""
         super().__init__(Path(path).absolute(), 0)
         count = world_count(self._path)
         self.worlds: list[RecordedWorld] = [RecordedWorld(self._path, w) for w in range(count)]

@@ -17,14 +17,15 @@ if TYPE_CHECKING:
     from tisim.io.trajectory import Trajectory
 
 EARLY_FRACTION = 1e-9
-"""Fraction of an interval by which a frame may come early, so that rounding of times costs no step."""
+"""A frame may come early by this fraction of an interval, so that rounding of times costs no step."""
 
 
 class Recorder(Observer):
     """This observer writes the frames that are due, and has worlds wait for those that come."""
 
     def __init__(self, trajectory: Trajectory, simulation: Simulation, indices: Sequence[int]) -> None:
-        """indices : of the scenes of the trajectory, one for each world of the loaded simulation."""
+        """Record a trajectory. indices : of the scenes of the trajectory, one for each world of the loaded
+        simulation."""
         self.trajectory, self.indices = trajectory, list(indices)
         self.interval = [trajectory.recording.interval(scene) for scene in simulation.scenes]
         self.last = [_last_time(trajectory.groups[index]) for index in self.indices]

@@ -35,15 +35,16 @@ from tisim.scene.scene import Scene
 from tisim.worlds.fields import SHARED, resolve_fields
 
 DATA = ("result.h5", "checkpoint.h5", "trajectory.h5", "scene.toml", "versions.json", "cloud.png")
-"""Names of the files that are about one run, in the order in which a new run removes them: without the result
-the folder is that of an interrupted run, and a checkpoint is of use only with the frames before it."""
+"""These are the names of the files that are about one run, in the order in which a new run removes them:
+without the result the folder is that of an interrupted run, and a checkpoint is of use only with the frames
+before it."""
 RUN_FILES = (*DATA, lock.LOCK)
-"""Names of all files that a run writes."""
+"""These are the names of all files that a run writes."""
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """The folder that a run writes to."""
+    """This is the folder that a run writes to."""
 
     path: Path
 
@@ -62,7 +63,7 @@ class RunFolder:
     def check(self, fresh: bool | None = None, overwrite: bool = False) -> bool:
         """Return whether a run resumes what is here (see ``resuming.resumes``); touch nothing.
 
-        InputError when a run is under way here, or writing here would lose what is not to be lost.
+        Raise InputError when a run is under way here, or writing here would lose what is not to be lost.
         """
         lock.check(self.path)
         return self._check(fresh, overwrite)
@@ -82,8 +83,8 @@ class RunFolder:
         """Make the folder, mark it as one of tisim's, and hold its lock.
 
         It yields whether the run resumes what is here. Where it does not, what an earlier one has left is
-        removed, so that nothing of it is taken for the new one's, even if that is killed. InputError where
-        ``check`` raises it, and where the folder cannot be made or locked.
+        removed, so that nothing of it is taken for the new one's, even if that is killed. Raise InputError
+        where ``check`` raises it, and where the folder cannot be made or locked.
         """
         ownership.claim(self.path, RUN_FILES, overwrite)
         with lock.acquire(self.path):
@@ -107,7 +108,7 @@ def versions() -> dict[str, str]:
 
 
 def write(result: Result, folder: RunFolder) -> list[Path]:
-    """Write all files of a run, in place of any before; return their paths. RunError on a full disk."""
+    """Write all files of a run, in place of any before; return their paths. Raise RunError on a full disk."""
     from tisim.plotting import cloud
 
     folder.result.unlink(missing_ok=True)
@@ -126,7 +127,7 @@ def write(result: Result, folder: RunFolder) -> list[Path]:
 
 
 def write_result(result: Result, path: Path) -> None:
-    """Write the result.h5 of a run, in place of any before. RunError on a full disk."""
+    """Write the result.h5 of a run, in place of any before. Raise RunError on a full disk."""
     with checksum.create_file(path) as file:
         file.attrs.update({
             "format": RESULT, "scene": result.scene.to_toml(), "ok": result.status.ok,
@@ -141,7 +142,8 @@ def write_result(result: Result, path: Path) -> None:
 
 
 def read_result(path: Path) -> Result:
-    """Return the Result that ``write_result`` has written, to the bit. InputError unless it is whole."""
+    """Return the Result that ``write_result`` has written, to the bit. Raise InputError unless it is
+    whole."""
     with checksum.open_file(path, "result", RESULT) as file, refuse_damage():
         arrays = {
             group: {name: np.asarray(values) for name, values in file[group].items()}

@@ -39,13 +39,14 @@ from tisim.scene.scene import Scene
 from tisim.worlds.fields import Field, resolve_fields
 
 LIBVER = ("v110", "v110")
-"""Versions of HDF5 that can read the file; earlier ones have no checksums of its structure."""
+"""These versions of HDF5 can read the file; earlier ones have no checksums of its structure."""
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A trajectory to record: ``frames`` evenly over the duration, or one frame ``every`` so much time (s).
+    """This is a trajectory to record: ``frames`` evenly over the duration, or one frame ``every`` so much
+    time (s).
 
     The start and the end are recorded always; with ``frames`` the start is one more.
     """
@@ -92,7 +93,7 @@ class Recording:
 
 
 class Trajectory:
-    """The file that frames are written to, for scenes that run one after another or side by side.
+    """This is the file that frames are written to, for scenes that run one after another or side by side.
 
     It is a context manager: without ``with``, ``close`` must be called.
     """
@@ -100,7 +101,7 @@ class Trajectory:
     def __init__(self, recording: Recording, scenes: Sequence[Scene], real: str = "f64") -> None:
         """Make the file, in place of any before. real : "f64" or "f32".
 
-        InputError when it cannot be made, RunError when the disk is full.
+        Raise InputError when it cannot be made, RunError when the disk is full.
         """
         self.recording, self.scenes, self.path = recording, list(scenes), Path(recording.path)
         self.fields = [recorded_fields(scene) for scene in scenes]
@@ -141,7 +142,7 @@ class Trajectory:
     def resume(cls, recording: Recording, scene: Scene, time: float, real: str = "f64") -> Self:
         """Open the file that a stopped run has left, less its frames after ``time`` (s), or create one.
 
-        InputError when the file is damaged, or of another scene; it is then as it was.
+        Raise InputError when the file is damaged, or of another scene; it is then as it was.
         """
         path = Path(recording.path)
         if not regular_file.exists(path):
@@ -163,7 +164,7 @@ class Trajectory:
 
     @defer_signals()
     def write(self, index: int, frame: Frame) -> None:
-        """Add a frame of the scene of this index; RunError when the disk is full. Ctrl-C waits."""
+        """Add a frame of the scene of this index; raise RunError when the disk is full. Ctrl-C waits."""
         group, count = self.groups[index], len(frame.arrays["id"])
         order = np.argsort(frame.arrays["id"], kind="stable")
         row = group["position/step"].shape[0]
@@ -199,7 +200,7 @@ class Trajectory:
         self._resources.close()
 
     def close(self) -> None:
-        """Finish the file; RunError when not all could be written."""
+        """Finish the file; raise RunError when not all could be written."""
         self._finish()
         self._check()
 

@@ -7,12 +7,13 @@ from tisim.worlds.status import WorldStatus
 
 
 def list_phases(neighbours: NeighbourList) -> tuple[Phase, ...]:
-    """Bring the list up to date where it is due."""
+    """Return the phases that bring the list up to date where it is due."""
     return (BinParticles(neighbours), SearchCells(neighbours), DeclareFresh(neighbours))
 
 
 class BinParticles(Phase):
-    """Sort the particles of a world into cells, serially, so that the order in a cell is that of indices."""
+    """This phase sorts the particles of a world into cells, serially, so that the order in a cell is that of
+    indices."""
 
     conditional = True
 
@@ -44,7 +45,7 @@ class BinParticles(Phase):
         spacing = roots[0] * roots[1] * roots[2] / ti.pow(ti.cast(count, s.real), 1.0 / 3.0)
         n.skin[w] = ti.min(2.0 * n.ahead * ti.cast(s.axes(s.displacement, w), s.real), spacing)
         n.gap[w] = n.horizon(w)
-        width = ti.max(spacing, 2.0 * least + n.reach(w, smallest))
+        width = ti.max(spacing, 2.0 * least + n.gap[w])
         dims = ti.max(1, ti.floor(ti.min(extent / width, 1e3), ti.i32))
         while dims[0] * dims[1] * dims[2] > n.max_cells:
             dims = (dims + 1) // 2
@@ -56,7 +57,7 @@ class BinParticles(Phase):
             c = n.place(w, s.position[w, i])
             flat = (c[2] * dims[1] + c[1]) * dims[0] + c[0]
             n.cell_of[w, i] = flat
-            n.cell_start[w, flat] += 1
+            n.cell_start[w, flat] = n.cell_start[w, flat] + 1
         total = 0
         for c in range(cells + 1):
             total += n.cell_start[w, c]
@@ -64,14 +65,14 @@ class BinParticles(Phase):
         for back in range(count):
             i = count - 1 - back
             c = n.cell_of[w, i]
-            n.cell_start[w, c] -= 1
+            n.cell_start[w, c] = n.cell_start[w, c] - 1
             m = n.cell_start[w, c]
             n.order[w, m] = i
             n.sorted_position[w, m], n.sorted_radius[w, m] = s.position[w, i], s.radius[w, i]
 
 
 class SearchCells(PerParticle):
-    """Let each particle list the smaller ones near it."""
+    """This phase lets each particle list the smaller ones near it."""
 
     conditional = True
 
@@ -90,7 +91,7 @@ class SearchCells(PerParticle):
             # Copies: the compiler cannot know that writing a list does not change what it reads.
             r, radius, dims, skin = s.position[w, i], s.radius[w, i], n.dims[w], n.skin[w]
             side = n.domain.side(w)
-            near = radius + n.reach(w, i)
+            near = radius + n.gap[w]
             reach = near + radius + skin
             first = ti.floor((r - reach - n.corner[w]) / n.cell[w], ti.i32)
             last = ti.floor((r + reach - n.corner[w]) / n.cell[w], ti.i32)
@@ -124,7 +125,7 @@ class SearchCells(PerParticle):
 
 
 class DeclareFresh(Phase):
-    """Declare the list fresh, once every particle has searched."""
+    """This phase declares the list fresh, once every particle has searched."""
 
     conditional = True
 

@@ -13,29 +13,25 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
-from tisim.effects.base import Pairwise
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
 SMALL_WORLD = 48
-"""Worlds of at most this many particles look at all pairs: what ``listed_above`` of the state is at first."""
+"""Worlds of at most this many particles look at all pairs; ``listed_above`` of the state is this at first."""
 MOST_NEIGHBOURS = 24
-"""The neighbours that a particle can list; one with more of them looks at all particles."""
+"""A particle can list this many neighbours; one with more of them looks at all particles."""
 HORIZON = 0.15
-"""Gap within which every pair is sure to be offered, in mean distances between particles."""
+"""Every pair is sure to be offered within this gap, in mean distances between particles."""
 STEPS_OF_SKIN = 2.0
-"""Steps that a list is meant to last: its skin along each axis is what particles move in them."""
+"""A list is meant to last this many steps: its skin along each axis is what particles move in them."""
 CELLS_PER_PARTICLE = 2
 
 
 @ti.data_oriented
 class NeighbourList:
-    """The pair list of every world."""
+    """The neighbour list holds the near pairs of every world."""
 
-    def __init__(
-        self, s: State, domain: Bound[Domain], short_ranged: tuple[Bound[Pairwise], ...] = ()
-    ) -> None:
-        self.short_ranged = short_ranged
+    def __init__(self, s: State, domain: Bound[Domain]) -> None:
         self.s, self.domain, self.joined = s, domain, domain.joined()
         worlds, capacity = s.worlds, s.capacity
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
@@ -66,7 +62,7 @@ class NeighbourList:
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
-        """Device memory, in bytes."""
+        """Return the device memory, in bytes."""
         real = 8 if self.s.real == ti.f64 else 4
         per_world = 4 * (self.max_cells + 5 + self.s.capacity * (4 + self.room))
         return self.s.worlds * (per_world + real * (10 + 4 * self.s.capacity))
@@ -77,14 +73,19 @@ class NeighbourList:
         self.stale.fill(1)
 
     @ti.func
+    def invalidate(self, w):
+        """Have the list of a world made anew before it is used again."""
+        self.stale[w] = 1
+
+    @ti.func
     def owns(self, w, i, j):
-        """Whether the pair is i's to list."""
+        """Return whether the pair is i's to list."""
         a, b = self.s.radius[w, i], self.s.radius[w, j]
         return a > b or (a == b and i < j)
 
     @ti.func
     def size(self, w, i):
-        """How many candidates ``candidate`` offers particle i."""
+        """Return how many candidates ``candidate`` offers particle i."""
         n = self.s.count[w]
         if n > self.s.listed_above[w] and self.neighbour_count[w, i] >= 0:
             n = self.neighbour_count[w, i]
@@ -92,7 +93,7 @@ class NeighbourList:
 
     @ti.func
     def candidate(self, w, i, k):
-        """The k-th particle that may be a neighbour owned by i; i itself where there is none."""
+        """Return the k-th particle that may be a neighbour owned by i; i itself where there is none."""
         j = k
         if self.s.count[w] > self.s.listed_above[w] and self.neighbour_count[w, i] >= 0:
             j = self.neighbour_index[w, i, k]
@@ -102,25 +103,18 @@ class NeighbourList:
 
     @ti.func
     def spacing(self, w):
-        """Mean distance between particles: the cube root of the volume at the start for each. m."""
+        """Return the mean distance (m) between particles: the cube root of the volume at the start for
+        each."""
         return ti.cast(ti.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
 
     @ti.func
     def horizon(self, w):
-        """Gap between surfaces (m) within which every pair is sure to be offered."""
+        """Return the gap between surfaces (m) within which every pair is sure to be offered."""
         return HORIZON * self.spacing(w)
 
     @ti.func
-    def reach(self, w, i):
-        """Widest gap (m) at which i is to list a particle that is no larger."""
-        gap = self.gap[w]
-        for effect in ti.static(self.short_ranged):
-            gap = ti.max(gap, effect.reach(self.s, w, i))
-        return gap
-
-    @ti.func
     def sure(self, w):
-        """Return that gap (m) where only near pairs are offered; 0, for no limit, where all pairs are."""
+        """Return ``horizon`` (m) where only near pairs are offered; 0, for no limit, where all pairs are."""
         return ti.select(self.s.count[w] > self.s.listed_above[w], self.horizon(w), 0.0)
 
     @ti.func
@@ -128,22 +122,24 @@ class NeighbourList:
         """Note that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
         for k in ti.static(range(3)):
-            self.s.displacement_since_list[w, k] += self.s.displacement[w, k]
+            self.s.displacement_since_list[w, k] = (
+                self.s.displacement_since_list[w, k] + self.s.displacement[w, k]
+            )
             if 2.0 * self.s.displacement_since_list[w, k] > self.skin[w][k]:
                 self.stale[w] = 1
 
     @ti.func
     def place(self, w, r):
-        """Index of the cell along each axis."""
+        """Return the index of the cell along each axis."""
         c = ti.floor((r - self.corner[w]) / self.cell[w], ti.i32)
         return ti.max(0, ti.min(c, self.dims[w] - 1))
 
     @ti.func
     def around(self, c, cells):
-        """Index of a cell that may lie across a joined face, by less than one turn."""
+        """Return the index of a cell that may lie across a joined face, by less than one turn."""
         return c + ti.select(c < 0, cells, 0) - ti.select(c >= cells, cells, 0)
 
     @ti.func
     def turns(self, c, cells):
-        """Which image of the box a cell lies in, along each axis: -1, 0 or 1."""
+        """Return which image of the box a cell lies in, along each axis: -1, 0 or 1."""
         return ti.select(c >= cells, 1, 0) - ti.select(c < 0, 1, 0)

@@ -12,22 +12,22 @@ from tisim.backend import runtime
 from tisim.backend.taichi import ti
 
 LIMITS = {ti.f64: (1e-8, 1e-17), ti.f32: (1e-4, 1e-9)}
-"""Relative difference at which the two means have met, as the next would be its square; and the least kc and
-|gamma|, below the rounding of what they are made of."""
+"""These are the relative difference at which the two means have met, as the next would be its square; and the
+least kc and |gamma|, below the rounding of what they are made of."""
 ITERATIONS = 16
 """The mean of the least kc has met its limit in fewer iterations than these."""
 
 
 def limits() -> tuple[float, float]:
-    """``LIMITS`` of the precision that runs."""
+    """Return ``LIMITS`` of the precision that runs."""
     return LIMITS[runtime.current().real]
 
 
 @ti.func
 def elliptic(kc, over_m, gamma, rest):
-    """K, sigma with E = K (1 - m/2 - m^2 sigma/2), 2 gamma^2 (Pi - K) / (n K), and 1 less the last.
+    """Return K, sigma with E = K (1 - m/2 - m^2 sigma/2), 2 gamma^2 (Pi - K) / (n K), and 1 less the last.
 
-    For two kc side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0. over_m : 1/m. rest :
+    Two kc go side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0. over_m : 1/m. rest :
     n - m + gamma^2 n, which the caller knows without cancellation. sigma = sum_i 2^i c_i^2 / m^2, i >= 1.
     """
     tolerance = ti.static(limits()[0])

@@ -8,10 +8,10 @@ TERMS = 9
 
 @ti.func
 def langevin_ratio(x):
-    """L(x) / x with L(x) = coth x - 1/x, for x >= 0; 1/3 at 0. To rounding, without overflow.
+    """Return L(x) / x with L(x) = coth x - 1/x, for x >= 0, and 1/3 at 0: to rounding, without overflow.
 
-    Where coth x and 1/x cancel, by the continued fraction L(x) = x / (3 + x^2 / (5 + x^2 / (7 + ...))), in
-    which nothing does (that of I_3/2 / I_1/2; NIST Digital Library of Mathematical Functions, 10.33.1).
+    Where coth x and 1/x cancel, it takes the continued fraction L(x) = x / (3 + x^2 / (5 + x^2 / (7 + ...))),
+    in which nothing does (that of I_3/2 / I_1/2; NIST Digital Library of Mathematical Functions, 10.33.1).
     """
     ratio = 0.0 * x
     if x < 1.0:

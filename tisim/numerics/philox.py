@@ -21,7 +21,7 @@ def _high(product):
 
 @ti.func
 def philox(counter, key_low, key_high):
-    """Four random 32-bit words of a counter of four 32-bit words and a key of two."""
+    """Return four random 32-bit words of a counter of four 32-bit words and a key of two."""
     c = counter
     k0, k1 = ti.cast(key_low, ti.u32), ti.cast(key_high, ti.u32)
     for _ in ti.static(range(PHILOX_ROUNDS)):
@@ -35,7 +35,8 @@ def philox(counter, key_low, key_high):
 
 @ti.func
 def bits(seed, stream, particle, step, draw=0):
-    """Four random words for a particle at a step. ``stream`` keeps uses apart; ``draw`` counts within a step.
+    """Return four random words for a particle at a step. ``stream`` keeps uses apart; ``draw`` counts within
+    a step.
 
     seed and step are 64-bit, the others 32-bit.
     """
@@ -53,7 +54,7 @@ def bits(seed, stream, particle, step, draw=0):
 
 @ti.func
 def uniform(words):
-    """Two numbers in (0, 1) with 53 random bits each, from four words. f64 whatever the precision."""
+    """Return two numbers in (0, 1) with 53 random bits each, from four words; f64 whatever the precision."""
     first = ti.cast(words[0] >> ti.u32(5), ti.f64) * 67108864.0 + ti.cast(words[1] >> ti.u32(6), ti.f64)
     second = ti.cast(words[2] >> ti.u32(5), ti.f64) * 67108864.0 + ti.cast(words[3] >> ti.u32(6), ti.f64)
     scale = ti.cast(1.0 / 9007199254740992.0, ti.f64)
@@ -64,7 +65,7 @@ def uniform(words):
 
 @ti.func
 def normal(words):
-    """Two independent standard normal numbers, from four words (Box and Muller 1958). f64."""
+    """Return two independent standard normal numbers (f64) from four words (Box and Muller 1958)."""
     u = uniform(words)
     size = ti.sqrt(-2.0 * ti.log(u[0]))
     angle = ti.cast(6.283185307179586, ti.f64) * u[1]
@@ -73,7 +74,7 @@ def normal(words):
 
 LOG_2, QUARTER, ROOT = log(2), pi / 2, sqrt(0.5)
 ROOT_BITS = 0x3FE6A09E667F3BCD
-"""The bits of ROOT as an f64 number."""
+"""These are the bits of ROOT as an f64 number."""
 ARTANH = tuple(1 / k for k in range(1, 14, 2))
 COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(7))
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(6))
@@ -82,7 +83,7 @@ SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(6))
 
 @ti.func
 def _series(x, coefficients: ti.template()):  # type: ignore[valid-type]
-    """c_0 + x (c_1 + x (c_2 + ...))."""
+    """Return c_0 + x (c_1 + x (c_2 + ...))."""
     total = ti.cast(coefficients[-1], ti.f64)
     for c in ti.static(coefficients[-2::-1]):
         total = total * x + ti.cast(c, ti.f64)
@@ -91,7 +92,8 @@ def _series(x, coefficients: ti.template()):  # type: ignore[valid-type]
 
 @ti.func
 def _length(word):
-    """sqrt(-2 ln u) of u = (word + 1/2)/2^32: of a vector of two normal numbers, to some 11 digits.
+    """Return sqrt(-2 ln u) of u = (word + 1/2)/2^32: the length of a vector of two normal numbers, to some 11
+    digits.
 
     u = m 2^e with m next to 1, and ln m = 2 artanh((m - 1)/(m + 1)): what compilers vectorise.
     """
@@ -119,9 +121,9 @@ def _direction(word):
 
 @ti.func
 def normals(words):
-    """Four independent standard normal numbers from four words, of 32 random bits each. f64.
+    """Return four independent standard normal numbers (f64) from four words, of 32 random bits each.
 
-    As ``normal`` at a fraction of its price; none is larger than 6.8, which one in 1e11 should be.
+    They cost a fraction of those of ``normal``; none is larger than 6.8, which one in 1e11 should be.
     """
     a, b = _length(words[0]) * _direction(words[1]), _length(words[2]) * _direction(words[3])
     return ti.Vector([a[0], a[1], b[0], b[1]], dt=ti.f64)

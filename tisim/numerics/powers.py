@@ -3,13 +3,14 @@
 from tisim.backend.taichi import ti
 
 Exponent = int | float
-"""The type of an exponent of an effect: an option, not a parameter per world. It is compiled in, and the same
-for a whole batch."""
+"""This is the type of an exponent of an effect: an option, not a parameter per world. It is compiled in, and
+the same for a whole batch."""
 
 
 @ti.func
 def power(x, exponent: ti.template()):  # type: ignore[valid-type]
-    """x ** exponent for x > 0; products where the exponent is whole, which cost a fraction of a pow."""
+    """Return x ** exponent for x > 0, by products where the exponent is whole, which cost a fraction of a
+    pow."""
     result = x
     if ti.static(float(exponent).is_integer()):
         result = whole_power(x, ti.static(int(exponent)))
@@ -20,7 +21,7 @@ def power(x, exponent: ti.template()):  # type: ignore[valid-type]
 
 @ti.func
 def whole_power(x, exponent: ti.template()):  # type: ignore[valid-type]
-    """x ** exponent by repeated squaring."""
+    """Return x ** exponent by repeated squaring."""
     square = x
     if ti.static(exponent < 0):
         square = 1.0 / x

@@ -7,11 +7,12 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
 CONFIDENCE = 0.95
-"""The probability with which an interval holds the true mean, where none other is asked for."""
+"""This is the probability with which an interval holds the true mean, where none other is asked for."""
 
 
 def half_width(values: ArrayLike, confidence: float = CONFIDENCE) -> Any:
-    """Half of the confidence interval of the mean over the first axis, by Student's t; inf for one value.
+    """Return half of the confidence interval of the mean over the first axis, by Student's t; inf for one
+    value.
 
     Spread over further axes is that of each component by itself.
     """

@@ -12,10 +12,10 @@ from tisim.worlds.bound import Peers
 from tisim.worlds.fields import Field
 
 STEFAN_BOLTZMANN = 5.670374419e-8
-"""W/(m^2 K^4), exact in SI to these digits; Z04 uses 5.67e-8. scipy.constants has more
-digits, with which the last bits of results would be others."""
+"""This is the constant of Stefan and Boltzmann, W/(m^2 K^4), exact in SI to these digits; Z04 uses 5.67e-8.
+scipy.constants has more digits, with which the last bits of results would be others."""
 CONVERGED = {ti.f64: 1e-7, ti.f32: 1e-4}
-"""Relative change at which Newton's iteration has converged. The error left is below 1.5 times its square, as
+"""Newton's iteration has converged at this relative change. The error left is below 1.5 times its square, as
 f''/(2 f') < 1.5/t for the equation below; a change below rounding would be waited for in vain."""
 
 
@@ -60,4 +60,4 @@ class Cooling(Operator):
             change = (t + c * t + cube * t - right_side) / (1.0 + c + 4.0 * cube)
             t -= change
         s.temperature[w, i] = t
-        s.cooling_loss[w, i] += capacity * (before - t)
+        s.cooling_loss[w, i] = s.cooling_loss[w, i] + capacity * (before - t)

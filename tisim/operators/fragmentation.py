@@ -78,7 +78,7 @@ class Fragmentation(ImpactLaw, Operator):
         if shrink * self.threshold(w) > 1.0 and pieces >= 2 and broke == 0:
             energy = surface * (ti.pow(ti.cast(pieces, s.real), 1.0 / 3.0) - 1.0)
             s.pieces[w, i] = pieces
-            s.fracture_energy[w, i] += energy
+            s.fracture_energy[w, i] = s.fracture_energy[w, i] + energy
             for law in ti.static(self.heating):
                 s.temperature[w, i] = law.temperature(s, w, i, -energy)
             ti.atomic_add(s.fractures[w], 1)
@@ -101,7 +101,8 @@ class Fragmentation(ImpactLaw, Operator):
 
     @ti.func
     def split(self, s, w, i, n):
-        """n equal pieces at the first n sites of a cubic block of touching spheres, about the old centre."""
+        """Put n equal pieces at the first n sites of a cubic block of touching spheres, about the old
+        centre."""
         edge = 1
         while edge * edge * edge < n:
             edge += 1
@@ -120,5 +121,5 @@ class Fragmentation(ImpactLaw, Operator):
 
     @ti.func
     def site(self, k, edge):
-        """k-th site of a cubic block, in diameters."""
+        """Return the k-th site of a cubic block, in diameters."""
         return ti.Vector([k % edge, k // edge % edge, k // (edge * edge)])

@@ -73,7 +73,7 @@ class RandomAroundCylinder(Placement):
         return self._rotate(centres) + np.asarray(self.centre)
 
     def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
-        """Points of the part, evenly, in a frame whose z axis is that of the cylinder. m."""
+        """Return points (m) of the part, evenly, in a frame whose z axis is that of the cylinder."""
         inner, outer = self.radius + radius, self.radius + self.thickness - radius
         # Half of what lies beside, with the corners where they belong to the part; then what lies beyond.
         height = self.length / 2 + (-radius if self.part == "side" else radius)

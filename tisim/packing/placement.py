@@ -17,7 +17,7 @@ from tisim.packing.random_sequential import place
 
 
 class Placement(Component):
-    """The contract of a placement, which gives places to equal spheres."""
+    """This is the contract of a placement, which gives places to equal spheres."""
 
     contract: ClassVar[bool] = True
 
@@ -104,7 +104,7 @@ class Lattice(Placement):
         return math.prod(self.shape)
 
     def steps(self) -> np.ndarray:
-        """Distance of neighbours along each axis, m, shape (3,)."""
+        """Return the distance of neighbours along each axis, m, shape (3,)."""
         gaps = np.maximum(np.asarray(self.shape) - 1, 1)
         return np.full(3, self.spacing) if self.size is None else np.asarray(self.size) / gaps
 

@@ -18,7 +18,7 @@ from tisim.packing.region import Region
 from tisim.packing.saturation import fill
 
 SATURATION_FRACTION = 0.3841
-"""The volume fraction at which no further sphere fits, in the bulk."""
+"""At this volume fraction no further sphere fits, in the bulk."""
 MAX_CONSECUTIVE_FAILURES = 5_000
 """After so many failures in a row places are no longer tried everywhere, only where there is room."""
 MAX_CELLS = 64
@@ -47,7 +47,7 @@ def _add(
     periodic: ti.i32,
     ball: ti.i32,
 ) -> ti.i32:
-    """Place the spheres; returns how many found room.
+    """Place the spheres; return how many found room.
 
     ``heads`` has the last member of each cell, and ``follow`` the one before each sphere in its cell; -1
     where there is none.
@@ -104,7 +104,8 @@ def _add(
 
 
 def place(count: int, radius: float, region: Region, seed: int) -> np.ndarray:
-    """Centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) in a region, none overlapping.
+    """Return centres, shape (count, 3) in m, of equal spheres of ``radius`` (m) in a region, none
+    overlapping.
 
     Depends on the arguments alone, not on device or threads. Goes up to saturation: InputError, which says
     the volume fraction reached, when no further sphere fits.

@@ -11,7 +11,8 @@ from tisim.errors import must
 
 @dataclass(frozen=True)
 class Region:
-    """A box ``low``..``high`` (m, shape (3,) each) of centres, or the ball that touches its faces.
+    """A region is a box ``low``..``high`` (m, shape (3,) each) of centres, or the ball that touches its
+    faces.
 
     periodic : spheres see each other across opposite faces. ball : see above.
     volume : m^3, of the container that volume fractions are of.
@@ -25,17 +26,17 @@ class Region:
 
     @property
     def side(self) -> np.ndarray:
-        """The lengths of the box along the axes, m, shape (3,)."""
+        """Return the lengths of the box along the axes, m, shape (3,)."""
         return self.high - self.low
 
     @property
     def centre(self) -> np.ndarray:
-        """The centre of the box, m, shape (3,)."""
+        """Return the centre of the box, m, shape (3,)."""
         return (self.low + self.high) / 2
 
     @property
     def reach(self) -> float:
-        """The radius of the ball, m."""
+        """Return the radius of the ball, m."""
         return float(self.side[0]) / 2
 
     def reachable_volume(self, radius: float) -> float:
@@ -46,7 +47,7 @@ class Region:
 
 
 def box(low: np.ndarray, high: np.ndarray, periodic: bool = False) -> Region:
-    """Centres anywhere in a box low..high (m); spheres may reach over its faces."""
+    """Return the region of centres anywhere in a box low..high (m); spheres may reach over its faces."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     wide = bool((high > low).all())
     must(wide, "box", "wider than nothing in each direction", (high - low).tolist())
@@ -54,7 +55,7 @@ def box(low: np.ndarray, high: np.ndarray, periodic: bool = False) -> Region:
 
 
 def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
-    """Spheres of ``radius`` (m) wholly inside a box low..high (m)."""
+    """Return the region of spheres of ``radius`` (m) wholly inside a box low..high (m)."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     room = bool((high - low > 2 * radius).all())
     must(room, "box", f"wider than a sphere, {2 * radius:g} m, in each direction", (high - low).tolist())
@@ -62,7 +63,7 @@ def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
 
 
 def inside_ball(centre: np.ndarray, size: float, radius: float) -> Region:
-    """Spheres of ``radius`` (m) wholly inside a ball of radius ``size`` (m)."""
+    """Return the region of spheres of ``radius`` (m) wholly inside a ball of radius ``size`` (m)."""
     must(size > radius, "ball", f"larger than a sphere, of radius {radius:g} m", size)
     centre = np.asarray(centre, float)
     reach = size - radius

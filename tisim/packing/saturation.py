@@ -20,7 +20,7 @@ FIRST_VOXEL_SIDE = 0.5
 VOXELS_PER_BLOCK = 200_000
 """So many voxels are worked on at once, which bounds the memory that it takes."""
 NEAREST_CENTRES = 4
-"""Whether a voxel is covered is asked of so many centres, those nearest to the voxel that it was cut from;
+"""So many centres, those nearest to the voxel that it was cut from, are asked whether they cover a voxel;
 what is missed for the moment is found in a finer cut."""
 MAX_CUTS = 40
 """Voxels are cut so many times at most; their side is then below the rounding of a diameter."""
@@ -29,12 +29,13 @@ MAX_CUTS = 40
 def fill(
     centres: np.ndarray, count: int, diameter: float, region: Region, generator: np.random.Generator
 ) -> np.ndarray:
-    """Centres, shape (n, 3), m: those given, and more until there are ``count`` or no room is left."""
+    """Return centres, shape (n, 3), m: those given, and more until there are ``count`` or no room is left."""
     return _Voids(np.asarray(centres, float), diameter, region).fill(count, generator)
 
 
 class _Voids:
-    """index : of the voxels left, shape (m, 3); voxel k spans index_k step .. (index_k + 1) step.
+    """The voids are the voxels left. index : their indices, shape (m, 3); voxel k spans index_k step ..
+    (index_k + 1) step.
 
     Places are counted from the lower corner of the region, m.
     """
@@ -70,7 +71,7 @@ class _Voids:
         return self.region.low + self.places
 
     def _try(self, tries: int, generator: np.random.Generator) -> np.ndarray:
-        """Places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
+        """Return the places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
         voxel = self.index[generator.integers(len(self.index), size=tries)]
         places = (voxel + generator.random((tries, 3))) * self.step
         if self.region.ball:

@@ -20,15 +20,15 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
 PIXELS = 1400
-"""Width of a panel as it is drawn; half of it as it is shown, so that edges are smooth."""
+"""A panel is drawn this many pixels wide, twice as many as are shown, so that edges are smooth."""
 SMALLEST = 4.0
-"""Least radius of a grain in those pixels: a smaller one would not be seen."""
+"""A grain has at least this radius in those pixels: a smaller one would not be seen."""
 AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
 """The viewer stands in this direction: its angle to x in the xy plane and above it, rad."""
 GRAIN_COLOUR = (0.36, 0.55, 0.73)
-"""The colour of grains without a temperature: red, green and blue, 0..1."""
+"""Grains without a temperature have this colour: red, green and blue, 0..1."""
 GRAVITY_COLOUR = "#b3413e"
-"""The colour of the arrow of gravity."""
+"""The arrow of gravity has this colour."""
 # Without its black end, against which neither shade nor edge of a cold grain would show.
 HEAT = ListedColormap(colormaps["inferno"](np.linspace(0.17, 0.97, 256)))
 
@@ -43,7 +43,7 @@ _LIGHT = np.array([-0.45, 0.6, 0.66])
 
 
 def cloud(result: Result) -> Figure:
-    """Start and end of a run side by side, as ``start_and_end``."""
+    """Draw start and end of a run side by side, as ``start_and_end`` does."""
     return start_and_end((result.start, result.state), (0.0, result.time), result.scene)
 
 

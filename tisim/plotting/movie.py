@@ -18,9 +18,9 @@ from tisim.plotting import cloud
 from tisim.scene.initial_state import Arrays
 
 SIDE = 5.0
-"""The side of the picture, inches."""
+"""The picture has sides of this length, inches."""
 DPI = 110
-"""Pixels per inch of the picture."""
+"""The picture has this many pixels per inch."""
 
 
 def movie(
@@ -28,8 +28,8 @@ def movie(
 ) -> None:
     """Write a moving picture of all frames, ``rate`` of them a second, in place of any before.
 
-    path : ends in .gif, or in .mp4 where ffmpeg is installed; InputError otherwise. progress : called with
-    the finished fraction, 0..1.
+    path : ends in .gif, or in .mp4 where ffmpeg is installed; raise InputError otherwise. progress : called
+    with the finished fraction, 0..1.
     """
     writer = check(frames, path, rate)
     coloured, ranges = _scales(frames)
@@ -63,7 +63,7 @@ def while_drawn(path: Path) -> str:
 
 
 def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
-    """Return what writes such a file; InputError when there is no movie to make, or nothing to make it
+    """Return what writes such a file; raise InputError when there is no movie to make, or nothing to make it
     with."""
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
     must(len(frames) > 1, "file", "one with 2 frames or more", f"{len(frames)} frames")

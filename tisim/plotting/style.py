@@ -17,12 +17,12 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter
 
 TIME = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
-"""Colours of time: even to the eye, and without the end that is lost on white."""
+"""These colours of time are even to the eye, and without the end that is lost on white."""
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-"""The prefix of a unit by power of ten."""
+"""These are the prefixes of a unit by power of ten."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = 30.0
-"""Largest over smallest value from which on an axis is logarithmic."""
+"""An axis is logarithmic where its largest value is more than this many times its smallest."""
 
 
 def empty(width: float, height: float, pad: float | None = None) -> Figure:

@@ -14,12 +14,12 @@ from tisim.plotting.cloud import start_and_end
 from tisim.plotting.style import empty, legend_above, letters, plain, quantity, scale_of
 
 AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
-"""The colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
+"""These are the colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
 
 
 @dataclass(frozen=True)
 class TimeSeries:
-    """What is drawn against time; a value for each frame.
+    """A time series is what is drawn against time, with a value for each frame.
 
     time : s. kinetic_energy : J. number : of particles.
     shift : of the centre of gravity from where it was at the start, m, shape (frames, 3).
@@ -47,7 +47,7 @@ def history(frames: Frames) -> TimeSeries:
 
 
 def clouds(frames: Frames) -> Figure:
-    """Draw the first and the last frame side by side. InputError when there is none."""
+    """Draw the first and the last frame side by side. Raise InputError when there is none."""
     must(len(frames) > 0, "file", "one with a frame", "one with none yet")
     first, last = frames[0], frames[-1]
     states, times = (first.arrays, last.arrays), (first.time, last.time)
@@ -62,8 +62,8 @@ def mark_missing(figure: Figure, frames: Frames) -> Figure:
 
 
 def quantities(frames: Frames) -> Figure:
-    """Draw kinetic energy, centre of gravity and number of particles against time; InputError for under 2
-    frames.
+    """Draw kinetic energy, centre of gravity and number of particles against time; raise InputError for under
+    2 frames.
 
     Where particles re-enter through opposite faces, the centre of gravity jumps with them; its velocity is
     drawn instead. A number of particles that stays the same is written above.

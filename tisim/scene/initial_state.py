@@ -17,11 +17,11 @@ from tisim.packing.placement import Placement, RandomInDomain
 from tisim.scene.initial_velocity import Pulse
 
 Arrays = dict[str, np.ndarray]
-"""Particle quantities by field name: shape (n,) or (n, 3), SI."""
+"""These are particle quantities by field name: shape (n,) or (n, 3), SI."""
 
 
 class Start(Component):
-    """The contract of a starting configuration."""
+    """This is the contract of a starting configuration."""
 
     contract: ClassVar[bool] = True
 
@@ -63,7 +63,7 @@ class Particles(Start):
     __hash__ = None  # type: ignore[assignment]
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
-        """Arrays that come from another process are not writeable either."""
+        """Set the state that comes from another process: its arrays are not writeable either."""
         super().__setstate__(state)
         for value in (*self.__dict__.values(), *self.quantities.values()):
             if isinstance(value, np.ndarray):
@@ -135,7 +135,7 @@ def _worst(column: np.ndarray) -> float:
 
 
 def check_sizes(name: str, unit: str, column: np.ndarray) -> None:
-    """InputError unless all are above 0 and within the limits of their unit."""
+    """Raise InputError unless all are above 0 and within the limits of their unit."""
     least, most = limits(unit)
     must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min()))
     outside = column[(column < least) | (column > most)]
@@ -196,7 +196,7 @@ class Cloud(Start):
         return self.placement.sites() or self.number or 0
 
     def _mass(self) -> float:
-        """Mass of each sphere, kg."""
+        """Return the mass of each sphere, kg."""
         return self.density * 4 / 3 * np.pi * self.radius**3
 
     def masses(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from tisim.errors import must
 
 
 class Pulse(Component):
-    """The contract of a change of all velocities at the start."""
+    """This is the contract of a change of all velocities at the start."""
 
     contract: ClassVar[bool] = True
 

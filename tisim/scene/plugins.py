@@ -26,7 +26,8 @@ GROUP = "tisim.effects"
 def load(path: str | Path) -> ModuleType:
     """Import a Python file of the user's, so that the parts in it can be found by name.
 
-    InputError when it cannot be imported, or defines a kind whose name is taken; nothing of it is then known.
+    InputError is raised when it cannot be imported, or defines a kind whose name is taken; nothing of it is
+    then known.
     """
     _load_own()
     module = python_file.load(path)
@@ -83,7 +84,7 @@ def _checksum(entry: EntryPoint) -> str:
 
 
 def _check(module: ModuleType) -> None:
-    """InputError for a kind of a module that another one of the same family has."""
+    """Raise InputError for a kind of a module that another one of the same family has."""
     for kind in list(vars(module).values()):
         if not (isinstance(kind, type) and issubclass(kind, Component)) or kind.__dict__.get("contract"):
             continue

@@ -23,8 +23,8 @@ from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.verlet import Verlet
 
-PHYSICS_VERSION = 2
-"""Raised whenever a change of code changes the result of a scene; part of its digest."""
+PHYSICS_VERSION = 3
+"""This number is raised whenever a change of code changes the result of a scene; it is part of its digest."""
 
 __all__ = ["Box", "Open", "Scene"]
 
@@ -200,7 +200,7 @@ class Scene(Component):
 
 
 def _table(effect: Effect) -> dict[str, Any]:
-    """Parameters of an effect, with its kind where that is not the name of its table."""
+    """Return the parameters of an effect, with its kind where that is not the name of its table."""
     values = serialization.to_dict(effect, named=effect.label != effect.kind())
     return {key: value for key, value in values.items() if key != "name"}
 

@@ -25,7 +25,7 @@ class UniformFlow(Source):
 
 
 def kozeny_carman(porosity, size, constant):
-    """Permeability k = (1 - phi)^3 nu^2 / (C phi^2) of a packing (m^2).
+    """Return the permeability k = (1 - phi)^3 nu^2 / (C phi^2) of a packing (m^2).
 
     porosity : 1 - phi. size : nu (m), volume over surface of what it is packed of. constant : C.
     Source: B16 Eq. (7.4), after Kozeny (1927) and Carman (1937).

@@ -19,7 +19,7 @@ from tisim.worlds.parameter_table import ParameterTable
 
 @ti.data_oriented
 class _Sum:
-    """The sum of bound sources."""
+    """This is the sum of bound sources."""
 
     def __init__(self, fields: Peers) -> None:
         self.fields = fields
@@ -42,11 +42,11 @@ class _Sum:
 def sample(
     effects: Sequence[Effect], quantity: str, points: ArrayLike, time: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The sum of all sources of a quantity among effects, shape (n, 3), and its gradient, (n, 3, 3).
+    """Return the sum of all sources of a quantity among effects, shape (n, 3), and its gradient, (n, 3, 3).
 
     quantity : its standard name, such as "magnetic_flux_density" (T). points : m, shape (n, 3). time : s.
     [k, a, b] of the gradient is the derivative of component a along axis b, per metre.
-    InputError where there is no source of it, or for points of another shape.
+    InputError is raised where there is no source of it, or for points of another shape.
     """
     real = runtime.current().real
     places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)

@@ -12,7 +12,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Uniform(Source):
-    """The contract of a field constant + amplitude sin(omega t + phase), each component by itself."""
+    """This is the contract of a field constant + amplitude sin(omega t + phase), each component by itself."""
 
     contract: ClassVar[bool] = True
 

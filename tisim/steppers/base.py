@@ -18,10 +18,10 @@ from tisim.worlds.fields import Field
 
 
 def single(effect: Effect) -> bool:
-    """Return whether an effect acts on each particle by itself."""
-    return isinstance(effect, Force | Source | DerivedQuantity) and not isinstance(
-        effect, SelfConsistentQuantity
-    )
+    """Return whether an effect acts on each particle by itself, and remembers nothing of it."""
+    if isinstance(effect, Force):
+        return not effect.offers("load")
+    return isinstance(effect, Source | DerivedQuantity) and not isinstance(effect, SelfConsistentQuantity)
 
 
 class Stepper(StepperHints, Component):
@@ -31,10 +31,11 @@ class Stepper(StepperHints, Component):
 
     counters, world_quantities, flags : names of what it keeps of a world, ``s.NAME[w]``: counters of events
     (i64), which a Result gives back, quantities (f64) and integers (i32), 0 at the start. random : whether it
-    draws random numbers, so that only statistics converge.
+    draws random numbers, so that only statistics converge. all_pairs : whether it sums over all pairs itself.
     """
 
     contract: ClassVar[bool] = True
+    all_pairs: ClassVar[bool] = False
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
     flags: ClassVar[tuple[str, ...]] = ()
@@ -43,14 +44,14 @@ class Stepper(StepperHints, Component):
 
     @property
     def order(self) -> int:
-        """The order of its error in dt, for smooth forces."""
+        """Return the order of the stepper's error in dt, for smooth forces."""
         return 2
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        """Raise InputError when it cannot step a scene of these effects; by default it can."""
+        """Raise InputError when the stepper cannot step a scene of these effects; by default it can."""
 
     def countable(self, effects: Sequence[Effect]) -> float:
-        """Return the number of steps that it can count in a scene of these effects."""
+        """Return the number of steps that the stepper can count in a scene of these effects."""
         return MOST_STEPS
 
     def fewest(self, effects: Sequence[Effect], duration: float) -> float:
@@ -62,8 +63,8 @@ class Stepper(StepperHints, Component):
         return max(1.0, steps)
 
     def independent(self, effects: Sequence[Effect]) -> bool:
-        """Return whether it may take each particle by itself: by default, when they feel nothing of each
-        other and only forces change them."""
+        """Return whether the stepper may take each particle by itself: by default, when particles feel
+        nothing of each other and only forces change them."""
         return all(single(effect) for effect in effects)
 
     def structure(self) -> tuple[Any, ...]:
@@ -71,8 +72,8 @@ class Stepper(StepperHints, Component):
         return (*own, *self.control.structure())
 
     def fields(self, turning: bool, independent: bool) -> tuple[str | Field, ...]:
-        """Return the fields that it reads or writes in a scene with torques (``turning``), or whose particles
-        do not feel each other (``independent``)."""
+        """Return the fields that the stepper reads or writes in a scene with torques (``turning``), or whose
+        particles do not feel each other (``independent``)."""
         return ()
 
     def step(self, context: StepContext) -> Step:
@@ -82,7 +83,7 @@ class Stepper(StepperHints, Component):
         ``events`` to 0; once the control has been asked, set ``approach_time`` to infinity and ``fastest`` to
         0, for its notes on the next step; call ``particle`` of each operator; put back into the domain what
         has left it; and say how far particles have moved: ``displacement`` relative to the frame, then
-        ``neighbour_list.moved(w)``, or simply ``neighbour_list.stale[w] = 1``. Verlet is a pattern. In
+        ``neighbour_lists.moved(w)``, or simply ``neighbour_lists.invalidate(w)``. Verlet is a pattern. In
         kernels a parameter of the stepper is read of ``context.stepper``.
 
         Forces are summed at ``time``. A stepper that sums them within a step puts ``time`` there, as Boris

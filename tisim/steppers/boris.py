@@ -50,13 +50,13 @@ class Boris(Stepper):
 
     def step(self, context: StepContext) -> Step:
         drift = (BorisDrift(context), *report_displacement(context))
-        kick = (*context.update_lists, *context.update_history, *context.sum_forces, BorisRotation(context))
+        kick = (*context.update_lists, *context.sum_forces, BorisRotation(context))
         end = (*apply_operators(context), AdvanceClock(context))
         return Step((BeginStep(context), Middle(context), *drift, *kick, *drift, *end))
 
 
 class Middle(Phase):
-    """Forces are those at the middle of the step."""
+    """This phase moves the time of the trial state to the middle of the step, as forces are those there."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -69,7 +69,7 @@ class Middle(Phase):
 
 
 class BorisDrift(PerParticle):
-    """Half a drift: r += dt/2 v."""
+    """This phase moves particles by half a drift: r += dt/2 v."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -84,7 +84,7 @@ class BorisDrift(PerParticle):
 
 
 class BorisRotation(PerParticle):
-    """v- to v+ to v', with the forces at the middle of the step."""
+    """This phase takes v- to v+ to v', with the forces at the middle of the step."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -102,6 +102,6 @@ class BorisRotation(PerParticle):
             minus = s.velocity[w, i] + rest
             s.velocity[w, i] = solved(one - turn, (one + turn) @ minus) + rest
         else:
-            s.velocity[w, i] += 2.0 * half * s.force[w, i]
+            s.velocity[w, i] = s.velocity[w, i] + 2.0 * half * s.force[w, i]
         if ti.static(self.turning):
-            s.spin[w, i] += dt / (0.4 * m * s.radius[w, i] ** 2) * s.torque[w, i]
+            s.spin[w, i] = s.spin[w, i] + dt / (0.4 * m * s.radius[w, i] ** 2) * s.torque[w, i]

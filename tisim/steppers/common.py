@@ -8,7 +8,8 @@ from tisim.worlds.status import WorldStatus
 
 @ti.func
 def note_displacement(s, w, moved):
-    """Note that a particle has moved so far relative to the world's frame, for the pair lists. m, f64."""
+    """Note for the pair lists that a particle has moved by ``moved`` (m, f64) relative to the world's
+    frame."""
     for k in ti.static(range(3)):
         far = ti.abs(moved[k])
         if far > s.displacement[w, k]:
@@ -17,8 +18,8 @@ def note_displacement(s, w, moved):
 
 @ti.func
 def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type: ignore[valid-type]
-    """Put a particle at r, wherever that is in the domain; ``moved`` relative to the frame, and ``grown`` in
-    radius: for pair lists a surface that grows is one that moves. m; the last two in f64."""
+    """Put a particle at r (m), wherever that is in the domain. It has moved by ``moved`` (m, f64) relative to
+    the frame, and by ``grown`` (m, f64) in radius: for pair lists a surface that grows is one that moves."""
     change = ti.abs(moved) + ti.abs(grown)
     # Not below infinity: also true of NaN.
     if not (change.sum() < ti.math.inf):
@@ -31,18 +32,18 @@ def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type
 
 
 class BeginStep(Phase):
-    """Choose the step; the last one ends exactly on time."""
+    """This phase chooses the step; the last one ends exactly on time."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.control = context.s, context.control
-        self.neighbour_list, self.lists = context.neighbour_list, context.neighbour_list is not None
+        self.lists, self.listed = context.neighbour_lists, context.neighbour_lists is not None
 
     @ti.func
     def run(self, w, _k):
         s = self.s
         horizon = ti.cast(0.0, s.real)
-        if ti.static(self.lists):
-            horizon = self.neighbour_list.sure(w)
+        if ti.static(self.listed):
+            horizon = self.lists.sure(w)
         dt = self.control.next(s, w, horizon)
         remaining = s.end[w] - s.time[w]
         # A remainder as small as rounding leaves is not worth a step of its own.
@@ -60,7 +61,7 @@ class BeginStep(Phase):
 
 @ti.func
 def advance_clock(s, w):
-    """Time moves on by dt, with the rounding error carried along (W. Kahan 1965)."""
+    """Move time on by dt, with the rounding error carried along (W. Kahan 1965)."""
     last = s.dt[w] == s.end[w] - s.time[w]
     step = s.dt[w] - s.time_carry[w]
     time = s.time[w] + step
@@ -71,20 +72,20 @@ def advance_clock(s, w):
 
 
 class ReportDisplacement(Phase):
-    """Tell the neighbour lists how far particles have moved."""
+    """This phase tells the neighbour lists how far particles have moved."""
 
     def __init__(self, context: StepContext) -> None:
-        self.s, self.neighbour_list = context.s, context.neighbour_list
+        self.s, self.lists = context.s, context.neighbour_lists
 
     @ti.func
     def run(self, w, _k):
-        self.neighbour_list.moved(w)
+        self.lists.moved(w)
         for k in ti.static(range(3)):
             self.s.displacement[w, k] = 0.0
 
 
 class ApplyOperators(PerParticle):
-    """What operators do to single particles after the step, which began at ``time_before``."""
+    """This phase lets operators change single particles after the step, which began at ``time_before``."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -102,7 +103,7 @@ class ApplyOperators(PerParticle):
 
 
 class AdvanceClock(Phase):
-    """The step is done: time, which was that of a trial state, moves on from where the step began."""
+    """This phase ends the step: time, which was that of a trial state, moves on from where the step began."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -114,7 +115,7 @@ class AdvanceClock(Phase):
 
 
 class FinishStep(Phase):
-    """A world that has reached its end stops."""
+    """This phase stops a world that has reached its end."""
 
     def __init__(self, s) -> None:
         self.s = s
@@ -126,8 +127,9 @@ class FinishStep(Phase):
 
 
 def report_displacement(context: StepContext) -> tuple[Phase, ...]:
-    """Return the phase that does so, where there are neighbour lists."""
-    return (ReportDisplacement(context),) if context.neighbour_list else ()
+    """Return the phase that tells the neighbour lists how far particles have moved, where there are such
+    lists."""
+    return (ReportDisplacement(context),) if context.neighbour_lists else ()
 
 
 def apply_operators(context: StepContext) -> tuple[Phase, ...]:

@@ -11,7 +11,7 @@ from tisim.operators.base import Operator
 if TYPE_CHECKING:
     from tisim.components.domain import Domain
     from tisim.interactions.force_sum import SumForces
-    from tisim.neighbours.pair_list import NeighbourList
+    from tisim.neighbours.lists import NeighbourLists
     from tisim.worlds.bound import Bound, Peers
     from tisim.worlds.program import Item
     from tisim.worlds.state import State
@@ -19,13 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StepContext:
-    """The bound parts of a scene that a step is made of; a tuple of items is empty where nothing is to do.
+    """A context holds the bound parts of a scene that a step is made of; a tuple of items is empty where
+    nothing is to do.
 
     s : device memory of the worlds. effects : all of them, ``effects.of(Source)`` those of a kind. stepper :
-    the stepper itself, as kernels see it; control, domain : likewise. neighbour_list : None where nothing
+    the stepper itself, as kernels see it; control, domain : likewise. neighbour_lists : None where nothing
     asks for pairs. independent : whether the stepper may take each particle by itself.
 
-    update_lists : items that bring the neighbour lists up to date with the positions. update_history : bring
+    update_lists : items that bring the neighbour lists up to date with the positions. advance_memory : bring
     up to date what touching pairs remember, over ``dt``; once a step. sum_forces : set derived quantities,
     and sum force and torque of the trial state. sum_trial_forces : the same for a state that may be far from
     any solution, where a force that is not finite is the stepper's to deal with. Lists and forces may stand
@@ -38,38 +39,39 @@ class StepContext:
     stepper: Bound[Any]
     control: Bound[Any]
     domain: Bound[Domain]
-    neighbour_list: NeighbourList | None
+    neighbour_lists: NeighbourLists | None
     independent: bool
     update_lists: tuple[Item, ...]
-    update_history: tuple[Item, ...]
+    advance_memory: tuple[Item, ...]
     sum_forces: tuple[Item, ...]
     sum_trial_forces: tuple[Item, ...]
     force_sum: SumForces
 
     @property
     def operators(self) -> tuple[Bound[Operator], ...]:
-        """The operators of the scene, in scene order."""
+        """Return the operators of the scene, in scene order."""
         return self.effects.of(Operator)
 
     @property
     def single_forces(self) -> tuple[Bound[Force], ...]:
-        """The forces on particles by themselves, in scene order."""
+        """Return the forces on particles by themselves, in scene order."""
         return self.effects.of(Force)
 
     @property
     def forced(self) -> bool:
-        """Whether there are forces at all."""
+        """Return whether there are forces at all."""
         return bool(self.force_sum.forces or self.force_sum.pair_forces)
 
     @property
     def turning(self) -> bool:
-        """Whether there are torques."""
+        """Return whether there are torques."""
         return self.force_sum.turning
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """Device memory beside the state: ``memory`` tells its ``bytes()``; what it is, and for what."""
+    """A buffer is device memory beside the state: ``memory`` tells its ``bytes()``; the rest says what it is,
+    and for what."""
 
     memory: Any
     what: str
@@ -78,7 +80,7 @@ class Buffer:
 
 @dataclass(frozen=True)
 class Step:
-    """The items of a step, in order, and the device memory that was allocated for them."""
+    """A step is its items, in order, and the device memory that was allocated for them."""
 
     items: tuple[Item, ...]
     buffers: tuple[Buffer, ...] = ()

@@ -12,29 +12,31 @@ from tisim.worlds.program import Phase
 from tisim.worlds.status import WorldStatus
 
 LAUNCH_ATTEMPTS = 2**20
-"""The most intervals of a launch, and the most attempts at a step, of all particles together: about a
+"""A launch has at most so many intervals, and so many attempts at a step, of all particles together: about a
 second."""
 LEAST_INTERVALS = 64
 """A launch may take every particle through so many intervals or attempts, however many particles there
 are."""
 LITTLE = 1e-6
-"""A remainder of an interval or a step, over its length, that is worth no step of its own: rounding leaves
-it."""
+"""A remainder of an interval or a step of this part of its length is worth no step of its own: rounding
+leaves it."""
 OWN_CLOCK = tuple(
     Field(name, unit, 1, "keep", scratch=True, double=True)
     for name, unit in (("own_interval", ""), ("own_elapsed", "s"), ("own_carry", "s"))
 )
-"""The fields that say where a particle is on its way: the number of its interval, how far it is in it, and
-the rounding error of that."""
+"""These fields say where a particle is on its way: the number of its interval, how far it is in it, and the
+rounding error of that."""
 INTERVAL_QUANTITIES = ("intervals", "launch_intervals")
-"""The intervals of a world that are over, and those that this launch is to take it through."""
+"""These are the intervals of a world that are over, and those that this launch is to take it through."""
 INTERVAL_FLAGS = ("halted", "attempt_limit")
-"""Whether a particle of a world cannot go on, and how many attempts each may make in this launch."""
+"""These say whether a particle of a world cannot go on, and how many attempts each may make in this
+launch."""
 
 
 class BeginIntervals(Phase):
-    """The intervals of a launch: up to the end, to the next time at which somebody looks, or to as many as
-    are asked for; and the attempts that a particle may make. What an earlier launch has left is done first.
+    """This phase sets the intervals of a launch: up to the end, to the next time at which somebody looks, or
+    to as many as are asked for; and the attempts that a particle may make. What an earlier launch has left is
+    done first.
 
     The world's time is counted in intervals, so that it does not drift.
     """
@@ -80,8 +82,8 @@ def own_time(s, control: ti.template(), w, i):  # type: ignore[valid-type]
 
 
 class EndIntervals(Phase):
-    """The intervals are done, or a part of them, or one that is cut; or the first particle to be stuck is
-    found."""
+    """This phase ends the intervals, or a part of them, or one that is cut; or it finds the first particle to
+    be stuck."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.control = context.s, context.control
@@ -107,7 +109,7 @@ class EndIntervals(Phase):
 
     @ti.func
     def slowest(self, w):
-        """The particle that has come least far."""
+        """Return the particle that has come least far."""
         s = self.s
         least = 0
         for i in range(s.count[w]):
@@ -117,13 +119,14 @@ class EndIntervals(Phase):
 
     @ti.func
     def report_failure(self, w):
-        """The particle that got stuck first, and when."""
+        """Record the particle that got stuck first, and when."""
         self.stop(w, self.slowest(w), WorldStatus.STEP_TOO_SHORT)
         self.s.ask(w, self.s.time[w])
 
     @ti.func
     def stop(self, w, i, fault):
-        """The world, where a particle has been stopped by this; intervals that all have passed are good."""
+        """Stop the world where a particle has been stopped by this fault; intervals that all have passed are
+        good."""
         s = self.s
         s.steps[w] += ti.cast(s.own_interval[w, i] - s.intervals[w], ti.i64)
         s.time[w], s.cut[w] = own_time(s, self.control, w, i), s.own_elapsed[w, i]

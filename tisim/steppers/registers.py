@@ -10,7 +10,8 @@ Part = TypeVar("Part")
 
 
 class Local:
-    """Stands for a particle field where a single particle is looked at: its value, whatever the index."""
+    """Local stands for a particle field where a single particle is looked at: its value, whatever the
+    index."""
 
     value: Any = None
 
@@ -23,7 +24,8 @@ class Local:
 
 @ti.data_oriented
 class Registers:
-    """``state`` is read and written as any other, but the named fields of one particle are local variables.
+    """Registers hold a state that is read and written as any other, but the named fields of one particle are
+    local variables.
 
     loaded : fields of three components or one that are taken from memory, and put back. own : vectors that
     exist here only.
@@ -53,7 +55,7 @@ class Registers:
             ti.static(local.assign(value))
 
     def assign(self, *values: Any) -> None:
-        """Take these for what ``load`` would take from memory."""
+        """Take these values for what ``load`` would take from memory."""
         for (_, local), value in zip(self.loaded, values, strict=True):
             local.assign(value)
 

@@ -15,14 +15,16 @@ from tisim.errors import must
 TOUCH = 1.0 + 1e-6
 """Steps go this much past the meeting of surfaces, so that rounding does not decide whether they have met."""
 SHORTEST_STEP = 1e-30
-"""The shortest step that may be asked for, s: light goes 3e-22 m in it, and single precision holds it."""
+"""This is the shortest step that may be asked for, s: light goes 3e-22 m in it, and single precision holds
+it."""
 MOST_STEPS = 2.0**53
-"""Steps that a run may take: with more, one is shorter than what the time at the end is rounded to."""
+"""A run may take so many steps: with more, one is shorter than what the time at the end is rounded to."""
 
 
 @ti.func
 def shortest_representable(s, w, shortest):
-    """The shortest step (s, f64), where this one is asked for, that the time at the end still tells."""
+    """Return the shortest step (s, f64), where ``shortest`` is asked for, that the time at the end still
+    tells."""
     return ti.max(ti.cast(shortest, ti.f64), s.end[w] / MOST_STEPS)
 
 

@@ -41,20 +41,21 @@ class Verlet(Stepper):
     def step(self, context: StepContext) -> Step:
         kick = (Kick(context),) if context.forced else ()
         drift = (BeginStep(context), Move(context), Advance(context))
-        return Step((*drift, *context.update_lists, *context.update_history, *context.sum_forces, *kick))
+        return Step((*drift, *context.update_lists, *context.sum_forces, *kick))
 
 
 @ti.func
 def half_kick(s, w, i, turning: ti.template()):  # type: ignore[valid-type]
-    """v += dt/2 F/m; spin += dt/2 M/I with I = 2/5 m R^2, a solid sphere's (Z16 7.8)."""
+    """Kick velocity and spin by half a step: v += dt/2 F/m; spin += dt/2 M/I with I = 2/5 m R^2, a solid
+    sphere's (Z16 7.8)."""
     half = 0.5 * ti.cast(s.dt[w], s.real)
-    s.velocity[w, i] += half / s.mass[w, i] * s.force[w, i]
+    s.velocity[w, i] = s.velocity[w, i] + half / s.mass[w, i] * s.force[w, i]
     if ti.static(turning):
-        s.spin[w, i] += half / (0.4 * s.mass[w, i] * s.radius[w, i] ** 2) * s.torque[w, i]
+        s.spin[w, i] = s.spin[w, i] + half / (0.4 * s.mass[w, i] * s.radius[w, i] ** 2) * s.torque[w, i]
 
 
 class Move(PerParticle):
-    """Kick, drift, wrap, and what operators do to single particles."""
+    """This phase kicks, drifts and wraps particles, and lets operators change single particles."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -79,7 +80,9 @@ class Move(PerParticle):
 
 
 class Kick(PerParticle):
-    """The second half of the kick."""
+    """This phase is the second half of the kick."""
+
+    local = True
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -91,14 +94,14 @@ class Kick(PerParticle):
 
 
 class Advance(Phase):
-    """Time moves on, and pair lists hear how far particles have moved."""
+    """This phase moves time on, and tells pair lists how far particles have moved."""
 
     def __init__(self, context: StepContext) -> None:
-        self.s, self.neighbour_list = context.s, context.neighbour_list
-        self.lists = context.neighbour_list is not None
+        self.s, self.lists = context.s, context.neighbour_lists
+        self.listed = context.neighbour_lists is not None
 
     @ti.func
     def run(self, w, _k):
         advance_clock(self.s, w)
-        if ti.static(self.lists):
-            self.neighbour_list.moved(w)
+        if ti.static(self.listed):
+            self.lists.moved(w)

@@ -5,8 +5,8 @@ from typing import Any
 
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects.base import Effect, PairForce
-from tisim.interactions.contact_history import memory_fields
+from tisim.effects.base import Effect, Force, PairEvent, PairForce
+from tisim.interactions.contact_memory import memory_fields
 from tisim.interactions.force_sum import FORCE, TORQUE, turning
 from tisim.scene.scene import Scene
 from tisim.testing.uncompiled import allocated, offered
@@ -60,6 +60,8 @@ class _DeclaredState:
         found = [effect.data for effect in effects]
         fields = [field for data in found for field in data.required_fields()]
         fields += [field for data in found if isinstance(data, PairForce) for field in memory_fields(data)]
+        for force in (data for data in found if isinstance(data, Force)):
+            fields += force.memory_fields(found)
         self.declared = {field if isinstance(field, str) else field.name for field in fields}
         if turning(found):
             self.declared.add("spin")
@@ -85,9 +87,11 @@ class _Hooks:
         self.single = offered(effect, "force", "torque", "velocity_jacobian")
         self.reach = offered(effect, "reach")
         self.pair = offered(effect, "pair_force", "pair_torque", "influence")
-        self.touching, self.remember = offered(effect, "touching"), offered(effect, "remember")
+        self.load, self.interaction = offered(effect, "load"), offered(effect, "interaction")
+        self.memory = max(1, getattr(effect.data, "memory", 0))
         self.response = offered(effect, "response")
-        self.event = offered(effect, "contact", "resolve")
+        event = isinstance(effect.data, PairEvent)
+        self.event = offered(effect, "contact", "resolve") if event else ()
         self.particle, self.world = offered(effect, "particle"), offered(effect, "world")
 
     @ti.kernel
@@ -106,10 +110,11 @@ class _Hooks:
             hook(s, w, i)
         for hook in ti.static(self.pair):
             hook(s, w, i, j, apart, distance, t)
-        for hook in ti.static(self.touching):
-            hook(s, w, i, j, apart, distance)
-        for hook in ti.static(self.remember):
-            hook(s, w, i, j, apart, distance, apart, dt)
+        past = ti.Vector.zero(s.real, self.memory)
+        for hook in ti.static(self.interaction):
+            hook(s, w, i, j, apart, distance, past, dt, t)
+        for hook in ti.static(self.load):
+            hook(s, w, i, t, dt, True)
         for hook in ti.static(self.response):
             hook(s, w, i, apart, t)
         for hook in ti.static(self.event):

@@ -4,10 +4,8 @@ import numpy as np
 
 from tisim.engine.simulation import Simulation
 from tisim.errors import must
+from tisim.neighbours.half_list import ALL_PAIRS
 from tisim.scene.scene import Scene
-
-NO_LISTS = 2**30
-"""More particles than any world has: one with so many still looks at all pairs."""
 
 
 def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
@@ -23,7 +21,7 @@ def assert_lists(scene: Scene, simulation: Simulation | None = None) -> None:
     must(not control.watches_pairs, "step control", "one that does not look at pairs", control.kind())
     made = simulation or Simulation(scene, worlds=2)
     made.load([scene, scene])
-    made.s.write("listed_above", np.array([0, NO_LISTS]))
+    made.s.write("listed_above", np.array([0, ALL_PAIRS]))
     made.begin()
     _assert_equal(made, "at the start")
     made.run()

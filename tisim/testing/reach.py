@@ -7,11 +7,11 @@ import numpy as np
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects.base import DerivedQuantity, Pairwise
+from tisim.effects.base import DerivedQuantity, PairForce, Pairwise
 from tisim.engine.allocation import parts
 from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.scene.scene import Scene
-from tisim.testing.uncompiled import allocated, offered
+from tisim.testing.uncompiled import allocated
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
@@ -62,8 +62,8 @@ class _Distances:
     """This kernel evaluates a short-ranged law for each pair of the first world, at some distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
-        names = ("pair_force", "pair_torque", "influence")
-        self.s, self.effect, self.laws = s, effect, offered(effect, *names)
+        self.s, self.effect, self.force = s, effect, isinstance(effect.data, PairForce)
+        self.memory = max(1, getattr(effect.data, "memory", 0))
         # Where the distance is that of the reach, a law may find it just within by rounding.
         at = 1.0 + 1e3 * float(np.finfo(np.float64 if s.real == ti.f64 else np.float32).eps)
         self.factors = (WITHIN, at, *FARTHER)
@@ -95,9 +95,18 @@ class _Distances:
         apart = s.position[0, j] - s.position[0, i]
         for k in range(self.number):
             distance = limit * ti.cast(self.factor[k], s.real)
-            total = 0.0 * a
-            for law in ti.static(self.laws):
-                done = law(s, 0, i, j, distance / apart.norm() * apart, distance, s.time[0])
-                # Not its length: in f32 the square of a small force is nothing.
-                total += ti.abs(done).max()
-            self.size[i, j, k] = total
+            self.size[i, j, k] = self.effect_size(i, j, distance / apart.norm() * apart, distance)
+
+    @ti.func
+    def effect_size(self, i, j, separation, distance):
+        """How much i and j do to each other; no length: in f32 the square of a small force is nothing."""
+        s, total = self.s, 0.0 * distance
+        if ti.static(self.force):
+            past = ti.Vector.zero(s.real, self.memory)
+            force, turn, back, _ = self.effect.interaction(
+                s, 0, i, j, separation, distance, past, 0.0 * distance, s.time[0]
+            )
+            total = ti.abs(force).max() + ti.abs(turn).max() + ti.abs(back).max()
+        else:
+            total = ti.abs(self.effect.influence(s, 0, i, j, separation, distance, s.time[0])).max()
+        return total

@@ -6,7 +6,7 @@ from typing import Any
 
 from tisim.backend.memory import collected
 from tisim.effects.base import Effect
-from tisim.engine.allocation import Allocation, allocate
+from tisim.engine.allocation import Allocation
 from tisim.scene.scene import Scene
 from tisim.worlds.bound import Bound
 
@@ -15,7 +15,7 @@ from tisim.worlds.bound import Bound
 def allocated(scene: Scene) -> Iterator[Allocation]:
     """Yield the fields of one world and the bound parts of its scene; free the memory at the end."""
     with collected() as trees:
-        made = allocate(scene, 1, scene.capacity())
+        made = Allocation(scene, 1, scene.capacity())
         try:
             yield made
         finally:

@@ -6,12 +6,12 @@ from tisim.worlds.program import Phase
 from tisim.worlds.state import State
 
 BLOCK = 64
-"""Particles of a block."""
+"""A block has so many particles."""
 
 
 @ti.data_oriented
 class BlockSums:
-    """The sums over each block, ``terms`` of them side by side; f64."""
+    """BlockSums hold the sums over each block, ``terms`` of them side by side; f64."""
 
     def __init__(self, s: State, terms: int) -> None:
         self.s, self.terms = s, terms
@@ -22,17 +22,17 @@ class BlockSums:
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
-        """Device memory, in bytes."""
+        """Return the device memory that the sums take, in bytes."""
         return 8 * self.s.worlds * self.blocks * self.terms
 
     @ti.func
     def number(self, w):
-        """Blocks in use."""
+        """Return the number of blocks in use."""
         return (self.s.count[w] + BLOCK - 1) // BLOCK
 
     @ti.func
     def total(self, w):
-        """The sums over all blocks."""
+        """Return the sums over all blocks."""
         total = ti.Vector.zero(ti.f64, self.terms)
         for b in range(self.number(w)):
             total += self.partial[w, b]
@@ -40,7 +40,7 @@ class BlockSums:
 
 
 class PerBlock(Phase):
-    """A loop over blocks of particles that also sums ``each(w, i)`` over them."""
+    """This phase is a loop over blocks of particles that also sums ``each(w, i)`` over them."""
 
     def __init__(self, sums: BlockSums) -> None:
         self.s, self.sums, self.extent = sums.s, sums, sums.blocks
@@ -51,7 +51,7 @@ class PerBlock(Phase):
 
     @ti.func
     def each(self, w, i):
-        """Work on particle i, and its terms of the sums; f64."""
+        """Work on particle i, and return its terms of the sums; f64."""
         return ti.Vector.zero(ti.f64, self.sums.terms)
 
     @ti.func

@@ -15,7 +15,7 @@ Kind = TypeVar("Kind", bound=Component)
 
 
 class Bound(Generic[Part]):
-    """A part of a scene, bound to the device memory of a batch of worlds.
+    """A bound part is a part of a scene with the device memory of a batch of worlds.
 
     In a method decorated with ``ti.func``, ``self`` is the bound object. There each parameter is a function
     of the world, ``self.hardness(w)``, each list of parts is one object for all of its rows,
@@ -44,14 +44,14 @@ class Bound(Generic[Part]):
 
 
 class Peers(tuple[Bound[Any], ...]):
-    """The bound effects of a scene, in scene order."""
+    """Peers are the bound effects of a scene, in scene order."""
 
     def of(self, *kinds: type[Kind]) -> tuple[Bound[Kind], ...]:
-        """Return those whose data is of one of these classes."""
+        """Return those peers whose data is of one of these classes."""
         return tuple(effect for effect in self if isinstance(effect.data, kinds))
 
     def bound(self, part: Kind) -> Bound[Kind]:
-        """Return the one that was made from this very part."""
+        """Return the peer that was made from this very part."""
         return next(effect for effect in self if effect.data is part)
 
 

@@ -11,7 +11,7 @@ from tisim.errors import must
 
 @dataclass(frozen=True)
 class Field:
-    """A quantity that particles carry.
+    """A field is a quantity that particles carry.
 
     merge : what becomes of it when two particles become one: "mean" by mass, "sum", "volume" (a radius),
         or "keep" (of the absorbing particle). Splitting does the reverse: a sum is shared equally.
@@ -62,13 +62,13 @@ SHARED = {
         Field("fixed", "", 1, "keep", integer=True, minimum=0.0),
     )
 }
-"""Fields that several effects share by name."""
+"""These are the fields that several effects share by name."""
 
 
 def resolve_fields(needs: Iterable[str | Field]) -> tuple[Field, ...]:
-    """The core and everything needed, each once, in a fixed order.
+    """Return the core and everything needed, each once, in a fixed order.
 
-    InputError for a field that two parts declare differently.
+    InputError is raised for a field that two parts declare differently.
     """
     fields = {field.name: field for field in CORE}
     for need in needs:

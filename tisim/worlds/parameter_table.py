@@ -66,14 +66,15 @@ def _width(kind: type[Component]) -> int:
 
 
 def _slots(part: Component) -> int:
-    """In the table of a world: the part's own, and for each list its length and room for its rows."""
+    """Return the number of slots of a part in the table of a world: its own, and for each list its length and
+    room for its rows."""
     return _width(type(part)) + sum(
         1 + _width(kind) * room(len(getattr(part, n))) for n, kind in part.lists()
     )
 
 
 def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
-    """What stands in the slots of a part, in order, each with its dotted name."""
+    """Yield what stands in the slots of a part, in order, each with its dotted name."""
     names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
     yield from zip(names, part.values(), strict=True)
     for name, kind in part.lists():
@@ -86,7 +87,7 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
 
 
 class ParameterTable:
-    """The parameters of every part of a scene, for every world: ``table[world, slot]``."""
+    """The table has the parameters of every part of a scene, for every world: ``table[world, slot]``."""
 
     def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
         self.slots = sum(_slots(part) for part in parts)
@@ -112,7 +113,7 @@ class ParameterTable:
 
     @in_taichi_thread
     def _place(self, values: np.ndarray) -> Any:
-        """An array in device memory."""
+        """Return an array in device memory that holds these values."""
         column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
         builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
         self.trees.append(Tree(builder))
@@ -133,7 +134,7 @@ class ParameterTable:
     def write(self, rows: Sequence[Sequence[Component]]) -> None:
         """Set the parameters of each world from its parts, in the order they were bound.
 
-        InputError for one that the precision cannot hold, or that kernels would flush to zero.
+        InputError is raised for one that the precision cannot hold, or that kernels would flush to zero.
         """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):

@@ -6,36 +6,48 @@ a ``Repeat``. The same phases run on two schedules, with the same bits:
 
 "world"    - a thread takes a world through many steps in one launch. No launches and no barriers between
              phases, and a world stays in cache: the way for batches and small systems on a CPU.
-"particle" - each phase is one launch over all particles of all worlds: the way for GPUs and for one
-             large system on many cores.
+"particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs and for one
+             large system on many cores. What may be repeated begins a launch of its own.
 
 That the bits agree needs no luck: phases only combine through sums in a fixed order, integer atomics and
 floating-point minima and maxima, none of which depend on the order of parallel work.
 """
 
 from collections.abc import Iterator
+from itertools import groupby
 from typing import ClassVar
 
+from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
 TASK = 512
-"""Iterations that Taichi and Quadrants hand to a CPU thread at once, whatever block size is asked for
-(measured: a loop of 512 runs on one thread, one of 1024 on two). With one world in each, worlds spread
-over all threads."""
+"""Taichi and Quadrants hand so many iterations to a CPU thread at once, whatever block size is asked for
+(measured: a loop of 512 runs on one thread, one of 1024 on two). With one world in each, worlds spread over
+all threads."""
+
+TASKS_PER_THREAD = 4
+"""A loop has so many tasks for each thread of a CPU, so that a thread that comes late has less to do."""
 
 
 class Phase:
-    """One loop. ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds size.
+    """A phase is one loop: ``run(w, k)`` is called for k in 0..size(w)-1 when ``when(w)``; ``extent`` bounds
+    size.
 
-    ``long`` says that one item is work enough for a launch.
+    ``long`` says that one item is work enough for a launch, ``light`` that a task has many items, on a CPU.
     """
 
     conditional: ClassVar[bool] = False
     long: bool = False
     extent: int = 1
+    light: bool = True
+
+    @property
+    def name(self) -> str:
+        """Return what the phase is called where a step is explained."""
+        return type(self).__name__
 
     @ti.func
     def when(self, w):
@@ -51,7 +63,13 @@ class Phase:
 
 
 class PerParticle(Phase):
-    """A loop over the live particles of a world."""
+    """This phase is a loop over the live particles of a world.
+
+    local : whether an item reads and writes nothing but its own particle and what its world had before, so
+    that it may follow at once when the phase before is done with that particle.
+    """
+
+    local: ClassVar[bool] = False
 
     def __init__(self, s: State) -> None:
         self.s, self.extent = s, s.capacity
@@ -62,7 +80,7 @@ class PerParticle(Phase):
 
 
 class Repeat:
-    """Items, in order, again and again while ``pending(w)`` is above zero.
+    """A repeat takes items in order, again and again while ``pending(w)`` is above zero.
 
     Items are phases, and further repeats. Only the last phase may change what ``pending`` says, and once it
     says 0, the items of that phase that are left must have nothing to do: they may be skipped.
@@ -80,18 +98,19 @@ Item = Phase | Repeat
 
 
 class Nest:
-    """Repeats within each other, from the outermost; a loop in them runs while all are pending."""
+    """A nest is repeats within each other, from the outermost; a loop in them runs while all are pending."""
 
     def __init__(self, repeats: tuple[Repeat, ...] = ()) -> None:
         self.repeats = repeats
         self.inner: dict[Repeat, Nest] = {}
 
     def within(self, repeat: Repeat) -> "Nest":
-        """This nest, and a repeat in it; the same object whenever asked, as kernels are compiled for each."""
+        """Return this nest with a repeat in it; the same object whenever asked, as kernels are compiled for
+        each."""
         return self.inner.setdefault(repeat, Nest((*self.repeats, repeat)))
 
     def phases(self, items: tuple[Item, ...]) -> "Iterator[tuple[Phase, Nest]]":
-        """Every phase among the items, in order, with the nest that it is in."""
+        """Yield every phase among the items, in order, with the nest that it is in."""
         for item in items:
             if isinstance(item, Repeat):
                 yield from self.within(item).phases(item.items)
@@ -100,16 +119,94 @@ class Nest:
 
 
 @ti.data_oriented
+class Launch:
+    """A launch takes phases that follow each other: a loop over tasks of each, in every world that goes on.
+
+    A task is a range of items. On a CPU there are not more than keep all threads busy, nor are they so small
+    that waking a thread is not worth it.
+    """
+
+    def __init__(self, program: "Program", phases: tuple[Phase, ...], nest: Nest) -> None:
+        self.program, self.s, self.nest = program, program.s, nest
+        settings = runtime.current()
+        self.iterations = TASK if settings.device == "cpu" else 1
+        most = TASKS_PER_THREAD * settings.threads
+        self.loops: tuple[tuple[Phase, int, int], ...] = ()
+        for phase in phases:
+            tasks = phase.extent
+            if settings.device == "cpu":
+                tasks = max(1, min(most, phase.extent // (TASK if phase.light else 1)))
+            self.loops += ((phase, tasks, -(-phase.extent // tasks)),)
+
+    @ti.kernel
+    def run(self):
+        for loop in ti.static(self.loops):
+            if ti.static(self.program.serial and self.s.worlds * loop[1] == 1):
+                ti.loop_config(serialize=True)
+            for w, q in ti.ndrange(self.s.worlds, loop[1] * self.iterations):
+                if q % self.iterations == 0:
+                    self.task(loop, w, q // self.iterations)
+            if ti.static(self.program.serial):
+                ti.loop_config(serialize=True)
+            for w in range(self.s.worlds):
+                self.program._stop_failed(w)
+
+    @ti.func
+    def task(self, loop: ti.template(), w, task):  # type: ignore[valid-type]
+        if self.program._active(self.nest, w) and loop[0].when(w) > 0:
+            begin = task * loop[2]
+            for k in range(begin, ti.min(begin + loop[2], loop[0].size(w))):
+                loop[0].run(w, k)
+
+
+@ti.data_oriented
+class Loop:
+    """A loop makes the launches of a repeat, again and again while any world is pending."""
+
+    def __init__(self, program: "Program", items: "tuple[Item, ...]", nest: Nest) -> None:
+        self.program, self.s, self.nest = program, program.s, nest
+        self.plan = plan(program, items, nest)
+
+    @ti.kernel
+    def count(self) -> ti.i32:
+        n = 0
+        if ti.static(self.program.serial):
+            ti.loop_config(serialize=True)
+        for w in range(self.s.worlds):
+            if self.program._active(self.nest, w):
+                n += 1
+        return n
+
+
+Plan = tuple[Launch | Loop, ...]
+
+
+def plan(program: "Program", items: "tuple[Item, ...]", nest: Nest) -> Plan:
+    """Return the launches that these items take."""
+    launches: list[Launch | Loop] = []
+    for repeated, group in groupby(items, lambda item: isinstance(item, Repeat)):
+        if repeated:
+            repeats = [item for item in group if isinstance(item, Repeat)]
+            launches += [Loop(program, repeat.items, nest.within(repeat)) for repeat in repeats]
+        else:
+            launches.append(Launch(program, tuple(item for item in group if isinstance(item, Phase)), nest))
+    return tuple(launches)
+
+
+@ti.data_oriented
 class Program:
-    """One step of every running world, compiled for a state and a list of items."""
+    """A program is one step of every running world, compiled for a state and a list of items."""
 
     def __init__(self, s: State, items: tuple[Item, ...], schedule: str) -> None:
         self.s, self.items, self.schedule = s, items, schedule
         self.outside = Nest()
+        # One task has one thread, which is faster without waking it.
+        self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
+        self.plan: Plan = plan(self, items, self.outside) if schedule == "particle" else ()
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
-        """At most ``steps`` steps of every running world; none goes on past its ``pause_time`` or its
+        """Take at most ``steps`` steps of every running world; none goes on past its ``pause_time`` or its
         ``goal``, or after a launch that has left a step under way."""
         self.s.check()
         if self.schedule == "world":
@@ -119,15 +216,15 @@ class Program:
         for _ in range(steps):
             if not self._count_going_on():
                 return
-            self._launch(self.items, self.outside)
+            self._launch(self.plan)
 
-    def _launch(self, items: tuple[Item, ...], nest: Nest) -> None:
-        for item in items:
-            if isinstance(item, Repeat):
-                while self._count_running(nest.within(item)):
-                    self._launch(item.items, nest.within(item))
+    def _launch(self, launches: Plan) -> None:
+        for launch in launches:
+            if isinstance(launch, Launch):
+                launch.run()
             else:
-                self._sweep(item, nest)
+                while launch.count():
+                    self._launch(launch.plan)
 
     @in_taichi_thread
     def compile(self) -> None:
@@ -136,15 +233,20 @@ class Program:
             self._advance_worlds(0)
             return
         self._count_going_on()
-        for phase, nest in self.outside.phases(self.items):
-            self._count_running(nest)
-            self._sweep(phase, nest)
+        self._compile(self.plan)
+
+    def _compile(self, launches: Plan) -> None:
+        for launch in launches:
+            if isinstance(launch, Launch):
+                launch.run()
+            else:
+                launch.count()
+                self._compile(launch.plan)
 
     def names(self) -> list[str]:
-        """What runs in a step, in order; repeated phases have a star for each repeat that they are in."""
-        return [
-            type(phase).__name__ + "*" * len(nest.repeats) for phase, nest in self.outside.phases(self.items)
-        ]
+        """Return what runs in a step, in order; repeated phases have a star for each repeat that they are
+        in."""
+        return [phase.name + "*" * len(nest.repeats) for phase, nest in self.outside.phases(self.items)]
 
     @ti.kernel
     def _advance_worlds(self, steps: ti.i32):
@@ -205,27 +307,13 @@ class Program:
         return active
 
     @ti.kernel
-    def _sweep(self, phase: ti.template(), nest: ti.template()):  # type: ignore[valid-type]
-        for w, k in ti.ndrange(self.s.worlds, phase.extent):
-            if self._active(nest, w) and k < phase.size(w) and phase.when(w) > 0:
-                phase.run(w, k)
-        for w in range(self.s.worlds):
-            self._stop_failed(w)
-
-    @ti.kernel
     def _count_going_on(self) -> ti.i32:
-        """Between two steps: which worlds wait, and how many do not."""
+        """Note between two steps which worlds wait, and return how many do not."""
         n = 0
+        if ti.static(self.serial):
+            ti.loop_config(serialize=True)
         for w in range(self.s.worlds):
             self.s.paused[w] = ti.cast(self._waits(w), ti.i32)
             if self._active(self.outside, w):
-                n += 1
-        return n
-
-    @ti.kernel
-    def _count_running(self, nest: ti.template()) -> ti.i32:  # type: ignore[valid-type]
-        n = 0
-        for w in range(self.s.worlds):
-            if self._active(nest, w):
                 n += 1
         return n

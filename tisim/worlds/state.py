@@ -1,10 +1,11 @@
 """The particle fields of a batch of worlds: a core, plus the union of what the scene's effects need.
 
 Every field has a leading world axis. Vectors are stored as separate components (structure of arrays),
-which the compiler can vectorise over particles.
+which the compiler can vectorise over particles; or all quantities of a particle together (array of
+structures), for scenes that do most of their work on pairs of particles picked from a list.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,21 +22,21 @@ CLOCK = (
     *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
     *("reached", "cut"),
 )
-"""The quantities of a world that tell its time and how its steps go, f64."""
+"""These quantities of a world (f64) tell its time and how its steps go."""
 BOOKS = (
     *("count", "status", "failed", "failing_particle", "failing_effect"),
     *("changed", "events", "next_id", "underway"),
 )
-"""The integers of a world that tell how many particles it has and how it is doing, i32."""
+"""These integers of a world (i32) tell how many particles it has and how it is doing."""
 MOTION = ("frame", "displacement", "displacement_since_list")
-"""The vectors of a world that tell how far its particles have moved, f64."""
+"""These vectors of a world (f64) tell how far its particles have moved."""
 TALLIES = ("steps", "particle_steps")
-"""The counters that every world keeps, i64."""
+"""These counters (i64) are those that every world keeps."""
 
 
 @ti.data_oriented
 class State:
-    """Device memory of ``worlds`` worlds of at most ``capacity`` particles.
+    """A state is the device memory of ``worlds`` worlds of at most ``capacity`` particles.
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
     ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
@@ -45,6 +46,9 @@ class State:
     not ended it yet: unless that is 0 the particles have no time in common, ``time`` is that of when the step
     began, and ``reached`` (s) one that all have got to. ``cut`` is how far into such a step all was well (s),
     when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
+
+    records : whether the real quantities of a particle lie together in memory.
+    before_reading : called before particle fields are read, by what keeps some of their values elsewhere.
     """
 
     def __init__(
@@ -55,6 +59,7 @@ class State:
         counters: tuple[str, ...],
         world_quantities: tuple[str, ...] = (),
         flags: tuple[str, ...] = (),
+        records: bool = False,
     ) -> None:
         self.worlds, self.capacity = worlds, capacity
         self.fields, self.counters = fields, (*TALLIES, *counters)
@@ -62,8 +67,11 @@ class State:
         self.reported = tuple(field for field in fields if not field.scratch)
         self.real = runtime.current().real
         builder = ti.FieldsBuilder()
+        self._record: list[Any] | None = [] if records else None
         for field in fields:
             setattr(self, field.name, self._place(builder, field))
+        if self._record:
+            builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
         quantities, integers = (*CLOCK, *world_quantities), (*BOOKS, *flags)
         for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (self.counters, ti.i64)):
             for name in names:
@@ -90,6 +98,7 @@ class State:
             setattr(self, name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
+        self.before_reading: list[Callable[[], None]] = []
         own = ("seed", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
         self.columns = (*quantities, *integers, *MOTION, *self.counters, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
@@ -118,14 +127,17 @@ class State:
         column = ti.field(dtype) if field.components == 1 else ti.Vector.field(field.components, dtype)
         parts = [column] if field.components == 1 else [column.get_scalar_field(k) for k in range(3)]
         for part in parts:
-            builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).place(part)
+            if self._record is not None and dtype == self.real:
+                self._record.append(part)
+            else:
+                builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).place(part)
         return column
 
     def _by_merge_rule(self, rule: str) -> tuple[Any, ...]:
         return tuple(getattr(self, field.name) for field in self.fields if field.merge == rule)
 
     def bytes(self) -> dict[str, int]:
-        """Bytes of each particle field, all worlds together."""
+        """Return the bytes of each particle field, all worlds together."""
         size = 8 if self.real == ti.f64 else 4
         return {
             f.name: int(np.prod(f.shape(self.worlds, self.capacity)))
@@ -140,29 +152,32 @@ class State:
         return self._exchanges[names]
 
     def snapshot(self, names: Iterable[str]) -> dict[str, np.ndarray]:
-        """Fields as arrays of their full shapes, by name.
+        """Return fields as arrays of their full shapes, by name.
 
         A copy is compiled for each choice of particle fields, and one for all quantities of the worlds.
         """
         names = tuple(names)
         particles = tuple(name for name in names if name not in self.columns)
+        for store in self.before_reading if particles else ():
+            store()
         arrays = self._exchange(particles).read() if particles else {}
         if len(particles) < len(names):
             arrays |= self._exchange(self.columns).read()
         return {name: arrays[name] for name in names}
 
     def read(self, name: str) -> np.ndarray:
-        """A field as an array of its full shape."""
+        """Return a field as an array of its full shape."""
         return self.snapshot((name,))[name]
 
     def saved(self) -> tuple[str, ...]:
-        """Names of all that decides how a simulation goes on, pair lists apart: these may be made anew."""
+        """Return the names of all that decides how a simulation goes on, pair lists apart: these may be made
+        anew."""
         fields = (field.name for field in self.fields)
         worlds = (*CLOCK, *BOOKS, *self.counters, *self.world_quantities, *self.flags)
         return (*fields, *worlds, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
-        """A copy of all worlds as they are, by the names that are saved."""
+        """Return a copy of all worlds as they are, by the names that are saved."""
         return self.snapshot(self.saved())
 
     def fill(self, values: Mapping[str, Any]) -> None:
@@ -181,11 +196,12 @@ class State:
 
     @property
     def alive(self) -> bool:
-        """Whether the memory is there: neither given back, nor gone because Taichi has been started anew."""
+        """Return whether the memory is there: neither given back, nor gone because Taichi has been started
+        anew."""
         return self._tree.alive
 
     def check(self) -> None:
-        """RunError when the memory is gone."""
+        """Raise RunError when the memory is gone."""
         if self._tree.generation != runtime.generation():
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
         if not self.alive:
@@ -193,7 +209,7 @@ class State:
 
     @ti.func
     def axes(self, column: ti.template(), w):  # type: ignore[valid-type]
-        """The three components of a world quantity."""
+        """Return the three components of a world quantity."""
         return ti.Vector([column[w, 0], column[w, 1], column[w, 2]])
 
     @ti.func
@@ -219,7 +235,7 @@ class State:
 
     @ti.func
     def append(self, w, i):
-        """A copy of particle i in a new slot, whose index is returned. The caller has checked ``room``."""
+        """Copy particle i to a new slot, and return its index. The caller has checked ``room``."""
         k = self.count[w]
         self.copy(w, i, k)
         for column in ti.static(self.slotted):
@@ -233,7 +249,8 @@ class State:
 
     @ti.func
     def room(self, w):
-        """Free slots, of those that its scene has, so that no world ends otherwise in a larger simulation."""
+        """Return the number of free slots, of those that its scene has, so that no world ends otherwise in a
+        larger simulation."""
         return self.most[w] - self.count[w]
 
     @ti.func
@@ -245,13 +262,13 @@ class State:
 
     @ti.func
     def fail_by_force(self, w, status, i):
-        """Stop a world by a force on i; which of them, failure_attribution.py finds out."""
+        """Stop a world by a force on particle i; failure_attribution.py finds out which of them it was."""
         self.fail(w, status, i)
         self.ask(w, self.time[w])
 
     @ti.func
     def ask(self, w, t):
-        """Which force it was at t (s), as the world is now."""
+        """Ask which force it was that stopped a world, at t (s) and as the world is now."""
         ti.atomic_min(self.failing_effect[w], ASKED)
         self.failure_time[w] = t
 

@@ -4,7 +4,8 @@ from enum import IntEnum
 
 
 class WorldStatus(IntEnum):
-    """How a world is doing; of several failures in one phase, the one with the highest number counts."""
+    """A status says how a world is doing; of several failures in one phase, the one with the highest number
+    counts."""
 
     RUNNING = 0
     ENDED = 1
@@ -25,12 +26,16 @@ class WorldStatus(IntEnum):
     """A force asks for a step shorter than the shortest."""
     NOT_POSITIVE_DEFINITE = 9
     """A diffusion matrix is not positive definite."""
+    LIST_OVERFLOW = 10
+    """There are more near pairs than their list has room for; it is made longer, and the world goes on."""
 
 
 NO_ONE = 2**31 - 1
-"""The value of failing_particle and failing_effect of a world that no particle, or no effect, has stopped."""
+"""This is the value of failing_particle and failing_effect of a world that no particle, or no effect, has
+stopped."""
 ASKED = NO_ONE - 1
-"""The value of failing_effect where a force has stopped a world and which of them is not yet known."""
+"""This is the value of failing_effect where a force has stopped a world and which of them is not yet
+known."""
 
 NEVER = 2**62
-"""A number of steps that no world gets to."""
+"""This is a number of steps that no world gets to."""

@@ -61,7 +61,8 @@ def slip(s, w, i, j, separation, distance):
 
 
 class NormalContact(PairForce):
-    """The contract of a law by which spheres that touch push each other apart along the line of centres."""
+    """This is the contract of a law by which spheres that touch push each other apart along the line of
+    centres."""
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True

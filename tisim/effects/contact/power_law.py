@@ -12,13 +12,13 @@ from tisim.worlds.bound import Peers
 
 
 class ContactLaw(Effect):
-    """The contract of an effect that changes the stiffness of contact."""
+    """This is the contract of an effect that changes the stiffness of contact."""
 
     contract: ClassVar[bool] = True
 
     @ti.func
     def softened(self, s, w, i, stiffness):
-        """Stiffness of grain i as it is now, given that of the material (N/m^2)."""
+        """Return the stiffness (N/m^2) of grain i as it is now, given that of the material."""
         return stiffness
 
 

@@ -8,7 +8,7 @@ from tisim.effects.contact.normal import NormalContact, arm
 
 
 class SurfaceContact(PairForce):
-    """The contract of a force at the point of contact of touching spheres, which turns both."""
+    """This is the contract of a force at the point of contact of touching spheres, which turns both."""
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
@@ -22,13 +22,12 @@ class SurfaceContact(PairForce):
         return 0.0 * separation
 
     @ti.func
-    def pair_force(self, s, w, i, j, separation, distance, t):
-        total = 0.0 * separation
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        force, turn, back = 0.0 * separation, 0.0 * separation, 0.0 * separation
         if distance <= s.radius[w, i] + s.radius[w, j]:
-            total = self.surface_force(s, w, i, j, separation, distance)
-        return total
-
-    @ti.func
-    def pair_torque(self, s, w, i, j, separation, distance, t):
-        force = self.pair_force(s, w, i, j, separation, distance, t)
-        return arm(s, w, i, j, distance) / distance * separation.cross(force)
+            force = self.surface_force(s, w, i, j, separation, distance)
+            # n x F is the same seen from either: both turn round at once.
+            couple = separation.cross(force) / distance
+            turn = arm(s, w, i, j, distance) * couple
+            back = arm(s, w, j, i, distance) * couple
+        return force, turn, back, past

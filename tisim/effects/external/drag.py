@@ -17,11 +17,12 @@ from tisim.sources.base import sources
 from tisim.worlds.bound import Peers
 
 LEAST_SPEED = 1e-30
-"""m/s. Stands for a speed of zero where a direction is needed that then has no effect."""
+"""This speed, in m/s, stands for zero where a direction is needed that then has no effect."""
 
 
 class Drag(Force):
-    """The contract of a drag law, F = g u, where g is a multiple of a power of |u| and u = v_f - v."""
+    """This is the contract of a drag law, F = g u, where g is a multiple of a power of |u| and u = v_f -
+    v."""
 
     contract: ClassVar[bool] = True
     depends_on_velocity: ClassVar[bool] = True
@@ -32,12 +33,12 @@ class Drag(Force):
 
     @ti.func
     def resistance(self, s, w, i, speed):
-        """g (N s/m) at this |u| (m/s), and the power of |u| that it goes with."""
+        """Return g (N s/m) at this |u| (m/s), and the power of |u| that it goes with."""
         return 0.0 * speed, 0.0 * speed
 
     @ti.func
     def approach(self, s, w, i, t):
-        """u = v_f - v. m/s."""
+        """Return u = v_f - v, in m/s."""
         u = -s.velocity[w, i]
         for source in ti.static(self.flow):
             u += source.value(w, s.position[w, i], t)
@@ -51,7 +52,7 @@ class Drag(Force):
 
     @ti.func
     def velocity_jacobian(self, s, w, i, t):
-        """dF/dv = -g (I + p u u^T / u^2) for g that goes with |u|^p."""
+        """Return dF/dv = -g (I + p u u^T / u^2) for g that goes with |u|^p, in N s/m."""
         u = self.approach(s, w, i, t)
         speed = u.norm()
         g, power = self.resistance(s, w, i, speed)

@@ -45,6 +45,6 @@ class Lorentz(Force):
 
     @ti.func
     def velocity_jacobian(self, s, w, i, t):
-        """d(q v x B)/dv = -q [B]x, [B]x v = B x v."""
+        """Return d(q v x B)/dv = -q [B]x, where [B]x v = B x v, in N s/m."""
         b = self.flux_density(s, w, i, t)
         return s.charge[w, i] * ti.Matrix([[0.0, b[2], -b[1]], [-b[2], 0.0, b[0]], [b[1], -b[0], 0.0]])

@@ -27,11 +27,11 @@ class Agglomeration(ImpactLaw):
     @ti.func
     def bond(self, s, w, i, j, separation):
         share = s.mass[w, j] / (s.mass[w, i] + s.mass[w, j])
-        s.position[w, i] += share * separation
+        s.position[w, i] = s.position[w, i] + share * separation
         for field in ti.static(s.means):
-            field[w, i] += share * (field[w, j] - field[w, i])
+            field[w, i] = field[w, i] + share * (field[w, j] - field[w, i])
         s.radius[w, i] = ti.pow(s.radius[w, i] ** 3 + s.radius[w, j] ** 3, 1.0 / 3.0)
         for field in ti.static(s.sums):
-            field[w, i] += field[w, j]
+            field[w, i] = field[w, i] + field[w, j]
         s.remove(w, j)
         ti.atomic_add(s.merges[w], 1)

@@ -53,4 +53,4 @@ class DeformationWork(ImpactLaw):
 
     @ti.func
     def book(self, s, w, i, energy):
-        s.deformation_work[w, i] += energy
+        s.deformation_work[w, i] = s.deformation_work[w, i] + energy

@@ -98,7 +98,8 @@ class Impact(PairEvent):
 
     @ti.func
     def contact(self, s, w, i, j, separation):
-        """Time since the surfaces met (s): overlap over approach speed; negative unless both are positive."""
+        """Return the time (s) since the surfaces met: overlap over approach speed; negative unless both are
+        positive."""
         closing = (s.velocity[w, i] - s.velocity[w, j]).dot(separation)
         reach = s.radius[w, i] + s.radius[w, j]
         due = ti.cast(-1.0, s.real)
@@ -118,7 +119,8 @@ class Impact(PairEvent):
 
     @ti.func
     def bonding(self, w, pressure, hardness):
-        """x = 1 - e from the force over 2 pi min(b)^2 (Pa): the quadratic above, in a form without loss."""
+        """Return x = 1 - e from the force over 2 pi min(b)^2 (Pa), by the quadratic above in a form without
+        loss."""
         a0, d = self.initial_area(w), self.final_area(w) - self.initial_area(w)
         p = pressure / hardness
         x = 0.0 * p
@@ -129,7 +131,8 @@ class Impact(PairEvent):
 
     @ti.func
     def tangential(self, w, reduced, v_n, v_t, x):
-        """Tangential impulse (N s): all of the slip when bonded, else what friction gives, never more."""
+        """Return the tangential impulse (N s): all of the slip when bonded, else what friction gives, never
+        more."""
         stop = reduced * v_t
         impulse = stop
         if x < 1.0:
@@ -140,13 +143,13 @@ class Impact(PairEvent):
 
     @ti.func
     def lost(self, w, reduced, v_n, v_t, x):
-        """Kinetic energy lost by the pair, J."""
+        """Return the kinetic energy (J) lost by the pair."""
         e, slip = 1.0 - x, v_t - self.tangential(w, reduced, v_n, v_t, x) / reduced
         return 0.5 * reduced * ((1.0 - e * e) * v_n * v_n + v_t * v_t - slip * slip)
 
     @ti.func
     def supplied(self, w, reduced, v_n, smaller, x):
-        """Energy that the impact laws give each grain, J."""
+        """Return the energy (J) that the impact laws give each grain."""
         energy = 0.0 * x
         for law in ti.static(self.supply):
             energy += law.supply(w, self.area(w, smaller, x), self.work(reduced, v_n, x))
@@ -154,7 +157,7 @@ class Impact(PairEvent):
 
     @ti.func
     def work(self, reduced, v_n, x):
-        """Work of deformation (Z04 4.7-4.9; see heating.py), J."""
+        """Return the work of deformation (Z04 4.7-4.9; see heating.py), in J."""
         e = 1.0 - x
         return reduced * v_n * v_n * (1.0 - e * e) / 3.0
 
@@ -165,7 +168,7 @@ class Impact(PairEvent):
 
     @ti.func
     def solve_restitution(self, s, w, i, j, reduced, v_n, v_t, smaller):
-        """x = 1 - e at which hardness, heat and restitution agree."""
+        """Return x = 1 - e at which hardness, heat and restitution agree."""
         pressure = reduced * v_n * v_n / (4.0 * ti.math.pi * self.deformation_length(w) * smaller**3)
         x = ti.cast(1.0, s.real)
         if ti.static(len(self.hardness_factor) == 0):
@@ -200,7 +203,7 @@ class Impact(PairEvent):
 
     @ti.func
     def support(self, s, w, i, j, separation):
-        """What forces press together stays together, and slides as friction lets it; what that takes of its
+        """Hold together what forces press together, which slides as friction lets it; what that takes of its
         kinetic energy is heat, and nothing else happens."""
         m_i, m_j = s.mass[w, i], s.mass[w, j]
         reduced = m_i * m_j / (m_i + m_j)
@@ -240,8 +243,8 @@ class Impact(PairEvent):
         impulse = reduced * v_n * (2.0 - x) * n
         if v_t > 0.0:
             impulse += self.tangential(w, reduced, v_n, v_t, x) * slip / v_t
-        s.velocity[w, i] -= impulse / m_i
-        s.velocity[w, j] += impulse / m_j
+        s.velocity[w, i] = s.velocity[w, i] - impulse / m_i
+        s.velocity[w, j] = s.velocity[w, j] + impulse / m_j
         if x >= 1.0:
             common = s.velocity[w, i] + m_j / (m_i + m_j) * (s.velocity[w, j] - s.velocity[w, i])
             s.velocity[w, i], s.velocity[w, j] = common, common

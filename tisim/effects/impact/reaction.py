@@ -32,4 +32,4 @@ class Reaction(ImpactLaw):
 
     @ti.func
     def book(self, s, w, i, energy):
-        s.reaction_heat[w, i] += energy
+        s.reaction_heat[w, i] = s.reaction_heat[w, i] + energy

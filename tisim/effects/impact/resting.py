@@ -17,22 +17,24 @@ is, a pair that meets in this step collides, and what SHARE takes for rest goes 
 from tisim.backend.taichi import ti
 
 ROUNDOFF = {ti.f64: 2.0**-53, ti.f32: 2.0**-24}
-"""u: a number is known to this part of itself."""
+"""The unit roundoff u: a number is known to this part of itself."""
 
 SHARE = 16.0
-"""How much faster than forces make it in a step a pair in contact may approach, and still not collide."""
+"""A pair in contact may approach this many times as fast as forces make it in a step, and still not
+collide."""
 
 
 @ti.func
 def rounding(s, w, i, j, separation):
-    """What rounding may make of (v_i - v_j) . (r_j - r_i) of a pair at rest. m^2/s."""
+    """Return what rounding may make of (v_i - v_j) . (r_j - r_i) of a pair at rest, in m^2/s."""
     speeds = ti.abs(s.velocity[w, i]) + ti.abs(s.velocity[w, j])
     return 5.0 * ROUNDOFF[s.real] * speeds.dot(ti.abs(separation))
 
 
 @ti.func
 def rests(s, w, i, j, separation):
-    """Whether an overlapping pair was in contact when the step began, and only forces have pressed it."""
+    """Return whether an overlapping pair was in contact when the step began, and only forces have pressed
+    it."""
     dt = ti.cast(s.dt[w], s.real)
     slip = s.velocity[w, i] - s.velocity[w, j]
     gained = dt * (s.force[w, i] / s.mass[w, i] - s.force[w, j] / s.mass[w, j])
@@ -47,5 +49,5 @@ def rests(s, w, i, j, separation):
 @ti.func
 def press(s, w, i, impulse):
     """Give grain i the impulse of a contact (N s), and count it among the forces of the step."""
-    s.velocity[w, i] += impulse / s.mass[w, i]
-    s.force[w, i] += impulse / ti.cast(s.dt[w], s.real)
+    s.velocity[w, i] = s.velocity[w, i] + impulse / s.mass[w, i]
+    s.force[w, i] = s.force[w, i] + impulse / ti.cast(s.dt[w], s.real)

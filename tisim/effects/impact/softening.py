@@ -12,7 +12,8 @@ from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.law import ImpactLaw
 
 LARGEST_EXPONENT = 50.0
-"""Hardness is then 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a solid."""
+"""At this exponent hardness is 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a
+solid."""
 
 
 class Softening(ImpactLaw):

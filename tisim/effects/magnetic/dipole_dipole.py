@@ -9,7 +9,7 @@ from tisim.effects.base import Effect, PairForce, parameter
 from tisim.effects.magnetic.moment import MOMENT
 
 CUTOFFS = (10.0, 20.0, 30.0, 60.0)
-"""Cut-offs worth a try, in radii."""
+"""These cut-offs, in radii, are worth a try."""
 
 
 class DipoleDipole(PairForce):
@@ -39,7 +39,7 @@ class DipoleDipole(PairForce):
 
     @ti.func
     def between(self, s, w, i, j, separation, distance):
-        """Force on i by j. N."""
+        """Return the force on i by j, in N."""
         inverse = 1.0 / distance
         n, square = inverse * separation, inverse * inverse
         # In this order: in f32 the product of two moments of 1e-20 A m^2 is nothing.

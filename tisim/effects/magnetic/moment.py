@@ -24,7 +24,7 @@ DOMAIN = Field("domain_moment", "A m^2", 1, "mean", default="saturation_moment",
 
 
 class Moment(DerivedQuantity):
-    """The contract of a law that gives each particle a magnetic moment, m = law(B)."""
+    """This is the contract of a law that gives each particle a magnetic moment, m = law(B)."""
 
     contract: ClassVar[bool] = True
     quantity = "moment"
@@ -35,12 +35,13 @@ class Moment(DerivedQuantity):
 
     @ti.func
     def law(self, s, w, i, b):
-        """The moment of i in a field of b (T). A m^2."""
+        """Return the moment (A m^2) of i in a field of b (T)."""
         return 0.0 * b
 
     @ti.func
     def response(self, s, w, i, total, t):
-        """In the field of the sources and, where particles act on each other, of theirs: ``total``, T."""
+        """Return the moment (A m^2) of i in the field of the sources and, where particles act on each other,
+        in theirs: ``total``, T."""
         b = total
         for source in ti.static(self.applied):
             b += source.value(w, s.position[w, i], t)

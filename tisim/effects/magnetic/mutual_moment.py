@@ -12,7 +12,7 @@ from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment, Moment
 
 
 class MutualMoment(SelfConsistentQuantity, Moment):
-    """The contract of a moment that follows the field of the sources and of all other moments.
+    """This is the contract of a moment that follows the field of the sources and of all other moments.
 
         m_i = law(B(r_i) + sum_j B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
@@ -22,7 +22,7 @@ class MutualMoment(SelfConsistentQuantity, Moment):
 
     contract: ClassVar[bool] = True
     independent_law: ClassVar[type[Moment]]
-    """The law of a particle that the others do not magnetise."""
+    """This law is that of a particle that the others do not magnetise."""
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         options = {name: getattr(self, name) for name in self.independent_law.model_fields}
@@ -30,7 +30,7 @@ class MutualMoment(SelfConsistentQuantity, Moment):
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """Field of j at i. T."""
+        """Return the field (T) of j at i."""
         inverse = 1.0 / distance
         n = inverse * separation
         # Cube first: in f32 a moment of 1e-17 A m^2 squared is nothing.

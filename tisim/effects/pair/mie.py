@@ -43,7 +43,7 @@ class Mie(PairForce):
 
     @property
     def prefactor(self) -> float:
-        """The prefactor C of the law, which gives it its depth."""
+        """Return the prefactor C of the law, which gives it its depth."""
         return self.n / (self.n - self.m) * (self.n / self.m) ** (self.m / (self.n - self.m))
 
     def at_start(self, masses: np.ndarray) -> Self:

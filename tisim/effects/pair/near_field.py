@@ -21,7 +21,7 @@ from tisim.numerics.powers import Exponent, power
 from tisim.worlds.fields import Field
 
 CUTOFF_PARTS = (0.1, 0.2, 0.5, 1.0)
-"""Cut-offs worth a try, as parts of the largest distance."""
+"""These cut-offs, as parts of the largest distance, are worth a try."""
 
 
 class NearField(PairForce):
@@ -82,7 +82,7 @@ class NearField(PairForce):
 
     @ti.func
     def between(self, s, w, i, j, separation, distance):
-        """Force on i by j. N."""
+        """Return the force on i by j, in N."""
         # Each over d once more, for n_ij = separation / d; one division serves both whole powers.
         attraction = self.alpha1(w) * power(distance, -1 - self.beta1)
         repulsion = self.alpha2(w) * power(distance, -1 - self.beta2)

@@ -37,13 +37,13 @@ class Cylinder(Body):
 
     @property
     def direction(self) -> Vector:
-        """The unit vector along the axis."""
+        """Return the unit vector along the axis."""
         (a, b, c), (u, v, w) = split_direction(self.axis)
         return a + u, b + v, c + w
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
-        """What it is given, and what kernels read in place of axis and magnetisation."""
+        """Yield what the cylinder is given, and what kernels read in place of axis and magnetisation."""
         yield from super().columns()
         yield from (("lead", 3), ("rest", 3), ("across", 3), ("along", 1))
 
@@ -54,8 +54,8 @@ class Cylinder(Body):
 
     @ti.func
     def place(self, w, k, r):
-        """Where r lies: distance from the axis of cylinder k, unit vector from it, place along it from the
-        centre, and distance beyond the nearer end, negative before it."""
+        """Return where r (m) lies: distance from the axis of cylinder k, unit vector from it, place along it
+        from the centre, and distance beyond the nearer end, negative before it."""
         rho, outward, foot, z = place(r, self.centre(w, k), self.lead(w, k), self.rest(w, k))
         side = ti.select(foot + z < 0.0, -1.0, 1.0)
         return rho, outward, foot + z, (side * foot - 0.5 * self.length(w, k)) + side * z
@@ -75,12 +75,12 @@ class Cylinder(Body):
 
     @ti.func
     def unit(self, w, k):
-        """The unit vector along the axis."""
+        """Return the unit vector along the axis."""
         return self.lead(w, k) + self.rest(w, k)
 
     @ti.func
     def shape(self, w, k, rho, z, end):
-        """The six functions of ``cylinder_field``."""
+        """Return the six functions of ``cylinder_field``."""
         return cylinder_field.shape(rho, z, end, self.radius(w, k), 0.5 * self.length(w, k), self.ends)
 
     @ti.func
@@ -99,7 +99,7 @@ class Cylinder(Body):
 
     @ti.func
     def density(self, w, k, six, rho, outward, end):
-        """B = mu_0 (H + M), M inside only."""
+        """Return the flux density B = mu_0 (H + M) (T), M inside only."""
         across, along = cylinder_field.field(six, rho, outward, self.across(w, k), self.along(w, k))
         b = across + along * self.unit(w, k)
         if rho < self.radius(w, k) and end < 0.0:

@@ -18,21 +18,21 @@ from tisim.backend.taichi import ti
 from tisim.numerics.elliptic import elliptic, limits
 
 SLIM = 1.0 / 36.0
-"""(rho / distance to the rim)^2, seen from the axis, below which the series about the axis is used."""
+"""Below this (rho / distance to the rim)^2, seen from the axis, the series about the axis is used."""
 SERIES_BELOW = {ti.f64: 1e-18, ti.f32: 1e-9}
 """Powers in a series that are below this are left out."""
 
 
 def small() -> float:
-    """``SERIES_BELOW`` of the precision that runs."""
+    """Return ``SERIES_BELOW`` of the precision that runs."""
     return SERIES_BELOW[runtime.current().real]
 
 
 @ti.func
 def two_ends(rho, u, radius):
-    """The six numbers of two ends, (6, 2); rho >= 0, both u >= 0, radius > 0 in one unit of length.
+    """Return the six numbers of two ends, (6, 2); rho >= 0, both u >= 0, radius > 0 in one unit of length.
 
-    Side by side, as each waits for its own divisions and roots.
+    They are made side by side, as each waits for its own divisions and roots.
     """
     far = u * u + radius * radius
     slim = rho * rho < SLIM * far
@@ -51,13 +51,13 @@ def two_ends(rho, u, radius):
 
 @ti.func
 def end(rho, u, radius):
-    """The six numbers of one end."""
+    """Return the six numbers of one end."""
     both = two_ends(rho, ti.Vector([u, u]), radius)
     return ti.Vector([both[i, 0] for i in ti.static(range(6))])
 
 
 class ClosedEnds:
-    """Ends as accurate as the precision allows.
+    """These ends are as accurate as the precision allows.
 
     far : (distance from the centre / that of the rim)^2 from where the cylinder is taken as a whole.
     small : powers in that series which are below this are left out.
@@ -75,7 +75,8 @@ class ClosedEnds:
 
 @ti.func
 def near_axis(rho, u, radius, far):
-    """The power series in rho of an axisymmetric harmonic function, whose values on the axis are closed.
+    """Return the six numbers of an end by the power series in rho of an axisymmetric harmonic function, whose
+    values on the axis are closed.
 
     V_uuu(0, u) = R^2 / (2 d^3), d^2 = far = u^2 + R^2, and its k-th derivative is that times
     (-1)^k k! C_k(u/d) / d^k, with Gegenbauer's C_k of order 3/2.
@@ -122,7 +123,8 @@ def near_axis(rho, u, radius, far):
 
 @ti.func
 def off_axis(rho, u, radius):
-    """Closed forms in complete elliptic integrals, put into the sums of ``elliptic``; of two ends, (6, 2).
+    """Return the six numbers of two ends, (6, 2), by closed forms in complete elliptic integrals, put into
+    the sums of ``elliptic``.
 
     The second derivatives are B16 Eqs (5.3)-(5.6), (5.20)-(5.22), the third those of a current loop (W. R.
     Smythe, Static and Dynamic Electricity, 1950, section 7.10).

@@ -7,7 +7,7 @@ from tisim.backend.taichi import ti
 
 @ti.func
 def far_field(rho, z, radius, half, small):
-    """What ``cylinder_field.shape`` gives, at distances r > a = sqrt(R^2 + L^2).
+    """Return what ``cylinder_field.shape`` gives, at distances r > a = sqrt(R^2 + L^2).
 
     small : powers of (a/r)^2 below this are left out.
 

@@ -13,8 +13,8 @@ from tisim.sources.magnetic.cylinder_far import far_field
 
 @ti.func
 def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
-    """The six functions, as a vector. Lengths in one unit. end : |z| - half, which the caller knows without
-    cancellation. ends : closed or tabulated."""
+    """Return the six functions, as a vector. Lengths are in one unit. end : |z| - half, which the caller
+    knows without cancellation. ends : closed or tabulated."""
     six = ti.Vector([0.0 * rho, 0.0, 0.0, 0.0, 0.0, 0.0])
     if rho * rho + z * z > ends.far * (radius * radius + half * half):
         six = far_field(rho, z, radius, half, ends.small)
@@ -25,7 +25,7 @@ def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid
 
 @ti.func
 def close_by(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
-    """The difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
+    """Return the difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
     side, between = ti.select(z < 0.0, -1.0, 1.0), end < 0.0
     pair = ends.both(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
     odd = ti.select(between, 1.0, -1.0)
@@ -50,7 +50,7 @@ def close_by(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[va
 
 @ti.func
 def field(six, rho, outward, m_across, m_along):
-    """H across and along the axis, of M across and along it: sum_j W_ij M_j, in the unit of M.
+    """Return H across and along the axis, of M across and along it: sum_j W_ij M_j, in the unit of M.
 
     outward : unit vector from the axis to the point. All but the last are vectors across the axis.
     """
@@ -61,7 +61,7 @@ def field(six, rho, outward, m_across, m_along):
 
 @ti.func
 def gradient(six, rho, outward, axis, m_across, m_along):
-    """[i, k] dH_i / dr_k = sum_j W_ijk M_j, per unit of length: symmetric and without trace."""
+    """Return [i, k] dH_i / dr_k = sum_j W_ijk M_j, per unit of length: it is symmetric and without trace."""
     turn, cross, bend = six[2], six[3], rho * six[5]
     both, steep = six[4] + 2.0 * cross, bend + 4.0 * turn
     m_out = outward.dot(m_across)

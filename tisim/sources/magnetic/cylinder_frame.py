@@ -14,13 +14,15 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 
 DIGITS, BITS = 50, 24
-"""Digits of what is found here; bits of a unit vector's leading part, whose product with as many is exact."""
+"""These are the digits of what is found here, and the bits of a unit vector's leading part, whose product
+with as many is exact."""
 LARGEST_PLACE = 1e37
-"""m: the largest place along an axis that is split, within the range of f32."""
+"""This is the largest place (m) along an axis that is split, within the range of f32."""
 
 
 def split_direction(axis: Vector) -> tuple[Vector, Vector]:
-    """The unit vector along an axis as the sum of one of ``BITS`` bits and what is left, which is rounded."""
+    """Return the unit vector along an axis as the sum of one of ``BITS`` bits and what is left, which is
+    rounded."""
     with localcontext(prec=DIGITS):
         a = [Decimal(c) for c in axis]
         size = _dot(a, a).sqrt()
@@ -30,7 +32,7 @@ def split_direction(axis: Vector) -> tuple[Vector, Vector]:
 
 
 def split_magnetisation(axis: Vector, magnetisation: Vector) -> tuple[Vector, float]:
-    """The magnetisation across an axis, and its component along it, each rounded once. A/m."""
+    """Return the magnetisation (A/m) across an axis, and its component along it, each rounded once."""
     with localcontext(prec=DIGITS):
         a, m = [Decimal(c) for c in axis], [Decimal(c) for c in magnetisation]
         square = _dot(a, a)
@@ -55,11 +57,11 @@ def _vector(components: list[float]) -> Vector:
 
 @ti.func
 def place(r, centre, lead, rest):
-    """Where r lies: its distance from the axis, the unit vector from there, and its place along the axis as a
-    sum of two, of which the first has the bits of f32.
+    """Return where r lies: its distance from the axis, the unit vector from there, and its place along the
+    axis as a sum of two, of which the first has the bits of f32.
 
-    To rounding of the distance from the axis, however far from the centre. r, centre : m. lead, rest : the
-    direction, as of ``split_direction``.
+    It is exact to rounding of the distance from the axis, however far from the centre. r, centre : m. lead,
+    rest : the direction, as of ``split_direction``.
     """
     # r - centre = d + lost, exactly (D. E. Knuth, The Art of Computer Programming, volume 2, 4.2.2).
     d = r - centre

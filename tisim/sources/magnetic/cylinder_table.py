@@ -18,11 +18,12 @@ from tisim.errors import InputError
 from tisim.sources.magnetic.cylinder_end import end
 
 FIRST_OCTAVE, OCTAVES_END = -40, 16
-"""Powers of two of (d / R)^2 between which the table is."""
+"""The table is between these powers of two of (d / R)^2."""
 GRIDS = ((3, 1, 2), (3, 2, 4), (3, 4, 8), (3, 8, 16), (5, 4, 8), (5, 8, 16))
-"""Degree, cells of d^2 in an octave, and of direction in a quadrant; the smallest first."""
+"""These are the degree, and the cells of d^2 in an octave and of direction in a quadrant; the smallest
+first."""
 SAFE = 3.0
-"""Field and gradient are differences between ends, in which errors weigh more: by less than that."""
+"""Field and gradient are differences between ends, in which errors weigh more, by less than this factor."""
 
 
 @in_taichi_thread
@@ -47,8 +48,8 @@ def _numbers(octave: np.ndarray, part: np.ndarray, side: np.ndarray, slant: np.n
 
 
 def _coefficients(degree: int, parts: int, slants: int) -> np.ndarray:
-    """Coefficients of all cells, (octaves, parts, slants, sides, degree + 1, degree + 1, 6), highest power
-    first."""
+    """Return the coefficients of all cells, (octaves, parts, slants, sides, degree + 1, degree + 1, 6),
+    highest power first."""
     x = chebyshev.chebpts1(degree + 1)
     solve = np.linalg.inv(np.vander(x, degree + 1))
     octave, i, j, side = np.meshgrid(
@@ -62,8 +63,8 @@ def _coefficients(degree: int, parts: int, slants: int) -> np.ndarray:
 
 
 def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
-    """Largest error at random points, of what makes the field and of what makes the gradient, each of its own
-    size."""
+    """Return the largest error at random points, of what makes the field and of what makes the gradient, each
+    of its own size."""
     draw = np.random.Generator(np.random.Philox(16))
     _, parts, slants, _, n, _, _ = coefficients.shape
     octave, side = draw.integers(FIRST_OCTAVE, OCTAVES_END, points), draw.integers(0, 2, points)
@@ -82,7 +83,8 @@ def _error(coefficients: np.ndarray, points: int = 200_000) -> float:
 
 @cache
 def _table(digits: int, settings: runtime.Runtime) -> tuple[np.ndarray, tuple[int, int, int]]:
-    """The smallest that is accurate to so many digits, (cells, numbers in each), and its grid."""
+    """Return the smallest table that is accurate to so many digits, (cells, numbers in each), and its
+    grid."""
     for grid in GRIDS:
         coefficients = _coefficients(*grid)
         if SAFE * _error(coefficients) < 10.0**-digits:
@@ -97,7 +99,7 @@ def table(digits: int) -> tuple[np.ndarray, tuple[int, int, int]]:
 
 
 class TabulatedEnds:
-    """Ends read from a table, where there is one. cells : the bound array of ``table``."""
+    """These ends are read from a table, where there is one. cells : the bound array of ``table``."""
 
     far = 9.0
 

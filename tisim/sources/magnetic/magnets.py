@@ -11,7 +11,7 @@ from tisim.worlds.bound import Peers
 
 
 class Body(Component):
-    """The contract of a solid body that may be magnetised; k is its row in the list of the source."""
+    """This is the contract of a solid body that may be magnetised; k is its row in the list of the source."""
 
     contract: ClassVar[bool] = True
 
@@ -36,9 +36,8 @@ class Body(Component):
 
 
 class Magnets(Source):
-    """The contract of the sum of the fields of a list of bodies, each magnetised as it says, not by the
-    others.
-    """
+    """This is the contract of the sum of the fields of a list of bodies, each magnetised as it says, not by
+    the others."""
 
     contract: ClassVar[bool] = True
     quantity: ClassVar[str] = "magnetic_flux_density"

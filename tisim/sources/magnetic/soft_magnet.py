@@ -17,7 +17,8 @@ from tisim.sources.magnetic.stoner_wohlfarth import demagnetising_factor
 def magnetisation(
     axis: Vector, radius: float, length: float, saturation: float, flux_density: Vector
 ) -> Vector:
-    """M (A/m) of a body without hysteresis and of a permeability without end, in a uniform field B_0 (T).
+    """Return M (A/m) of a body without hysteresis and of a permeability without end, in a uniform field B_0
+    (T).
 
     It minimises shape and Zeeman energy, mu_0/2 M.N M - M.B_0 per volume, among all M of size ``saturation``
     at most. So its own field cancels the applied one inside, N M = B_0/mu_0 along each axis, until it is
@@ -25,7 +26,7 @@ def magnetisation(
     N is the mean over the volume. Long bodies saturate in weaker fields along their axis than across, where
     N is near 1/2.
     Source: R. M. Bozorth, D. M. Chapin, J. Appl. Phys. 13 (1942) 320.
-    InputError for an axis of length 0, or a cylinder or saturation that is not above 0.
+    InputError is raised for an axis of length 0, or a cylinder or saturation that is not above 0.
     """
     size = float(np.linalg.norm(axis))
     must(0 < size < np.inf, "axis of a cylinder", "a direction", axis)

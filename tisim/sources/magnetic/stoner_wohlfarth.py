@@ -14,12 +14,13 @@ from tisim.errors import must
 
 
 def demagnetising_factor(radius: float, length: float) -> float:
-    """N of a uniformly magnetised cylinder along its axis, the mean over its volume; (1 - N) / 2 across it.
+    """Return N of a uniformly magnetised cylinder along its axis, the mean over its volume; (1 - N) / 2
+    across it.
 
     1 - N is what a current sheet of its shape has of the inductance of a long one, per length: with
     k^2 = 4 R^2 / (4 R^2 + l^2), 4 / (3 pi k') ((k'/k)^2 (K - E) + E - k) (L. Lorenz, Ann. Phys. 243 (1879)
     161; H. Nagaoka, J. Coll. Sci. Imp. Univ. Tokyo 27 (1909) 1).
-    InputError unless both (m) are above 0.
+    InputError is raised unless both (m) are above 0.
     """
     must(radius > 0, "radius of a cylinder", "greater than 0", radius)
     must(length > 0, "length of a cylinder", "greater than 0", length)
@@ -33,16 +34,17 @@ def demagnetising_factor(radius: float, length: float) -> float:
 def magnetisation(
     axis: Vector, radius: float, length: float, saturation: float, flux_density: Vector
 ) -> Vector:
-    """M (A/m), of size ``saturation``, that minimises shape and Zeeman energy in a uniform field B_0 (T).
+    """Return M (A/m), of size ``saturation``, that minimises shape and Zeeman energy in a uniform field B_0
+    (T).
 
     Per volume, with psi from the axis and alpha the angle of B_0 from it,
 
         mu_0 M^2 / 4 (1 - 3 N) sin^2(psi) - M B_0 cos(psi - alpha)
 
-    The minimum over all psi, so without hysteresis. Of two alike the one along ``axis``; without a field
-    that is where M of a long cylinder points, and a flat one then has it somewhere across.
+    It is the minimum over all psi, so without hysteresis. Of two alike the one along ``axis`` is taken;
+    without a field that is where M of a long cylinder points, and a flat one then has it somewhere across.
     Source: E. C. Stoner, E. P. Wohlfarth, Phil. Trans. R. Soc. A 240 (1948) 599; B16 section 6.3.
-    InputError for an axis of length 0, or a cylinder or saturation that is not above 0.
+    InputError is raised for an axis of length 0, or a cylinder or saturation that is not above 0.
     """
     size = float(np.linalg.norm(axis))
     must(0 < size < np.inf, "axis of a cylinder", "a direction", axis)
@@ -60,7 +62,7 @@ def magnetisation(
 
 
 def _angle(anisotropy: float, along: float, across: float) -> float:
-    """psi that minimises a/2 sin^2(psi) - b_1 cos(psi) - b_2 sin(psi), all in T; b_2 >= 0.
+    """Return psi that minimises a/2 sin^2(psi) - b_1 cos(psi) - b_2 sin(psi), all in T; b_2 >= 0.
 
     Where it is stationary x = tan(psi/2) satisfies b_2 x^4 + 2 (b_1 - a) x^3 + 2 (b_1 + a) x - b_2 = 0.
     """

@@ -64,6 +64,7 @@ class Brownian(Stepper):
     )
     noise: Literal["exact", "fast"] = option("how noise is made", "exact")
 
+    all_pairs = True
     random: ClassVar = True
     world_quantities: ClassVar = (*INTERVAL_QUANTITIES, "beta")
     flags: ClassVar = INTERVAL_FLAGS
@@ -112,7 +113,7 @@ class Brownian(Stepper):
         matrix = isinstance(interaction, Exact)
         drift = (*interaction.phases(), BrownianDrift(context, fluid, interaction))
         move = (BeginStep(context), Scatter(context, fluid, interaction), Proceed(context))
-        end = (*context.update_lists, *context.update_history, *context.sum_forces)
+        end = (*context.update_lists, *context.sum_forces)
         buffers = (Buffer(interaction, "diffusion matrix", self.kind()),) if matrix else ()
         return Step((*drift, *move, *end), buffers)
 
@@ -126,5 +127,5 @@ class Brownian(Stepper):
 
 
 def _one_by_one(effect: Effect) -> bool:
-    """Whether it changes each particle by itself, and a world as a whole never."""
+    """Return whether an effect changes each particle by itself, and a world as a whole never."""
     return isinstance(effect, Operator) and not effect.offers("world")

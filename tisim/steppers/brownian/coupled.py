@@ -9,28 +9,28 @@ from tisim.worlds.program import PerParticle, Phase
 
 @ti.data_oriented
 class Separate:
-    """No hydrodynamic interaction: D_ij = 0 for i != j."""
+    """Separate leaves out hydrodynamic interaction: D_ij = 0 for i != j."""
 
     def __init__(self, fluid) -> None:
         self.s, self.fluid = fluid.s, fluid
 
     def phases(self):
-        """What prepares a step."""
+        """Return the phases that prepare a step: none."""
         return ()
 
     @ti.func
     def push_velocity(self, w, i):
-        """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
+        """Return the velocity (m/s) that forces give particle i, sum_j D_ij F_j / kT."""
         return self.fluid.push_velocity(w, i, self.fluid.mobility(w, i))
 
     @ti.func
     def scattered(self, w, i):
-        """A random vector z_i with <z_i z_j> = D_ij. m/s^0.5."""
+        """Return a random vector z_i (m/s^0.5) with <z_i z_j> = D_ij."""
         return ti.sqrt(self.fluid.diffusivity(w, i)) * self.fluid.normals(w, i, self.s.steps[w])
 
 
 class BrownianDrift(PerParticle):
-    """The velocity of drift at the start of a step, and the step that it allows."""
+    """This phase sets the velocity of drift at the start of a step, and notes the step that it allows."""
 
     def __init__(self, context: StepContext, fluid, interaction) -> None:
         super().__init__(context.s)
@@ -52,7 +52,8 @@ class BrownianDrift(PerParticle):
 
 
 class Scatter(PerParticle):
-    """r += dt v + sqrt(2 dt) z (B16 Eqs 6.11, 6.15), and what operators do to single particles."""
+    """This phase moves particles, r += dt v + sqrt(2 dt) z (B16 Eqs 6.11, 6.15), and lets operators change
+    single particles."""
 
     def __init__(self, context: StepContext, fluid, interaction) -> None:
         super().__init__(context.s)
@@ -75,15 +76,16 @@ class Scatter(PerParticle):
 
 
 class Proceed(Phase):
-    """Time moves on, pair lists hear how far particles have moved, and nothing limits the next step yet."""
+    """This phase moves time on, tells pair lists how far particles have moved, and lifts every limit on the
+    next step."""
 
     def __init__(self, context: StepContext) -> None:
-        self.s, self.neighbour_list = context.s, context.neighbour_list
-        self.lists = context.neighbour_list is not None
+        self.s, self.lists = context.s, context.neighbour_lists
+        self.listed = context.neighbour_lists is not None
 
     @ti.func
     def run(self, w, _k):
         advance_clock(self.s, w)
         self.s.steepest[w] = 0.0
-        if ti.static(self.lists):
-            self.neighbour_list.moved(w)
+        if ti.static(self.listed):
+            self.lists.moved(w)

@@ -14,12 +14,13 @@ from tisim.steppers.step_control import SHORTEST_STEP, Controller
 from tisim.worlds.status import WorldStatus
 
 LARGEST_DRIFT = 1e9
-"""Steps of one longest step at most: a particle by itself numbers them with 32 bits."""
+"""The number of steps in one longest step is at most this: a particle by itself numbers them with 32 bits."""
 
 
 @ti.func
 def fault(rate):
-    """What is wrong with a force that asks for steps of 1/rate which are too short."""
+    """Return the status that says what is wrong with a force that asks for steps of 1/rate which are too
+    short."""
     return ti.select(rate < ti.math.inf, WorldStatus.FORCE_TOO_STEEP, WorldStatus.NOT_FINITE)
 
 
@@ -64,24 +65,25 @@ class DriftLimit(Controller):
 
     @ti.func
     def rate(self, s, w, i, velocity):
-        """1 over the step that a particle allows which forces move at ``velocity`` (m/s). 1/s, f64."""
+        """Return 1 over the step (1/s, f64) that a particle allows which forces move at ``velocity``
+        (m/s)."""
         return ti.cast(velocity.norm() / (self.drift(w) * s.radius[w, i]), ti.f64)
 
     @ti.func
     def easy(self, s, w, i, velocity):
-        """Whether the longest step is one that a particle allows: without root and division, which take
-        longer than the rest of a step. False of NaN."""
+        """Return whether a particle allows the longest step, found without root and division, which take
+        longer than the rest of a step; False for a NaN."""
         reach, path = self.drift(w) * s.radius[w, i], self.longest(w) * velocity
         return path.norm_sqr() < reach * reach
 
     @ti.func
     def hopeless(self, w, rate):
-        """Whether that step is too short; also true of NaN."""
+        """Return whether the step for this rate (1/s) is too short; also True for a NaN."""
         return not (rate * ti.cast(self.shortest(w), ti.f64) <= 1.0)
 
     @ti.func
     def step(self, w, rate):
-        """The step for this rate. s, f64."""
+        """Return the step (s, f64) for this rate (1/s)."""
         dt = ti.cast(self.longest(w), ti.f64)
         # A branch that is mostly not taken: others need not wait for the force.
         if rate * dt > 1.0:

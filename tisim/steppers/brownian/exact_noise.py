@@ -13,16 +13,17 @@ from tisim.worlds.program import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)
-"""Three standard normal numbers of a particle in a step."""
+"""This field holds the three standard normal numbers of a particle in a step."""
 TILE_ROWS = 32
-"""Rows of the matrix that are reduced together, so that compilers vectorise it."""
+"""So many rows of the matrix are reduced together, so that compilers vectorise it."""
 
 
 @ti.data_oriented
 class Exact:
-    """The matrix of every world, over sqrt(D_ii D_jj); then C^T in its place, a row for each column of C.
+    """Exact keeps the diffusion matrix of every world, over sqrt(D_ii D_jj); then C^T in its place, a row for
+    each column of C.
 
-    InputError where all of them are more than the machine has room for.
+    InputError is raised where all of them are more than the machine has room for.
     """
 
     def __init__(self, fluid, mobility, domain) -> None:
@@ -39,21 +40,21 @@ class Exact:
         self.least = 1e-12 if self.s.real == ti.f64 else 1e-5
 
     def phases(self):
-        """What prepares a step."""
+        """Return the phases that prepare a step."""
         return (Draw(self.fluid), Push(self), Fill(self), Factor(self))
 
     def bytes(self) -> int:
-        """Device memory, in bytes."""
+        """Return the device memory that the matrices take, in bytes."""
         return (8 if self.s.real == ti.f64 else 4) * self.s.worlds * self.rows**2
 
     @ti.func
     def push_velocity(self, w, i):
-        """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
+        """Return the velocity (m/s) that forces give particle i, sum_j D_ij F_j / kT."""
         return self.s.velocity[w, i]
 
     @ti.func
     def scattered(self, w, i):
-        """A random vector z_i with <z_i z_j> = D_ij, sum_j C_ij g_j. m/s^0.5."""
+        """Return a random vector z_i = sum_j C_ij g_j (m/s^0.5) with <z_i z_j> = D_ij."""
         z = 0.0 * self.s.gauss[w, i]
         for j in range(i + 1):
             g = self.s.gauss[w, j]
@@ -64,7 +65,7 @@ class Exact:
 
 
 class Draw(PerParticle):
-    """The noise of a step."""
+    """This phase draws the noise of a step."""
 
     def __init__(self, fluid) -> None:
         super().__init__(fluid.s)
@@ -76,7 +77,7 @@ class Draw(PerParticle):
 
 
 class Push(PairSum):
-    """What forces do, sum_j D_ij F_j / kT, kept in ``velocity``."""
+    """This phase sums what forces do, sum_j D_ij F_j / kT, and keeps it in ``velocity``."""
 
     def __init__(self, exact) -> None:
         super().__init__(exact.s, exact.domain, (exact.mobility,), None)
@@ -94,7 +95,7 @@ class Push(PairSum):
 
 
 class Fill(PerParticle):
-    """The blocks of a particle and those after it."""
+    """This phase fills in the block of a particle by itself, and those of it with the particles after it."""
 
     def __init__(self, exact) -> None:
         super().__init__(exact.s)
@@ -113,7 +114,7 @@ class Fill(PerParticle):
 
 
 class Factor(Phase):
-    """Cholesky's decomposition, left-looking, three columns at a time."""
+    """This phase is Cholesky's decomposition, left-looking, three columns at a time."""
 
     def __init__(self, exact) -> None:
         self.s, self.m = exact.s, exact
@@ -155,7 +156,7 @@ class Factor(Phase):
         for k in range(3 * j, column):
             x = matrix[w, k, column]
             for row in range(column, n):
-                matrix[w, column, row] -= x * matrix[w, k, row]
+                matrix[w, column, row] = matrix[w, column, row] - x * matrix[w, k, row]
         pivot = matrix[w, column, column]
         # Not above: also true of NaN.
         if not (pivot > -self.m.least):

@@ -26,28 +26,29 @@ SUMS = (
     Field("coupling_squares", "", 3, "keep", scratch=True),
     Field("coupling", "", 1, "keep", scratch=True),
 )
-"""The sums of a particle: sum_j rho_ij g_j, sum_j rho_ij^2 for each coordinate, and the traces of rho_ij."""
+"""These fields hold the sums of a particle: sum_j rho_ij g_j, sum_j rho_ij^2 for each coordinate, and the
+traces of rho_ij."""
 
 
 @ti.data_oriented
 class Fast:
-    """The truncated expansion in a world."""
+    """Fast makes the noise of a world by the truncated expansion."""
 
     def __init__(self, fluid, mobility, domain) -> None:
         self.s, self.fluid, self.mobility, self.domain = fluid.s, fluid, mobility, domain
 
     def phases(self):
-        """What prepares a step."""
+        """Return the phases that prepare a step."""
         return (Draw(self.fluid), Couple(self), Weigh(self.fluid))
 
     @ti.func
     def push_velocity(self, w, i):
-        """Velocity that forces give i, sum_j D_ij F_j / kT. m/s."""
+        """Return the velocity (m/s) that forces give particle i, sum_j D_ij F_j / kT."""
         return self.s.velocity[w, i]
 
     @ti.func
     def scattered(self, w, i):
-        """A random vector z_i with nearly <z_i z_j> = D_ij. m/s^0.5."""
+        """Return a random vector z_i (m/s^0.5) with nearly <z_i z_j> = D_ij."""
         s = self.s
         beta = ti.cast(s.beta[w], s.real)
         scale = 1.0 / ti.sqrt(1.0 + beta * beta * s.coupling_squares[w, i])
@@ -55,8 +56,8 @@ class Fast:
 
 
 class Couple(PairSum):
-    """All sums over the others: of what forces do, of noise, of squares, of traces; and of pairs that cannot
-    be, where the tensor does not exclude them."""
+    """This phase makes all sums over the other particles: of what forces do, of noise, of squares, of traces;
+    and stops a world at pairs that cannot be, where the tensor does not exclude them."""
 
     def __init__(self, fast) -> None:
         super().__init__(fast.s, fast.domain, (fast.mobility,), None)
@@ -97,7 +98,7 @@ class Couple(PairSum):
 
 
 class Weigh(Phase):
-    """beta, from the mean of rho_ij."""
+    """This phase finds beta from the mean of rho_ij."""
 
     def __init__(self, fluid) -> None:
         self.s, self.fluid = fluid.s, fluid

@@ -9,12 +9,12 @@ from tisim.sources.base import sources
 from tisim.steppers.context import StepContext
 
 PER_KELVIN = scipy.constants.k
-"""Boltzmann's constant, J/K."""
+"""This is Boltzmann's constant, J/K."""
 
 
 @ti.data_oriented
 class Fluid:
-    """At rest but for the flow, and infinite.
+    """The fluid is infinite, and at rest but for the flow.
 
     In a scene with the field ``fixed``, particles for which that is not 0 stay where they are.
     """
@@ -28,7 +28,7 @@ class Fluid:
 
     @ti.func
     def mobile(self, w, i):
-        """1 for a particle that can move, else 0."""
+        """Return 1 for a particle that can move, else 0."""
         mobile = 1
         if ti.static(self.holds):
             mobile = ti.select(self.s.fixed[w, i] == 0, 1, 0)
@@ -36,7 +36,7 @@ class Fluid:
 
     @ti.func
     def softness(self, w):
-        """1/(6 pi eta): the mobility of a sphere times its radius. m^2/(N s)."""
+        """Return 1/(6 pi eta) (m^2/(N s)): the mobility of a sphere times its radius."""
         return 1.0 / (6.0 * ti.math.pi * self.viscosity(w))
 
     @ti.func
@@ -46,12 +46,12 @@ class Fluid:
 
     @ti.func
     def mobility(self, w, i):
-        """1/(6 pi eta R) (B16 Eq. 6.1). s/kg."""
+        """Return the mobility 1/(6 pi eta R) (s/kg) of particle i (B16 Eq. 6.1)."""
         return self.softness(w) / self.s.radius[w, i]
 
     @ti.func
     def push_velocity(self, w, i, mobility):
-        """Velocity that the force on i gives it. m/s."""
+        """Return the velocity (m/s) that the force on particle i gives it."""
         velocity = 0.0 * self.s.velocity[w, i]
         if ti.static(self.forced):
             velocity = mobility * self.s.force[w, i]
@@ -59,7 +59,7 @@ class Fluid:
 
     @ti.func
     def flow(self, w, i, t):
-        """Velocity of the flow at the centre of i. m/s."""
+        """Return the velocity (m/s) of the flow at the centre of particle i."""
         velocity = 0.0 * self.s.velocity[w, i]
         for source in ti.static(self.streams):
             velocity += source.value(w, self.s.position[w, i], t)
@@ -67,12 +67,12 @@ class Fluid:
 
     @ti.func
     def diffusivity(self, w, i):
-        """D_ii = kT/(6 pi eta R) (B16 Eq. 6.8). m^2/s."""
+        """Return the diffusivity D_ii = kT/(6 pi eta R) (m^2/s) of particle i (B16 Eq. 6.8)."""
         return self.heat(w) * self.mobility(w, i)
 
     @ti.func
     def normals(self, w, i, step):
-        """Three independent standard normal numbers, those of a particle in a step."""
+        """Return three independent standard normal numbers, those of a particle in a step."""
         s = self.s
         g = philox.normals(philox.bits(s.seed[w], BROWNIAN_MOTION, s.id[w, i], step))
         return ti.cast(ti.Vector([g[0], g[1], g[2]]), s.real)

@@ -19,23 +19,24 @@ OWN_BROWNIAN_FIELDS = (
     Field("own_steps", "", 1, "keep", integer=True, scratch=True),
     Field("own_fault", "", 1, "keep", integer=True, scratch=True),
 )
-"""Where a particle is on its way, after how many steps in its interval, and what has stopped it: a status of
-the world, or 0."""
+"""These fields say where a particle is on its way, after how many steps in its interval, and what has stopped
+it: a status of the world, or 0."""
 AHEAD = 8
-"""Synchronisation intervals for which the noise of the first step, mostly the only one, is drawn at once: in
-vectors."""
+"""The noise of the first step, mostly the only one, is drawn for so many synchronisation intervals at once:
+in vectors."""
 
 
 @ti.func
 def euler_step(s, fluid: ti.template(), w, i, mobility, push_velocity, t, dt, g):  # type: ignore[valid-type]
-    """Velocity of drift, u + F/(6 pi eta R), and where a step leads: by dt times that + sqrt(2 D dt) g."""
+    """Return the velocity of drift (m/s), u + F/(6 pi eta R), and the position (m) that a step leads to: by
+    dt times that + sqrt(2 D dt) g."""
     velocity = fluid.flow(w, i, t) + push_velocity
     width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
     return velocity, s.position[w, i] + (dt * velocity + width * g)
 
 
 class IndependentBrownianSteps(PerParticle):
-    """A particle through the intervals of a launch."""
+    """This phase takes each particle through the intervals of a launch."""
 
     long = True
 
@@ -53,7 +54,7 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def advance(self, w, i):
-        """Particle i through the intervals of the launch, from where it is."""
+        """Take particle i through the intervals of the launch, from where it is."""
         s = self.s
         self.registers.load(w, i)
         interval, end = s.own_interval[w, i], s.intervals[w] + s.launch_intervals[w]
@@ -97,17 +98,18 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def able(self, w, i):
-        """Whether there is anything to do for it: it is there, can move, and nothing has stopped it."""
+        """Return 1 when there is anything to do for a particle, else 0: it is there, can move, and nothing
+        has stopped it."""
         s = self.s
         there = s.mass[w, i] > 0.0 and s.own_fault[w, i] == 0
         return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
 
     @ti.func
     def interval(self, w, i, interval, kick, start, rounding, before, most):
-        """A particle through an interval from ``start`` (s) on, ``before`` steps after its beginning: how far
-        it gets, to the end unless stopped, in ``most`` further steps; the rounding error of that; its steps
-        in the interval; whether it can go on, and whether it is at the end. ``kick`` are the normal numbers
-        of the first step in the interval."""
+        """Take a particle through an interval from ``start`` (s) on, ``before`` steps after its beginning.
+        Return how far it gets (s), to the end unless stopped, in ``most`` further steps; the rounding error
+        of that; its steps in the interval; whether it can go on, and whether it is at the end. ``kick`` are
+        the normal numbers of the first step in the interval."""
         begin = beginning(self.s, self.control, w, interval)
         length = duration(self.s, self.control, w, interval, begin)
         elapsed, carry = start, rounding
@@ -143,7 +145,7 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def move(self, w, i, mobility, push_velocity, t, dt, g):
-        """A step, and what operators do to it."""
+        """Move a particle by a step, and let operators change it."""
         s, step = self.own, ti.cast(dt, self.s.real)
         s.velocity[w, i], s.position[w, i] = euler_step(
             s, self.fluid, w, i, mobility, push_velocity, t, step, g
@@ -161,14 +163,14 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def stop(self, w, i, fault):
-        """It goes no further, and its world ends with the launch."""
+        """Stop a particle: it goes no further, and its world ends with the launch."""
         s = self.s
         s.own_fault[w, i] = fault
         ti.atomic_max(s.halted[w], 1)
 
 
 class EndBrownianIntervals(EndIntervals):
-    """The intervals are done; or the first particle to be stopped is found."""
+    """This phase ends the intervals, or finds the first particle to be stopped."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context)
@@ -176,7 +178,7 @@ class EndBrownianIntervals(EndIntervals):
 
     @ti.func
     def report_failure(self, w):
-        """The particle that was stopped first, and when."""
+        """Record the particle that was stopped first, and when."""
         s = self.s
         first = self.slowest(w)
         self.stop(w, first, s.own_fault[w, first])

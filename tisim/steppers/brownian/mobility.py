@@ -12,20 +12,22 @@ NEAR = 1e-9
 
 @ti.data_oriented
 class Oseen:
-    """a = 3/(4r), b = a/r^2: of points (B16 Eq. 6.9). Not positive definite for r < 3/2 sqrt(R_i R_j)."""
+    """Oseen's tensor is that of points, a = 3/(4r), b = a/r^2 (B16 Eq. 6.9); it is not positive definite for
+    r < 3/2 sqrt(R_i R_j)."""
 
     sound = False
 
     @ti.func
     def of(self, one, other, r):
-        """a (1/m) and b (1/m^3) for two radii at a distance. m."""
+        """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m)."""
         a = 0.75 / r
         return ti.Vector([a, a / (r * r)])
 
 
 @ti.data_oriented
 class RotnePrager:
-    """That of J. Rotne and S. Prager (1969) and H. Yamakawa (1970), for any radii, overlapping or not.
+    """This is the tensor of J. Rotne and S. Prager (1969) and H. Yamakawa (1970), for any radii, overlapping
+    or not.
 
     With R the larger radius, s = R_i + R_j, d = R_i - R_j, and b r^2 the second of each pair,
 
@@ -34,15 +36,15 @@ class RotnePrager:
         1/R,                                               0                                    r <= |d|
 
     (P. J. Zuk, E. Wajnryb, K. A. Mizerski, P. Szymczak, J. Fluid Mech. 741, R5 (2014), Eqs 3.7-3.9; B16
-    Eq. 6.10 for equal radii). Positive definite everywhere, but for spheres in each other's place: those move
-    as one, and the matrix is singular.
+    Eq. 6.10 for equal radii). It is positive definite everywhere, but for spheres in each other's place:
+    those move as one, and the matrix is singular.
     """
 
     sound = True
 
     @ti.func
     def of(self, one, other, r):
-        """a (1/m) and b (1/m^3) for two radii at a distance. m."""
+        """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m)."""
         # In units of s, which keeps powers within what f32 can hold; few divisions, as these take longest.
         unit = 1.0 / (one + other)
         x, d, p = ti.max(r * unit, NEAR), ti.abs(one - other) * unit, one * other * unit * unit
@@ -66,7 +68,8 @@ class RotnePrager:
 
 @ti.data_oriented
 class Mobility:
-    """The blocks of a world over kT/(6 pi eta), 1/m; 0 between particles of which one cannot move."""
+    """Mobility gives the blocks of a world over kT/(6 pi eta), 1/m; 0 between particles of which one cannot
+    move."""
 
     short_ranged = False
 
@@ -75,7 +78,7 @@ class Mobility:
 
     @ti.func
     def pair(self, w, i, j, distance):
-        """a (1/m) and b (1/m^3) of a block."""
+        """Return a (1/m) and b (1/m^3) of the block of particles i and j."""
         s = self.s
         parts = self.tensor.of(s.radius[w, i], s.radius[w, j], distance)
         if ti.static(self.fluid.holds):
@@ -84,5 +87,5 @@ class Mobility:
 
     @ti.func
     def times(self, parts, r, vector):
-        """A block times a vector."""
+        """Return a block times a vector."""
         return parts[0] * vector + parts[1] * r.dot(vector) * r

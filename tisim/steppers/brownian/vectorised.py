@@ -15,14 +15,14 @@ from tisim.steppers.registers import Registers
 
 
 def vectorises(context: StepContext) -> bool:
-    """Whether it is of use: on a CPU, where nothing that a particle meets in a step is more than arithmetic,
-    as derived quantities and what operators do."""
+    """Return whether vectors are of use: on a CPU, in worlds with room for a tile, where all that a particle
+    meets in a step is arithmetic: no derived quantities, and no operators."""
     simple = not context.operators and not context.force_sum.derived_solvers
     return simple and runtime.current().device == "cpu" and context.s.capacity >= TILE
 
 
 class VectorisedBrownianSteps(IndependentBrownianSteps):
-    """Tiles of particles through the intervals of a launch."""
+    """This phase takes tiles of particles through the intervals of a launch."""
 
     def __init__(self, context: StepContext, fluid) -> None:
         super().__init__(context, fluid)
@@ -45,8 +45,8 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
 
     @ti.func
     def level(self, w, first):
-        """Whether all particles of a tile are where the launch begins, and have whole intervals before
-        them."""
+        """Return 1 when all particles of a tile are where the launch begins, and have whole intervals before
+        them; else 0."""
         s = self.s
         level = ti.select(s.cut[w] > 0.0, 0, 1)
         for j in range(first, first + TILE):
@@ -56,7 +56,8 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
 
     @ti.func
     def tile(self, w, first):
-        """Particles from ``first`` on, through as many intervals as all take in one step: that number."""
+        """Take the particles from ``first`` on through as many intervals as all take in one step, and return
+        that number."""
         s = self.s
         place = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         drift = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]

@@ -14,7 +14,8 @@ from tisim.worlds.program import Item, PerParticle
 
 
 def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
-    """Force that an iterate was made with, that the last one gave, and its residual; and torques."""
+    """Return the fields of the force that an iterate was made with, that the last one gave, and its residual;
+    and of torques."""
     names = [("force", "N"), *([("torque", "N m")] if turning else [])]
     return tuple(
         Field(f"{name}_{what}", unit, 3, "keep", scratch=True)
@@ -24,12 +25,13 @@ def memory_of_iterates(turning: bool) -> tuple[Field, ...]:
 
 
 def accelerated(context: StepContext, forces: tuple[Item, ...], sums: BlockSums) -> tuple[Item, ...]:
-    """The phases ``forces`` within an iteration, and those that mix the result with the last one."""
+    """Return the phases ``forces`` within an iteration, and those that mix the result with the last one."""
     return (Used(context), *forces, Compare(context, sums), Mix(context, sums))
 
 
 class Mixed:
-    """What is mixed: value, that used, that of the last iterate, its residual; and whether it is a torque."""
+    """Mixed lists what is mixed: value, that used, that of the last iterate, its residual; and whether it is
+    a torque."""
 
     def __init__(self, context: StepContext) -> None:
         s = context.s
@@ -41,7 +43,7 @@ class Mixed:
 
 
 class Used(PerParticle):
-    """Note the force that the present iterate was made with."""
+    """This phase notes the force that the present iterate was made with."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
@@ -54,7 +56,7 @@ class Used(PerParticle):
 
 
 class Compare(PerBlock):
-    """<r, r - r_last> and |r - r_last|^2, of displacements."""
+    """This phase sums <r, r - r_last> and |r - r_last|^2, of displacements."""
 
     def __init__(self, context: StepContext, sums: BlockSums) -> None:
         super().__init__(sums)
@@ -76,7 +78,7 @@ class Compare(PerBlock):
 
 
 class Mix(PerParticle):
-    """x = f - theta (f - f_last); f itself when there is no last one."""
+    """This phase takes x = f - theta (f - f_last); f itself when there is no last one."""
 
     def __init__(self, context: StepContext, sums: BlockSums) -> None:
         super().__init__(context.s)

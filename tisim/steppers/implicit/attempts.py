@@ -8,14 +8,15 @@ from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.status import WorldStatus
 
 RETRY, ACCEPTED, HOPELESS = range(3)
-"""Verdict on an attempt: to be tried again with a shorter step, good, or given up for good."""
+"""The verdict on an attempt is one of these: to be tried again with a shorter step, good, or given up for
+good."""
 
 SHORTER = 0.8
-"""The longest that a second attempt may be, in lengths of the first."""
+"""A second attempt may be at most so long, in lengths of the first."""
 
 
 class Begin(Phase):
-    """A step begins."""
+    """This phase begins a step."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -35,7 +36,7 @@ class Begin(Phase):
 
 
 class SaveState(PerParticle):
-    """Keep the state at the beginning of the step."""
+    """This phase keeps the state at the beginning of the step."""
 
     def __init__(self, saved_state: SavedState) -> None:
         super().__init__(saved_state.s)
@@ -47,7 +48,7 @@ class SaveState(PerParticle):
 
 
 class StepAttempt(Repeat):
-    """Attempts at a step, until one is accepted or all hope is lost."""
+    """This repeat makes attempts at a step, until one is accepted or all hope is lost."""
 
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
@@ -71,7 +72,7 @@ def length(s, control: ti.template(), w):  # type: ignore[valid-type]
 
 @ti.func
 def report_failure(s, w):
-    """The particle whose last iterate changed most; which force on it is at fault, see
+    """Record the particle whose last iterate changed most, and ask which force on it is at fault, see
     failure_attribution.py."""
     worst, most = 0, s.iterate_change[w, 0]
     for i in range(s.count[w]):
@@ -82,7 +83,7 @@ def report_failure(s, w):
 
 
 class RestoreState(PerParticle):
-    """An attempt that has failed leaves everything as it was, for the next one.
+    """After an attempt that has failed this phase puts everything back as it was, for the next one.
 
     One that is hopeless is left as it is: there, which force it was can still be seen (see
     failure_attribution.py).
@@ -107,7 +108,7 @@ class RestoreState(PerParticle):
 
 
 class Decide(Phase):
-    """Try again, or not."""
+    """This phase decides whether to try again."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s

@@ -98,7 +98,7 @@ class Collocation(Stepper):
         )
         begin = (Forget(context), Begin(context), SaveState(stages))
         note = (NoteExcursion(stages),) if self.control.at_end else ()
-        end = (*note, *context.update_history, *apply_operators(context), AdvanceClock(context))
+        end = (*note, *context.advance_memory, *apply_operators(context), AdvanceClock(context))
         return Step(
             (*begin, StepAttempt(context, attempt), *end),
             (

@@ -11,7 +11,7 @@ from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 
 
 class Forget(Phase):
-    """After impacts the past says nothing about what is to come."""
+    """This phase forgets the last step after impacts, when the past says nothing about what is to come."""
 
     def __init__(self, context: StepContext) -> None:
         self.s = context.s
@@ -23,7 +23,7 @@ class Forget(Phase):
 
 
 class ChooseCollocationStep(Phase):
-    """Choose the step, and begin at the first stage after its beginning."""
+    """This phase chooses the step, and begins at the first stage after its beginning."""
 
     def __init__(self, context: StepContext, stages) -> None:
         self.s, self.control, self.stages = context.s, context.control, stages
@@ -40,7 +40,7 @@ class ChooseCollocationStep(Phase):
 
 
 class OfStages(PerParticle):
-    """A loop over particles that knows the stages."""
+    """This is a loop over particles that knows the stages."""
 
     def __init__(self, stages) -> None:
         super().__init__(stages.s)
@@ -48,7 +48,8 @@ class OfStages(PerParticle):
 
 
 class PredictStages(OfStages):
-    """The rates at all stages, from the polynomial of the last step; at the first they are known."""
+    """This phase predicts the rates at all stages from the polynomial of the last step; at the first they are
+    known."""
 
     @ti.func
     def run(self, w, i):
@@ -67,7 +68,7 @@ class PredictStages(OfStages):
 
 
 class StageSweep(Repeat):
-    """Stage after stage, again and again, until there is a verdict."""
+    """This repeat takes stage after stage, again and again, until there is a verdict."""
 
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
@@ -79,7 +80,7 @@ class StageSweep(Repeat):
 
 
 class Place(OfStages):
-    """Put particles where they are at the stage, as far as is known."""
+    """This phase puts particles where they are at the stage, as far as is known."""
 
     @ti.func
     def run(self, w, i):
@@ -98,8 +99,9 @@ class Place(OfStages):
 
 
 class TakeStages(PerBlock):
-    """The rates that the forces at the stage give; sums of their change, as displacements (m), and at the
-    last stage of the error, of what both are compared with, and of what displacements are rounded to."""
+    """This phase takes the rates that the forces at the stage give; it sums their change, as displacements
+    (m), and at the last stage the error, what both are compared with, and what displacements are rounded
+    to."""
 
     def __init__(self, context: StepContext, sums, stages) -> None:
         super().__init__(sums)
@@ -129,7 +131,8 @@ class TakeStages(PerBlock):
 
     @ti.func
     def take(self, rate: ti.template(), w, i, stage, new):  # type: ignore[valid-type]
-        """Note a rate; how much it differs from what was known. Later stages are off alike (``shape``)."""
+        """Note a rate, and return how much it differs from what was known. Later stages are off alike
+        (``shape``)."""
         s, stages = self.s, self.stages
         off = new - stages.at(rate, w, i, stage)
         stages.put(rate, w, i, stage, new)
@@ -141,7 +144,8 @@ class TakeStages(PerBlock):
 
     @ti.func
     def estimate(self, rate: ti.template(), w, i):  # type: ignore[valid-type]
-        """The error over dt^2: |sum_j d_j rate_j|, which bounds it, or what that says of its leading term."""
+        """Return the error over dt^2: |sum_j d_j rate_j|, which bounds it, or what that says of its leading
+        term."""
         total, largest = ti.Vector.zero(self.s.real, 3), ti.cast(0.0, self.s.real)
         for j in range(self.stages.number):
             here = self.stages.at(rate, w, i, j)
@@ -155,7 +159,8 @@ class TakeStages(PerBlock):
 
 
 class Conclude(OfStages):
-    """The velocity at the end, and what the next step is predicted from; positions are there already."""
+    """This phase sets the velocity at the end, and what the next step is predicted from; positions are there
+    already."""
 
     conditional = True
 

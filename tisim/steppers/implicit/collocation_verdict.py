@@ -6,13 +6,15 @@ from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER,
 from tisim.worlds.program import Phase
 
 GUESS = 0.5
-"""Taken for the factor by which a sweep makes the error smaller where nothing is known of it, and at most."""
+"""This is taken for the factor by which a sweep makes the error smaller where nothing is known of it, and at
+most."""
 DIVERGED = 0.5
-"""The longest that a second attempt may be where sweeps did not converge, in lengths of the first."""
+"""A second attempt may be at most so long where sweeps did not converge, in lengths of the first."""
 
 
 class JudgeStages(Phase):
-    """To the next stage; after the last one: is the step solved, to be swept again, or to be given up?"""
+    """This phase goes on to the next stage; after the last one it judges whether the step is solved, to be
+    swept again, or to be given up."""
 
     def __init__(self, context: StepContext, sums, stages) -> None:
         self.s, self.control, self.sums, self.stages = context.s, context.control, sums, stages
@@ -40,7 +42,7 @@ class JudgeStages(Phase):
 
     @ti.func
     def judge(self, w, total):
-        """At the end of a sweep."""
+        """Judge a sweep at its end."""
         s = self.s
         change, error = s.sweep_change[w], ti.cast(0.0, ti.f64)
         # Nothing moves where nothing changes: 0/0 is no error.
@@ -65,7 +67,8 @@ class JudgeStages(Phase):
 
     @ti.func
     def foreseen(self, w):
-        """What a sweep multiplies the error by: it grows as dt^2 and, to be safe, falls as dt only."""
+        """Return what a sweep is foreseen to multiply the error by: it grows as dt^2 and, to be safe, falls
+        as dt only."""
         s = self.s
         factor = ti.cast(GUESS, ti.f64)
         if s.measured_dt[w] > 0.0:
@@ -75,7 +78,7 @@ class JudgeStages(Phase):
 
     @ti.func
     def decide(self, w, solved, contraction, error):
-        """The verdict, and how long the next step is to be."""
+        """Set the verdict, and how long the next step is to be."""
         s = self.s
         s.sweeping[w], s.verdict[w] = 0, RETRY
         # One that is only foreseen may be of long ago: it is no reason for a shorter step.

@@ -13,22 +13,22 @@ from tisim.worlds.fields import Field
 from tisim.worlds.program import PerParticle
 
 Per = Literal["step", "run"]
-"""What an error that is asked for is of: a step, over the displacement in it, or the end of a run, over the
-size of the motion."""
+"""This says what an error that is asked for is of: a step, over the displacement in it, or the end of a run,
+over the size of the motion."""
 TOTAL_DISPLACEMENT = Field("total_displacement", "m", 3, "keep", scratch=True)
-"""The displacement of a particle since its start, through faces of a box too."""
+"""This field is the displacement of a particle since its start, through faces of a box too."""
 EXCURSION = Field("excursion", "m", 1, "keep", scratch=True)
-"""The largest of its distances from its start, at the ends of steps."""
+"""This field is the largest distance of a particle from its start, at the ends of steps."""
 
 
 def excursion_fields(at_end: bool) -> tuple[Field, ...]:
-    """The fields that it takes."""
+    """Return the fields that the control takes when it aims at the end of the run."""
     return (TOTAL_DISPLACEMENT, EXCURSION) if at_end else ()
 
 
 @ti.func
 def error_scale(control: ti.template(), s, w, i, moved, dt):  # type: ignore[valid-type]
-    """What the error is compared with of a particle that has moved so far in a step of dt (s). m."""
+    """Return what the error of a particle that has moved so far in a step of dt (s) is compared with (m)."""
     size, share = moved, ti.cast(1.0, s.real)
     if ti.static(control.at_end):
         size, share = ti.max(s.excursion[w, i], moved), dt / ti.cast(s.end[w], s.real)
@@ -38,12 +38,12 @@ def error_scale(control: ti.template(), s, w, i, moved, dt):  # type: ignore[val
 @ti.func
 def note_excursion(s, w, i, moved):
     """Note the displacement (m, a vector) in a step that is accepted."""
-    s.total_displacement[w, i] += moved
+    s.total_displacement[w, i] = s.total_displacement[w, i] + moved
     s.excursion[w, i] = ti.max(s.excursion[w, i], s.total_displacement[w, i].norm())
 
 
 class NoteExcursion(PerParticle):
-    """Note the displacements in a step. ``solve`` tells them."""
+    """This phase notes the displacements in a step. ``solve`` tells them."""
 
     def __init__(self, solve) -> None:
         super().__init__(solve.s)

@@ -15,7 +15,7 @@ from tisim.worlds.program import PerParticle
 
 
 class IndependentSteps(PerParticle):
-    """A particle through the intervals of a launch."""
+    """This phase takes each particle through the intervals of a launch."""
 
     long = True
 
@@ -67,9 +67,9 @@ class IndependentSteps(PerParticle):
 
     @ti.func
     def interval(self, w, i, begin, length, start, rounding, attempt_limit, aim):
-        """A particle through an interval from ``start`` (s) on: how far it gets, to the end unless it is
-        stuck or has made as many attempts as are allowed; the rounding error of that; its last verdict,
-        steps, attempts and iterations."""
+        """Take a particle through an interval from ``start`` (s) on. Return how far it gets (s), to the end
+        unless it is stuck or has made as many attempts as are allowed; the rounding error of that; its last
+        verdict, steps, attempts and iterations."""
         s = self.own
         elapsed, carry = start, rounding
         steps, tries, iterations, verdict = ti.i64(0), ti.i64(0), ti.i64(0), ACCEPTED
@@ -98,7 +98,7 @@ class IndependentSteps(PerParticle):
 
     @ti.func
     def attempt(self, w, i, t, dt, aim):
-        """One step of this length; the verdict on it, and how many iterations it took."""
+        """Attempt one step of this length (s). Return the verdict on it, and how many iterations it took."""
         s, solve = self.own, self.solve
         step, end = ti.cast(dt, s.real), t + dt
         v = solve.velocity(w, i, step, solve.jacobian(w, i, end))

@@ -17,13 +17,13 @@ from numpy.polynomial.legendre import Legendre
 
 
 def nodes(stages: int) -> np.ndarray:
-    """Where the stages are, in parts of the step, from 0 to 1."""
+    """Return where the stages are, in parts of the step, from 0 to 1."""
     inner = np.sort(Legendre.basis(stages - 1).deriv().roots().real)
     return np.concatenate([[0.0], (inner + 1.0) / 2.0, [1.0]])
 
 
 def lagrange(c: np.ndarray) -> list[Polynomial]:
-    """The polynomials that are 1 at one node and 0 at all others."""
+    """Return the polynomials that are 1 at one node and 0 at all others."""
     polynomials = []
     for j, here in enumerate(c):
         others = np.delete(c, j)
@@ -32,13 +32,14 @@ def lagrange(c: np.ndarray) -> list[Polynomial]:
 
 
 def integrals(stages: int) -> np.ndarray:
-    """a_ij: a quantity at stage i is that at stage 0 plus dt sum_j a_ij rate_j (Hairer and Wanner IV.5)."""
+    """Return a_ij: a quantity at stage i is that at stage 0 plus dt sum_j a_ij rate_j (Hairer and Wanner
+    IV.5)."""
     c = nodes(stages)
     return np.array([[basis.integ()(here) for basis in lagrange(c)] for here in c])
 
 
 def highest(stages: int) -> np.ndarray:
-    """Coefficients d_j of an estimate of error: of position, dt^2 |sum_j d_j acceleration_j|.
+    """Return the coefficients d_j of an estimate of error: of position, dt^2 |sum_j d_j acceleration_j|.
 
     sum_j acceleration_j prod_k 1/(c_j - c_k) is the coefficient of the highest power in the polynomial of the
     acceleration. A polynomial through all nodes but the last is without it, and off by it times
@@ -49,14 +50,14 @@ def highest(stages: int) -> np.ndarray:
 
 
 def bound(c: np.ndarray) -> float:
-    """The integral of (1 - x) |prod_(k<s-1) (x - c_k)| from 0 to 1."""
+    """Return the integral of (1 - x) |prod_(k<s-1) (x - c_k)| from 0 to 1."""
     rest = Polynomial.fromroots(c[:-1]) * Polynomial([1.0, -1.0])
     # |rest| has no sign changes between nodes.
     return float(sum(abs(rest.integ()(b) - rest.integ()(a)) for a, b in pairwise(c)))
 
 
 def leading(stages: int) -> tuple[float, float]:
-    """l and p of the leading term of the error, in position dt^2 a (l e)^p, where e is the estimate by
+    """Return l and p of the leading term of the error, in position dt^2 a (l e)^p, where e is the estimate by
     ``highest`` over dt^2 a, and a the largest acceleration.
 
     The method multiplies a motion of rate k by the (s - 1, s - 1) approximant of Pade to exp(k dt), which is

@@ -10,13 +10,13 @@ from tisim.steppers.implicit.saved_state import SavedState
 
 
 def with_jacobian(forces):
-    """Those forces that say how they depend on velocity."""
+    """Return those forces that say how they depend on velocity."""
     return tuple(force for force in forces if force.data.offers("velocity_jacobian"))
 
 
 @ti.func
 def summed_jacobian(forces: ti.template(), s, w, i, t):  # type: ignore[valid-type]
-    """Sum of the derivatives of forces on i by its velocity. N s/m."""
+    """Return the sum (N s/m) of the derivatives of forces on particle i by its velocity."""
     total = ti.Matrix.zero(s.real, 3, 3)
     for force in ti.static(forces):
         total += force.velocity_jacobian(s, w, i, t)
@@ -25,7 +25,7 @@ def summed_jacobian(forces: ti.template(), s, w, i, t):  # type: ignore[valid-ty
 
 @ti.func
 def solved(a, b):
-    """x of a x = b, by Cramer's rule; the division comes last, so that nothing waits for it."""
+    """Return x of a x = b, by Cramer's rule; the division comes last, so that nothing waits for it."""
     x, y, z = a[:, 0], a[:, 1], a[:, 2]
     yz = y.cross(z)
     return 1.0 / x.dot(yz) * ti.Vector([b.dot(yz), x.dot(b.cross(z)), x.dot(y.cross(b))])
@@ -33,7 +33,7 @@ def solved(a, b):
 
 @ti.data_oriented
 class Solve(SavedState):
-    """One iterate of a particle, given the force at the last one."""
+    """Solve makes one iterate of a particle, given the force at the last one."""
 
     def __init__(self, context: StepContext, phi) -> None:
         super().__init__(context)
@@ -42,22 +42,24 @@ class Solve(SavedState):
 
     @ti.func
     def displacement(self, w, i, v, dt):
-        """dt (phi v' + (1 - phi) v). m."""
+        """Return the displacement dt (phi v' + (1 - phi) v) (m)."""
         return dt * (self.phi(w) * v + (1.0 - self.phi(w)) * self.s.velocity_before[w, i])
 
     @ti.func
     def step_displacement(self, w, i, dt):
-        """The displacement in a step that has been accepted. m."""
+        """Return the displacement (m) in a step that has been accepted."""
         return self.displacement(w, i, self.s.velocity[w, i], dt)
 
     @ti.func
     def jacobian(self, w, i, t):
-        """J, the derivative of the force by velocity where effects give it, at the present v. N s/m."""
+        """Return J (N s/m), the derivative of the force by velocity where effects give it, at the present
+        v."""
         return summed_jacobian(self.linear, self.s, w, i, t)
 
     @ti.func
     def velocity(self, w, i, dt, jacobian):
-        """v' of m v' = m v + dt (phi (F' + J (v' - v_K)) + (1 - phi) F), with F' and J those at v_K. m/s."""
+        """Return v' (m/s) of m v' = m v + dt (phi (F' + J (v' - v_K)) + (1 - phi) F), with F' and J those at
+        v_K."""
         s, phi, over_mass = self.s, self.phi(w), dt / self.s.mass[w, i]
         v, total = s.velocity_before[w, i], phi * s.force[w, i] + (1.0 - phi) * s.force_before[w, i]
         new = v + over_mass * total
@@ -65,12 +67,13 @@ class Solve(SavedState):
             # Divided by the mass: a determinant of kg^3 is nothing to f32.
             matrix = ti.Matrix.identity(s.real, 3) - phi * over_mass * jacobian
             new = solved(matrix, v + over_mass * (total - phi * (jacobian @ s.velocity[w, i])))
-            s.force[w, i] += jacobian @ (new - s.velocity[w, i])
+            s.force[w, i] = s.force[w, i] + jacobian @ (new - s.velocity[w, i])
         return new
 
     @ti.func
     def turn(self, w, i, dt):
-        """spin' = spin + dt/I (phi M' + (1 - phi) M), I = 2/5 m R^2; returns how far the surface moved, m."""
+        """Set spin' = spin + dt/I (phi M' + (1 - phi) M), I = 2/5 m R^2; return how far the surface moved
+        (m)."""
         s, phi, radius = self.s, self.phi(w), self.s.radius[w, i]
         torque = phi * s.torque[w, i] + (1.0 - phi) * s.torque_before[w, i]
         new = s.spin_before[w, i] + dt / (0.4 * s.mass[w, i] * radius * radius) * torque
@@ -80,7 +83,7 @@ class Solve(SavedState):
 
     @ti.func
     def advance(self, w, i, v, dt):
-        """Put a particle where it gets with v'; returns how far its surface moved besides, by turning, m."""
+        """Put a particle where it gets with v'; return how far its surface moved besides, by turning (m)."""
         s = self.s
         s.velocity[w, i] = v
         s.position[w, i] = self.domain.wrap(w, s.position_before[w, i] + self.displacement(w, i, v, dt))
@@ -98,5 +101,5 @@ class Solve(SavedState):
 
     @ti.func
     def reachable(self, w, i, v, dt):
-        """Whether a particle with v' gets to a place that numbers can tell."""
+        """Return whether a particle with v' gets to a place that numbers can tell."""
         return self.sound(w, self.s.position_before[w, i] + self.displacement(w, i, v, dt))

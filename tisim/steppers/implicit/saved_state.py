@@ -10,7 +10,7 @@ STATE_BEFORE = (
     Field("force_before", "N", 3, "keep", scratch=True),
 )
 CHANGE = Field("iterate_change", "m", 1, "keep", scratch=True)
-"""How much the last iterate differs from the one before."""
+"""This field is how much the last iterate differs from the one before."""
 TURNING_BEFORE = (
     Field("spin_before", "rad/s", 3, "keep", scratch=True),
     Field("torque_before", "N m", 3, "keep", scratch=True),
@@ -18,13 +18,13 @@ TURNING_BEFORE = (
 
 
 def saved_fields(turning: bool) -> tuple[Field, ...]:
-    """The fields it takes, in a scene that has torques or not."""
+    """Return the fields that the saved state takes, in a scene that has torques or not."""
     return (*STATE_BEFORE, *(TURNING_BEFORE if turning else ()))
 
 
 @ti.data_oriented
 class SavedState:
-    """Keeps the state of a particle, and gives it back."""
+    """SavedState keeps the state of a particle, and gives it back."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.domain, self.turning = context.s, context.domain, context.turning
@@ -40,7 +40,7 @@ class SavedState:
 
     @ti.func
     def restore(self, w, i):
-        """Back to the beginning of the step."""
+        """Put a particle back to the beginning of the step."""
         s = self.s
         s.position[w, i], s.velocity[w, i] = s.position_before[w, i], s.velocity_before[w, i]
         s.force[w, i] = s.force_before[w, i]
@@ -49,6 +49,6 @@ class SavedState:
 
     @ti.func
     def sound(self, w, r):
-        """Whether this is a place (m) that numbers can tell."""
+        """Return whether r (m) is a place that numbers can tell."""
         # Below infinity: not true of NaN.
         return r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)

@@ -10,7 +10,7 @@ from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
 
 CONTRACTION = 0.25
-"""What a sweep is to multiply the error by, at most, where convergence limits the step."""
+"""A sweep is to multiply the error by this, at most, where convergence limits the step."""
 
 
 class StageControl(ImplicitControl):
@@ -57,27 +57,29 @@ class StageControl(ImplicitControl):
         return self.per == "run"
 
     def order(self, stages: int) -> int:
-        """The power of dt with which an estimate of error falls, over what it is compared with."""
+        """Return the power of dt with which an estimate of error falls, over what it is compared with."""
         return 2 * stages - 2 if self.at_end else stages
 
     @ti.func
     def scale(self, s, w, i, moved, dt):
-        """What the error of a particle that has moved so far in a step of dt (s) is compared with. m."""
+        """Return what the error of a particle that has moved so far in a step of dt (s) is compared with
+        (m)."""
         return error_scale(self, s, w, i, moved, dt)
 
     @ti.func
     def solved(self, w, error):
-        """Whether sweeps may end, with this much error left."""
+        """Return whether sweeps may end, with this much error left."""
         return error <= ti.cast(self.part(w) * self.error(w), ti.f64)
 
     @ti.func
     def accepts(self, w, error):
-        """Whether a solved step is accurate enough."""
+        """Return whether a solved step is accurate enough."""
         return error <= ti.cast(self.error(w), ti.f64)
 
     @ti.func
     def factor(self, w, contraction, error, order):
-        """What the next step is to be multiplied by: the error falls as dt^order, the contraction as dt^2."""
+        """Return what the next step is to be multiplied by: the error falls as dt^order, the contraction as
+        dt^2."""
         tolerance = ti.cast(self.error(w), ti.f64)
         target = ti.cast(self.safety(w), ti.f64) * ti.pow(tolerance, 1.0 / order)
         by_error = self.limited(w, target, ti.pow(error, 1.0 / order))

@@ -13,7 +13,8 @@ from tisim.worlds.fields import Field
 
 @ti.data_oriented
 class Stages(SavedState):
-    """``acceleration[w, i, 3 j + k]`` of stage j along axis k, and with torques ``turning`` likewise.
+    """Stages keep the rates: ``acceleration[w, i, 3 j + k]`` of stage j along axis k, and with torques
+    ``turning`` likewise.
 
     ``c[j]`` is where stage j is, in parts of the step; ``speeds[i, j]`` gives v_i, ``places[i, j]`` r_i, and
     ``estimate[j]`` the error. Of each world: ``predict[w, i, j]`` gives what the polynomial of the last step
@@ -48,7 +49,7 @@ class Stages(SavedState):
 
     @staticmethod
     def fields(number: int, turning: bool) -> tuple[Field, ...]:
-        """The rates of this step and of the last one."""
+        """Return the fields of the rates of this step and of the last one."""
         names = [("acceleration", "m/s^2"), *([("turning", "rad/s^2")] if turning else [])]
         return tuple(
             Field(f"{when}_{name}", unit, merge="keep", slots=3 * number, scratch=True)
@@ -57,7 +58,7 @@ class Stages(SavedState):
         )
 
     def bytes(self) -> int:
-        """Device memory, in bytes."""
+        """Return the device memory that the coefficients take, in bytes."""
         n = self.number
         return 8 * (2 * n + 2 * n * n + self.s.worlds * n * (n + 1))
 
@@ -79,7 +80,7 @@ class Stages(SavedState):
 
     @ti.func
     def at(self, rate: ti.template(), w, i, j):  # type: ignore[valid-type]
-        """A rate at stage j."""
+        """Return a rate at stage j."""
         return ti.Vector([rate[w, i, 3 * j], rate[w, i, 3 * j + 1], rate[w, i, 3 * j + 2]])
 
     @ti.func
@@ -89,7 +90,7 @@ class Stages(SavedState):
 
     @ti.func
     def sum(self, weights: ti.template(), stage, rate: ti.template(), w, i):  # type: ignore[valid-type]
-        """sum_j weights[stage, j] rate_j."""
+        """Return sum_j weights[stage, j] rate_j."""
         total = ti.Vector.zero(self.s.real, 3)
         for j in range(self.number):
             total += ti.cast(weights[stage, j], self.s.real) * self.at(rate, w, i, j)
@@ -97,20 +98,20 @@ class Stages(SavedState):
 
     @ti.func
     def velocity(self, w, i, stage, dt):
-        """v_i = v + dt sum_j a_ij v'_j. m/s."""
+        """Return the velocity at a stage, v_i = v + dt sum_j a_ij v'_j (m/s)."""
         s = self.s
         return s.velocity_before[w, i] + dt * self.sum(self.speeds, stage, s.stage_acceleration, w, i)
 
     @ti.func
     def displacement(self, w, i, stage, dt):
-        """r_i - r = c_i dt v + dt^2 sum_jk a_ij a_jk v'_k. m."""
+        """Return the displacement up to a stage, r_i - r = c_i dt v + dt^2 sum_jk a_ij a_jk v'_k (m)."""
         s = self.s
         moved = dt * ti.cast(self.c[stage], s.real) * s.velocity_before[w, i]
         return moved + dt * dt * self.sum(self.places, stage, s.stage_acceleration, w, i)
 
     @ti.func
     def step_displacement(self, w, i, dt):
-        """The displacement in a step that has been accepted. m."""
+        """Return the displacement (m) in a step that has been accepted."""
         return self.displacement(w, i, self.number - 1, dt)
 
     @ti.func
@@ -120,13 +121,13 @@ class Stages(SavedState):
 
     @ti.func
     def inertia(self, w, i):
-        """2/5 m R^2, a solid sphere's (Z16 7.8). kg m^2."""
+        """Return the moment of inertia 2/5 m R^2 (kg m^2) of a solid sphere (Z16 7.8)."""
         return 0.4 * self.s.mass[w, i] * self.s.radius[w, i] ** 2
 
     @ti.func
     def newest(self, w, i, stage, dt, t):
-        """The acceleration that the force at a stage gives, m/s^2; what is linear in velocity solved exactly:
-        m v' = F + J dt a_ii (v' - v'_last)."""
+        """Return the acceleration (m/s^2) that the force at a stage gives; what is linear in velocity is
+        solved exactly: m v' = F + J dt a_ii (v' - v'_last)."""
         s = self.s
         m = s.mass[w, i]
         new = s.force[w, i] / m

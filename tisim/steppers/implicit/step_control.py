@@ -15,12 +15,12 @@ from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
 
 LEAST_SAFETY = 0.01
-"""The least part of an error asked for that steps may aim at. Where that is below what rounding makes of an
-error, no step is short enough, and all would be the shortest."""
+"""Steps may aim at no smaller part of an error asked for than this. Where that is below what rounding makes
+of an error, no step is short enough, and all would be the shortest."""
 
 
 class ImplicitControl(StepControl):
-    """The contract of step control of implicit steppers: the limits of a step."""
+    """This is the contract of step control of implicit steppers: it sets the limits of a step."""
 
     contract: ClassVar[bool] = True
     first: float = parameter("s", "step that is tried first, dt_0", 1e-5, ge=SHORTEST_STEP)
@@ -36,7 +36,7 @@ class ImplicitControl(StepControl):
 
     @property
     def at_end(self) -> bool:
-        """Whether it aims at the error at the end of the run."""
+        """Return whether the control aims at the error at the end of the run."""
         return False
 
     @model_validator(mode="after")
@@ -58,19 +58,19 @@ class ImplicitControl(StepControl):
 
     @ti.func
     def step(self, s, w, target):
-        """The step (s, f64) where this one was wanted; 0 for the first of all."""
+        """Return the step (s, f64) to take where ``target`` was wanted; that is 0 for the first of all."""
         longest = ti.cast(self.longest(w), ti.f64)
         step = ti.min(ti.select(target > 0.0, target, ti.cast(self.first(w), ti.f64)), longest)
         return ti.max(shortest_representable(s, w, self.shortest(w)), step)
 
     @ti.func
     def hopeless(self, s, w, dt):
-        """Whether a step of this length (s) that has failed must not be made shorter."""
+        """Return whether a step of this length (s) that has failed must not be made shorter."""
         return dt <= shortest_representable(s, w, self.shortest(w)) * (1.0 + 1e-9)
 
     @ti.func
     def limited(self, w, target, actual):
-        """wanted / reached, between ``least`` and ``most``; the least for a NaN."""
+        """Return wanted / reached, between ``least`` and ``most``; the least for a NaN."""
         least, most = ti.cast(self.least(w), ti.f64), ti.cast(self.most(w), ti.f64)
         factor = least
         if target >= least * actual:
@@ -110,34 +110,36 @@ class IterationControl(ImplicitControl):
 
     @ti.func
     def solved(self, w, change):
-        """Whether the iteration may end, its last relative change having been this."""
+        """Return whether the iteration may end, its last relative change having been this."""
         return change <= self.tolerance(w)
 
     @ti.func
     def accepts(self, w, error):
-        """Whether a solved step is accurate enough; ``error`` is that of the rule over the displacement."""
+        """Return whether a solved step is accurate enough; ``error`` is that of the rule over the
+        displacement."""
         return True
 
     @ti.func
     def scale(self, s, w, i, moved, dt):
-        """What the error of a particle that has moved so far in a step of dt (s) is compared with. m."""
+        """Return what the error of a particle that has moved so far in a step of dt (s) is compared with
+        (m)."""
         return moved
 
     @ti.func
     def aim(self, w):
-        """TOL^(1/K_d), the same for all particles."""
+        """Return TOL^(1/K_d), the same for all particles."""
         return ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / self.iterations)
 
     @ti.func
     def factor(self, w, aim, change, k, error):
-        """What the next step is to be multiplied by, after K = k iterations."""
+        """Return what the next step is to be multiplied by, after K = k iterations."""
         root = 1.0 / ti.cast(self.order(w), ti.f64)
         return self.limited(w, ti.pow(aim, root), ti.pow(change, root / k))
 
     @ti.func
     def stays(self, w, dt, aim, change, k, error):
-        """Whether a step (s) is the longest that may be and ``factor`` is at least 1, so that the next one is
-        as long; without a root to take."""
+        """Return whether a step (s) is the longest that may be and ``factor`` is at least 1, so that the next
+        one is as long; there is no root to take."""
         bound = ti.cast(1.0, ti.f64)
         for _ in range(k):
             bound *= aim

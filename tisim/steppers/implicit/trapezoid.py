@@ -36,7 +36,8 @@ from tisim.worlds.fields import Field
 from tisim.worlds.program import Item
 
 OWN_STEP_FIELDS = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
-"""The fields of a particle that takes steps of its own: the length of the next one, and its clock."""
+"""These are the fields of a particle that takes steps of its own: the length of the next one, and its
+clock."""
 
 
 class Trapezoid(Stepper):
@@ -118,5 +119,5 @@ class Trapezoid(Stepper):
             Decide(context),
         )
         note = (NoteExcursion(solve),) if self.control.at_end else ()
-        end = (*note, *context.update_history, *apply_operators(context), AdvanceClock(context))
+        end = (*note, *context.advance_memory, *apply_operators(context), AdvanceClock(context))
         return Step((Begin(context), SaveState(solve), StepAttempt(context, attempt), *end), buffers)

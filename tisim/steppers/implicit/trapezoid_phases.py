@@ -9,7 +9,7 @@ from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 
 
 class Iteration(Repeat):
-    """Iterations of an attempt, until there is a verdict."""
+    """This repeat makes iterations of an attempt, until there is a verdict."""
 
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
@@ -21,7 +21,8 @@ class Iteration(Repeat):
 
 
 class ChooseTrapezoidStep(Phase):
-    """Choose the step; the last one ends exactly on time. Forces will be those of the end of the step."""
+    """This phase chooses the step; the last one ends exactly on time. Forces will be those of the end of the
+    step."""
 
     def __init__(self, context: StepContext) -> None:
         self.s, self.control = context.s, context.control
@@ -36,7 +37,7 @@ class ChooseTrapezoidStep(Phase):
 
 
 class PredictEnd(PerParticle):
-    """The first iterate, K = 1, with the force at the beginning of the step."""
+    """This phase makes the first iterate, K = 1, with the force at the beginning of the step."""
 
     def __init__(self, solve) -> None:
         super().__init__(solve.s)
@@ -55,7 +56,8 @@ class PredictEnd(PerParticle):
 
 
 class Correct(PerBlock):
-    """The next iterate, and sums of change, displacement, error, and what the error is compared with. m."""
+    """This phase makes the next iterate, and sums change, displacement, error, and what the error is compared
+    with (m)."""
 
     def __init__(self, context: StepContext, sums, solve) -> None:
         super().__init__(sums)
@@ -79,7 +81,7 @@ class Correct(PerBlock):
 
 
 class JudgeIteration(Phase):
-    """Is the iteration solved, to go on, or to be given up?"""
+    """This phase judges whether the iteration is solved, to go on, or to be given up."""
 
     def __init__(self, context: StepContext, sums) -> None:
         self.s, self.control, self.sums = context.s, context.control, sums

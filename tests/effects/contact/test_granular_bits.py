@@ -1,0 +1,144 @@
+"""Grains that remember their contacts: the same bits however run, and as in NumPy when one is taken."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.grains import heap, twin
+from tests.scenes import by_id
+from tisim import Simulation
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.effects import parameter
+from tisim.interactions import pair_chunks
+from tisim.operators import Operator
+
+GRAINS, STEPS, DT = 200, 200, 2e-4
+CHUNK_SLOTS = 32
+"""Small, so that most pairs are of two chunks."""
+
+
+class TakeAway(Operator):
+    """One particle is removed after a time."""
+
+    after: float = parameter("s", "time", ge=0)
+    which: float = parameter("", "its id", ge=0)
+
+    @ti.func
+    def world(self, s, w):
+        if s.time[w] >= self.after(w):
+            for i in range(s.count[w]):
+                if s.id[w, i] == ti.cast(self.which(w), ti.i32):
+                    s.remove(w, i)
+
+
+def bed(seed, after=1e9, which=7):
+    """200 grains in a cell too small for them."""
+    made = heap(np.random.default_rng(seed), GRAINS, side=2.7, dt=DT, steps=STEPS)
+    return made.model_copy(update={"effects": (*made.effects, TakeAway(after=after, which=which))})
+
+
+def simulated(schedule):
+    """A simulation of three beds, with small chunks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pair_chunks, "CHUNK_SLOTS", CHUNK_SLOTS)
+        return Simulation(bed(0), worlds=3, capacity=GRAINS, schedule=schedule)
+
+
+def ends(simulation, scenes):
+    """What becomes of scenes."""
+    simulation.load(scenes)
+    simulation.run()
+    results = simulation.results()
+    assert all(result.status.ok for result in results), results[0].status.reason
+    return [by_id(result) for result in results]
+
+
+def same(found, expected):
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    made = simulated("particle")
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def usual(simulation):
+    """Of three beds side by side."""
+    return ends(simulation, [bed(k) for k in range(3)])
+
+
+@pytest.mark.long
+def test_of_one_alone_in_a_batch_and_restarted(simulation, usual, tmp_path):
+    same(ends(simulation, [bed(2)])[0], usual[2])
+    simulation.load([bed(k) for k in range(3)])
+    simulation.run(steps=STEPS // 2)
+    simulation.checkpoint(tmp_path / "half.h5")
+    simulation.run(steps=7)
+    simulation.load([bed(k) for k in range(3)])
+    simulation.restore(tmp_path / "half.h5")
+    simulation.run()
+    for result, expected in zip(simulation.results(), usual, strict=True):
+        assert result.work["steps"] == STEPS
+        same(by_id(result), expected)
+
+
+@pytest.mark.slow
+def test_of_both_schedules(usual):
+    simulation = simulated("world")
+    for found, expected in zip(ends(simulation, [bed(k) for k in range(3)]), usual, strict=True):
+        same(found, expected)
+    simulation.close()
+
+
+@pytest.mark.long
+def test_a_grain_that_is_taken_away_leaves_what_the_others_remember(simulation):
+    """In NumPy, row and column are cut out; here indices move and lists are made anew."""
+    made = [bed(5, after=(100 - 0.5) * DT, which=which) for which in (0, 77, 199)]
+    for which, one, found in zip((0, 77, 199), made, ends(simulation, made), strict=True):
+        known = twin(one)
+        known.run(100, DT)
+        assert (known.past[which] != 0).any() or (known.past[:, which] != 0).any()
+        known.remove(which)
+        known.run(STEPS - 100, DT)
+        assert len(found["mass"]) == GRAINS - 1
+        np.testing.assert_allclose(found["velocity"], known.v, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found["spin"], known.w, rtol=0, atol=1e-8)
+
+
+ELSEWHERE = """
+import sys
+import numpy as np
+from tests.effects.contact.test_granular_bits import bed, ends, simulated
+from tisim.backend import runtime
+
+kept = {}
+for name, settings in {"one": {"threads": 1}, "two": {"threads": 2}, "f32": {"precision": "f32"}}.items():
+    runtime.init(device="cpu", **settings)
+    simulation = simulated("particle")
+    for state, seed in zip(ends(simulation, [bed(k) for k in range(3)]), range(3), strict=True):
+        kept.update({f"{name}/{seed}/{key}": values for key, values in state.items()})
+    simulation.close()
+np.savez(sys.argv[1], **kept)
+"""
+
+
+@pytest.mark.slow
+def test_of_one_thread_and_two_and_nearly_those_of_single_precision(usual, tmp_path):
+    command = [sys.executable, "-c", ELSEWHERE, str(tmp_path / "results.npz")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert runtime.current().precision == "f64"
+    with np.load(tmp_path / "results.npz") as stored:
+        for k, expected in enumerate(usual):
+            for name, values in expected.items():
+                np.testing.assert_array_equal(stored[f"one/{k}/{name}"], values)
+                np.testing.assert_array_equal(stored[f"two/{k}/{name}"], values)
+            moved = np.abs(expected["velocity"] - stored[f"f32/{k}/velocity"])
+            assert 0 < np.median(moved) < 1e-3

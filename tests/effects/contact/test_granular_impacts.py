@@ -1,0 +1,190 @@
+"""Impacts under Hertz and Mindlin: restitution, Hertz's time and depth, friction, and what energy is left."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.grains import AWAY, CAPACITY, FLOOR, USUAL, WORLDS, grains, run
+from tests.scenes import by_id, compiled, fixed
+from tisim import Simulation
+from tisim.steppers import Boris, FixedStep, IterationControl, Trapezoid
+
+E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
+
+
+def depth(speed, radius=1.0, mass=1.0):
+    """Greatest overlap (m) of an elastic impact at a speed, of R* and m*."""
+    return (15 * mass * speed**2 / (16 * E_STAR * radius**0.5)) ** 0.4
+
+
+def duration(speed, radius=1.0, mass=1.0):
+    """How long an elastic impact lasts, s."""
+    return 2.943275 * depth(speed, radius, mass) / speed
+
+
+SPEEDS, RESTITUTIONS = (0.01, 0.1, 1.0, 10.0), (0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
+EXACT = np.array(RESTITUTIONS)[:, None]
+
+
+def restitutions(steps):
+    """Of a head-on impact of two unlike grains, and of one at a wall: by speed (rows) and e; ``steps`` are
+    those of an elastic impact at the wall."""
+    made = [
+        grains(
+            [[10, 0, 50], [11.5, 0, 50], [0, 0, 1]],
+            [[v, 0, 0], [-v / 2, 0, 0], [0, 0, -v]],
+            planes=[FLOOR],
+            law={"restitution": e},
+            radius=[1.0, 0.5, 1.0],
+            mass=[3.0, 1.5, 1.0],
+            dt=duration(v) / steps,
+            steps=6 * steps,
+        )
+        for v in SPEEDS
+        for e in RESTITUTIONS
+    ]
+    found = []
+    for one, result in zip(made, run(made), strict=True):
+        after, before = by_id(result)["velocity"], one.particles.velocity
+        assert result.state["position"][result.state["id"] == 2, 2] > 1
+        found.append([(after[1] - after[0])[0] / (before[0] - before[1])[0], -after[2, 2] / before[2][2]])
+    return np.array(found).reshape(len(SPEEDS), len(RESTITUTIONS), 2)
+
+
+@pytest.mark.long
+def test_an_impact_has_the_restitution_at_any_speed():
+    """Over three decades, of grains and at a wall; the error falls as the step."""
+    for steps in (25, 100, 400):
+        found = restitutions(steps)
+        np.testing.assert_allclose(found, np.broadcast_to(EXACT, found.shape), rtol=0, atol=0.2 / steps)
+        # In units of its own an impact is the same at any speed.
+        assert np.ptp(found, axis=0).max() < 1e-9
+
+
+def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
+    """At half its time it is at rest, with the overlap and the force of the formulas."""
+    errors = []
+    for steps in (200, 400):
+        made = grains([[0, 0, 1]], [[0, 0, -1]], planes=[FLOOR], law={"restitution": 1.0},
+                      dt=duration(1.0) / steps, steps=2 * steps)  # fmt: skip
+        simulation = compiled(made, WORLDS, CAPACITY)
+        simulation.load([made])
+        simulation.run(steps=steps // 2)
+        most = simulation.s.read("force")[0, 0, 2] / (4 / 3 * E_STAR * depth(1.0) ** 1.5)
+        (half,) = simulation.results()
+        deepest, stands = 1 - half.state["position"][0, 2], half.state["velocity"][0, 2]
+        simulation.run()
+        (end,) = simulation.results()
+        since = (end.state["position"][0, 2] - 1) / end.state["velocity"][0, 2]
+        lasted = (end.time - since) / duration(1.0)
+        errors.append(np.abs([most - 1, deepest / depth(1.0) - 1, stands, lasted - 1]))
+    assert np.max(errors[1]) < 1e-4
+    assert (errors[1] < errors[0] / 2).all() or np.max(errors[0]) < 1e-6
+
+
+@pytest.mark.slow
+def test_other_steppers_find_the_same():
+    """Boris with the same steps, and the implicit trapezoid, which starts with steps of a whole impact and
+    shortens them where it is: an oblique impact of a grain that spins, with friction and damping."""
+    ends = []
+    for stepper in (
+        fixed(duration(1.0) / 100),
+        Boris(control=FixedStep(dt=duration(1.0) / 100)),
+        Trapezoid(control=IterationControl(first=duration(1.0), longest=duration(1.0))),
+    ):
+        made = grains(
+            [[0, 0, 1]],
+            [[0.7, 0, -1]],
+            [[1, 2, 3]],
+            planes=[FLOOR],
+            law={"restitution": 0.6, "friction": 0.3},
+            stepper=stepper,
+            duration=3 * duration(1.0),
+        )
+        simulation = Simulation(made)
+        simulation.load(made)
+        simulation.run()
+        (result,) = simulation.results()
+        assert result.status.ok
+        ends.append(np.concatenate([result.state["velocity"], result.state["spin"]]))
+        simulation.close()
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=2e-3)
+    np.testing.assert_allclose(ends[2], ends[0], rtol=0, atol=0.1)
+    assert result.work["rejections"] > 2
+
+
+def oblique(angles, **law):
+    """A grain that hits the floor at 1 m/s downwards, and angles (tangents) to the upright: at its end."""
+    made = [
+        grains([[0, 0, 1]], [[tangent, 0, -1.0]], planes=[FLOOR], law=law, dt=duration(1.0) / 400, steps=600)
+        for tangent in angles
+    ]
+    return [result.state for result in run(made)]
+
+
+def test_a_grain_that_slides_through_its_impact_loses_mu_times_the_push():
+    """Delta v = mu (1 + e) v_n, and a spin of 5/2 of that over R, however fast it slid."""
+    angles, friction = (4.0, 8.0, 30.0), 0.2
+    for tangent, state in zip(angles, oblique(angles, restitution=1.0, friction=friction), strict=True):
+        loss = tangent - state["velocity"][0, 0]
+        assert loss == pytest.approx(2 * friction, rel=1e-4)
+        # The lever is R - delta / 2 of the depth that the impact has.
+        spin = 2.5 * loss * (1 - 0.5 * depth(1.0))
+        assert state["spin"][0, 1] == pytest.approx(spin, rel=0.3 * depth(1.0))
+        np.testing.assert_array_equal(state["spin"][0, [0, 2]], 0)
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.5, 5.0])
+def test_friction_slows_the_surface_and_no_more(friction):
+    """At any angle: never beyond Coulomb's push, never faster back than it came, and no energy from nowhere;
+    what spin gains over what motion loses is 5/2 of the lever."""
+    angles = np.tan(np.linspace(0.02, 1.5, 32))
+    for tangent, state in zip(angles, oblique(angles, restitution=1.0, friction=friction), strict=True):
+        loss, spin = tangent - state["velocity"][0, 0], state["spin"][0, 1]
+        assert 0 < loss <= 2 * friction * (1 + 1e-4)
+        assert spin == pytest.approx(2.5 * loss, abs=depth(1.0) * (1 + tangent))
+        surface = state["velocity"][0, 0] - spin
+        assert abs(surface) < tangent
+        left = (state["velocity"] ** 2).sum() + 0.4 * (state["spin"] ** 2).sum()
+        assert left <= (1 + tangent**2) * (1 + 1e-6)
+
+
+@pytest.mark.long
+def test_energy_never_grows(rng):
+    """Of a thousand impacts of unlike grains that spin, a third of them grazing; e of 0.1 to 1, mu to 3."""
+    couples, made = CAPACITY // 2, []
+    for k in range(WORLDS):
+        radius, mass = rng.uniform(0.3, 1, (couples, 2)), rng.uniform(0.5, 2, (couples, 2))
+        aside = np.where(rng.uniform(size=couples) < 0.3, 1 - 10 ** rng.uniform(-6, -2, couples),
+                         rng.uniform(0, 1, couples))  # fmt: skip
+        first = np.stack([100.0 * np.arange(couples), 0 * aside, 0 * aside], axis=1)
+        normal = np.stack([0 * aside, aside, np.sqrt(1 - aside**2)], axis=1)
+        second = first + radius.sum(axis=1)[:, None] * normal
+        v, speed = np.zeros((couples, 2, 3)), 10 ** rng.uniform(0, 1, couples)
+        v[:, 0, 2] = speed
+        law = {"restitution": min(1.0, 0.1 + k / 30), "friction": rng.uniform(0, 1) if k % 4 else 3.0}
+        made.append(
+            grains(
+                np.stack([first, second], axis=1).reshape(-1, 3),
+                v.reshape(-1, 3),
+                (rng.normal(size=(couples, 2, 3)) * speed[:, None, None]).reshape(-1, 3),
+                planes=[AWAY],
+                law=law,
+                radius=radius.ravel(),
+                mass=mass.ravel(),
+                dt=duration(10.0, 0.15, 0.25) / 100,
+                steps=1500,
+            )
+        )
+    met = 0
+    for result in run(made):
+        before, after = (couple_energies(one) for one in (result.start, by_id(result)))
+        met += (after != before).sum()
+        assert (after <= before * (1 + 1e-5)).all()
+    assert met > 1000
+
+
+def couple_energies(state):
+    """Of each two that follow each other, J."""
+    inertia = 0.4 * state["mass"] * state["radius"] ** 2
+    moving = state["mass"] * (state["velocity"] ** 2).sum(axis=1)
+    return 0.5 * (moving + inertia * (state["spin"] ** 2).sum(axis=1)).reshape(-1, 2).sum(axis=1)

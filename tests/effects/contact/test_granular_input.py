@@ -1,0 +1,95 @@
+"""Hertz, Mindlin and walls: what is wrong in a scene is named; what no step can follow stops the world."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.grains import CAPACITY, FLOOR, USUAL, WORLDS, effects, grains
+from tests.scenes import scene, simulate
+from tisim import InputError
+from tisim.effects import Hertz, HertzMindlin, Walls
+from tisim.geometry import Plane
+from tisim.steppers import Verlet
+
+
+def law(**changes):
+    return HertzMindlin(**{**USUAL, **changes})
+
+
+def one(*acting, **more):
+    return scene([[0, 0, 0]], [[0, 0, 0]], acting, **more)
+
+
+WRONG = {
+    "hertz_mindlin.young must be greater than 0.0; received 0": lambda: law(young=0),
+    "hertz_mindlin.poisson must be greater than -1.0; received -1": lambda: law(poisson=-1),
+    "hertz_mindlin.poisson must be at most 0.5; received 0.6": lambda: law(poisson=0.6),
+    "hertz_mindlin.restitution must be greater than 0.0; received 0": lambda: law(restitution=0),
+    "hertz_mindlin.restitution must be at most 1.0; received 1.5": lambda: law(restitution=1.5),
+    "hertz_mindlin.friction must be at least 0.0; received -0.1": lambda: law(friction=-0.1),
+    "hertz_mindlin.friction must be a finite number; received nan": lambda: law(friction=float("nan")),
+    "walls.planes must be a list of 1; received ()": lambda: Walls(planes=()),
+    "plane.normal must be a direction, not of length 0; received (0.0, 0.0, 0.0)": lambda: Plane(
+        normal=(0, 0, 0)
+    ),
+    "effects.walls must be used together with effects.hertz_mindlin; received 'walls'": lambda: one(Walls()),
+    "effects.walls must be used together with effects.hertz_mindlin; received 'hertz, walls'": lambda: one(
+        Hertz(young=1, poisson=0), Walls()
+    ),
+    "stepper.control must be one that suits hertz_mindlin, such as fixed_step or that of an implicit "
+    "stepper; received 'approach_time'": lambda: one(law(), stepper=Verlet()),
+    "effects.hertz_mindlin must be given once; received 2": lambda: one(law(), law()),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_wrong_is_named(message):
+    with pytest.raises(InputError) as fault:
+        WRONG[message]()
+    assert str(fault.value) == message
+
+
+def ends(scenes):
+    return simulate(scenes, worlds=WORLDS, capacity=CAPACITY)
+
+
+def test_what_no_step_can_follow_stops_the_world_and_is_named():
+    """Centres in one place, a modulus beyond numbers, and steps too long for a pair and for a wall; the state
+    of before is kept."""
+    far = {"dt": 1e-3, "steps": 1000}
+    stiff = {"law": {"young": 1e15}, **far}
+    couple = [[0, 0, 9], [2.1, 0, 9]]
+    made = {
+        "one place": (grains([[0, 0, 5]] * 2, [[0, 0, 0]] * 2, **far), "hertz_mindlin"),
+        "no number": (
+            grains([[0, 0, 5], [1, 0, 5]], [[0, 0, 0]] * 2, law={"young": 1e300}, **far),
+            "hertz_mindlin",
+        ),
+        "pair": (grains(couple, [[0, 0, 0], [-9, 0, 0]], **stiff), "hertz_mindlin"),
+        "wall": (grains([[0, 0, 1.1]], [[0, 0, -9]], planes=[FLOOR], **stiff), "walls"),
+        "slow": (grains([[0, 0, 1.1]], [[0, 0, -9]], planes=[FLOOR], dt=0.05, steps=99), "walls"),
+    }
+    for (_, by), result in zip(made.values(), ends([one for one, _ in made.values()]), strict=True):
+        assert not result.status.ok
+        for word in ("not finite", f"effects.{by}", "particle 0"):
+            assert word in result.status.reason
+        for name in ("position", "velocity", "spin"):
+            assert np.isfinite(result.state[name]).all(), name
+        assert np.abs(result.state["velocity"]).max() <= 9
+
+
+def test_what_is_pressed_far_into_each_other_gives_back_what_it_holds():
+    """A grain far beyond a wall, one within a larger one, and centres 1e-6 radii apart: Hertz's 8/15 E*
+    sqrt(R*) delta^2.5, by steps that resolve it."""
+    e_star = effects()[0].effective_young
+    more = {"law": {"restitution": 1.0}, "dt": 1e-5, "steps": 4000}
+    still = [[0, 0, 0]] * 2
+    made = [
+        (grains([[0, 0, -2]], still[:1], planes=[FLOOR], **more), 1, 3),
+        (grains([[0, 0, 5], [0.3, 0, 5]], still, radius=[1, 0.5], **more), 1 / 3, 1.2),
+        (grains([[0, 0, 5], [1e-6, 0, 5]], still, **more), 0.5, 2 - 1e-6),
+    ]
+    for (_, radius, overlap), result in zip(made, ends([one for one, *_ in made]), strict=True):
+        assert result.status.ok, result.status.reason
+        moving = 0.5 * (result.state["velocity"] ** 2).sum()
+        assert moving == pytest.approx(8 / 15 * e_star * radius**0.5 * overlap**2.5, rel=1e-3)
+        np.testing.assert_array_equal(result.state["spin"], 0)

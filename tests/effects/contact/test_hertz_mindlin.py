@@ -1,0 +1,135 @@
+"""Hertz and Mindlin against a NumPy twin, and what the law says of one contact that is led along a path."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.grains import CAPACITY, USUAL, WORLDS, effects, grains, heap, run, twin
+from tests.scenes import by_id, compiled
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects import HertzMindlin
+
+E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
+G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))
+DT = 1e-5
+"""s, of a step along a path."""
+GRIP, PRESSED, EASED, SLID = 1e6, 0.02, 0.005, 1e-3
+"""A friction without end; overlaps and a way, m."""
+
+
+@in_taichi_thread
+@ti.kernel
+def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarray(), out: ti.types.ndarray()):
+    """Forces along a path of overlap and slip, of R* = 1 m and m* = 1 kg."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        past = ti.Vector.zero(ti.f64, 4)
+        for k in range(path.shape[0]):
+            n = ti.Vector([normal[k, 0], normal[k, 1], normal[k, 2]])
+            slip = ti.Vector([path[k, 1], path[k, 2], path[k, 3]])
+            force, known = law.contact(0, n, path[k, 0], 1.0, 1.0, slip, past, DT)
+            past = known
+            for c in ti.static(range(3)):
+                out[k, c], out[k, 3 + c] = force[c], known[c]
+
+
+def along(normal, overlap, moved, **law):
+    """Force and what is remembered of it, at each point of a path of one contact; ``moved`` is how far its
+    surfaces have moved past each other since the point before, m."""
+    one = grains([[0, 0, 0]], [[0, 0, 0]], law=law)
+    simulation = compiled(one, WORLDS, CAPACITY)
+    simulation.load([one])
+    (bound,) = simulation.assembly.effects.of(HertzMindlin)
+    path, out = np.column_stack([overlap, moved / DT]), np.zeros((len(moved), 6))
+    _along(bound, np.ascontiguousarray(np.broadcast_to(normal, moved.shape), float), path, out)
+    return out[:, :3], out[:, 3:]
+
+
+@pytest.mark.long
+def test_one_step_and_some_hundred_are_those_of_the_twin(rng):
+    """Unlike grains that overlap, spin and slide, in a cell; many stick, many slide."""
+    made = [heap(rng, friction=0.1 + 0.2 * k, restitution=0.3 + 0.2 * k) for k in range(4)]
+    for steps in (1, 300):
+        for one, result in zip(made, run(made, steps=steps), strict=True):
+            known, state = twin(one), by_id(result)
+            known.run(steps, 2e-4)
+            for name, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
+                np.testing.assert_allclose(state[name], values, rtol=0, atol=1e-11 * np.abs(values).max())
+            assert steps == 1 or min(known.sliding, known.sticking) > 1000
+            assert np.abs(known.v - result.start["velocity"]).max() > (0.03 if steps == 1 else 3)
+
+
+def test_force_and_stiffness_are_those_of_hertz_and_mindlin():
+    """At rest, 4/3 E* sqrt(R*) delta^1.5; pushed aside a little, 8 G* a more per metre."""
+    force, elastic = along([0, 0, 1], [PRESSED, PRESSED], np.array([[0, 0, 0], [1e-6, 0, 0]]), restitution=1)
+    np.testing.assert_allclose(force[0], [0, 0, -4 / 3 * E_STAR * PRESSED**1.5], rtol=1e-14)
+    np.testing.assert_allclose(force[1, 0], 8 * G_STAR * PRESSED**0.5 * 1e-6, rtol=1e-14)
+    np.testing.assert_array_equal(elastic[1], [force[1, 0], 0, 0])
+
+
+def test_what_is_remembered_turns_with_the_pair():
+    """Held aside, then turned by 2 rad about an axis of its own: the force has its size and turns too."""
+    turns = 400
+    angle = np.linspace(0, 2, turns + 1)
+    normal = np.stack([0 * angle, np.sin(angle), np.cos(angle)], axis=1)
+    moved = np.zeros((turns + 1, 3))
+    moved[0] = [3e-6, 4e-6, 0]
+    _, elastic = along(normal, np.full(turns + 1, PRESSED), moved)
+    np.testing.assert_allclose(np.linalg.norm(elastic, axis=1), np.linalg.norm(elastic[0]), rtol=1e-12)
+    assert np.abs((elastic * normal).sum(axis=1)).max() < 1e-12 * np.abs(elastic).max()
+    # Each turn is a projection with its size restored, which turns what lies along the axis a little.
+    ahead = np.linalg.norm(elastic[0]) * np.array([0.6, 0.8 * np.cos(2), -0.8 * np.sin(2)])
+    np.testing.assert_allclose(elastic[-1], ahead, atol=0.01 * np.linalg.norm(ahead))
+
+
+def test_coulombs_limit_holds_with_the_damping_and_is_left_at_once():
+    """Slid far, the force is mu F_n; turned back, it falls from there as the spring does."""
+    moved = np.zeros((30, 3))
+    moved[:20, 0], moved[20:, 0] = 1e-3, -1e-7
+    force, _ = along([0, 0, 1], np.full(30, PRESSED), moved, restitution=1.0, friction=0.3)
+    limit = 0.3 * 4 / 3 * E_STAR * PRESSED**1.5
+    np.testing.assert_allclose(force[10:20, 0], limit, rtol=1e-14)
+    back = limit - 8 * G_STAR * PRESSED**0.5 * 1e-7 * np.arange(1, 11)
+    np.testing.assert_allclose(force[20:, 0], back, rtol=1e-12)
+
+
+def test_a_closed_path_yields_no_work():
+    """Pressed, sheared, eased, sheared back and pressed again: half (S_1 - S_0) u^2 is lost, nothing won."""
+    n = 500
+    still, down = np.zeros(n), np.linspace(PRESSED, EASED, n)
+    overlap = np.concatenate([still + PRESSED, down, still + EASED, down[::-1]])
+    aside = np.concatenate([still + SLID / n, still, still - SLID / n, still])
+    moved = np.column_stack([aside, 0 * aside, -np.gradient(overlap)])
+    force, elastic = along([0, 0, 1], overlap, moved, restitution=1.0, friction=GRIP)
+    middle = force[:, 0] - 0.5 * np.diff(elastic[:, 0], prepend=0)
+    stiffness = 8 * G_STAR * np.sqrt([PRESSED, EASED])
+    lost = 0.5 * (stiffness[0] - stiffness[1]) * SLID**2
+    assert (middle * aside).sum() == pytest.approx(lost, rel=1e-9)
+    np.testing.assert_allclose(elastic[-1], 0, atol=1e-9 * np.abs(elastic).max())
+
+
+@pytest.mark.long
+def test_momentum_and_angular_momentum_stay(rng):
+    """Grains of unlike sizes and masses, far from any wall, that stick and slide."""
+    n = 40
+    radius, place = rng.uniform(0.1, 0.3, n), rng.uniform(0, 1.2, (n, 3))
+    made = grains(place, rng.normal(size=(n, 3)), rng.normal(size=(n, 3)), law={"young": 1e5},
+                  radius=radius, mass=rng.uniform(1, 3, n), dt=2e-4, steps=500)  # fmt: skip
+    (result,) = run([made])
+
+    def sums(state):
+        momentum = state["mass"][:, None] * state["velocity"]
+        inertia = 0.4 * state["mass"] * state["radius"] ** 2
+        turning = np.cross(state["position"], momentum) + inertia[:, None] * state["spin"]
+        return np.concatenate([momentum.sum(axis=0), turning.sum(axis=0)])
+
+    assert np.abs(result.state["spin"] - result.start["spin"]).max() > 3
+    np.testing.assert_allclose(sums(result.state), sums(result.start), rtol=0, atol=3e-12 * n)
+
+
+def test_a_law_of_one_material():
+    """E* and G* of two grains alike, and the c of their damping."""
+    law = effects()[0]
+    assert law.effective_young == pytest.approx(E_STAR, rel=1e-15)
+    assert law.effective_shear == pytest.approx(G_STAR, rel=1e-15)
+    assert HertzMindlin(**{**USUAL, "restitution": 1}).damping == 0

@@ -1,0 +1,166 @@
+"""Lists of pairs for short-ranged forces against brute force, and the order in which chunks have them."""
+
+import numpy as np
+import pytest
+
+from tests.neighbours.test_pair_list import DOMAINS, clouds, motion, near_pairs
+from tests.scenes import scene
+from tests.throwaway import SoftShell
+from tisim import Simulation
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects import PairForce, parameter
+from tisim.engine import replay
+from tisim.interactions import pair_chunks
+
+WORLDS, CAPACITY, STEPS, DT, GAP, SLOTS = 18, 300, 4, 1.0, 0.02, 32
+
+
+class Idle(PairForce):
+    """Within a gap it would act, and does nothing."""
+
+    short_ranged = True
+    gap: float = parameter("m", "gap", gt=0)
+
+    @ti.func
+    def reach(self, s, w, i):
+        return self.gap(w)
+
+
+@in_taichi_thread
+def listed(simulation):
+    """Pairs of each world, by index, as chunks have them; asserts that each is where it belongs."""
+    p, counts = simulation.assembly.pairs, simulation.s.count.to_numpy()
+    first, second, fetched = (column.to_numpy() for column in (p.first, p.second, p.fetched))
+    begin, outer, end = (column.to_numpy() for column in (p.begin, p.outer, p.end))
+    fetch_begin, fetch_count = p.fetch_begin.to_numpy(), p.fetch_count.to_numpy()
+    pairs = []
+    for w, n in enumerate(counts):
+        chunks, found, left = -(-n // SLOTS), [], {i: [] for i in range(n)}
+        for c in range(chunks):
+            assert begin[w, c] == (end[w, c - 1] if c else 0), "chunks follow each other"
+            for m in range(begin[w, c], end[w, c]):
+                i, j = int(first[w, m]), int(second[w, m])
+                homes = {i // SLOTS, j // SLOTS}
+                assert c in homes
+                assert (len(homes) == 1) == (m < outer[w, c])
+                if m >= outer[w, c]:
+                    left[j if i // SLOTS == c else i].append(m)
+                found.append((i, j))
+        for i in range(n):
+            told = fetched[w, fetch_begin[w, i] : fetch_begin[w, i] + fetch_count[w, i]]
+            assert told.tolist() == sorted(left[i])
+        pairs.append(found)
+    return pairs
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("domain", ["joined", "open"])
+def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
+    """At the start, and after steps in which some move far and most do not; crowds make the list grow."""
+    monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", SLOTS)
+    domain, names, scenes = DOMAINS[domain], [], []
+    for name, position, radius in clouds(rng):
+        names.append(name)
+        n = len(position)
+        scenes.append(
+            scene(
+                position,
+                motion(rng, n) * 0.1,
+                (Idle(gap=GAP),),
+                radius=radius if np.ndim(radius) else np.full(n, radius),
+                mass=1.0,
+                domain=domain,
+                dt=DT,
+                steps=STEPS + 1,
+            )
+        )
+    simulation = Simulation(scenes[0], WORLDS, CAPACITY, schedule)
+    row = simulation.assembly.pairs.half_list.row
+    simulation.load(scenes)
+    assert simulation.assembly.pairs.half_list.row > row
+    for step in range(STEPS):
+        results = simulation.results()
+        for name, result, pairs in zip(names, results, listed(simulation), strict=False):
+            where, state = f"{name}, step {step}", result.state
+            assert all(i < j for i, j in pairs), where
+            assert len(set(pairs)) == len(pairs), where
+            near = near_pairs(state["position"], state["radius"], domain, GAP * (1 - 1e-12))
+            missed = {tuple(sorted(pair)) for pair in near} - set(pairs)
+            assert not missed, f"{where}: missed {sorted(missed)[:5]}"
+        simulation.run(steps=1)
+        assert (simulation.s.read("status")[: len(scenes)] == 0).all()
+    # A list is worth having: the equal cloud does not have all its pairs.
+    assert len(listed(simulation)[0]) < 0.1 * 300 * 299 / 2
+    simulation.close()
+
+
+def burst(seed=2, n=240):
+    """A cloud that falls together, so that its list overflows on the way."""
+    draw = np.random.default_rng(seed)
+    position = draw.uniform(-1.0, 1.0, (n, 3))
+    return scene(
+        position,
+        -0.9 * position,
+        (SoftShell(stiffness=1e-3, width=0.05),),
+        radius=0.02,
+        mass=1.0,
+        dt=5e-3,
+        steps=180,
+    )
+
+
+def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit():
+    """Beside a run whose list was long enough from the start."""
+    ends = []
+    for longer in (False, True):
+        made = burst()
+        simulation = Simulation(made)
+        if longer:
+            simulation.load(made)
+            simulation.run()
+        rows = simulation.assembly.pairs.half_list.row
+        simulation.load(made)
+        simulation.run()
+        assert (simulation.assembly.pairs.half_list.row > rows) == (not longer)
+        (result,) = simulation.results()
+        assert result.status.ok, result.status.reason
+        ends.append(result)
+        simulation.close()
+    for name, values in ends[0].state.items():
+        np.testing.assert_array_equal(values, ends[1].state[name], err_msg=name)
+    assert ends[0].work == ends[1].work
+
+
+def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):
+    """A grain flies through a ring of larger ones, which are all near enough to list within ``window``."""
+    small, large = 1.0, 1.5
+    width = np.sqrt((2 * small + large + gap) ** 2 - window**2)
+    angle = 2 * np.pi * np.arange(n) / n
+    ring = width * np.stack([0 * angle, np.cos(angle), np.sin(angle)], axis=1)
+    position = np.concatenate([[[-1.513, 0.0, 0.0]], ring])
+    velocity = np.zeros_like(position)
+    velocity[0, 0] = 1.0
+    law = SoftShell(stiffness=1e-9, width=gap)
+    radius = np.concatenate([[small], np.full(n, large)])
+    return scene(position, velocity, (law,), radius=radius, mass=1.0, dt=dt, steps=steps)
+
+
+@pytest.mark.long
+def test_a_list_that_overflows_at_one_time_and_not_at_another_stops_no_world(monkeypatch):
+    """Run once more from an image the list is made in other steps, none of them in the ring: the world is as
+    good as any."""
+    monkeypatch.setattr(replay, "EVERY", 0.0)
+    made = through_a_ring()
+    simulation = Simulation(made)
+    row = simulation.assembly.pairs.half_list.row
+    simulation.load(made)
+    # An image four steps before the list overflows, in step 31.
+    simulation.run(steps=27)
+    simulation.run()
+    (result,) = simulation.results()
+    assert result.status.ok, result.status.reason
+    assert result.work["steps"] == 60
+    assert simulation.assembly.pairs.half_list.row > row
+    simulation.close()

@@ -1,0 +1,2 @@
+from .plane import Plane as Plane
+from .shape import Shape as Shape

@@ -1,0 +1,45 @@
+"""A plane, and the side of it on which particles are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector, parameter
+from tisim.errors import must
+from tisim.geometry.shape import Shape
+
+
+class Plane(Shape):
+    """An infinite plane; particles are on the side that its normal points to.
+
+    Its signed distance is d(r) = (r - point) . normal / |normal|.
+    """
+
+    point: Vector = parameter("m", "a point of the plane", (0.0, 0.0, 0.0))
+    normal: Vector = parameter("", "direction of the normal, towards the particles", (0.0, 0.0, 1.0))
+
+    @model_validator(mode="after")
+    def _directed(self) -> Plane:
+        length = math.hypot(*self.normal)
+        must(
+            length > 0 and math.isfinite(length), "plane.normal", "a direction, not of length 0", self.normal
+        )
+        return self
+
+    @classmethod
+    def columns(cls) -> Iterator[tuple[str, int]]:
+        yield from super().columns()
+        yield "direction", 3
+
+    def values(self) -> list[float]:
+        length = math.hypot(*self.normal)
+        return [*super().values(), *(component / length for component in self.normal)]
+
+    @ti.func
+    def distance(self, w, k, r):
+        """Return the signed distance (m) of r from plane k, positive where particles are."""
+        return (r - self.point(w, k)).dot(self.direction(w, k))

@@ -1,0 +1,278 @@
+"""The listed pairs, laid out so that each is computed once and the sums have one order.
+
+Particles are taken in chunks of a fixed number of slots. The pairs of a chunk follow each other: first those
+within it, then those that one of its particles lists with a particle of another chunk. A chunk is the work of
+one thread. It adds a pair within it to both particles; of another it adds one side, and leaves the other in
+the slot of the pair, where the chunk of that particle fetches it. So every sum has one writer, and an order
+that depends on the indices of particles alone: the same bits on one thread and on many.
+
+What touching pairs remember lies with them. Before indices move, or a list is made anew, it is stored with
+the particles, under the id of the other, from where a new list recalls it.
+"""
+
+from typing import TYPE_CHECKING
+
+from tisim.backend import runtime
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.neighbours.cell_grid import sort_row
+from tisim.neighbours.half_list import HalfList
+from tisim.worlds.program import Item, Phase, Repeat
+from tisim.worlds.status import WorldStatus
+
+if TYPE_CHECKING:
+    from tisim.interactions.contact_memory import ContactMemory
+
+CHUNK_SLOTS = 512
+"""A chunk has this many slots on a CPU: the state of so many particles stays in the nearest cache. On a GPU
+it has one."""
+
+
+@ti.data_oriented
+class PairChunks:
+    """Pair chunks hold the pairs of every world: particles ``first[w, m]`` and ``second[w, m]``, the one of
+    lower id first.
+
+    Chunk c has its inner pairs from ``begin[w, c]`` to ``outer[w, c]``, and the others up to ``end[w, c]``.
+    Particle i fetches ``fetched[w, m]``, slots of pairs, for m from ``fetch_begin[w, i]`` on. ``unsaved[w]``
+    says whether pairs remember what the particles have not stored: sums that bring memory up to date set it.
+    A list that is made for a trial state may lack pairs of the last good one, whose memory stays stored.
+    """
+
+    def __init__(self, half_list: HalfList, memories: tuple["ContactMemory", ...]) -> None:
+        self.half_list, self.s = half_list, half_list.s
+        s = self.s
+        self.memories = memories
+        self.chunk = CHUNK_SLOTS if runtime.current().device == "cpu" else 1
+        self.chunks = -(-s.capacity // self.chunk)
+        self.room = half_list.sizes.mean * s.capacity
+        self.first, self.second, self.fetched, self.fetch_begin, self.fetch_count = (
+            ti.field(ti.i32) for _ in range(5)
+        )
+        self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
+        builder = ti.FieldsBuilder()
+        # A pair and its memory are one record: they are read together.
+        records = (self.first, self.second, *(value for one in memories for value in one.fields()))
+        builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
+        builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(self.fetched)
+        for column in (self.fetch_begin, self.fetch_count):
+            builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
+        for column in (self.begin, self.outer, self.end):
+            builder.dense(ti.i, s.worlds).dense(ti.j, self.chunks).place(column)
+        builder.dense(ti.i, s.worlds).place(self.unsaved)
+        self.tree = Tree(builder)
+
+    def bytes(self) -> int:
+        """Return the device memory, in bytes."""
+        s, real = self.s, 8 if self.s.real == ti.f64 else 4
+        values = sum(one.size for one in self.memories)
+        per_world = self.room * (12 + real * values) + 8 * s.capacity + 12 * self.chunks + 4
+        return s.worlds * per_world + self.half_list.bytes()
+
+    @in_taichi_thread
+    def forget(self) -> None:
+        """Have every list made anew before it is used again; particles know what they have stored."""
+        self.half_list.stale.fill(1)
+        self.unsaved.fill(0)
+
+    @ti.func
+    def moved(self, w):
+        """Note how far particles have moved in a step."""
+        self.half_list.moved(w)
+
+    @ti.func
+    def chunk_of(self, i):
+        """Return the chunk that particle i belongs to."""
+        return i // self.chunk
+
+    def phases(self) -> "tuple[Item, ...]":
+        """Return the phases that bring the pairs up to date where the list is due."""
+        kinds = (CountPairs, PlacePairs, FillPairs, EndFetches, EnterFetches, SortFetches, EndRebuild)
+        store = (StoreMemory(self),) if self.memories else ()
+        fill = (kind(self) for kind in kinds)
+        rebuild = RebuildPairs(self, (*store, BeginRebuild(self), *self.half_list.phases(), *fill))
+        return (*self.half_list.watch(), rebuild)
+
+    @in_taichi_thread
+    def store_memory(self) -> None:
+        """Store what pairs remember with the particles, so that these can be read."""
+        if self.memories:
+            self._store_all()
+
+    @ti.kernel
+    def _store_all(self):
+        for w, c in ti.ndrange(self.s.worlds, self.chunks):
+            if self.unsaved[w] > 0 and c * self.chunk < self.s.count[w]:
+                self.store_chunk(w, c)
+
+    @ti.func
+    def store_chunk(self, w, c):
+        s = self.s
+        for i in range(c * self.chunk, ti.min((c + 1) * self.chunk, s.count[w])):
+            for one in ti.static(self.memories):
+                one.clear(w, i)
+        for m in range(self.begin[w, c], self.end[w, c]):
+            i, j = self.first[w, m], self.second[w, m]
+            # Within a chunk either may store it; else the one whose chunk this is.
+            keeper, other = i, j
+            if self.chunk_of(i) != c or (m < self.outer[w, c] and self.half_list.lists(w, j, i)):
+                keeper, other = j, i
+            for one in ti.static(self.memories):
+                one.store(w, m, keeper, other)
+
+    @ti.func
+    def invalidate(self, w):
+        """Have the list made anew; particles have been put elsewhere, and know what they have stored."""
+        self.half_list.stale[w], self.unsaved[w] = 1, 0
+
+
+class RebuildPairs(Repeat):
+    """This item makes the pairs of a world anew, once, when its list is due."""
+
+    def __init__(self, pairs: PairChunks, items: tuple[Phase, ...]) -> None:
+        super().__init__(items)
+        self.p = pairs
+
+    @ti.func
+    def pending(self, w):
+        return self.p.half_list.stale[w]
+
+
+class OfWorld(Phase):
+    """This phase works on the pairs of a world."""
+
+    def __init__(self, pairs: PairChunks) -> None:
+        self.p, self.s = pairs, pairs.s
+
+
+class OfChunks(OfWorld):
+    """This phase works on the pairs of each chunk."""
+
+    light = False
+
+    def __init__(self, pairs: PairChunks) -> None:
+        super().__init__(pairs)
+        self.extent = pairs.chunks
+
+    @ti.func
+    def size(self, w):
+        return (self.s.count[w] + self.p.chunk - 1) // self.p.chunk
+
+
+class StoreMemory(OfChunks):
+    """This phase stores what pairs remember with the particles, where these have not stored it yet."""
+
+    conditional = True
+
+    @ti.func
+    def when(self, w):
+        return self.p.unsaved[w]
+
+    @ti.func
+    def run(self, w, c):
+        self.p.store_chunk(w, c)
+
+
+class BeginRebuild(OfWorld):
+    """After this phase the particles have stored what there is to remember."""
+
+    @ti.func
+    def run(self, w, _k):
+        self.p.unsaved[w] = 0
+
+
+class CountPairs(OfChunks):
+    """This phase counts how many pairs of a chunk are within it, and how many not."""
+
+    @ti.func
+    def run(self, w, c):
+        p = self.p
+        n, inner, outer = p.half_list, 0, 0
+        for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, self.s.count[w])):
+            p.fetch_begin[w, i] = 0
+            for k in range(n.size[w, i]):
+                within = ti.cast(p.chunk_of(n.index[w, i, k]) == c, ti.i32)
+                inner, outer = inner + within, outer + 1 - within
+        p.outer[w, c], p.end[w, c] = inner, outer
+
+
+class PlacePairs(OfWorld):
+    """This phase finds where the pairs of each chunk begin and end."""
+
+    @ti.func
+    def run(self, w, _k):
+        p, total = self.p, 0
+        for c in range((self.s.count[w] + p.chunk - 1) // p.chunk):
+            inner, outer = p.outer[w, c], p.end[w, c]
+            p.begin[w, c], p.outer[w, c] = total, total + inner
+            total += inner + outer
+            p.end[w, c] = total
+        if total > p.room:
+            ti.atomic_max(self.s.failed[w], WorldStatus.LIST_OVERFLOW)
+            for c in range((self.s.count[w] + p.chunk - 1) // p.chunk):
+                p.begin[w, c], p.outer[w, c], p.end[w, c] = 0, 0, 0
+
+
+class FillPairs(OfChunks):
+    """This phase enters the pairs of a chunk, in the order of who lists them, and what they remember."""
+
+    @ti.func
+    def run(self, w, c):
+        p, s = self.p, self.s
+        n, inner, outer = p.half_list, p.begin[w, c], p.outer[w, c]
+        if p.end[w, c] > inner:
+            for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, s.count[w])):
+                for k in range(n.size[w, i]):
+                    j = n.index[w, i, k]
+                    within = p.chunk_of(j) == c
+                    m = ti.select(within, inner, outer)
+                    inner, outer = inner + ti.select(within, 1, 0), outer + ti.select(within, 0, 1)
+                    if not within:
+                        ti.atomic_add(p.fetch_begin[w, j], 1)
+                    ordered = s.id[w, i] < s.id[w, j]
+                    p.first[w, m], p.second[w, m] = ti.select(ordered, i, j), ti.select(ordered, j, i)
+                    for one in ti.static(p.memories):
+                        one.recall(w, m, i, j)
+
+
+class EndFetches(OfWorld):
+    """This phase finds where the pairs that each particle fetches end, among all."""
+
+    @ti.func
+    def run(self, w, _k):
+        p, total = self.p, 0
+        for i in range(self.s.count[w]):
+            count = p.fetch_begin[w, i]
+            total += count
+            p.fetch_count[w, i], p.fetch_begin[w, i] = count, total
+
+
+class EnterFetches(OfChunks):
+    """This phase tells the other particle of each pair that is not within a chunk, in whatever order threads
+    come."""
+
+    @ti.func
+    def run(self, w, c):
+        p = self.p
+        for m in range(p.outer[w, c], p.end[w, c]):
+            j = ti.select(p.chunk_of(p.first[w, m]) == c, p.second[w, m], p.first[w, m])
+            p.fetched[w, ti.atomic_sub(p.fetch_begin[w, j], 1) - 1] = m
+
+
+class SortFetches(OfChunks):
+    """This phase orders what each particle fetches by place in the list."""
+
+    @ti.func
+    def run(self, w, c):
+        p = self.p
+        for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, self.s.count[w])):
+            sort_row(p.fetched, w, p.fetch_begin[w, i], p.fetch_begin[w, i] + p.fetch_count[w, i])
+
+
+class EndRebuild(OfWorld):
+    """This phase declares the list as good as new."""
+
+    @ti.func
+    def run(self, w, _k):
+        self.p.half_list.stale[w] = 0

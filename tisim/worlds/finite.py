@@ -1,0 +1,50 @@
+"""Whether every quantity of the live particles is finite, asked on the device."""
+
+import numpy as np
+
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.worlds.state import State
+
+
+@ti.data_oriented
+class FiniteCheck:
+    """This check asks for all worlds of a state at once whether all is finite; a copy of all quantities would
+    take much longer."""
+
+    def __init__(self, s: State) -> None:
+        self.s, self.broken = s, ti.field(ti.i32)
+        builder = ti.FieldsBuilder()
+        builder.dense(ti.i, s.worlds).place(self.broken)
+        self.tree = Tree(builder)
+        fields = [field for field in s.reported if not field.integer]
+        self.scalars = tuple(getattr(s, f.name) for f in fields if f.components == 1 and not f.slots)
+        self.vectors = tuple(getattr(s, f.name) for f in fields if f.components == 3)
+        self.slotted = tuple((getattr(s, f.name), f.slots) for f in fields if f.slots)
+
+    @in_taichi_thread
+    def worlds(self) -> np.ndarray:
+        """Return whether all is finite, by world."""
+        self._look()
+        finite: np.ndarray = self.broken.to_numpy() == 0
+        return finite
+
+    @ti.kernel
+    def _look(self):
+        for w in range(self.s.worlds):
+            self.broken[w] = 0
+        for w, i in ti.ndrange(self.s.worlds, self.s.capacity):
+            if i < self.s.count[w]:
+                total = ti.cast(0.0, ti.f64)
+                for column in ti.static(self.scalars):
+                    total += 0.0 * column[w, i]
+                for column in ti.static(self.vectors):
+                    for k in ti.static(range(3)):
+                        total += 0.0 * column[w, i][k]
+                for column in ti.static(self.slotted):
+                    for k in range(column[1]):
+                        total += 0.0 * column[0][w, i, k]
+                # 0 times what is not finite is not a number, and with one no sum is.
+                if ti.math.isnan(total):
+                    self.broken[w] = 1
