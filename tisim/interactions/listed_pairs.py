@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.interactions.pair_chunks import PairChunks
+from tisim.interactions.pair_chunks import OfChunks, PairChunks
 from tisim.worlds.program import Item, PerParticle, Phase
 
 if TYPE_CHECKING:
@@ -43,26 +43,20 @@ class PairTerms:
         return term
 
 
-class OfChunk(Phase):
+class PartOfSum(OfChunks):
     """This phase does a part of a sum, for each chunk."""
 
     conditional = True
-    light = False
 
     def __init__(self, total: "PairSum", left: PairTerms) -> None:
-        pairs = left.pairs
-        self.total, self.left, self.p, self.s = total, left, pairs, pairs.s
-        self.extent = pairs.chunks
+        super().__init__(left.pairs)
+        self.total, self.left = total, left
         self.alone = not total.long_ranged
-        self.commits = total.commits and bool(pairs.memories)
+        self.commits = total.commits and bool(left.pairs.memories)
 
     @ti.func
     def when(self, w):
         return self.total.when(w)
-
-    @ti.func
-    def size(self, w):
-        return (self.s.count[w] + self.p.chunk - 1) // self.p.chunk
 
     @ti.func
     def note_memory(self, w):
@@ -71,7 +65,7 @@ class OfChunk(Phase):
             self.p.unsaved[w] = 1
 
 
-class AddPairs(OfChunk):
+class AddPairs(PartOfSum):
     """This phase computes the pairs of a chunk, and adds each to both particles, or to the one that is in
     it."""
 
@@ -104,7 +98,7 @@ class AddPairs(OfChunk):
                     self.left.leave(w, m, ti.Vector.zero(s.real, self.total.components))
 
 
-class CloseSum(OfChunk):
+class CloseSum(PartOfSum):
     """This phase adds what other chunks have left for the particles of this one; then the sums are done.
 
     after : what follows with each particle at once, while it is in the cache.
@@ -168,7 +162,7 @@ class AdvanceParticles(PerParticle):
         self.total.singles(w, i, self.s.time[w])
 
 
-class AdvancePairs(OfChunk):
+class AdvancePairs(PartOfSum):
     """This phase brings what pairs remember up to date with the end of a step that was found by trial."""
 
     def __init__(self, total: "SumForces", left: PairTerms) -> None:
