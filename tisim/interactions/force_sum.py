@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
+from tisim.numerics.vectors import piece
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
 
@@ -69,6 +70,12 @@ class SumForces(PairSum):
         self.turning = turning([effect.data for effect in effects])
         self.fixes = any(field.name == "fixed" for field in s.fields)
         self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
+        # A listed pair comes to a force, torques on both, and what each law has it remember.
+        self.pair_values, laws = 9 if self.turning else 3, []
+        for law in self.short_ranged:
+            laws.append((law, self.pair_values))
+            self.pair_values += law.data.memory if self.commits else 0
+        self.laws = tuple(laws)
 
     @ti.func
     def start(self, w, i, t):
@@ -111,24 +118,44 @@ class SumForces(PairSum):
         return total
 
     @ti.func
-    def terms_of_pair(self, w, m, i, j, separation, distance, t):
-        force, turn, back = self.interaction(self.short_ranged[0], w, m, i, j, separation, distance, t)
-        for effect in ti.static(self.short_ranged[1:]):
-            more = self.interaction(effect, w, m, i, j, separation, distance, t)
-            force, turn, back = force + more[0], turn + more[1], back + more[2]
-        return self.wrench(force, turn), self.wrench(-force, back)
+    def of_pair(self, w, m, i, j, separation, distance, t):
+        values = ti.Vector.zero(self.s.real, self.pair_values)
+        for law, begin in ti.static(self.laws):
+            force, turn, back, known = self.interaction(law, w, m, i, j, separation, distance, t)
+            for k in ti.static(range(3)):
+                values[k] += force[k]
+                if ti.static(self.turning):
+                    values[3 + k] += turn[k]
+                    values[6 + k] += back[k]
+            if ti.static(self.commits):
+                for k in ti.static(range(law.memory)):
+                    values[begin + k] = known[k]
+        return values
 
     @ti.func
-    def interaction(self, effect: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
-        """Return force and torques of one law between listed pair m; what it remembers goes on."""
+    def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        """Return force, torques and new memory of one law between listed pair m."""
         s, dt = self.s, self.gone_by(w)
-        past = ti.Vector.zero(s.real, max(1, effect.memory))
-        if ti.static(effect.memory > 0):
-            past = effect.past.read(w, m)
-        force, turn, back, known = effect.interaction(s, w, i, j, separation, distance, past, dt, t)
-        if ti.static(effect.memory > 0 and self.commits):
-            effect.past.write(w, m, known)
-        return force, turn, back
+        past = ti.Vector.zero(s.real, max(1, law.memory))
+        if ti.static(law.memory > 0):
+            past = law.past.read(w, m)
+        return law.interaction(s, w, i, j, separation, distance, past, dt, t)
+
+    @ti.func
+    def shares(self, values):
+        force = piece(values, 0, 3)
+        here, there = self.wrench(force, force), self.wrench(-force, force)
+        if ti.static(self.turning):
+            here = self.wrench(force, piece(values, 3, 3))
+            there = self.wrench(-force, piece(values, 6, 3))
+        return here, there
+
+    @ti.func
+    def keep(self, w, m, values):
+        if ti.static(self.commits):
+            for law, begin in ti.static(self.laws):
+                if ti.static(law.memory > 0):
+                    law.past.write(w, m, piece(values, begin, law.memory))
 
     @ti.func
     def gone_by(self, w):

@@ -35,6 +35,7 @@ class PairChunks:
     lower id first.
 
     Chunk c has its inner pairs from ``begin[w, c]`` to ``outer[w, c]``, and the others up to ``end[w, c]``.
+    ``sorted`` has room for the same slots in the order of a sum: those of pairs within reach come first.
     Particle i fetches ``fetched[w, m]``, slots of pairs, for m from ``fetch_begin[w, i]`` on. ``unsaved[w]``
     says whether pairs remember what the particles have not stored: sums that bring memory up to date set it.
     A list that is made for a trial state may lack pairs of the last good one, whose memory stays stored.
@@ -47,15 +48,16 @@ class PairChunks:
         self.chunk = CHUNK_SLOTS if runtime.current().device == "cpu" else 1
         self.chunks = -(-s.capacity // self.chunk)
         self.room = half_list.sizes.mean * s.capacity
-        self.first, self.second, self.fetched, self.fetch_begin, self.fetch_count = (
-            ti.field(ti.i32) for _ in range(5)
+        self.first, self.second, self.sorted, self.fetched, self.fetch_begin, self.fetch_count = (
+            ti.field(ti.i32) for _ in range(6)
         )
         self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
         builder = ti.FieldsBuilder()
         # A pair and its memory are one record: they are read together.
         records = (self.first, self.second, *(value for one in memories for value in one.fields()))
         builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
-        builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(self.fetched)
+        for column in (self.sorted, self.fetched):
+            builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(column)
         for column in (self.fetch_begin, self.fetch_count):
             builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
         for column in (self.begin, self.outer, self.end):
@@ -67,7 +69,7 @@ class PairChunks:
         """Return the device memory, in bytes."""
         s, real = self.s, 8 if self.s.real == ti.f64 else 4
         values = sum(one.size for one in self.memories)
-        per_world = self.room * (12 + real * values) + 8 * s.capacity + 12 * self.chunks + 4
+        per_world = self.room * (16 + real * values) + 8 * s.capacity + 12 * self.chunks + 4
         return s.worlds * per_world + self.half_list.bytes()
 
     @in_taichi_thread

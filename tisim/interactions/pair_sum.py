@@ -35,11 +35,13 @@ class PairSum(PerParticle):
 
     A subclass says what the sum begins with, in ``start``, what one other contributes, in ``term``, and what
     becomes of it, in ``finish``; ``components`` is its length. Where pairs are listed it also says where the
-    sum is kept meanwhile, in ``put`` and ``get``, and what a pair gives to both, in ``terms_of_pair``;
-    ``commits`` says whether what pairs remember is brought up to date with the sum.
+    sum is kept meanwhile, in ``put`` and ``get``, what a pair comes to, in ``of_pair``, a vector of
+    ``pair_values``, and what of it each of the two is given, in ``shares``; ``commits`` says whether what
+    pairs remember is brought up to date with the sum, by ``keep``.
     """
 
     components: int = 3
+    pair_values: int = 0
     commits: ClassVar[bool] = False
 
     def __init__(
@@ -82,10 +84,20 @@ class PairSum(PerParticle):
         return ti.Vector.zero(self.s.real, self.components)
 
     @ti.func
-    def terms_of_pair(self, w, m, i, j, separation, distance, t):
-        """Return what listed pair m gives to the sums of i and of j; i has the lower id."""
+    def of_pair(self, w, m, i, j, separation, distance, t):
+        """Return what listed pair m of i and j comes to; i has the lower id. Nothing is written: lanes side by
+        side compute pairs whose turn it is not yet."""
+        return ti.Vector.zero(self.s.real, self.pair_values)
+
+    @ti.func
+    def shares(self, values):
+        """Return what a pair gives to the sums of i and of j, by what it comes to."""
         nothing = ti.Vector.zero(self.s.real, self.components)
         return nothing, nothing
+
+    @ti.func
+    def keep(self, w, m, values):
+        """Keep what listed pair m remembers from now on, by what it comes to."""
 
     @ti.func
     def out_of_reach(self, w, m):

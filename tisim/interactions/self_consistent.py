@@ -13,6 +13,7 @@ from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.listed_pairs import PairTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
+from tisim.numerics.vectors import piece
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
@@ -107,7 +108,7 @@ class JacobiSweep(PairSum):
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         super().__init__(solver.s, solver.domain, (solver.effect,), solver.pairs)
         self.solver, self.effect, self.trial = solver, solver.effect, trial
-        self.components = solver.components
+        self.components, self.pair_values = solver.components, 2 * solver.components
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
@@ -122,10 +123,17 @@ class JacobiSweep(PairSum):
         return self.solver.packed(self.solver.next[w, i])
 
     @ti.func
-    def terms_of_pair(self, w, m, i, j, separation, distance, t):
+    def of_pair(self, w, m, i, j, separation, distance, t):
         here = self.term(self.effect, w, i, j, separation, distance, t)
         there = self.term(self.effect, w, j, i, -separation, distance, t)
-        return here, there
+        values = ti.Vector.zero(self.s.real, self.pair_values)
+        for k in ti.static(range(self.components)):
+            values[k], values[self.components + k] = here[k], there[k]
+        return values
+
+    @ti.func
+    def shares(self, values):
+        return piece(values, 0, self.components), piece(values, self.components, self.components)
 
     @ti.func
     def finish(self, w, i, total, t):

@@ -39,21 +39,20 @@ class GranularContact(PairForce):
         a, b = s.radius[w, i], s.radius[w, j]
         overlap = a + b - distance
         arm = a - 0.5 * overlap
-        force, couple = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
-        known = ti.Vector.zero(s.real, max(1, self.memory))
-        if overlap >= 0.0:
-            normal = (1.0 / distance) * separation
-            turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
-            slip = s.velocity[w, j] - s.velocity[w, i] - turn.cross(normal)
-            m, n = s.mass[w, i], s.mass[w, j]
-            # R* and m*, by one division.
-            sizes, masses = a + b, m + n
-            inverse = 1.0 / (sizes * masses)
-            radius, mass = a * b * (masses * inverse), m * n * (sizes * inverse)
-            force, known = self.contact(w, normal, overlap, radius, mass, slip, past, dt)
-            # n x F is the same seen from either: both turn round at once.
-            couple = normal.cross(force)
-        return force, arm * couple, (distance - arm) * couple, known
+        normal = (1.0 / distance) * separation
+        turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
+        slip = s.velocity[w, j] - s.velocity[w, i] - turn.cross(normal)
+        m, n = s.mass[w, i], s.mass[w, j]
+        # R* and m*, by one division.
+        sizes, masses = a + b, m + n
+        inverse = 1.0 / (sizes * masses)
+        radius, mass = a * b * (masses * inverse), m * n * (sizes * inverse)
+        # Chosen afterwards, not by a branch: several pairs are computed at once.
+        push, known = self.contact(w, normal, ti.max(overlap, 0.0), radius, mass, slip, past, dt)
+        force = ti.select(overlap >= 0.0, push, 0.0)
+        # n x F is the same seen from either: both turn round at once.
+        couple = normal.cross(force)
+        return force, arm * couple, (distance - arm) * couple, ti.select(overlap >= 0.0, known, 0.0)
 
     @ti.func
     def at_wall(self, s, w, i, normal, overlap, past, dt):

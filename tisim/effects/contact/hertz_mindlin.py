@@ -10,6 +10,8 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.contact.granular import GranularContact
 
+NO_GRIP = 1e-30
+"""Contacts below this radius, m, hold nothing."""
 TURN = 1e-12
 """What a pair remembers turns with it; its square is not corrected by less than this part of it."""
 
@@ -89,7 +91,7 @@ class HertzMindlin(GranularContact):
 
         elastic = ti.Vector([past[0], past[1], past[2]])
         # A lighter grip holds less; at constant T more would come back than was put in.
-        elastic *= ti.select(circle < past[3], circle / past[3], 1.0)
+        elastic *= ti.min(circle / ti.max(past[3], NO_GRIP), 1.0)
         # What is remembered turns with the pair: into the plane of contact, with its size.
         out, size = elastic.dot(normal), elastic.norm_sqr()
         known = elastic - out * normal
