@@ -85,8 +85,8 @@ class PairSum(PerParticle):
 
     @ti.func
     def of_pair(self, w, m, i, j, separation, distance, t):
-        """Return what listed pair m of i and j comes to; i has the lower id. Nothing is written: lanes side by
-        side compute pairs whose turn it is not yet."""
+        """Return what listed pair m of i and j comes to; i has the lower id. It writes nothing: pairs are
+        computed side by side, and some more than once."""
         return ti.Vector.zero(self.s.real, self.pair_values)
 
     @ti.func
