@@ -13,7 +13,7 @@ That the bits agree needs no luck: phases only combine through sums in a fixed o
 floating-point minima and maxima, none of which depend on the order of parallel work.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import ClassVar
 
@@ -123,11 +123,12 @@ class Launch:
     """A launch takes phases that follow each other: a loop over tasks of each, in every world that goes on.
 
     A task is a range of items. On a CPU there are not more than keep all threads busy, nor are they so small
-    that waking a thread is not worth it.
+    that waking a thread is not worth it. ``run`` returns how many worlds go on with what follows: a repeat in
+    the nest ``following``, or the next step.
     """
 
-    def __init__(self, program: "Program", phases: tuple[Phase, ...], nest: Nest) -> None:
-        self.program, self.s, self.nest = program, program.s, nest
+    def __init__(self, program: "Program", phases: tuple[Phase, ...], nest: Nest, following: Nest) -> None:
+        self.program, self.s, self.nest, self.following = program, program.s, nest, following
         settings = runtime.current()
         self.iterations = TASK if settings.device == "cpu" else 1
         most = TASKS_PER_THREAD * settings.threads
@@ -139,7 +140,7 @@ class Launch:
             self.loops += ((phase, tasks, -(-phase.extent // tasks)),)
 
     @ti.kernel
-    def run(self):
+    def run(self) -> ti.i32:
         for loop in ti.static(self.loops):
             if ti.static(self.program.serial and self.s.worlds * loop[1] == 1):
                 ti.loop_config(serialize=True)
@@ -150,6 +151,12 @@ class Launch:
                 ti.loop_config(serialize=True)
             for w in range(self.s.worlds):
                 self.program._stop_failed(w)
+        n = 0
+        if ti.static(self.program.serial):
+            ti.loop_config(serialize=True)
+        for w in range(self.s.worlds):
+            n += self.program._goes_on(self.following, w)
+        return n
 
     @ti.func
     def task(self, loop: ti.template(), w, task):  # type: ignore[valid-type]
@@ -165,7 +172,7 @@ class Loop:
 
     def __init__(self, program: "Program", items: "tuple[Item, ...]", nest: Nest) -> None:
         self.program, self.s, self.nest = program, program.s, nest
-        self.plan = plan(program, items, nest)
+        self.plan = plan(program, items, nest, nest)
 
     @ti.kernel
     def count(self) -> ti.i32:
@@ -173,23 +180,27 @@ class Loop:
         if ti.static(self.program.serial):
             ti.loop_config(serialize=True)
         for w in range(self.s.worlds):
-            if self.program._active(self.nest, w):
-                n += 1
+            n += self.program._goes_on(self.nest, w)
         return n
 
 
 Plan = tuple[Launch | Loop, ...]
 
 
-def plan(program: "Program", items: "tuple[Item, ...]", nest: Nest) -> Plan:
-    """Return the launches that these items take."""
+def plan(program: "Program", items: "tuple[Item, ...]", nest: Nest, last: Nest) -> Plan:
+    """Return the launches that these items take; the last of them is followed by what ``last`` says."""
     launches: list[Launch | Loop] = []
-    for repeated, group in groupby(items, lambda item: isinstance(item, Repeat)):
+    groups = [(repeated, tuple(group)) for repeated, group in groupby(items, lambda i: isinstance(i, Repeat))]
+    for k, (repeated, group) in enumerate(groups):
         if repeated:
-            repeats = [item for item in group if isinstance(item, Repeat)]
-            launches += [Loop(program, repeat.items, nest.within(repeat)) for repeat in repeats]
+            launches += [Loop(program, r.items, nest.within(r)) for r in group if isinstance(r, Repeat)]
         else:
-            launches.append(Launch(program, tuple(item for item in group if isinstance(item, Phase)), nest))
+            next_repeats = [
+                r for r in (groups[k + 1][1] if k + 1 < len(groups) else ()) if isinstance(r, Repeat)
+            ]
+            following = nest.within(next_repeats[0]) if next_repeats else last
+            phases = tuple(item for item in group if isinstance(item, Phase))
+            launches.append(Launch(program, phases, nest, following))
     return tuple(launches)
 
 
@@ -202,7 +213,7 @@ class Program:
         self.outside = Nest()
         # One task has one thread, which is faster without waking it.
         self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
-        self.plan: Plan = plan(self, items, self.outside) if schedule == "particle" else ()
+        self.plan: Plan = plan(self, items, self.outside, self.outside) if schedule == "particle" else ()
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
@@ -213,18 +224,25 @@ class Program:
             self._advance_worlds(steps)
             return
         self._allow(steps)
+        pending = self._count()
         for _ in range(steps):
-            if not self._count_going_on():
+            if not pending:
                 return
-            self._launch(self.plan)
+            pending = self._launch(self.plan, self._count)
 
-    def _launch(self, launches: Plan) -> None:
+    def _launch(self, launches: Plan, count: Callable[[], int]) -> int:
+        """Make the launches, and return how many worlds go on with what follows them, which ``count``
+        tells."""
+        pending: int | None = None
         for launch in launches:
             if isinstance(launch, Launch):
-                launch.run()
+                pending = launch.run()
             else:
-                while launch.count():
-                    self._launch(launch.plan)
+                pending = launch.count() if pending is None else pending
+                while pending:
+                    pending = self._launch(launch.plan, launch.count)
+                pending = None
+        return count() if pending is None else pending
 
     @in_taichi_thread
     def compile(self) -> None:
@@ -232,7 +250,7 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(0)
             return
-        self._count_going_on()
+        self._count()
         self._compile(self.plan)
 
     def _compile(self, launches: Plan) -> None:
@@ -306,14 +324,19 @@ class Program:
             active = active and repeat.pending(w) > 0
         return active
 
+    @ti.func
+    def _goes_on(self, nest: ti.template(), w):  # type: ignore[valid-type]
+        """Return 1 for a world that goes on in a nest, else 0. Between two steps, note whether it waits."""
+        if ti.static(len(nest.repeats) == 0):
+            self.s.paused[w] = ti.cast(self._waits(w), ti.i32)
+        return ti.cast(self._active(nest, w), ti.i32)
+
     @ti.kernel
-    def _count_going_on(self) -> ti.i32:
-        """Note between two steps which worlds wait, and return how many do not."""
+    def _count(self) -> ti.i32:
+        """Return how many worlds take the next step."""
         n = 0
         if ti.static(self.serial):
             ti.loop_config(serialize=True)
         for w in range(self.s.worlds):
-            self.s.paused[w] = ti.cast(self._waits(w), ti.i32)
-            if self._active(self.outside, w):
-                n += 1
+            n += self._goes_on(self.outside, w)
         return n
