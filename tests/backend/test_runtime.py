@@ -243,9 +243,17 @@ def test_small_scenes_do_not_go_through_the_memory_of_large_ones():
         ((_, result),) = batches.run([grains(number)])
         assert result.status.ok
     sizes = [(each.worlds, each.s.capacity) for each in batches._idle]
-    assert sorted(sizes) == [(1, 3), (1, 5), (1, 10240)]
+    assert sorted(sizes) == [(1, 10240), (8, 3), (8, 5)]
     batches.close()
     assert not batches._idle
+
+
+def test_a_few_worlds_of_a_small_scene_compile_nothing_after_one():
+    batches = Batches()
+    for number in (1, 3, 8, 2):
+        assert all(result.status.ok for _, result in batches.run([grains(500)] * number))
+    assert [(each.worlds, each.s.capacity) for each in batches._idle] == [(8, 512)]
+    batches.close()
 
 
 def test_rounded_sizes():

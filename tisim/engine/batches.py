@@ -25,6 +25,8 @@ IDLE_SIMULATIONS = 8
 SPARE, WASTE = 4096, 8
 """A kept simulation serves where it has room for at most so many particles, or so many times what is needed:
 all of its room is loaded and looked at."""
+FEW_WORLDS = 8
+"""A small scene is compiled for so many worlds, as what one world of it shows is often asked of a few."""
 
 Progress = Callable[[float], None]
 
@@ -101,7 +103,8 @@ class Batches:
         if simulation is None:
             _renew()
             capacity = rounded(capacity)
-            worlds = max(1, min(rounded(worlds), self.limit, BATCH_PARTICLES // capacity))
+            few = min(FEW_WORLDS, SPARE // capacity)
+            worlds = max(1, min(max(few, rounded(worlds)), self.limit, BATCH_PARTICLES // capacity))
             simulation = Simulation(scenes[0], worlds, capacity)
         try:
             yield simulation
