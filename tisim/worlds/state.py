@@ -14,7 +14,7 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
-from tisim.errors import RunError
+from tisim.errors import RunError, must
 from tisim.worlds.fields import Field
 from tisim.worlds.status import ASKED, WorldStatus
 
@@ -69,7 +69,7 @@ class State:
         builder = ti.FieldsBuilder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:
-            setattr(self, field.name, self._place(builder, field))
+            self._name(field.name, self._place(builder, field))
         if self._record:
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
         quantities, integers = (*CLOCK, *world_quantities), (*BOOKS, *flags)
@@ -77,7 +77,7 @@ class State:
             for name in names:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
-                setattr(self, name, column)
+                self._name(name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
         # Particles that its scene may ever have; the capacity may be that of a larger one.
@@ -117,6 +117,12 @@ class State:
     def __getattr__(self, name: str) -> Any:
         what = "the fields, counters or world_quantities of an effect that reads it"
         raise AttributeError(f"{name!r} must be declared in {what}")
+
+    def _name(self, name: str, column: Any) -> None:
+        """Have ``s.NAME`` be a column; raise InputError where the name means something else already."""
+        free = name.isidentifier() and name not in self.__dict__ and not hasattr(type(self), name)
+        must(free, "name of a field, counter, flag or quantity", "one that a state has no other use for", name)
+        setattr(self, name, column)
 
     def _place(self, builder: Any, field: Field) -> Any:
         dtype = ti.i32 if field.integer else ti.f64 if field.double else self.real
