@@ -46,8 +46,8 @@ SAID = {
     "UnknownName": r"laws\.py, line 11, in UnknownName\.force, must be what Taichi can compile; .*'kk'",
     "NotCalled": r"laws\.py, line 19, in NotCalled\.force, must be what Taichi can compile; .*bad operand",
     "Undeclared": r"laws\.py, line 25, in Undeclared\.force, must be .*'charge' must be declared in",
-    "Reads": r"^name of .* must be one that a state has no other use for; received 'read'$",
-    "Again": r"^name of .* must be one that a state has no other use for; received 'status'$",
+    "Reads": r"^name of .* must be a name of no other use on a state; received 'read'$",
+    "Again": r"^name of .* must be a name of no other use on a state; received 'status'$",
 }
 
 

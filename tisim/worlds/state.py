@@ -14,24 +14,10 @@ from tisim.backend import runtime
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
-from tisim.errors import RunError, must
+from tisim.errors import RunError
+from tisim.worlds.columns import BOOKS, CLOCK, MOTION, OWN, TALLIES, check_names
 from tisim.worlds.fields import Field
 from tisim.worlds.status import ASKED, WorldStatus
-
-CLOCK = (
-    *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
-    *("reached", "cut"),
-)
-"""These quantities of a world (f64) tell its time and how its steps go."""
-BOOKS = (
-    *("count", "status", "failed", "failing_particle", "failing_effect"),
-    *("changed", "events", "next_id", "underway"),
-)
-"""These integers of a world (i32) tell how many particles it has and how it is doing."""
-MOTION = ("frame", "displacement", "displacement_since_list")
-"""These vectors of a world (f64) tell how far its particles have moved."""
-TALLIES = ("steps", "particle_steps")
-"""These counters (i64) are those that every world keeps."""
 
 
 @ti.data_oriented
@@ -61,6 +47,8 @@ class State:
         flags: tuple[str, ...] = (),
         records: bool = False,
     ) -> None:
+        # Before anything is placed: fields that are left half made are a fault of every later kernel.
+        check_names(type(self), (*(field.name for field in fields), *counters, *world_quantities, *flags))
         self.worlds, self.capacity = worlds, capacity
         self.fields, self.counters = fields, (*TALLIES, *counters)
         self.world_quantities, self.flags = world_quantities, flags
@@ -69,7 +57,7 @@ class State:
         builder = ti.FieldsBuilder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:
-            self._name(field.name, self._place(builder, field))
+            setattr(self, field.name, self._place(builder, field))
         if self._record:
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
         quantities, integers = (*CLOCK, *world_quantities), (*BOOKS, *flags)
@@ -77,7 +65,7 @@ class State:
             for name in names:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
-                self._name(name, column)
+                setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
         # Particles that its scene may ever have; the capacity may be that of a larger one.
@@ -99,8 +87,7 @@ class State:
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
         self.before_reading: list[Callable[[], None]] = []
-        own = ("seed", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
-        self.columns = (*quantities, *integers, *MOTION, *self.counters, *own)
+        self.columns = (*quantities, *integers, *MOTION, *self.counters, *OWN)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -117,12 +104,6 @@ class State:
     def __getattr__(self, name: str) -> Any:
         what = "the fields, counters or world_quantities of an effect that reads it"
         raise AttributeError(f"{name!r} must be declared in {what}")
-
-    def _name(self, name: str, column: Any) -> None:
-        """Have ``s.NAME`` be a column; raise InputError where the name means something else already."""
-        free = name.isidentifier() and name not in self.__dict__ and not hasattr(type(self), name)
-        must(free, "name of a field, counter, flag or quantity", "one that a state has no other use for", name)
-        setattr(self, name, column)
 
     def _place(self, builder: Any, field: Field) -> Any:
         dtype = ti.i32 if field.integer else ti.f64 if field.double else self.real
