@@ -228,9 +228,10 @@ class PairForce(Pairwise):
         """Return the force on i by j (N), the torques on i and on j about their centres (N m), and what the
         pair remembers from now on, given what it did, ``past``, and that ``dt`` (s) have gone by since.
 
-        It is asked of every listed pair within ``reach``, once: i is the one of lower id, and what is
-        remembered is as i sees it. ``past`` is a vector of ``memory`` values, or of one 0 where there are
-        none, which is returned as it came.
+        It is asked of listed pairs within ``reach``: i is the one of lower id, and what is remembered is as i
+        sees it. ``past`` is a vector of ``memory`` values, or of one 0 where there are none, which is returned
+        as it came. It writes nothing else: several pairs are computed at once, and some twice. Choices
+        (``ti.select``) are faster there than branches.
         """
         force = self.pair_force(s, w, i, j, separation, distance, t)
         turn = self.pair_torque(s, w, i, j, separation, distance, t)
