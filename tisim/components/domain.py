@@ -1,4 +1,4 @@
-"""The space a scene lives in: open, or a box whose opposite faces are joined."""
+"""The space a scene lives in: open, or a box whose opposite faces are joined along the axes of choice."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.errors import must
 
+Axes = tuple[bool, bool, bool]
+"""An answer for each axis: x, y and z."""
+NO_AXIS: Axes = (False, False, False)
+
 
 class Domain(Component):
     """This is unbounded space, and the contract of a domain."""
@@ -22,13 +26,14 @@ class Domain(Component):
         """Return the corners in m, shape (3,) each; None where there are none."""
         return None, None
 
-    def joined(self) -> bool:
-        """Return whether opposite faces are joined."""
-        return False
+    def joined(self) -> Axes:
+        """Return along which axes opposite faces are joined, so that what leaves by one enters by the
+        other."""
+        return NO_AXIS
 
-    def periodic(self) -> bool:
-        """Return whether particles see each other across joined faces."""
-        return False
+    def imaged(self) -> Axes:
+        """Return along which axes particles see each other across joined faces."""
+        return NO_AXIS
 
     @ti.func
     def wrap(self, w, r):
@@ -66,19 +71,25 @@ class Open(Domain):
 
 
 class Box(Domain):
-    """The domain is a box; what leaves it through one face comes back through the opposite one.
+    """The domain is a box; what leaves it along a periodic axis comes back through the opposite face.
 
-    With images, particles also see each other across the faces: a periodic system. Without, it is the control
-    volume of Z04 section 7: a grain that leaves comes back on the other side with the same velocity, and
-    meets there whatever is there. (The paper reverses the coordinate; the two differ by twice the overshoot,
-    and translation keeps the particle inside.)
+    Along any other axis space goes on beyond the faces, which hold nothing back: put walls there where grains
+    must stay. The faces then only say where a random start has room for whole spheres, what volume it is, and
+    what is drawn as the box.
+
+    With images, particles also see each other across joined faces: a periodic system, in which each sees the
+    nearest image of another. So twice the reach of a law must fit into the sides. Without images it is the
+    control volume of Z04 section 7: a grain that leaves comes back on the other side with the same velocity,
+    and meets there whatever is there. (The paper reverses the coordinate; the two differ by twice the
+    overshoot, and translation keeps the particle inside.)
 
     Source: Z04 section 7.
     """
 
     low: Vector = parameter("m", "lower corner of the box", examples=[(-0.01, -0.01, -0.01)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
-    images: bool = option("whether particles see each other across the faces", True)
+    periodic: Axes = option("whether opposite faces are joined along x, y and z", (True, True, True))
+    images: bool = option("whether particles see each other across joined faces", True)
 
     @model_validator(mode="after")
     def _ordered(self) -> Box:
@@ -91,11 +102,11 @@ class Box(Domain):
     def bounds(self) -> tuple[np.ndarray | None, np.ndarray | None]:
         return np.asarray(self.low), np.asarray(self.high)
 
-    def joined(self) -> bool:
-        return True
+    def joined(self) -> Axes:
+        return self.periodic
 
-    def periodic(self) -> bool:
-        return self.images
+    def imaged(self) -> Axes:
+        return self.periodic if self.images else NO_AXIS
 
     @ti.func
     def origin(self, w):
@@ -111,7 +122,7 @@ class Box(Domain):
         inside = r
         for k in ti.static(range(3)):
             # Not x - side * floor(...) for all: that would round what has not moved across a face.
-            if not (r[k] >= low[k] and r[k] < low[k] + side[k]):
+            if ti.static(self.periodic[k]) and not (r[k] >= low[k] and r[k] < low[k] + side[k]):
                 inside[k] = r[k] - side[k] * ti.floor((r[k] - low[k]) / side[k])
                 # Rounding can land exactly on the upper face, which is the lower one.
                 if inside[k] >= low[k] + side[k]:
@@ -121,8 +132,11 @@ class Box(Domain):
     @ti.func
     def lost(self, w, r):
         # A number so large that a thousandth of the side is below half of its last digit.
-        blurred = r + 1e-3 * self.side(w) == r
-        return blurred.any()
+        side, blurred = self.side(w), 0
+        for k in ti.static(range(3)):
+            if ti.static(self.periodic[k]):
+                blurred += ti.select(r[k] + 1e-3 * side[k] == r[k], 1, 0)
+        return blurred
 
     @ti.func
     def nearest(self, w, a, b):
@@ -130,8 +144,9 @@ class Box(Domain):
         d = b - a
         # Both places lie in the box, so one turn is enough.
         for k in ti.static(range(3)):
-            d[k] -= ti.select(d[k] > 0.5 * side[k], side[k], 0.0)
-            d[k] += ti.select(d[k] < -0.5 * side[k], side[k], 0.0)
+            if ti.static(self.periodic[k]):
+                d[k] -= ti.select(d[k] > 0.5 * side[k], side[k], 0.0)
+                d[k] += ti.select(d[k] < -0.5 * side[k], side[k], 0.0)
         return d
 
     @ti.func

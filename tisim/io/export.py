@@ -156,7 +156,7 @@ def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
     if low is not None and high is not None:
         lattice = " ".join(repr(float(x)) for x in np.diag(high - low).ravel())
         origin = " ".join(repr(float(x)) for x in low)
-        pbc = "T T T" if trajectory.scene.domain.joined() else "F F F"
+        pbc = " ".join("T" if joined else "F" for joined in trajectory.scene.domain.joined())
         box = f'Lattice="{lattice}" Origin="{origin}" pbc="{pbc}" '
     path = folder / f"{name}.xyz"
     temporary = path.with_name(temporary_name(path.name))

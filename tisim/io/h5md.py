@@ -70,15 +70,15 @@ def unit_string(text: str) -> str:
 
 
 def write_box(group: h5py.Group, domain: Domain) -> None:
-    """Write the group ``box``. Where it is periodic, positions are those of the image in the domain.
+    """Write the group ``box``. Along an axis that is periodic, positions are those of the image in the
+    domain.
 
     Beyond the specification, ``origin`` is the lower corner of the domain, m.
     """
     low, high = domain.bounds()
-    kind = b"periodic" if low is not None and domain.joined() else b"none"
     box = group.create_group("box")
     box.attrs.create("dimension", 3, dtype=np.int32)
-    box.attrs["boundary"] = np.array([kind] * 3)
+    box.attrs["boundary"] = np.array([b"periodic" if joined else b"none" for joined in domain.joined()])
     if low is not None and high is not None:
         # Within the header of the dataset, of which HDF5 checks the checksum.
         compact = h5py.h5p.create(h5py.h5p.DATASET_CREATE)

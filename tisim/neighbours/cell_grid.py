@@ -166,13 +166,12 @@ class ShapeGrid(OfGrid):
     def run(self, w, _k):
         g = self.g
         extent, cells = ti.Vector.zero(self.s.real, 3), 0
-        if ti.static(g.joined):
-            low, side = g.domain.origin(w), g.domain.side(w)
-            for k in ti.static(range(3)):
+        low, side = g.domain.origin(w), g.domain.side(w)
+        for k in ti.static(range(3)):
+            if ti.static(g.joined[k]):
                 g.low[w, k], g.high[w, k] = low[k], low[k] + side[k]
                 extent[k] = side[k]
-        else:
-            for k in ti.static(range(3)):
+            else:
                 extent[k] = g.high[w, k] - g.low[w, k]
         for level in range(LEVELS):
             most = CELLS_PER_PARTICLE * g.population[w, level] + SPARE_CELLS

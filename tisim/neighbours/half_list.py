@@ -192,7 +192,7 @@ class SearchRows(OfParticles):
                     dims, width = g.dims[w, level, k], g.cell[w, level, k]
                     a = ti.floor((r[k] - reach - g.low[w, k]) / width, ti.i32)
                     b = ti.floor((r[k] + reach - g.low[w, k]) / width, ti.i32)
-                    if ti.static(not g.joined):
+                    if ti.static(not g.joined[k]):
                         a, b = ti.max(a, 0), ti.min(b, dims - 1)
                     if b - a >= dims or s.listed_above[w] >= ALL_PAIRS:
                         # Around the whole box: each cell once.
