@@ -35,10 +35,29 @@ class Domain(Component):
         """Return along which axes particles see each other across joined faces."""
         return NO_AXIS
 
+    def cyclic(self) -> Axes:
+        """Return along which axes a row of cells goes on across joined faces."""
+        return self.joined()
+
+    def shears(self) -> bool:
+        """Return whether images move past the box."""
+        return False
+
+    def edges(self, time: float) -> np.ndarray:
+        """Return the edges of the box (m) as vectors, a row for each axis, shape (3, 3): along joined axes
+        they lead from a particle to its images at a time (s)."""
+        low, high = self.bounds()
+        return np.zeros((3, 3)) if low is None or high is None else np.diag(high - low)
+
     @ti.func
-    def wrap(self, w, r):
-        """Return the place (m) inside the domain of a particle that has moved to r."""
+    def wrap(self, w, r, t):
+        """Return the place (m) inside the domain, at time t (s), of a particle that has moved to r."""
         return r
+
+    @ti.func
+    def put(self, s, w, i, r, t):
+        """Put a particle that has moved to r (m) inside the domain, at time t (s)."""
+        s.position[w, i] = self.wrap(w, r, t)
 
     @ti.func
     def lost(self, w, r):
@@ -46,14 +65,42 @@ class Domain(Component):
         return 0
 
     @ti.func
-    def separation(self, w, a, b):
-        """Return the vector (m) from a to b as contacts and forces see it."""
+    def separation(self, w, a, b, t):
+        """Return the vector (m) from a to b, at time t (s), as contacts and forces see it."""
         return b - a
 
     @ti.func
-    def nearest(self, w, a, b):
-        """Return the shortest vector (m) from a to b, across joined faces where there are any."""
+    def nearest(self, w, a, b, t):
+        """Return the shortest vector (m) from a to b, at time t (s), across joined faces where there are
+        any."""
         return b - a
+
+    @ti.func
+    def relative_velocity(self, s, w, i, j, separation):
+        """Return the velocity (m/s) relative to particle i of j, or of that image of it which is at
+        ``separation`` (m) from i."""
+        return s.velocity[w, j] - s.velocity[w, i]
+
+    @ti.func
+    def shear_rate(self, w):
+        """Return the rate (1/s) at which images move past the box, over their distance."""
+        return 0.0
+
+    @ti.func
+    def streaming(self, w, r):
+        """Return the velocity (m/s) at r of the flow that images take part in."""
+        return ti.Vector([0.0, 0.0, 0.0])
+
+    @ti.func
+    def turn(self, w, a, b):
+        """Return which image of b, in faces that move past each other, is the nearest to a: -1, 0 or 1."""
+        return 0
+
+    @ti.func
+    def seen_from(self, w, r, turn, t):
+        """Return the place (m) from which particles themselves are seen as their images of this ``turn`` are
+        from r."""
+        return r
 
     @ti.func
     def origin(self, w):
@@ -94,7 +141,7 @@ class Box(Domain):
     @model_validator(mode="after")
     def _ordered(self) -> Box:
         ordered = all(a < b for a, b in zip(self.low, self.high, strict=True))
-        must(ordered, "box.high", "above box.low in every component", self.high)
+        must(ordered, f"{self.label}.high", f"above {self.label}.low in every component", self.high)
         volume = math.prod(b - a for a, b in zip(self.low, self.high, strict=True))
         must(math.isfinite(volume), "volume of the box", "a finite number", volume)
         return self
@@ -117,7 +164,12 @@ class Box(Domain):
         return self.high(w) - self.low(w)
 
     @ti.func
-    def wrap(self, w, r):
+    def wrap(self, w, r, t):
+        return self.wrapped(w, r)
+
+    @ti.func
+    def wrapped(self, w, r):
+        """Return the place (m) of r between the faces, of those axes that are periodic."""
         low, side = self.low(w), self.side(w)
         inside = r
         for k in ti.static(range(3)):
@@ -139,10 +191,13 @@ class Box(Domain):
         return blurred
 
     @ti.func
-    def nearest(self, w, a, b):
-        side = self.side(w)
-        d = b - a
-        # Both places lie in the box, so one turn is enough.
+    def nearest(self, w, a, b, t):
+        return self.shortest(w, b - a)
+
+    @ti.func
+    def shortest(self, w, apart):
+        """Return the shortest vector (m) between two that are ``apart`` by at most one and a half sides."""
+        side, d = self.side(w), apart
         for k in ti.static(range(3)):
             if ti.static(self.periodic[k]):
                 d[k] -= ti.select(d[k] > 0.5 * side[k], side[k], 0.0)
@@ -150,8 +205,8 @@ class Box(Domain):
         return d
 
     @ti.func
-    def separation(self, w, a, b):
+    def separation(self, w, a, b, t):
         d = b - a
         if ti.static(self.images):
-            d = self.nearest(w, a, b)
+            d = self.nearest(w, a, b, t)
         return d

@@ -79,7 +79,7 @@ class AddPairs(PartOfSum):
                 self.total.put(w, i, ti.Vector.zero(s.real, self.total.components))
         for m in range(p.begin[w, c], p.end[w, c]):
             i, j = p.first[w, m], p.second[w, m]
-            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j])
+            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
             square, limit = d.norm_sqr(), p.half_list.widest(w, i, j)
             if square <= limit * limit:
                 here, there = self.total.terms_of_pair(w, m, i, j, d, ti.sqrt(square), t)
@@ -175,7 +175,7 @@ class AdvancePairs(PartOfSum):
         self.note_memory(w)
         for m in range(p.begin[w, c], p.end[w, c]):
             i, j = p.first[w, m], p.second[w, m]
-            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j])
+            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
             square, limit = d.norm_sqr(), p.half_list.widest(w, i, j)
             if square <= limit * limit:
                 for law in ti.static(self.laws):

@@ -28,7 +28,7 @@ class CellGrid:
     """
 
     def __init__(self, s: State, domain: Bound[Domain]) -> None:
-        self.s, self.domain, self.joined = s, domain, domain.joined()
+        self.s, self.domain, self.joined = s, domain, domain.cyclic()
         self.max_cells = CELLS_PER_PARTICLE * s.capacity + SPARE_CELLS * LEVELS
         builder = ti.FieldsBuilder()
         self.near, self.skin, self.smallest = (ti.field(s.real) for _ in range(3))

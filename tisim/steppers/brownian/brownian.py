@@ -74,6 +74,7 @@ class Brownian(Stepper):
         return 1
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
+        super().suits(effects, domain)
         for effect in effects:
             name = f"effects.{effect.label}"
             turns = effect.offers("torque") if isinstance(effect, Force) else False
