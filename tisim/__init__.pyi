@@ -52,4 +52,5 @@ from .scene.initial_velocity import Blast as Blast
 from .scene.scene import Box as Box
 from .scene.scene import Open as Open
 from .scene.scene import Scene as Scene
+from .scene.scene import ShearedBox as ShearedBox
 from .version import __version__ as __version__

@@ -33,6 +33,16 @@ def test_comes_back_through_the_opposite_face_with_the_same_velocity(rng):
     assert (np.abs(r + v).max(axis=1) > 20).any(), "some must leave by several boxes"
 
 
+def test_along_an_axis_that_is_not_periodic_space_goes_on_beyond_the_faces():
+    """A start may lie there too, and what flies on comes back along the other axes alone."""
+    box = Box(low=BOX.low, high=BOX.high, periodic=(True, False, True))
+    place, speed = [[0.9, 1.9, -2.9], [0.0, -7.0, 0.0]], [[0.3, 5.0, -0.3], [0.0, -1e20, 0.0]]
+    (result,) = run([drift(place, speed, domain=box)])
+    assert result.status.ok, result.status.reason
+    expected = [[-0.8, 6.9, 3.8], [0.0, -1e20, 0.0]]
+    np.testing.assert_allclose(by_id(result)["position"], expected, rtol=0, atol=1e-14)
+
+
 def test_faces_belong_to_one_side():
     """Always low <= r < high: on the far face, just below the near one, at the last number inside."""
     low, high = (np.asarray(x) for x in (BOX.low, BOX.high))
@@ -64,11 +74,11 @@ def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
     """A joined box with images has contacts across its faces; Z04's control volume has not."""
     place, speed = [[-0.9995, 0, 0], [0.9995, 0, 0]], [[-1.0, 0, 0], [1.0, 0, 0]]
     impacts = []
-    for images in (True, False):
-        box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, images=images)
+    for settings in ({}, {"images": False}, {"periodic": (False, True, True)}):
+        box = Box(low=(-1.0,) * 3, high=(1.0,) * 3, **settings)
         (result,) = run([scene(place, speed, (Impact(hardness=1e9),), domain=box)])
         impacts.append(result.work["impacts"])
-    assert impacts == [1, 0]
+    assert impacts == [1, 0, 0]
 
 
 @pytest.mark.slow

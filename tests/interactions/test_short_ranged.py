@@ -82,7 +82,7 @@ class Grip(PairForce):
         force, couple, slid = 0.0 * separation, 0.0 * separation, 0.0 * separation
         if depth >= 0.0:
             n = separation / distance
-            slip = s.velocity[w, j] - s.velocity[w, i]
+            slip = s.relative_velocity(w, i, j, separation)
             slip -= (s.radius[w, i] * s.spin[w, i] + s.radius[w, j] * s.spin[w, j]).cross(n)
             new = past + dt * slip
             slid = new - new.dot(n) * n

@@ -211,6 +211,14 @@ def test_open_space_has_no_edges(tmp_path):
         assert (box.attrs["boundary"].tolist(), list(box)) == ([b"none"] * 3, [])
 
 
+def test_the_box_says_along_which_axes_it_is_periodic():
+    slab = Box(low=(0, 0, 0), high=(1, 2, 3), periodic=(True, False, True))
+    with h5py.File("slab.h5", "w", driver="core", backing_store=False) as made:
+        h5md.write_box(made, slab)
+        assert made["box"].attrs["boundary"].tolist() == [b"periodic", b"none", b"periodic"]
+        assert made["box/edges"][...].tolist() == [1.0, 2.0, 3.0]
+
+
 def test_it_goes_on_from_a_checkpoint(tmp_path):
     """Frames after the checkpoint are written again, and none is missing or double."""
     sim = simulation()

@@ -56,7 +56,7 @@ def listed(simulation):
 
 @pytest.mark.long
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("domain", ["joined", "open"])
+@pytest.mark.parametrize("domain", ["joined", "slab", pytest.param("open", marks=pytest.mark.slow)])
 def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
     """At the start, and after steps in which some move far and most do not; crowds make the list grow."""
     monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", SLOTS)

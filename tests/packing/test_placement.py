@@ -252,6 +252,18 @@ def test_more_than_the_machine_holds_is_refused_before_it_is_allocated(monkeypat
         tracemalloc.stop()
 
 
+def test_along_an_axis_that_is_not_periodic_spheres_lie_within_the_faces():
+    """There are walls where there are any; along the others they may reach over the faces."""
+    box = Box(low=(0, 0, 0), high=(1, 1, 0.5), periodic=(True, True, False))
+    place = arrays(Cloud(number=300, radius=0.04, density=1.0), box)["position"]
+    assert place[:, 2].min() >= 0.04
+    assert place[:, 2].max() <= 0.46
+    assert (place[:, :2].min(axis=0) < 0.04).all()
+    assert (place[:, :2].max(axis=0) > 0.96).all()
+    with pytest.raises(InputError, match=r"box must be wider than a sphere, 0.6 m, along axes that are not"):
+        arrays(Cloud(number=1, radius=0.3, density=1.0), box)
+
+
 def test_few_spheres_in_much_room_take_little_memory():
     """A gas as thin as air: memory is that of the spheres, not of all that a cell could hold."""
     placement = RandomInBox(low=(-1.0,) * 3, high=(1.0,) * 3)

@@ -13,18 +13,25 @@ from tisim.packing.saturation import fill
 
 LOW, HIGH = np.array([-1.0, 0.0, 2.0]), np.array([1.0, 1.0, 3.5])
 RADIUS = 0.05
+PERIODIC = [(False,) * 3, (True,) * 3, (True, False, True)]
 
 
-@pytest.mark.parametrize("periodic", [False, True])
+def tree_of(centres, periodic):
+    """A tree of places; a side of 0 is that of an axis that is not periodic."""
+    sides = np.where(periodic, HIGH - LOW, 0.0)
+    places = np.where(periodic, (centres - LOW) % (HIGH - LOW), centres - LOW)
+    return cKDTree(places, boxsize=sides if any(periodic) else None)
+
+
+@pytest.mark.parametrize("periodic", PERIODIC)
 def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
     for seed in range(5):
         centres = place(1200, RADIUS, box(LOW, HIGH, periodic), seed)
         assert ((centres >= LOW) & (centres < HIGH)).all()
-        tree = cKDTree(centres - LOW, boxsize=HIGH - LOW if periodic else None)
-        assert not tree.query_pairs(2 * RADIUS * (1 - 1e-12))
-    if not periodic:
+        assert not tree_of(centres, periodic).query_pairs(2 * RADIUS * (1 - 1e-12))
+    if not all(periodic):
         # What the periodic option is for: without it spheres do overlap across the faces.
-        assert cKDTree(centres - LOW, boxsize=HIGH - LOW).query_pairs(2 * RADIUS * (1 - 1e-12))
+        assert tree_of(centres, (True,) * 3).query_pairs(2 * RADIUS * (1 - 1e-12))
 
 
 def test_the_seed_decides():
@@ -47,7 +54,7 @@ def test_what_cannot_be_reached_is_refused():
 
 def test_what_is_just_beyond_reach_says_what_was_reached():
     with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as error_info:
-        place(2280, RADIUS, box(LOW, HIGH, periodic=True), 0)
+        place(2280, RADIUS, box(LOW, HIGH, periodic=(True,) * 3), 0)
     reached = float(str(error_info.value).split("at most ")[1][:6])
     # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
     assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
@@ -59,11 +66,11 @@ def saturated(region, radius, seed=0):
     return fill(np.empty((0, 3)), 10**6, 2 * radius, region, generator)
 
 
-@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("periodic", PERIODIC)
 def test_saturated_packing_has_no_room_left(rng, periodic):
     region = box(LOW, HIGH, periodic)
     centres = saturated(region, RADIUS)
-    tree = cKDTree((centres - LOW) % (HIGH - LOW), boxsize=HIGH - LOW if periodic else None)
+    tree = tree_of(centres, periodic)
     assert not tree.query_pairs(2 * RADIUS * (1 - 1e-12))
     places = rng.uniform(0, 1, (200_000, 3)) * (HIGH - LOW)
     assert tree.query(places)[0].max() < 2 * RADIUS
@@ -72,7 +79,7 @@ def test_saturated_packing_has_no_room_left(rng, periodic):
 @pytest.mark.slow
 def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
     """0.38413; for 700 spheres a single packing is off by about 0.002."""
-    region = box(np.zeros(3), np.ones(3), periodic=True)
+    region = box(np.zeros(3), np.ones(3), periodic=(True,) * 3)
     radius = (3 * SATURATION_FRACTION / (4 * np.pi * 700)) ** (1 / 3)
     sphere = 4 / 3 * np.pi * radius**3
     fractions = [len(saturated(region, radius, seed)) * sphere for seed in range(12)]
@@ -82,7 +89,7 @@ def test_saturation_in_the_bulk_is_that_of_zhang_and_torquato():
 @pytest.mark.slow
 def test_filling_voids_is_the_same_process_as_trying_everywhere():
     """Mean number of neighbours within 1.1 diameters at the same volume fraction, by either way."""
-    region = box(np.zeros(3), np.ones(3), periodic=True)
+    region = box(np.zeros(3), np.ones(3), periodic=(True,) * 3)
     number, radius = 900, (3 * 0.3 / (4 * np.pi * 900)) ** (1 / 3)
 
     def neighbours(centres):

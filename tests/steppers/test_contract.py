@@ -53,8 +53,8 @@ class Correct(PerParticle):
         dt = ti.cast(s.dt[w], s.real)
         v = s.velocity_before[w, i] + 0.5 * dt / s.mass[w, i] * (s.force_before[w, i] + s.force[w, i])
         r = s.position_before[w, i] + 0.5 * dt * (s.velocity_before[w, i] + v)
-        r = self.domain.wrap(w, r)
-        change = self.domain.nearest(w, s.position[w, i], r).norm()
+        r = self.domain.wrap(w, r, s.time[w])
+        change = self.domain.nearest(w, s.position[w, i], r, s.time[w]).norm()
         ti.atomic_max(s.largest_change[w], ti.cast(change, ti.f64))
         s.velocity[w, i], s.position[w, i] = v, r
 

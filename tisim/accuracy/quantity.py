@@ -102,11 +102,11 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     random themselves it is the mean square displacement.
     """
     if scene.stepper.random:
-        must(not scene.domain.joined(), "quantities", "given for random paths in a box", "none")
+        must(not any(scene.domain.joined()), "quantities", "given for random paths in a box", "none")
         return (Quantity("mean square displacement", mean_square, random=True),)
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
         # Where opposite faces are joined a place jumps; a velocity does not.
-        jumps = scene.domain.joined()
+        jumps = any(scene.domain.joined())
         name, value = ("velocity", velocity) if jumps else ("displacement", displacement)
         return (Quantity(name, value, returns=True),)
     starts = [scene.particles.arrays(scene.domain, scene.seed + k) for k in (0, 1)]

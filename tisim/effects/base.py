@@ -14,9 +14,11 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
    back. Of several effects of one kind they are summed, as all write the same.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
-   are summed in scene order. What near pairs remember of each other (``memory``) is handed to
-   ``interaction``, which returns it brought up to date, together with the force; what a particle remembers
-   of a force, such as that of walls, is brought up to date in ``load``, where that is told to.
+   are summed in scene order. The velocity of j relative to i is ``s.relative_velocity(w, i, j, separation)``:
+   that of an image that moves past the box is not the difference of the two. What near pairs remember of
+   each other (``memory``) is handed to ``interaction``, which returns it brought up to date, together with
+   the force; what a particle remembers of a force, such as that of walls, is brought up to date in ``load``,
+   where that is told to.
 6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
    ``requires_source`` the quantities of which a scene must have at least one source.
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field
@@ -229,9 +231,9 @@ class PairForce(Pairwise):
         pair remembers from now on, given what it did, ``past``, and that ``dt`` (s) have gone by since.
 
         It is asked of listed pairs within ``reach``: i is the one of lower id, and what is remembered is as i
-        sees it. ``past`` is a vector of ``memory`` values, or of one 0 where there are none, which is returned
-        as it came. It writes nothing else: several pairs are computed at once, and some twice. Choices
-        (``ti.select``) are faster there than branches.
+        sees it. ``past`` is a vector of ``memory`` values, or of one 0 where there are none, which is
+        returned as it came. It writes nothing: several pairs are computed at once, and some twice. Choices
+        (``ti.select``) are faster in it than branches.
         """
         force = self.pair_force(s, w, i, j, separation, distance, t)
         turn = self.pair_torque(s, w, i, j, separation, distance, t)

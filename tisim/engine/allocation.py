@@ -41,7 +41,7 @@ class Allocation:
         self.s = State(worlds, capacity, fields, counters, quantities, flags, picks_pairs(*asked))
         self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
         *effects, self.domain, self.stepper, self.control = (self.table.bind(part) for part in parts(scene))
-        self.effects = connected(effects)
+        self.s.domain, self.effects = self.domain, connected(effects)
         self._trees: list[Tree] = []
         self.assemble(ListSizes())
 

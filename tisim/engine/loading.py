@@ -24,8 +24,8 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     """
     low, high = scene.domain.bounds()
     if low is not None:
-        inside = ((start["position"] >= low) & (start["position"] < high)).all()
-        must(bool(inside), "particles.position", "inside the domain", "a particle outside")
+        inside = (start["position"] >= low) & (start["position"] < high) | ~np.array(scene.domain.joined())
+        must(bool(inside.all()), "particles.position", "inside the domain", "a particle outside")
     field_names = {f.name for f in fields} | SHARED.keys()
     for name in start:
         must(
@@ -118,9 +118,11 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
 
 
 def volume(scene: Scene, start: Arrays) -> float:
-    """Return the volume (m^3) of the domain, or of the box around the particles where it has no bounds."""
+    """Return the volume (m^3) of the domain; along axes without joined faces, of the box around the
+    particles."""
+    reach = start["radius"].max()
+    extent = (start["position"].max(axis=0) + reach) - (start["position"].min(axis=0) - reach)
     low, high = scene.domain.bounds()
-    if low is None or high is None:
-        reach = start["radius"].max()
-        low, high = start["position"].min(axis=0) - reach, start["position"].max(axis=0) + reach
-    return float(np.prod(high - low))
+    if low is not None and high is not None:
+        extent = np.where(scene.domain.joined(), high - low, extent)
+    return float(np.prod(extent))

@@ -67,7 +67,7 @@ class Resolve(PerContact):
             c.bid[w, k] = 0
             ti.atomic_sub(c.waiting[w], 1)
             if s.mass[w, i] > 0.0 and s.mass[w, j] > 0.0:
-                d = c.domain.separation(w, s.position[w, i], s.position[w, j])
+                d = c.domain.separation(w, s.position[w, i], s.position[w, j], s.time[w])
                 for event in ti.static(c.events):
                     if event.contact(s, w, i, j, d) >= 0.0:
                         event.resolve(s, w, i, j, d)

@@ -104,7 +104,8 @@ class FindContacts(PerParticle):
         for k in range(self.neighbour_list.size(w, i)):
             j = self.neighbour_list.candidate(w, i, k)
             if j != i:
-                d = self.neighbour_list.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
+                here, there = self.s.position[w, i], self.s.position[w, j]
+                d = self.neighbour_list.domain.separation(w, here, there, self.s.time[w])
                 overlaps += self.enter(w, i, j, d)
                 soonest = ti.min(soonest, self.control.pair(self.s, w, i, j, d))
         self.control.note(self.s, w, i, soonest)

@@ -211,7 +211,7 @@ class SumForces(PairSum):
     def by_other(self, effect: ti.template(), w, i, j, t):  # type: ignore[valid-type]
         """Return what j does to i by one law, given what they have stored of each other."""
         s = self.s
-        d = self.domain.separation(w, s.position[w, i], s.position[w, j])
+        d = self.domain.separation(w, s.position[w, i], s.position[w, j], t)
         first, second, sign = i, j, ti.cast(1.0, s.real)
         if s.id[w, i] > s.id[w, j]:
             first, second, sign = j, i, ti.cast(-1.0, s.real)

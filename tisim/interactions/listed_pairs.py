@@ -97,11 +97,11 @@ class PartOfSum(OfChunks):
     @ti.func
     def sort_pairs(self, w, begin, end):
         """Put pairs within reach first in ``sorted``, in the order of the list, and return where they end."""
-        p, s = self.p, self.s
+        p, s, t = self.p, self.s, self.s.time[w]
         near, far = begin, end - 1
         for m in range(begin, end):
             i, j = p.first[w, m], p.second[w, m]
-            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j])
+            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
             limit = p.half_list.widest(w, i, j)
             within = ti.cast(d.norm_sqr() <= limit * limit, ti.i32)
             p.sorted[w, ti.select(within > 0, near, far)] = m
@@ -117,7 +117,7 @@ class PartOfSum(OfChunks):
             # Lanes without a pair of their own compute the last one again, and nobody reads it.
             m = p.sorted[w, ti.min(begin + lane, end - 1)]
             i, j = p.first[w, m], p.second[w, m]
-            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j])
+            d = self.total.domain.separation(w, s.position[w, i], s.position[w, j], t)
             values = self.total.of_pair(w, m, i, j, d, d.norm(), t)
             for k in ti.static(range(self.total.pair_values)):
                 lanes[k][lane] = values[k]

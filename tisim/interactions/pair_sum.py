@@ -165,7 +165,7 @@ class PairSum(PerParticle):
     @ti.func
     def terms(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
         """Return the terms of j for i, which are not the same."""
-        d = self.domain.separation(w, self.s.position[w, i], self.s.position[w, j])
+        d = self.domain.separation(w, self.s.position[w, i], self.s.position[w, j], t)
         distance = d.norm()
         total = self.term(effects[0], w, i, j, d, distance, t)
         for effect in ti.static(effects[1:]):

@@ -61,7 +61,7 @@ class Rearrange(Phase):
             count = s.count[w]
             while i < count:
                 if s.mass[w, i] > 0.0:
-                    s.position[w, i] = self.domain.wrap(w, s.position[w, i])
+                    self.domain.put(s, w, i, s.position[w, i], s.time[w])
                     i += 1
                 else:
                     count -= 1

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from tisim.components.domain import Domain
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, world_count
@@ -151,23 +152,28 @@ def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
     chemistry takes for granted; the key Units has the unit of each column: "pos:m velo:m/s mass:kg", and
     "1" where there is none, with dots within a unit.
     """
-    low, high = trajectory.scene.domain.bounds()
-    box = ""
-    if low is not None and high is not None:
-        lattice = " ".join(repr(float(x)) for x in np.diag(high - low).ravel())
-        origin = " ".join(repr(float(x)) for x in low)
-        pbc = "T T T" if trajectory.scene.domain.joined() else "F F F"
-        box = f'Lattice="{lattice}" Origin="{origin}" pbc="{pbc}" '
     path = folder / f"{name}.xyz"
     temporary = path.with_name(temporary_name(path.name))
     with replacing(path, temporary), temporary.open("w") as file:
         for frame in frames_to_write:
             columns, properties = _columns(frame.arrays)
+            box = _lattice(trajectory.scene.domain, frame.time)
             keys = f'Properties={properties} Units="{_units(trajectory, frame.arrays)}" '
             keys += f"Time={frame.time!r} Step={frame.step}"
             file.write(f"{len(columns[0])}\n{box}{keys}\n")
             file.writelines("X " + " ".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
     return path
+
+
+def _lattice(domain: Domain, time: float) -> str:
+    """Return the keys that say what the box is at a time (s); none in open space."""
+    low, _ = domain.bounds()
+    if low is None:
+        return ""
+    lattice = " ".join(repr(float(x)) for x in domain.edges(time).ravel())
+    origin = " ".join(repr(float(x)) for x in low)
+    pbc = " ".join("T" if joined else "F" for joined in domain.joined())
+    return f'Lattice="{lattice}" Origin="{origin}" pbc="{pbc}" '
 
 
 def _columns(arrays: Arrays) -> tuple[list[list[float]], str]:

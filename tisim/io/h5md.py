@@ -70,20 +70,22 @@ def unit_string(text: str) -> str:
 
 
 def write_box(group: h5py.Group, domain: Domain) -> None:
-    """Write the group ``box``. Where it is periodic, positions are those of the image in the domain.
+    """Write the group ``box``. Along an axis that is periodic, positions are those of the image in the
+    domain.
 
-    Beyond the specification, ``origin`` is the lower corner of the domain, m.
+    Beyond the specification, ``origin`` is the lower corner of the domain, m. Edges that change with time are
+    an element of ``create_elements``.
     """
     low, high = domain.bounds()
-    kind = b"periodic" if low is not None and domain.joined() else b"none"
     box = group.create_group("box")
     box.attrs.create("dimension", 3, dtype=np.int32)
-    box.attrs["boundary"] = np.array([kind] * 3)
+    box.attrs["boundary"] = np.array([b"periodic" if joined else b"none" for joined in domain.joined()])
     if low is not None and high is not None:
         # Within the header of the dataset, of which HDF5 checks the checksum.
         compact = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         compact.set_layout(h5py.h5d.COMPACT)
-        for name, values in (("edges", high - low), ("origin", low)):
+        fixed = {"origin": low} if domain.shears() else {"edges": high - low, "origin": low}
+        for name, values in fixed.items():
             space, double = h5py.h5s.create_simple(values.shape), h5py.h5t.NATIVE_DOUBLE
             h5py.h5d.create(box.id, name.encode(), double, space, compact)
             box[name][...] = values
@@ -110,6 +112,17 @@ def create_elements(group: h5py.Group, fields: tuple[Field, ...], capacity: int,
             compression="gzip", compression_opts=1, shuffle=True,
         )  # fmt: skip
         _with_unit(value, field.unit)
+
+
+def create_edges(group: h5py.Group) -> None:
+    """Create an empty element for edges of the box that change with time, the vectors of each frame as rows,
+    on the ``step`` and ``time`` of position."""
+    edges = group.create_group("box/edges")
+    edges["step"], edges["time"] = group["position/step"], group["position/time"]
+    value = edges.create_dataset(
+        "value", (0, 3, 3), float, maxshape=(None, 3, 3), chunks=(CHUNK_ROWS, 3, 3), fillvalue=np.nan
+    )
+    _with_unit(value, "m")
 
 
 def write_scene(file: h5py.File, name: str, text: str) -> None:

@@ -134,6 +134,8 @@ class Trajectory:
                 group = file.create_group(f"particles/{name}")
                 h5md.write_box(group, scene.domain)
                 h5md.create_elements(group, fields, scene.capacity(), real)
+                if scene.domain.shears():
+                    h5md.create_edges(group)
                 h5md.write_scene(file, name, scene.to_toml())
                 h5md.create_checksums(file, name)
         return image.getvalue()
@@ -175,6 +177,12 @@ class Trajectory:
             value.resize((row + 1, max(count, value.shape[1]), *value.shape[2:]))
             value[row, :count] = arrays[field.name]
             self._flush(value)
+        domain = self.scenes[index].domain
+        if domain.shears():
+            edges = group["box/edges/value"]
+            edges.resize(row + 1, axis=0)
+            edges[row] = domain.edges(frame.time)
+            self._flush(edges)
         clock = h5md.clock_checksum(frame.step, frame.time)
         # The step comes last: it says that the row is whole.
         for column, entry in (

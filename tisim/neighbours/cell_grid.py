@@ -28,7 +28,7 @@ class CellGrid:
     """
 
     def __init__(self, s: State, domain: Bound[Domain]) -> None:
-        self.s, self.domain, self.joined = s, domain, domain.joined()
+        self.s, self.domain, self.joined = s, domain, domain.cyclic()
         self.max_cells = CELLS_PER_PARTICLE * s.capacity + SPARE_CELLS * LEVELS
         builder = ti.FieldsBuilder()
         self.near, self.skin, self.smallest = (ti.field(s.real) for _ in range(3))
@@ -166,13 +166,12 @@ class ShapeGrid(OfGrid):
     def run(self, w, _k):
         g = self.g
         extent, cells = ti.Vector.zero(self.s.real, 3), 0
-        if ti.static(g.joined):
-            low, side = g.domain.origin(w), g.domain.side(w)
-            for k in ti.static(range(3)):
+        low, side = g.domain.origin(w), g.domain.side(w)
+        for k in ti.static(range(3)):
+            if ti.static(g.joined[k]):
                 g.low[w, k], g.high[w, k] = low[k], low[k] + side[k]
                 extent[k] = side[k]
-        else:
-            for k in ti.static(range(3)):
+            else:
                 extent[k] = g.high[w, k] - g.low[w, k]
         for level in range(LEVELS):
             most = CELLS_PER_PARTICLE * g.population[w, level] + SPARE_CELLS

@@ -35,9 +35,10 @@ class BinParticles(Phase):
             # Not below infinity: also true of NaN, which belongs to no cell.
             if not (ti.abs(s.position[w, i]).sum() + s.radius[w, i] < ti.math.inf):
                 s.fail(w, WorldStatus.NOT_FINITE, i)
-        if ti.static(n.joined):
-            low = n.domain.origin(w)
-            high = low + n.domain.side(w)
+        corner, side = n.domain.origin(w), n.domain.side(w)
+        for k in ti.static(range(3)):
+            if ti.static(n.joined[k]):
+                low[k], high[k] = corner[k], corner[k] + side[k]
         least = s.radius[w, smallest]
         extent = ti.max(high - low, 1e-3 * least)
         # Root by root: in f32 a volume of 7000 million km cubed is infinite.
@@ -96,11 +97,12 @@ class SearchCells(PerParticle):
             first = ti.floor((r - reach - n.corner[w]) / n.cell[w], ti.i32)
             last = ti.floor((r + reach - n.corner[w]) / n.cell[w], ti.i32)
             count = 0
-            if ti.static(n.joined):
-                # What reaches around the box may meet one image or another: it looks at all.
-                count = ti.select((last - first >= dims).any(), n.room + 1, 0)
-            else:
-                first, last = ti.max(first, 0), ti.min(last, dims - 1)
+            for k in ti.static(range(3)):
+                if ti.static(n.joined[k]):
+                    # What reaches around the box may meet one image or another: it looks at all.
+                    count = ti.select(last[k] - first[k] >= dims[k], n.room + 1, count)
+                else:
+                    first[k], last[k] = ti.max(first[k], 0), ti.min(last[k], dims[k] - 1)
             z = first[2]
             while z <= last[2] and count <= n.room:
                 for y in range(first[1], last[1] + 1):

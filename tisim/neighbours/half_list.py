@@ -62,19 +62,21 @@ class HalfList:
         self.sizes, self.row = sizes, sizes.row
         self.index, self.size, self.stale = (ti.field(ti.i32) for _ in range(3))
         self.longest, self.total = ti.field(ti.i32), ti.field(ti.i32)
-        self.since = ti.field(ti.f64)
+        self.since, self.made = ti.field(ti.f64), ti.field(ti.f64)
+        # Images that move past the box lie in other cells than the particles: they are looked for apart.
+        self.images = 1 if domain.shears() else 0
         builder = ti.FieldsBuilder()
         particles = builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity)
         particles.place(self.size)
         particles.dense(ti.k, self.row).place(self.index)
-        for column in (self.stale, self.longest, self.total):
+        for column in (self.stale, self.longest, self.total, self.made):
             builder.dense(ti.i, s.worlds).place(column)
         builder.dense(ti.i, s.worlds).dense(ti.j, 3).place(self.since)
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        per_world = 36 + 4 * self.s.capacity * (1 + self.row)
+        per_world = 44 + 4 * self.s.capacity * (1 + self.row)
         return self.s.worlds * per_world + self.grid.bytes()
 
     @in_taichi_thread
@@ -117,8 +119,19 @@ class HalfList:
         for k in ti.static(range(3)):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
-        if not (2.0 * ti.sqrt(square) <= self.spent * self.grid.skin[w]):
+        apart = 2.0 * ti.sqrt(square)
+        if ti.static(self.images > 0):
+            apart += self.sheared(w, self.s.time[w] + self.s.dt[w] - self.made[w])
+        if not (apart <= self.spent * self.grid.skin[w]):
             self.stale[w] = 1
+
+    @ti.func
+    def sheared(self, w, elapsed):
+        """Return how far (m) shear alone may move two near particles past each other in a time (s)."""
+        g, widest = self.grid, ti.cast(0.0, self.s.real)
+        for level in range(LEVELS):
+            widest = ti.max(widest, g.largest[w, level] + g.widest[w, level])
+        return ti.abs(ti.cast(g.domain.shear_rate(w), ti.f64)) * elapsed * (widest + g.skin[w])
 
     def watch(self) -> tuple[Phase, ...]:
         """Find out whether laws have come to reach farther, where they reach beyond contact at all."""
@@ -144,8 +157,10 @@ class ChooseSkin(OfGrid):
         s, smallest = self.s, self.g.smallest[w]
         step = ti.cast(s.axes(s.displacement, w).norm(), s.real)
         wanted = 2.0 * STEPS_OF_LIST * step
+        if ti.static(self.n.images > 0):
+            wanted += STEPS_OF_LIST * ti.cast(self.n.sheared(w, s.dt[w]), s.real)
         self.g.skin[w] = ti.max(2.0 * LEAST_SKIN * smallest, ti.min(wanted, 2.0 * MOST_SKIN * smallest))
-        self.n.longest[w], self.n.total[w] = 0, 0
+        self.n.longest[w], self.n.total[w], self.n.made[w] = 0, 0, s.time[w]
         for k in ti.static(range(3)):
             self.n.since[w, k] = 0.0
 
@@ -182,8 +197,24 @@ class SearchRows(OfParticles):
 
     @ti.func
     def run(self, w, i):
-        n, g, s = self.n, self.g, self.s
-        r, radius, skin, count = s.position[w, i], s.radius[w, i], g.skin[w], 0
+        n, s, count = self.n, self.s, 0
+        for turn in range(-n.images, n.images + 1):
+            count = self.search(w, i, turn, count)
+        ti.atomic_add(n.total[w], count)
+        if count > n.longest[w]:
+            ti.atomic_max(n.longest[w], count)
+        if count > n.row:
+            s.fail(w, WorldStatus.LIST_OVERFLOW, i)
+        n.size[w, i] = ti.min(count, n.row)
+        self.order(w, i, n.size[w, i])
+
+    @ti.func
+    def search(self, w, i, turn, before):
+        """Enter the pairs of i with images of this ``turn`` behind the ``before`` that there are; return how
+        many there are then."""
+        n, g, s, count, t = self.n, self.g, self.s, before, self.s.time[w]
+        place, radius, skin = s.position[w, i], s.radius[w, i], g.skin[w]
+        r = g.domain.seen_from(w, place, turn, t)
         for level in range(g.level(w, radius), LEVELS):
             if g.population[w, level] > 0:
                 reach = radius + g.widest[w, level] + skin
@@ -192,12 +223,12 @@ class SearchRows(OfParticles):
                     dims, width = g.dims[w, level, k], g.cell[w, level, k]
                     a = ti.floor((r[k] - reach - g.low[w, k]) / width, ti.i32)
                     b = ti.floor((r[k] + reach - g.low[w, k]) / width, ti.i32)
-                    if ti.static(not g.joined):
+                    if ti.static(not g.joined[k]):
                         a, b = ti.max(a, 0), ti.min(b, dims - 1)
                     if b - a >= dims or s.listed_above[w] >= ALL_PAIRS:
                         # Around the whole box: each cell once.
                         a, b = 0, dims - 1
-                    first[k], cells[k] = a, b - a + 1
+                    first[k], cells[k] = a, ti.max(0, b - a + 1)
                 for zy in range(cells[2] * cells[1]):
                     z = self.inside(first[2] + zy // cells[1], g.dims[w, level, 2])
                     y = self.inside(first[1] + zy % cells[1], g.dims[w, level, 1])
@@ -211,20 +242,15 @@ class SearchRows(OfParticles):
                             if n.lists(w, i, j):
                                 limit = n.widest(w, i, j) + skin
                                 # Not as forces see it: the next step may take either through a face.
-                                d = g.domain.nearest(w, r, s.position[w, j])
-                                if d.norm_sqr() <= limit * limit:
+                                d = g.domain.nearest(w, place, s.position[w, j], t)
+                                here = g.domain.turn(w, place, s.position[w, j]) == turn
+                                if here and d.norm_sqr() <= limit * limit:
                                     if count < n.row:
                                         n.index[w, i, count] = j
                                     count += 1
                         left -= length
                         x = 0
-        ti.atomic_add(n.total[w], count)
-        if count > n.longest[w]:
-            ti.atomic_max(n.longest[w], count)
-        if count > n.row:
-            s.fail(w, WorldStatus.LIST_OVERFLOW, i)
-        n.size[w, i] = ti.min(count, n.row)
-        self.order(w, i, n.size[w, i])
+        return count
 
     @ti.func
     def inside(self, c, cells):

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_resolved
-from tisim.errors import InputError, must
+from tisim.errors import must
 from tisim.packing import region
 from tisim.packing.random_sequential import place
 
@@ -36,16 +36,14 @@ class Placement(Component):
 class RandomInDomain(Placement):
     """Spheres lie at random with their centres anywhere in the domain, by random sequential addition.
 
-    They may reach over the faces of the domain, across which they keep apart where it is periodic.
+    They may reach over faces of the domain that are joined, and across these they keep apart where particles
+    see each other there. Along an axis that is not periodic they lie wholly within the faces.
 
     Source: Z04 section 8.
     """
 
     def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        low, high = domain.bounds()
-        if low is None or high is None:
-            raise InputError("domain must be bounded to hold a random cloud; received an open one")
-        return place(number, radius, region.box(low, high, domain.periodic()), seed)
+        return place(number, radius, region.in_domain(domain, radius), seed)
 
 
 class RandomInBox(Placement):

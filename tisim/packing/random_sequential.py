@@ -44,7 +44,9 @@ def _add(
     nx: ti.i32,
     ny: ti.i32,
     nz: ti.i32,
-    periodic: ti.i32,
+    x_periodic: ti.i32,
+    y_periodic: ti.i32,
+    z_periodic: ti.i32,
     ball: ti.i32,
 ) -> ti.i32:
     """Place the spheres; return how many found room.
@@ -56,7 +58,7 @@ def _add(
     ti.loop_config(serialize=True)
     for _once in range(1):
         side, low = ti.Vector([x_side, y_side, z_side]), ti.Vector([x_low, y_low, z_low])
-        dims = ti.Vector([nx, ny, nz])
+        dims, periodic = ti.Vector([nx, ny, nz]), ti.Vector([x_periodic, y_periodic, z_periodic])
         attempt = ti.cast(0, ti.u64)
         stuck = False
         for i in range(spheres):
@@ -76,8 +78,7 @@ def _add(
                         # From the cell itself on: most places that are taken are found to be so there.
                         turn = (k + 13) % 27
                         c = cell + ti.Vector([turn // 9 - 1, turn // 3 % 3 - 1, turn % 3 - 1])
-                        if periodic > 0:
-                            c = (c + dims) % dims
+                        c = ti.select(periodic > 0, (c + dims) % dims, c)
                         if free and c.min() >= 0 and (c < dims).all():
                             at = (c[0] * dims[1] + c[1]) * dims[2] + c[2]
                             j = heads[at]
@@ -85,8 +86,7 @@ def _add(
                                 gap = ti.Vector([
                                     x[0] - centres[j, 0], x[1] - centres[j, 1], x[2] - centres[j, 2]
                                 ])  # fmt: skip
-                                if periodic > 0:
-                                    gap -= side * ti.round(gap / side)
+                                gap -= ti.select(periodic > 0, side * ti.round(gap / side), 0.0)
                                 if gap.norm_sqr() < 4.0 * radius * radius:
                                     free = False
                                 j = follow[j]
@@ -147,7 +147,7 @@ def _everywhere(count: int, radius: float, region: Region, seed: int) -> np.ndar
         *region.low.tolist(),
         *region.side.tolist(),
         *dims.tolist(),
-        region.periodic,
+        *region.periodic,
         region.ball,
     )
     return centres[:placed]

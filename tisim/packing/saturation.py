@@ -42,7 +42,8 @@ class _Voids:
 
     def __init__(self, centres: np.ndarray, diameter: float, region: Region) -> None:
         self.diameter, self.region = diameter, region
-        self.box = region.side if region.periodic else None
+        # A side of 0 is, for a tree, that of an axis along which nothing is periodic.
+        self.box = np.where(region.periodic, region.side, 0.0)
         self.places = centres - region.low
         self.tree = self._tree(self.places)
         dims = np.maximum(np.ceil(region.side / (FIRST_VOXEL_SIDE * diameter)), 1).astype(int)
@@ -54,7 +55,8 @@ class _Voids:
 
     def _tree(self, places: np.ndarray) -> cKDTree:
         # Rounding can put a centre on the upper face, which a periodic tree refuses.
-        return cKDTree(places % self.box if self.box is not None else places, boxsize=self.box)
+        inside = np.where(self.region.periodic, places % self.region.side, places)
+        return cKDTree(inside, boxsize=self.box if self.box.any() else None)
 
     def fill(self, count: int, generator: np.random.Generator) -> np.ndarray:
         for _ in range(MAX_CUTS):
@@ -126,8 +128,7 @@ class _Voids:
     def _is_covered(self, middle: np.ndarray, centre: np.ndarray) -> np.ndarray:
         """Return whether all of a voxel lies within a diameter of a centre: its farthest corner does."""
         apart = np.abs(middle - centre)
-        if self.box is not None:
-            apart = np.minimum(apart, np.abs(self.box - apart))
+        apart = np.minimum(apart, np.abs(self.box - apart))
         return np.asarray(((apart + self.step / 2) ** 2).sum(axis=-1) < self.diameter**2)
 
     def _in_ball(self, index: np.ndarray) -> np.ndarray:

@@ -82,7 +82,7 @@ def quantities(frames: Frames) -> Figure:
     else:
         energy.set_ylim(0, 1.08 * series.kinetic_energy.max() or 1.0)
     quantity(energy.yaxis, "kinetic energy", "J")
-    jumps = frames.scene.domain.joined()
+    jumps = any(frames.scene.domain.joined())
     for k, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         values = (series.drift if jumps else series.shift)[:, k]
         # Dashes, so that a line under the last one is seen.

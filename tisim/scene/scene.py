@@ -14,6 +14,7 @@ from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.json_text import json_pieces
+from tisim.components.sheared_box import ShearedBox
 from tisim.effects.base import Effect
 from tisim.errors import InputError, abbreviated, did_you_mean, must, printable
 from tisim.files import python_file
@@ -26,7 +27,7 @@ from tisim.steppers.verlet import Verlet
 PHYSICS_VERSION = 3
 """This number is raised whenever a change of code changes the result of a scene; it is part of its digest."""
 
-__all__ = ["Box", "Open", "Scene"]
+__all__ = ["Box", "Open", "Scene", "ShearedBox"]
 
 
 class Scene(Component):
@@ -39,7 +40,7 @@ class Scene(Component):
     name: Text = option("name of the scene, for people", "scene")
     particles: Start = option("what it starts with, Particles or Cloud")
     effects: tuple[Effect, ...] = option("effects, sources and operators, which act in this order", ())
-    domain: Domain = option("space that it lives in, Open or Box", Open())
+    domain: Domain = option("space that it lives in, such as Open or Box", Open())
     stepper: Stepper = option("how time advances; tolerances and limits are stated here", Verlet())
     duration: float = parameter("s", "simulated time", gt=0)
     seed: int = option("seed of all that is random in it", 0, ge=0, lt=2**63)

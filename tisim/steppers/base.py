@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import StepperHints
 from tisim.components.domain import Domain
-from tisim.effects.base import DerivedQuantity, Effect, Force, SelfConsistentQuantity
+from tisim.effects.base import DerivedQuantity, Effect, Force, PairEvent, SelfConsistentQuantity
 from tisim.errors import must
 from tisim.sources.base import Source
 from tisim.steppers.context import Step, StepContext
@@ -32,6 +32,8 @@ class Stepper(StepperHints, Component):
     counters, world_quantities, flags : names of what it keeps of a world, ``s.NAME[w]``: counters of events
     (i64), which a Result gives back, quantities (f64) and integers (i32), 0 at the start. random : whether it
     draws random numbers, so that only statistics converge. all_pairs : whether it sums over all pairs itself.
+    follows_shear : whether it puts particles where they have moved to by ``domain.put``, at the time of that,
+    and reports displacements relative to ``drift``, so that it can step a sheared box.
     """
 
     contract: ClassVar[bool] = True
@@ -40,6 +42,7 @@ class Stepper(StepperHints, Component):
     world_quantities: ClassVar[tuple[str, ...]] = ()
     flags: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
+    follows_shear: ClassVar[bool] = False
     control: StepControl = option("step control, which chooses the length of the next step")
 
     @property
@@ -48,7 +51,16 @@ class Stepper(StepperHints, Component):
         return 2
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
-        """Raise InputError when the stepper cannot step a scene of these effects; by default it can."""
+        """Raise InputError when the stepper cannot step a scene of these effects in this domain."""
+        if domain.shears():
+            where = f"in a {domain.kind()}"
+            rule = f"one that follows shear, such as verlet or boris, {where}"
+            must(self.follows_shear, "stepper", rule, self.kind())
+            rule = f"one that does not look at pairs, such as fixed_step, {where}"
+            must(not self.control.watches_pairs, "stepper.control", rule, self.control.kind())
+            for effect in effects:
+                name = f"effects.{effect.label}"
+                must(not isinstance(effect, PairEvent), name, f"a force, and not sudden, {where}", name)
 
     def countable(self, effects: Sequence[Effect]) -> float:
         """Return the number of steps that the stepper can count in a scene of these effects."""

@@ -13,6 +13,7 @@ from tisim.steppers.common import (
     BeginStep,
     apply_displacement,
     apply_operators,
+    drift,
     report_displacement,
 )
 from tisim.steppers.context import Step, StepContext
@@ -39,6 +40,7 @@ class Boris(Stepper):
     control: Controller = option("step control", examples=[FixedStep(dt=1e-6)])
 
     world_quantities: ClassVar = ("time_before",)
+    follows_shear: ClassVar = True
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
@@ -49,10 +51,11 @@ class Boris(Stepper):
         return (FORCE,)
 
     def step(self, context: StepContext) -> Step:
-        drift = (BorisDrift(context), *report_displacement(context))
+        report = report_displacement(context)
         kick = (*context.update_lists, *context.sum_forces, BorisRotation(context))
         end = (*apply_operators(context), AdvanceClock(context))
-        return Step((BeginStep(context), Middle(context), *drift, *kick, *drift, *end))
+        before = (BeginStep(context), Middle(context), BorisDrift(context, 0.5), *report)
+        return Step((*before, *kick, BorisDrift(context, 1.0), *report, *end))
 
 
 class Middle(Phase):
@@ -69,18 +72,19 @@ class Middle(Phase):
 
 
 class BorisDrift(PerParticle):
-    """This phase moves particles by half a drift: r += dt/2 v."""
+    """This phase moves particles by half a drift, r += dt/2 v, up to a part of the step."""
 
-    def __init__(self, context: StepContext) -> None:
+    def __init__(self, context: StepContext, part: float) -> None:
         super().__init__(context.s)
-        self.domain = context.domain
+        self.domain, self.part = context.domain, part
 
     @ti.func
     def run(self, w, i):
         s = self.s
         moved = 0.5 * ti.cast(s.dt[w], s.real) * s.velocity[w, i]
-        drift = ti.cast(moved, ti.f64) - 0.5 * s.dt[w] * s.axes(s.frame, w)
-        apply_displacement(s, self.domain, w, i, s.position[w, i] + moved, drift, ti.cast(0.0, ti.f64))
+        r, end = s.position[w, i], s.time_before[w] + self.part * s.dt[w]
+        beside = ti.cast(moved, ti.f64) - 0.5 * s.dt[w] * drift(s, self.domain, w, r)
+        apply_displacement(s, self.domain, w, i, r + moved, beside, ti.cast(0.0, ti.f64), end)
 
 
 class BorisRotation(PerParticle):

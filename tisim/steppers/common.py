@@ -17,9 +17,10 @@ def note_displacement(s, w, moved):
 
 
 @ti.func
-def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type: ignore[valid-type]
-    """Put a particle at r (m), wherever that is in the domain. It has moved by ``moved`` (m, f64) relative to
-    the frame, and by ``grown`` (m, f64) in radius: for pair lists a surface that grows is one that moves."""
+def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown, t):  # type: ignore[valid-type]
+    """Put a particle at r (m), wherever that is in the domain at time t (s). It has moved by ``moved`` (m,
+    f64) relative to the frame, and by ``grown`` (m, f64) in radius: for pair lists a surface that grows is
+    one that moves."""
     change = ti.abs(moved) + ti.abs(grown)
     # Not below infinity: also true of NaN.
     if not (change.sum() < ti.math.inf):
@@ -28,7 +29,13 @@ def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown):  # type
         s.fail(w, WorldStatus.POSITION_LOST, i)
     else:
         note_displacement(s, w, change)
-        s.position[w, i] = domain.wrap(w, r)
+        domain.put(s, w, i, r, t)
+
+
+@ti.func
+def drift(s, domain: ti.template(), w, r):  # type: ignore[valid-type]
+    """Return the velocity (m/s, f64) of the frame at r, that of the flow of a sheared domain included."""
+    return s.axes(s.frame, w) + ti.cast(domain.streaming(w, r), ti.f64)
 
 
 class BeginStep(Phase):
@@ -95,11 +102,12 @@ class ApplyOperators(PerParticle):
     def run(self, w, i):
         s = self.s
         before, size = s.position[w, i], s.radius[w, i]
+        end = s.time_before[w] + s.dt[w]
         for operator in ti.static(self.operators):
-            operator.particle(s, w, i, s.time_before[w] + s.dt[w], ti.cast(s.dt[w], s.real))
+            operator.particle(s, w, i, end, ti.cast(s.dt[w], s.real))
         after = s.position[w, i]
         grown = ti.cast(s.radius[w, i] - size, ti.f64)
-        apply_displacement(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown)
+        apply_displacement(s, self.domain, w, i, after, ti.cast(after - before, ti.f64), grown, end)
 
 
 class AdvanceClock(Phase):

@@ -5,13 +5,13 @@ without forces drifts in straight lines, r(t + dt) = r(t) + dt v (Z04 section 6c
 """
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairEvent
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import BeginStep, advance_clock, apply_displacement
+from tisim.steppers.common import BeginStep, advance_clock, apply_displacement, drift
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
 from tisim.worlds.program import PerParticle, Phase
@@ -29,6 +29,8 @@ class Verlet(Stepper):
     """
 
     control: Controller = option("step control", ApproachTime())
+
+    follows_shear: ClassVar = True
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
@@ -68,15 +70,13 @@ class Move(PerParticle):
         dt = ti.cast(s.dt[w], s.real)
         if ti.static(self.forced):
             half_kick(s, w, i, self.turning)
-        before, size = s.position[w, i], s.radius[w, i]
+        before, size, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
         s.position[w, i] = before + dt * s.velocity[w, i]
         for operator in ti.static(self.operators):
-            operator.particle(s, w, i, s.time[w] + s.dt[w], dt)
-        after, moved = (
-            s.position[w, i],
-            ti.cast(s.position[w, i] - before, ti.f64) - s.axes(s.frame, w) * s.dt[w],
-        )
-        apply_displacement(s, self.domain, w, i, after, moved, ti.cast(s.radius[w, i] - size, ti.f64))
+            operator.particle(s, w, i, end, dt)
+        after, grown = s.position[w, i], ti.cast(s.radius[w, i] - size, ti.f64)
+        moved = ti.cast(after - before, ti.f64) - drift(s, self.domain, w, before) * s.dt[w]
+        apply_displacement(s, self.domain, w, i, after, moved, grown, end)
 
 
 class Kick(PerParticle):

@@ -20,7 +20,7 @@ OWN = ("seed", "most", "pause_time", "paused", "goal", "step_limit", "listed_abo
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "reported", "real"),
-    *("before_reading", "columns", "singles", "slotted", "means", "sums"),
+    *("domain", "before_reading", "columns", "singles", "slotted", "means", "sums"),
 )
 
 

@@ -34,6 +34,7 @@ class State:
     when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
 
     records : whether the real quantities of a particle lie together in memory.
+    domain : the space of the worlds, as kernels see it.
     before_reading : called before particle fields are read, by what keeps some of their values elsewhere.
     """
 
@@ -86,6 +87,7 @@ class State:
             setattr(self, name, column)
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
+        self.domain: Any = None
         self.before_reading: list[Callable[[], None]] = []
         self.columns = (*quantities, *integers, *MOTION, *self.counters, *OWN)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
@@ -198,6 +200,12 @@ class State:
     def axes(self, column: ti.template(), w):  # type: ignore[valid-type]
         """Return the three components of a world quantity."""
         return ti.Vector([column[w, 0], column[w, 1], column[w, 2]])
+
+    @ti.func
+    def relative_velocity(self, w, i, j, separation):
+        """Return the velocity (m/s) of j, as i sees it at ``separation`` (m), relative to i; of an image that
+        moves past the box it is not the difference of the two velocities."""
+        return self.domain.relative_velocity(self, w, i, j, separation)
 
     @ti.func
     def copy(self, w, source, target):

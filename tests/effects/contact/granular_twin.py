@@ -87,8 +87,12 @@ class Grains:
         self.stored += self.material.stored.sum()
         return force, known
 
+    def apart(self):
+        """From i to j: how far each other is, m, and its velocity, m/s, both (n, n, 3)."""
+        return self.x[None] - self.x[:, None], self.v[None] - self.v[:, None]
+
     def _pairs(self, dt):
-        gap = self.x[None] - self.x[:, None]
+        gap, passing = self.apart()
         distance = np.linalg.norm(gap, axis=2)
         overlap = self.radius[:, None] + self.radius - distance
         i, j = np.nonzero(np.triu(overlap >= 0, 1))
@@ -99,7 +103,7 @@ class Grains:
             turn = np.cross(arm * self.w[i] + other * self.w[j], n)
         else:
             turn = np.cross(a[:, None] * self.w[i] + b[:, None] * self.w[j], n)
-        slip = self.v[j] - self.v[i] - turn
+        slip = passing[i, j] - turn
         mass = self.mass[i] * self.mass[j] / (self.mass[i] + self.mass[j])
         force, known = self._contact(n, delta, a * b / (a + b), mass, slip, self.past[i, j], dt)
         self.past[:] = 0

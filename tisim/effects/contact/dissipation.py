@@ -32,6 +32,6 @@ class ContactDissipation(PairForce):
         total = 0.0 * separation
         if distance <= s.radius[w, i] + s.radius[w, j]:
             n = separation / distance
-            opening = (s.velocity[w, j] - s.velocity[w, i]).dot(n)
+            opening = s.relative_velocity(w, i, j, separation).dot(n)
             total = self.damping(w) * opening * area(s, w, i, j, distance) * n
         return total

@@ -41,7 +41,7 @@ class GranularContact(PairForce):
         arm = a - 0.5 * overlap
         normal = (1.0 / distance) * separation
         turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
-        slip = s.velocity[w, j] - s.velocity[w, i] - turn.cross(normal)
+        slip = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
         m, n = s.mass[w, i], s.mass[w, j]
         # R* and m*, by one division.
         sizes, masses = a + b, m + n

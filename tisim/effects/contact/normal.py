@@ -56,7 +56,7 @@ def slip(s, w, i, j, separation, distance):
     (7.9, 7.14)."""
     n = separation / distance
     turn = arm(s, w, i, j, distance) * s.spin[w, i] + arm(s, w, j, i, distance) * s.spin[w, j]
-    past = s.velocity[w, j] - s.velocity[w, i] - turn.cross(n)
+    past = s.relative_velocity(w, i, j, separation) - turn.cross(n)
     return past - past.dot(n) * n
 
 

@@ -74,6 +74,7 @@ class Brownian(Stepper):
         return 1
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
+        super().suits(effects, domain)
         for effect in effects:
             name = f"effects.{effect.label}"
             turns = effect.offers("torque") if isinstance(effect, Force) else False
@@ -81,7 +82,7 @@ class Brownian(Stepper):
             must(not turns, name, "without torques in a scene stepped by brownian", name)
             rule = "one that does not depend on velocity in a scene stepped by brownian"
             must(not (effect.depends_on_velocity or isinstance(effect, PairEvent)), name, rule, name)
-        fits = self.hydrodynamics == "none" or not domain.periodic()
+        fits = self.hydrodynamics == "none" or not any(domain.imaged())
         must(fits, "brownian.hydrodynamics", "none in a periodic box", self.hydrodynamics)
 
     def independent(self, effects: Sequence[Effect]) -> bool:

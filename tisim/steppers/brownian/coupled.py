@@ -72,7 +72,7 @@ class Scatter(PerParticle):
             operator.particle(s, w, i, s.time[w] + s.dt[w], dt)
         after = s.position[w, i]
         moved, grown = ti.cast(after - before, ti.f64), ti.cast(s.radius[w, i] - size, ti.f64)
-        apply_displacement(s, self.domain, w, i, after, moved, grown)
+        apply_displacement(s, self.domain, w, i, after, moved, grown, s.time[w] + s.dt[w])
 
 
 class Proceed(Phase):

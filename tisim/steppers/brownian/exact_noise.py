@@ -105,7 +105,7 @@ class Fill(PerParticle):
     def run(self, w, j):
         m, s = self.m, self.s
         for i in range(j, s.count[w]):
-            r = m.domain.separation(w, s.position[w, j], s.position[w, i])
+            r = m.domain.separation(w, s.position[w, j], s.position[w, i], s.time[w])
             parts = ti.Vector([ti.cast(1.0, s.real), ti.cast(0.0, s.real)])
             if i != j:
                 parts = ti.sqrt(s.radius[w, i] * s.radius[w, j]) * m.mobility.pair(w, i, j, r.norm())

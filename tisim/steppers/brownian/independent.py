@@ -159,7 +159,7 @@ class IndependentBrownianSteps(PerParticle):
         elif self.domain.lost(w, r):
             self.stop(w, i, WorldStatus.POSITION_LOST)
         else:
-            s.position[w, i] = self.domain.wrap(w, r)
+            s.position[w, i] = self.domain.wrap(w, r, t + dt)
 
     @ti.func
     def stop(self, w, i, fault):

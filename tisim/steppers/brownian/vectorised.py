@@ -90,7 +90,7 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                 for lane in range(TILE):
                     i = first + lane
                     r = ti.Vector([place[0][lane], place[1][lane], place[2][lane]])
-                    s.position[w, i] = self.domain.wrap(w, r)
+                    s.position[w, i] = self.domain.wrap(w, r, begin + dt)
                     s.velocity[w, i] = ti.Vector([drift[0][lane], drift[1][lane], drift[2][lane]])
                     s.force[w, i] = ti.Vector([force[0][lane], force[1][lane], force[2][lane]])
                 finished += 1

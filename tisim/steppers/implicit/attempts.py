@@ -102,7 +102,8 @@ class RestoreState(PerParticle):
     @ti.func
     def run(self, w, i):
         s = self.s
-        back = self.saved_state.domain.nearest(w, s.position[w, i], s.position_before[w, i])
+        here, there = s.position[w, i], s.position_before[w, i]
+        back = self.saved_state.domain.nearest(w, here, there, s.time[w])
         note_displacement(s, w, ti.cast(back, ti.f64))
         self.saved_state.restore(w, i)
 

@@ -88,8 +88,8 @@ class Place(OfStages):
         dt, stage = ti.cast(s.dt[w], s.real), s.stage[w]
         r = s.position_before[w, i] + stages.displacement(w, i, stage, dt)
         if stages.sound(w, r):
-            here = stages.domain.wrap(w, r)
-            moved = stages.domain.nearest(w, s.position[w, i], here)
+            here = stages.domain.wrap(w, r, s.time[w])
+            moved = stages.domain.nearest(w, s.position[w, i], here, s.time[w])
             note_displacement(s, w, ti.cast(moved, ti.f64))
             s.position[w, i], s.velocity[w, i] = here, stages.velocity(w, i, stage, dt)
             if ti.static(stages.turning):

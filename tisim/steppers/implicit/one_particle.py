@@ -86,7 +86,8 @@ class Solve(SavedState):
         """Put a particle where it gets with v'; return how far its surface moved besides, by turning (m)."""
         s = self.s
         s.velocity[w, i] = v
-        s.position[w, i] = self.domain.wrap(w, s.position_before[w, i] + self.displacement(w, i, v, dt))
+        r = s.position_before[w, i] + self.displacement(w, i, v, dt)
+        s.position[w, i] = self.domain.wrap(w, r, s.time[w])
         turned = ti.cast(0.0, s.real)
         if ti.static(self.turning):
             turned = self.turn(w, i, dt)
