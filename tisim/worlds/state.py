@@ -80,6 +80,9 @@ class State:
                 setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
+        # The skin of its scene, m; 0 to have one chosen.
+        self.skin = ti.field(ti.f64)
+        builder.dense(ti.i, worlds).place(self.skin)
         # Particles that its scene may ever have; the capacity may be that of a larger one.
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)
@@ -99,7 +102,7 @@ class State:
         self._tree = Tree(builder)
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
         self.before_reading: list[Callable[[], None]] = []
-        own = ("seed", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
+        own = ("seed", "skin", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
         self.columns = (*quantities, *integers, *MOTION, *self.counters, *own)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
