@@ -65,7 +65,7 @@ class State:
         self.fields, self.counters = fields, (*TALLIES, *counters)
         self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
-        self.real = runtime.current().real
+        self.real, self.records = runtime.current().real, records
         builder = ti.FieldsBuilder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:
