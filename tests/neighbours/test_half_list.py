@@ -12,6 +12,8 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
 from tisim.engine import replay
 from tisim.interactions import pair_chunks
+from tisim.neighbours import half_list
+from tisim.steppers import Boris, FixedStep
 
 WORLDS, CAPACITY, STEPS, DT, GAP, SLOTS = 18, 300, 4, 1.0, 0.02, 32
 
@@ -112,7 +114,7 @@ def burst(seed=2, n=240):
 
 
 def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit():
-    """Beside a run whose list was long enough from the start."""
+    """Beside a run whose list was long enough from the start, and others of skins that the scene says."""
     ends = []
     for longer in (False, True):
         made = burst()
@@ -127,10 +129,43 @@ def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit():
         (result,) = simulation.results()
         assert result.status.ok, result.status.reason
         ends.append(result)
+        for skin in (0.002, 0.02) if longer else ():
+            simulation.load(made.model_copy(update={"skin": skin}))
+            simulation.run()
+            ends += simulation.results()
         simulation.close()
-    for name, values in ends[0].state.items():
-        np.testing.assert_array_equal(values, ends[1].state[name], err_msg=name)
-    assert ends[0].work == ends[1].work
+    for end in ends[1:]:
+        for name, values in ends[0].state.items():
+            np.testing.assert_array_equal(values, end.state[name], err_msg=name)
+        assert ends[0].work == end.work
+
+
+def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_them_twice():
+    """Boris' stepper reports how far they have moved before the list is made."""
+    speed, dt, diameter = 1.0, 1e-3, 0.2
+    made = scene(
+        [[0, 0, 0], [0, 0, 2]],
+        [[speed, 0, 0], [-speed, 0, 0]],
+        (SoftShell(stiffness=1.0, width=1e-9),),
+        radius=diameter / 2,
+        mass=1.0,
+        stepper=Boris(control=FixedStep(dt=dt)),
+        duration=200 * dt,
+    )
+    simulation = Simulation(made)
+    simulation.load(made)
+    simulation.run()
+    u = speed * dt / 2 / diameter / (1 - half_list.REACH_PART)
+    # The least of 2 u / x * REBUILD_COST + n (1 + x)^3, of what a skin of x diameters costs.
+    x = np.linspace(0.01, 0.5, 4901)
+    cost = 2 * u / x * half_list.REBUILD_COST + half_list.FEWEST_PAIRS * (1 + x) ** 3
+    assert chosen_skin(simulation) == pytest.approx(diameter * x[np.argmin(cost)], rel=1e-2)
+    simulation.close()
+
+
+@in_taichi_thread
+def chosen_skin(simulation):
+    return simulation.assembly.pairs.half_list.grid.skin[0]
 
 
 def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):

@@ -88,6 +88,17 @@ def test_digest_changes_with_every_number_in_the_scene():
     assert base.digest() == flow(grains=3).digest()
 
 
+def test_a_skin_is_part_of_the_scene_and_not_of_its_digest(tmp_path):
+    """Results do not depend on it, so what is stored of them need not be made anew."""
+    base, file = flow(grains=3), tmp_path / "scene.toml"
+    wide = base.replace({"skin": 0.125})
+    file.write_text(wide.to_toml(), encoding="utf-8")
+    assert Scene.from_toml(file).skin == 0.125
+    assert wide.digest() == base.digest()
+    with pytest.raises(InputError, match=r"scene.skin must be greater than 0.0; received -1"):
+        base.replace({"skin": -1.0})
+
+
 def test_digest_changes_with_each_quantity_and_effect():
     base = cloud()
     fewer = cloud(effects=(Impact(hardness=1e5), Friction(coefficient=0.3), Heating(heat_capacity=5e2)))
@@ -137,7 +148,7 @@ class TestReplace:
                 "nonsense",
                 1,
                 "scene.nonsense must be a known key: name, particles, effects, domain, stepper, "
-                "duration or seed; received 1",
+                "duration, skin or seed; received 1",
             ),
         ],
     )

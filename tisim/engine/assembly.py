@@ -7,6 +7,7 @@ from typing import Any
 
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, Effect, Force, PairEvent, PairForce, SelfConsistentQuantity
+from tisim.interactions import spatial_sort
 from tisim.interactions.collision_rounds import Rounds
 from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts, FindContactsAgain
 from tisim.interactions.contact_memory import ContactMemory, memory_fields
@@ -24,6 +25,7 @@ from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, Pair
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import Rearrange, StoreBefore
 from tisim.interactions.self_consistent import SelfConsistentSolver, solver
+from tisim.interactions.spatial_sort import SpatialSort
 from tisim.neighbours.cell_list import list_phases
 from tisim.neighbours.half_list import HalfList, ListSizes
 from tisim.neighbours.lists import NeighbourLists
@@ -77,6 +79,7 @@ class Assembly:
     """An assembly is what a step of a scene consists of.
 
     step : the items of a step. first : those that prepare the first one.
+    sort : sorts particles in memory between steps, where that is worth it.
     failure_attribution : finds the force that has stopped a world.
     buffers : what has been allocated beside the state.
     """
@@ -144,12 +147,17 @@ class Assembly:
                 step += [*lists, *self._summed(SumForcesAgain)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
+        # Events tell pairs apart by index, and operators on a world may add and remove particles.
+        fixed_order = not events and not any(operator.data.offers("world") for operator in operators)
+        sorts = s.records and fixed_order and s.capacity >= spatial_sort.SORTED_FROM
+        self.sort = SpatialSort(self.pairs, self.lists) if sorts and self.pairs and self.lists else None
         sudden, steady = "impacts, step control", "short-ranged forces"
         beside = (
             (near, "neighbour list", sudden),
             (contacts, "contact list", sudden),
             (self.pairs, "pair list", steady),
             (self.left, "forces between chunks", steady),
+            (self.sort, "sorting by place", steady),
         )
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),

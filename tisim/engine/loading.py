@@ -105,6 +105,7 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
     return {
         "frame": np.array(frames + [np.zeros(3)] * empty),
         "seed": np.array([scene.seed for scene in scenes] + [0] * empty),
+        "skin": np.array([scene.skin or 0.0 for scene in scenes] + [0.0] * empty),
         "count": counts,
         "next_id": counts,
         "most": np.array([scene.capacity() for scene in scenes] + [0] * empty),

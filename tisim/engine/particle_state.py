@@ -44,7 +44,7 @@ class ParticleState(Mapping[str, np.ndarray]):
     def __getitem__(self, name: str) -> np.ndarray:
         must(name in self, "quantity of particles", f"one of {', '.join(self)}", name)
         good = self._simulation.monitor.good
-        values: np.ndarray = good[name][self._world, : good["count"][self._world]].copy()
+        values: np.ndarray = good[name][self._world, self._simulation.in_order(self._world, good)]
         values.flags.writeable = False
         return values
 
@@ -99,7 +99,7 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
     reason = simulation.monitor.status(w, int(status[w])).reason
     must(status[w] == WorldStatus.RUNNING, "world to write to", "one that runs", reason)
     must(now["underway"][w] == 0, "world to write to", "between two steps", "one whose step is under way")
-    now[name][w, : len(values)] = values
+    now[name][w, simulation.in_order(w, now)] = values
     # As at a start, of this world alone.
     for quantity, start in (("approach_time", np.inf), ("fastest", 0.0), ("events", 0)):
         now[quantity][w] = start

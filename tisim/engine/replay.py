@@ -115,5 +115,5 @@ class Replay:
         image["goal"] = image["steps"] + steps
         self.simulation.put(image)
         while self.simulation.is_running():
-            self.simulation.program.advance(steps)
+            self.simulation.advance(steps)
         return self.simulation.s.image()

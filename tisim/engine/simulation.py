@@ -67,12 +67,16 @@ class Simulation:
 
     def _compile(self) -> None:
         """Compile the kernels of a step; no world may be running."""
-        self.program = Program(self.s, self.assembly.step, self.schedule)
+        sort = self.assembly.sort
+        self.program = Program(self.s, self.assembly.step, self.schedule, sort.every if sort else NEVER)
+        self.sort = Program(self.s, sort.items(), "particle") if sort else None
         self.first = Program(self.s, self.assembly.first, self.schedule)
         with law_errors.in_a_line():
             self.program.compile()
             if self.first.items:
                 self.first.compile()
+            if self.sort:
+                self.sort.compile()
 
     @property
     def assembly(self) -> Assembly:
@@ -216,7 +220,7 @@ class Simulation:
                 self.s.write("pause_time", pauses)
                 pauses_on_device = pauses
             began = time.perf_counter()
-            self.program.advance(chunk)
+            self.advance(chunk)
             self.monitor.check_worlds()
             seconds = time.perf_counter() - began
             self.wall_s += seconds
@@ -226,6 +230,19 @@ class Simulation:
                 chunk = max(chunk // 2, 1)
             watching.observe(self)
             yield
+
+    def advance(self, steps: int) -> None:
+        """Take at most ``steps`` steps of every running world; large ones are sorted first, where it is their
+        turn."""
+        if self.sort:
+            self.sort.advance(1)
+        self.program.advance(steps)
+
+    def in_order(self, w: int, good: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the indices of the live particles of a world, in the order in which they are shown: that of
+        ids where they are sorted in memory, else that of memory."""
+        n = int(good["count"][w])
+        return np.argsort(good["id"][w, :n]) if self.sort else np.arange(n)
 
     def is_running(self, until: float = np.inf) -> bool:
         """Return whether a world still has steps to take before it comes to ``until`` (s) or to its goal."""
@@ -265,11 +282,11 @@ class Simulation:
         status = now["status"]
         results = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
-            n = int(good["count"][w])
+            order = self.in_order(w, good)
             results.append(
                 Result(
                     scene=self.scenes[w],
-                    state={f.name: good[f.name][w, :n].copy() for f in self.s.reported},
+                    state={f.name: good[f.name][w, order] for f in self.s.reported},
                     start=self.starts[w],
                     time=float(good["time"][w]),
                     work={name: int(count[w]) for name, count in counts.items()},

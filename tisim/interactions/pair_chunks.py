@@ -75,7 +75,7 @@ class PairChunks:
     @in_taichi_thread
     def forget(self) -> None:
         """Have every list made anew before it is used again; particles know what they have stored."""
-        self.half_list.stale.fill(1)
+        self.half_list.forget()
         self.unsaved.fill(0)
 
     @ti.func

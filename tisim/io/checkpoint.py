@@ -48,7 +48,7 @@ def save(simulation: Simulation, path: str | Path) -> None:
     simulation.s.check()
     with checksum.create_file(Path(path)) as file:
         file.attrs.update({"format": CHECKPOINT_FORMAT, "wall_s": simulation.wall_s, **_identity(simulation)})
-        file.attrs["edits"] = json.dumps(simulation.edits)
+        file.attrs.update({"edits": json.dumps(simulation.edits), "sorted": simulation.sort is not None})
         image = simulation.s.image()
         for name, values in image.items():
             file[name] = values
@@ -81,7 +81,10 @@ def snapshot(path: str | Path) -> Snapshot:
         group, worlds = file.get(BEFORE_STEP, file), len(json.loads(file.attrs["scenes"]))
         arrays = {name: np.asarray(group[name]) for name in file if "unit" in file[name].attrs}
         counts, times, steps = (np.asarray(group[name])[:worlds] for name in ("count", "time", "steps"))
-        states = tuple({k: v[w, :n].copy() for k, v in arrays.items()} for w, n in enumerate(counts))
+        # Sorted in memory: what is shown is in the order of ids.
+        by_id = bool(file.attrs.get("sorted", False))
+        orders = [np.argsort(arrays["id"][w, :n]) if by_id else np.arange(n) for w, n in enumerate(counts)]
+        states = tuple({k: v[w, order] for k, v in arrays.items()} for w, order in enumerate(orders))
         return Snapshot(times, steps, states)
 
 

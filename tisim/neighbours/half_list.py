@@ -19,13 +19,15 @@ from tisim.worlds.program import Phase
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 
-STEPS_OF_LIST = 40.0
-"""A list is meant to last this many steps at the speed of the last one."""
+REBUILD_COST = 100.0
+"""Making a list takes, for each particle, as long as this many listed pairs take in a step that do not act on
+each other. Measured in a bed of grains (docs/performance.md): some 900 ns beside 9."""
 ALL_PAIRS = 2**30
 """This is the ``listed_above`` of a world in which all pairs are listed, however far apart."""
-LEAST_SKIN, MOST_SKIN = 0.05, 0.5
-"""These bound the skin, in diameters of the smallest particle."""
-
+LEAST_SKIN, MOST_SKIN = 0.01, 0.5
+"""These bound the skin, in distances at which two of the smallest particles see each other."""
+FEWEST_PAIRS = 1.0
+"""So many pairs of each particle are taken to see each other, where there are fewer: they may come to."""
 REACH_PART = 0.125
 """Part of the skin that is kept for laws that come to reach farther, as that of particles that grow does."""
 
@@ -61,22 +63,23 @@ class HalfList:
         self.grid, self.spent = CellGrid(s, domain), 1.0 - REACH_PART if self.laws else 1.0
         self.sizes, self.row = sizes, sizes.row
         self.index, self.size, self.stale = (ti.field(ti.i32) for _ in range(3))
-        self.longest, self.total = ti.field(ti.i32), ti.field(ti.i32)
-        self.since, self.made = ti.field(ti.f64), ti.field(ti.f64)
+        self.longest, self.total = ti.field(ti.i32), ti.field(ti.i64)
+        self.since, self.pace, self.moves = ti.field(ti.f64), ti.field(ti.f64), ti.field(ti.i32)
+        self.made = ti.field(ti.f64)
         # Images that move past the box lie in other cells than the particles: they are looked for apart.
         self.images = 1 if domain.shears() else 0
         builder = ti.FieldsBuilder()
         particles = builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity)
         particles.place(self.size)
         particles.dense(ti.k, self.row).place(self.index)
-        for column in (self.stale, self.longest, self.total, self.made):
+        for column in (self.stale, self.longest, self.total, self.pace, self.moves, self.made):
             builder.dense(ti.i, s.worlds).place(column)
         builder.dense(ti.i, s.worlds).dense(ti.j, 3).place(self.since)
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        per_world = 44 + 4 * self.s.capacity * (1 + self.row)
+        per_world = 56 + 4 * self.s.capacity * (1 + self.row)
         return self.s.worlds * per_world + self.grid.bytes()
 
     @in_taichi_thread
@@ -85,6 +88,11 @@ class HalfList:
         longest, total = int(self.longest.to_numpy().max()), int(self.total.to_numpy().max())
         row, mean = -(-5 * longest // 4), -(-5 * total // (4 * self.s.capacity))
         return self.sizes.joined(ListSizes(row, mean))
+
+    def forget(self) -> None:
+        """Have every list made anew before it is used again: how long the last one lasted is not known."""
+        self.stale.fill(1)
+        self.moves.fill(0)
 
     @ti.func
     def reach(self, w, i):
@@ -116,6 +124,7 @@ class HalfList:
         """Note that particles have moved by at most ``displacement`` relative to the frame, along each
         axis."""
         square = ti.cast(0.0, ti.f64)
+        self.moves[w] = self.moves[w] + 1
         for k in ti.static(range(3)):
             self.since[w, k] = self.since[w, k] + self.s.displacement[w, k]
             square += self.since[w, k] ** 2
@@ -145,8 +154,16 @@ class HalfList:
 
 
 class ChooseSkin(OfGrid):
-    """This phase chooses a skin that lasts for some steps at the present speed; a law of cost, not of
-    physics."""
+    """This phase sets the skin: that of the scene, or the one with which steps should cost least.
+
+    A wider skin makes lists last longer, in proportion, and longer to go through. Particles that move by u in
+    a step take, of n pairs each that see each other within D, with a skin b
+
+        2 u / b * REBUILD_COST + n (1 + b/D)^3
+
+    times what a pair costs, which is least where b (1 + b/D) = sqrt(2 u D REBUILD_COST / 3 n). Both u and n
+    are counts of the list before. No clock is asked, so a run makes its lists in the same steps again.
+    """
 
     def __init__(self, grid: CellGrid, half_list: HalfList) -> None:
         super().__init__(grid)
@@ -154,15 +171,28 @@ class ChooseSkin(OfGrid):
 
     @ti.func
     def run(self, w, _k):
-        s, smallest = self.s, self.g.smallest[w]
-        step = ti.cast(s.axes(s.displacement, w).norm(), s.real)
-        wanted = 2.0 * STEPS_OF_LIST * step
-        if ti.static(self.n.images > 0):
-            wanted += STEPS_OF_LIST * ti.cast(self.n.sheared(w, s.dt[w]), s.real)
-        self.g.skin[w] = ti.max(2.0 * LEAST_SKIN * smallest, ti.min(wanted, 2.0 * MOST_SKIN * smallest))
-        self.n.longest[w], self.n.total[w], self.n.made[w] = 0, 0, s.time[w]
+        g, n, s = self.g, self.n, self.s
+        square = ti.cast(0.0, ti.f64)
         for k in ti.static(range(3)):
-            self.n.since[w, k] = 0.0
+            square += n.since[w, k] ** 2
+            n.since[w, k] = 0.0
+        apart = 2.0 * ti.sqrt(square)
+        if ti.static(n.images > 0):
+            apart += n.sheared(w, s.time[w] - n.made[w])
+        if n.moves[w] > 0:
+            n.pace[w] = 0.5 * apart / n.moves[w]
+        n.moves[w], n.made[w] = 0, s.time[w]
+        chosen = ti.cast(s.skin[w], s.real)
+        if chosen <= 0.0:
+            distance = g.largest[w, 0] + g.widest[w, 0]
+            wider = 1.0 + g.skin[w] / distance
+            near = ti.cast(n.total[w], s.real) / (s.count[w] * wider * wider * wider)
+            pace = ti.cast(n.pace[w], s.real) / n.spent
+            best = pace * REBUILD_COST / (1.5 * distance * ti.max(near, FEWEST_PAIRS))
+            part = 0.5 * (ti.sqrt(1.0 + 4.0 * ti.sqrt(best)) - 1.0)
+            chosen = distance * ti.max(LEAST_SKIN, ti.min(part, MOST_SKIN))
+        g.skin[w] = chosen
+        n.longest[w], n.total[w] = 0, 0
 
 
 class NoteReach(OfParticles):
@@ -200,7 +230,7 @@ class SearchRows(OfParticles):
         n, s, count = self.n, self.s, 0
         for turn in range(-n.images, n.images + 1):
             count = self.search(w, i, turn, count)
-        ti.atomic_add(n.total[w], count)
+        ti.atomic_add(n.total[w], ti.cast(count, ti.i64))
         if count > n.longest[w]:
             ti.atomic_max(n.longest[w], count)
         if count > n.row:

@@ -43,6 +43,13 @@ class Scene(Component):
     domain: Domain = option("space that it lives in, such as Open or Box", Open())
     stepper: Stepper = option("how time advances; tolerances and limits are stated here", Verlet())
     duration: float = parameter("s", "simulated time", gt=0)
+    skin: float | None = parameter(
+        "m",
+        "how much farther than laws reach lists of pairs look, which are made anew when particles have moved "
+        "by half of it; chosen by what steps cost unless given; no result depends on it",
+        None,
+        gt=0,
+    )
     seed: int = option("seed of all that is random in it", 0, ge=0, lt=2**63)
 
     @field_validator("effects", mode="before")
@@ -108,7 +115,9 @@ class Scene(Component):
         order = [effect.label for effect in self.effects]
         files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
-        for piece in json_pieces(self._data(serialization.to_dict(self.particles, arrays=True))):
+        data = self._data(serialization.to_dict(self.particles, arrays=True))
+        data.pop("skin", None)
+        for piece in json_pieces(data):
             digest.update(piece.encode())
         digest.update((f", {json.dumps(files, sort_keys=True)}]" if files else "]").encode())
         return digest.hexdigest()
@@ -121,6 +130,7 @@ class Scene(Component):
         return {
             "name": self.name,
             "duration": self.duration,
+            **({} if self.skin is None else {"skin": self.skin}),
             "seed": self.seed,
             "particles": particles,
             "domain": serialization.to_dict(self.domain),

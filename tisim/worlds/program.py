@@ -21,7 +21,7 @@ from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.worlds.state import State
-from tisim.worlds.status import WorldStatus
+from tisim.worlds.status import NEVER, WorldStatus
 
 TASK = 512
 """Taichi and Quadrants hand so many iterations to a CPU thread at once, whatever block size is asked for
@@ -206,10 +206,13 @@ def plan(program: "Program", items: "tuple[Item, ...]", nest: Nest, last: Nest) 
 
 @ti.data_oriented
 class Program:
-    """A program is one step of every running world, compiled for a state and a list of items."""
+    """A program is one step of every running world, compiled for a state and a list of items.
 
-    def __init__(self, s: State, items: tuple[Item, ...], schedule: str) -> None:
-        self.s, self.items, self.schedule = s, items, schedule
+    rest_every : worlds rest after a number of steps that is a multiple of this one, for what is done there.
+    """
+
+    def __init__(self, s: State, items: tuple[Item, ...], schedule: str, rest_every: int = NEVER) -> None:
+        self.s, self.items, self.schedule, self.rest_every = s, items, schedule, rest_every
         self.outside = Nest()
         # One task has one thread, which is faster without waking it.
         self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
@@ -315,7 +318,10 @@ class Program:
 
     @ti.func
     def _allow_world(self, w, steps):
-        self.s.step_limit[w] = ti.min(self.s.steps[w] + steps, self.s.goal[w])
+        limit = ti.min(self.s.steps[w] + steps, self.s.goal[w])
+        if ti.static(self.rest_every < NEVER):
+            limit = ti.min(limit, (self.s.steps[w] // self.rest_every + 1) * self.rest_every)
+        self.s.step_limit[w] = limit
 
     @ti.func
     def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]

@@ -54,7 +54,7 @@ class State:
         self.fields, self.counters = fields, (*TALLIES, *counters)
         self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
-        self.real = runtime.current().real
+        self.real, self.records = runtime.current().real, records
         builder = ti.FieldsBuilder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:
@@ -69,6 +69,9 @@ class State:
                 setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
+        # The skin of its scene, m; 0 to have one chosen.
+        self.skin = ti.field(ti.f64)
+        builder.dense(ti.i, worlds).place(self.skin)
         # Particles that its scene may ever have; the capacity may be that of a larger one.
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)

@@ -11,6 +11,7 @@ from tests.scenes import by_id
 from tisim import Simulation
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
 from tisim.effects import parameter
 from tisim.interactions import pair_chunks
 from tisim.operators import Operator
@@ -87,6 +88,19 @@ def test_of_one_alone_in_a_batch_and_restarted(simulation, usual, tmp_path):
     for result, expected in zip(simulation.results(), usual, strict=True):
         assert result.work["steps"] == STEPS
         same(by_id(result), expected)
+
+
+def test_of_any_skin(simulation, usual):
+    """Lists are made at other times, and hold other pairs."""
+    skins = (2e-3, 2e-2, 0.1)
+    for found in ends(simulation, [bed(2).model_copy(update={"skin": skin}) for skin in skins]):
+        same(found, usual[2])
+    assert [skin_of(simulation, w) for w in range(3)] == list(skins)
+
+
+@in_taichi_thread
+def skin_of(simulation, w):
+    return simulation.assembly.pairs.half_list.grid.skin[w]
 
 
 @pytest.mark.slow

@@ -1,0 +1,121 @@
+"""Particles that are sorted in memory while they run: results stay in the order of the start."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.grains import heap
+from tisim import Simulation
+from tisim.interactions import pair_chunks, spatial_sort
+from tisim.io import checkpoint
+
+GRAINS, STEPS, EVERY = 200, 100, 40
+
+
+def bed(seed, n=GRAINS):
+    """Grains in a cell too small for them, in any order."""
+    return heap(np.random.default_rng(seed), n, side=2.7, dt=2e-4, steps=STEPS)
+
+
+def made(patch, schedule, least, worlds=2):
+    patch.setattr(pair_chunks, "CHUNK_SLOTS", 32)
+    patch.setattr(spatial_sort, "SORTED_FROM", least)
+    patch.setattr(spatial_sort, "SORT_EVERY", EVERY)
+    return Simulation(bed(0), worlds=worlds, capacity=GRAINS, schedule=schedule)
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    """Worlds of 150 and more are sorted."""
+    with pytest.MonkeyPatch.context() as patch:
+        simulation = made(patch, "world", 150)
+    yield simulation
+    simulation.close()
+
+
+def ends(simulation, scenes):
+    simulation.load(scenes)
+    simulation.run()
+    results = simulation.results()
+    assert all(result.status.ok for result in results), results[0].status.reason
+    return results
+
+
+def same(found, expected):
+    assert found.work == expected.work
+    for name, values in expected.state.items():
+        np.testing.assert_array_equal(found.state[name], values, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def usual(simulation):
+    return ends(simulation, [bed(1), bed(2, 140)])
+
+
+def test_memory_is_sorted_and_what_is_shown_is_not(simulation, usual):
+    sorted_ids, others = simulation.s.read("id")
+    assert (np.diff(sorted_ids) < 0).any()
+    assert (np.diff(others[:140]) == 1).all()
+    for result in usual:
+        n = len(result.state["id"])
+        np.testing.assert_array_equal(result.state["id"], np.arange(n))
+        np.testing.assert_array_equal(result.state["radius"], result.start["radius"])
+
+
+def neighbour_distance(simulation):
+    """Mean distance of particles that follow each other in memory."""
+    return np.linalg.norm(np.diff(simulation.s.read("position")[0], axis=0), axis=1).mean()
+
+
+def test_neighbours_lie_near_each_other(simulation, usual):
+    simulation.load([bed(1)])
+    before = neighbour_distance(simulation)
+    simulation.run(steps=1)
+    assert neighbour_distance(simulation) < 0.6 * before
+
+
+def test_the_bits_are_those_of_one_alone_and_of_a_run_that_is_restarted(simulation, usual, tmp_path):
+    same(ends(simulation, [bed(2, 140), bed(1)])[1], usual[0])
+    for stop in (EVERY, EVERY + 7):
+        simulation.load([bed(1), bed(2, 140)])
+        simulation.run(steps=stop)
+        simulation.checkpoint(tmp_path / "half.h5")
+        kept = simulation.results()
+        simulation.run(steps=3)
+        simulation.restore(tmp_path / "half.h5")
+        simulation.run()
+        for found, expected in zip(simulation.results(), usual, strict=True):
+            same(found, expected)
+        for state, expected in zip(checkpoint.snapshot(tmp_path / "half.h5").states, kept, strict=True):
+            np.testing.assert_array_equal(state["position"], expected.state["position"])
+
+
+def test_they_are_those_of_an_unsorted_run_but_for_rounding(simulation, usual):
+    with pytest.MonkeyPatch.context() as patch:
+        unsorted = made(patch, "particle", GRAINS + 1)
+    assert unsorted.sort is None
+    (expected,) = ends(unsorted, [bed(1)])
+    unsorted.close()
+    for name in ("position", "velocity", "spin", "hertz_mindlin_past"):
+        scale = np.abs(expected.state[name]).max()
+        sizes = [np.sort(result.state[name].reshape(GRAINS, -1)) for result in (usual[0], expected)]
+        np.testing.assert_allclose(*sizes, rtol=0, atol=1e-9 * scale, err_msg=name)
+
+
+def test_what_is_written_between_runs_goes_to_whom_it_is_for(simulation, usual):
+    simulation.load([bed(1)])
+    simulation.run(steps=EVERY + 1)
+    velocity = simulation.state["velocity"].copy()
+    velocity[3] = (1.0, 2.0, 3.0)
+    simulation.state["velocity"] = velocity
+    np.testing.assert_array_equal(simulation.state["velocity"], velocity)
+    memory = simulation.s.read("id")[0]
+    np.testing.assert_array_equal(simulation.s.read("velocity")[0, memory == 3], [[1.0, 2.0, 3.0]])
+
+
+@pytest.mark.slow
+def test_both_schedules_have_the_same_bits(usual):
+    with pytest.MonkeyPatch.context() as patch:
+        other = made(patch, "particle", 150)
+    for found, expected in zip(ends(other, [bed(1), bed(2, 140)]), usual, strict=True):
+        same(found, expected)
+    other.close()
