@@ -1,10 +1,14 @@
 """Particles that are sorted in memory while they run: results stay in the order of the start."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from tests.effects.contact.grains import heap
 from tisim import Simulation
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
 from tisim.interactions import pair_chunks, spatial_sort
 from tisim.io import checkpoint
 
@@ -119,3 +123,30 @@ def test_both_schedules_have_the_same_bits(usual):
     for found, expected in zip(ends(other, [bed(1), bed(2, 140)]), usual, strict=True):
         same(found, expected)
     other.close()
+
+
+def bricks(dims):
+    """The cells of a grid in order: bricks along x, then y, then z, and the same for the cells in each."""
+    numbers = [range(0, n, spatial_sort.BRICK) for n in dims]
+    for z, y, x in itertools.product(*reversed(numbers)):
+        ends = [min(k + spatial_sort.BRICK, n) for k, n in zip((x, y, z), dims, strict=True)]
+        for inner in itertools.product(range(z, ends[2]), range(y, ends[1]), range(x, ends[0])):
+            yield inner[::-1]
+
+
+def test_cells_are_numbered_brick_by_brick(simulation):
+    grid = simulation.assembly.sort.grid
+
+    @ti.kernel
+    def number(x: ti.i32, y: ti.i32, z: ti.i32) -> ti.i32:
+        return grid.cell_index(0, 0, ti.Vector([x, y, z]))
+
+    @in_taichi_thread
+    def numbers(dims):
+        for k, n in enumerate(dims):
+            grid.dims[0, 0, k] = n
+        grid.offset[0, 0] = 0
+        return [number(*at) for at in bricks(dims)]
+
+    for dims in ((9, 17, 5), (8, 1, 10)):
+        assert numbers(dims) == list(range(np.prod(dims)))

@@ -1,9 +1,10 @@
 """Particles of large worlds are sorted in memory by where they are, so that neighbours lie near each other.
 
-It is done every so many steps of a world, from its first on, in the order of the cells of its pair list. That
-follows from the state of the world alone, so a run has the same bits again, alone, in a batch or restarted.
-Sums are ordered by place in memory: their last digits are those of this order. What is asked for by particle,
-such as a Result, is in the order of ids, which is that of the start.
+It is done every so many steps of a world, from its first on, by bricks of cells. In a dense bed a brick has
+about as many particles as a chunk of pairs, so few pairs are between chunks. The order follows from the state
+of the world alone, so a run has the same bits again, alone, in a batch or restarted. Sums are ordered by
+place in memory: their last digits are those of this order. What is asked for by particle, such as a Result,
+is in the order of ids, which is that of the start.
 """
 
 from typing import Any
@@ -22,6 +23,28 @@ SORT_EVERY = 4096
 """A world is sorted each time after so many steps, which take some hundred times as long."""
 TOGETHER = 8
 """So many numbers of a particle are moved at once."""
+BRICK = 8
+"""A brick has so many cells along each axis."""
+
+
+@ti.data_oriented
+class BrickGrid(CellGrid):
+    """A brick grid numbers cells brick by brick; the last brick along an axis may be thinner."""
+
+    @ti.func
+    def cell_index(self, w, level, at):
+        index, cells, inner = self.offset[w, level], 1, 0
+        for k in ti.static(range(3)):
+            cells *= self.dims[w, level, k]
+        for k in ti.static((2, 1, 0)):
+            dims, begin = self.dims[w, level, k], at[k] // BRICK * BRICK
+            thick = ti.min(BRICK, dims - begin)
+            # Of the bricks at this place along the axes before, those that come first along this one.
+            cells = cells // dims
+            index += begin * cells
+            cells *= thick
+            inner = inner * thick + at[k] - begin
+        return index + inner
 
 
 @ti.data_oriented
@@ -34,6 +57,7 @@ class SpatialSort:
     def __init__(self, pairs: PairChunks, lists: NeighbourLists) -> None:
         s = pairs.s
         self.s, self.pairs, self.lists = s, pairs, lists
+        self.grid = BrickGrid(s, pairs.half_list.domain)
         self.least, self.every = SORTED_FROM, SORT_EVERY
         singles: list[tuple[Any, Any]] = []
         for field in s.fields:
@@ -55,11 +79,11 @@ class SpatialSort:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        return self.s.worlds * (8 + 8 * TOGETHER * self.s.capacity)
+        return self.s.worlds * (8 + 8 * TOGETHER * self.s.capacity) + self.grid.bytes()
 
     def items(self) -> tuple[Item, ...]:
         """Return the items that sort the worlds whose turn it is; between two steps."""
-        grid, pairs = self.pairs.half_list.grid, self.pairs
+        grid, pairs = self.grid, self.pairs
         store = (StoreMemory(pairs),) if pairs.memories else ()
         cells = (NoteReach(grid, pairs.half_list), *measure_phases(grid), DropSkin(grid), *cell_phases(grid))
         permute = EachColumns(self, (TakeColumns(grid, self), PutColumns(grid, self), EndColumns(grid, self)))
@@ -113,7 +137,7 @@ class DropSkin(OfGrid):
 
 
 class TakeColumns(OfParticles):
-    """This phase reads columns in the new order: along rows of cells, and by index within a cell."""
+    """This phase reads columns in the new order: along cells, and by index within a cell."""
 
     def __init__(self, grid: CellGrid, sort: SpatialSort) -> None:
         super().__init__(grid)

@@ -79,6 +79,11 @@ class CellGrid:
         """Return the index of the first cell of a row along x."""
         return self.offset[w, level] + (z * self.dims[w, level, 1] + y) * self.dims[w, level, 0]
 
+    @ti.func
+    def cell_index(self, w, level, at):
+        """Return the index of a cell, by its index along each axis."""
+        return self.row(w, level, at[2], at[1]) + at[0]
+
 
 class OfGrid(Phase):
     """This phase works on the cells of a world."""
@@ -203,8 +208,7 @@ class CountInCells(OfParticles):
     def run(self, w, i):
         g, s = self.g, self.s
         level = g.level(w, s.radius[w, i])
-        at = g.place(w, level, s.position[w, i])
-        c = g.row(w, level, at[2], at[1]) + at[0]
+        c = g.cell_index(w, level, g.place(w, level, s.position[w, i]))
         g.cell_of[w, i] = c
         ti.atomic_add(g.cell_start[w, c], 1)
 
