@@ -16,7 +16,7 @@ from tisim.backend.taichi import BACKEND, check_backend, ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.errors import InputError, is_whole, must
 
-DEVICES = ("cpu", "cuda")
+DEVICES = ("cpu", "cuda", "vulkan")
 PRECISIONS = ("f64", "f32")
 THREADS = 1024
 """Taichi is asked for at most so many threads; it makes them all, whether there are cores for them or not."""
@@ -113,7 +113,7 @@ def _start(requested: Runtime) -> None:
         # Taichi announces the device on standard output, where results go.
         with kernel_cache.exclusive_access(), contextlib.redirect_stdout(io.StringIO()):
             ti.init(
-                arch=ti.cuda if requested.device == "cuda" else ti.cpu,
+                arch=getattr(ti, requested.device),
                 default_fp=requested.real,
                 cpu_max_num_threads=requested.threads,
                 fast_math=False,

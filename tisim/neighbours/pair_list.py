@@ -13,6 +13,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
+from tisim.numerics import elementary
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
@@ -105,7 +106,7 @@ class NeighbourList:
     def spacing(self, w):
         """Return the mean distance (m) between particles: the cube root of the volume at the start for
         each."""
-        return ti.cast(ti.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
+        return ti.cast(elementary.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
 
     @ti.func
     def horizon(self, w):
