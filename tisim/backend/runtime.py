@@ -11,7 +11,7 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from tisim.backend import kernel_cache
+from tisim.backend import kernel_cache, loops
 from tisim.backend.taichi import BACKEND, check_backend, ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.errors import InputError, is_whole, must
@@ -26,7 +26,7 @@ THREADS = 1024
 class Runtime:
     """A runtime says where and how kernels run.
 
-    device : "cpu" or "cuda".
+    device : "cpu", "cuda" or "vulkan".
     precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
         Time is f64 whatever the precision.
     threads : CPU threads, >= 1.
@@ -130,6 +130,9 @@ def _start(requested: Runtime) -> None:
         raise InputError(
             f"device must be present on this machine; received {requested.device!r} ({failure})"
         ) from failure
+    if requested.device == "vulkan":
+        rule = "one whose driver ends loops where it should (Mesa's software device: from version 25 on)"
+        must(loops.end_where_they_should(), "device", rule, requested.device)
     _current = requested
 
 

@@ -13,6 +13,7 @@ the particles, under the id of the other, from where a new list recalls it.
 from typing import TYPE_CHECKING
 
 from tisim.backend import runtime
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -51,7 +52,7 @@ class PairChunks:
             ti.field(ti.i32) for _ in range(5)
         )
         self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         # A pair and its memory are one record: they are read together.
         records = (self.first, self.second, *(value for one in memories for value in one.fields()))
         builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)

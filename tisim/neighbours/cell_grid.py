@@ -6,6 +6,7 @@ the ratio of sizes. Counts are integer sums, and each cell is sorted by index in
 neither on the threads nor on what was there before.
 """
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
@@ -30,7 +31,7 @@ class CellGrid:
     def __init__(self, s: State, domain: Bound[Domain]) -> None:
         self.s, self.domain, self.joined = s, domain, domain.joined()
         self.max_cells = CELLS_PER_PARTICLE * s.capacity + SPARE_CELLS * LEVELS
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         self.near, self.skin, self.smallest = (ti.field(s.real) for _ in range(3))
         self.low, self.high, self.cell, self.widest, self.largest = (ti.field(s.real) for _ in range(5))
         self.cell_start, self.cell_of, self.order = (ti.field(ti.i32) for _ in range(3))

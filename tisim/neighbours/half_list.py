@@ -8,6 +8,7 @@ never on whether the list was due: results do not depend on when lists were made
 
 from dataclasses import dataclass
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -63,7 +64,7 @@ class HalfList:
         self.index, self.size, self.stale = (ti.field(ti.i32) for _ in range(3))
         self.longest, self.total = ti.field(ti.i32), ti.field(ti.i32)
         self.since = ti.field(ti.f64)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         particles = builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity)
         particles.place(self.size)
         particles.dense(ti.k, self.row).place(self.index)

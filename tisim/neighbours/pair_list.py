@@ -9,6 +9,7 @@ due: results do not depend on when lists were made, and a restarted run keeps it
 
 from __future__ import annotations
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -37,7 +38,7 @@ class NeighbourList:
         worlds, capacity = s.worlds, s.capacity
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
         self.room, self.ahead = MOST_NEIGHBOURS, STEPS_OF_SKIN
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         self.cell_start, self.cell_of, self.order, self.neighbour_count = (ti.field(ti.i32) for _ in range(4))
         self.neighbour_index = ti.field(ti.i32)
         self.dims = ti.Vector.field(3, ti.i32)

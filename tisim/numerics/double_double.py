@@ -1,37 +1,44 @@
-"""Sums and products of f64 numbers without rounding, each as a number and what rounding takes from it.
+"""Sums and products of f64 numbers without rounding, each as two numbers.
 
-They hold where the compiler neither reorders nor contracts, as tisim has it do (T. J. Dekker, Numer. Math. 18
-(1971) 224; D. E. Knuth, The Art of Computer Programming 2, section 4.2.2).
+The first has no more than 26 binary digits, the rest is in the second. So they hold also where a compiler
+contracts a product and a sum, or takes (a + b) - a for b, as those for Vulkan do: it cannot see through
+digits that are cut off. (T. J. Dekker, Numer. Math. 18 (1971) 224, has them for other compilers.)
 """
 
 from tisim.backend.taichi import ti
 
-SPLITTER = 2.0**27 + 1.0
-"""A product with this number splits an f64 number in two halves of 26 bits."""
+LOWER_BITS = 2**27 - 1
+"""These are the last 27 of the 53 binary digits of an f64 number."""
 
 
 @ti.func
-def two_sum(a, b):
-    """Return a + b, rounded, and the error."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
+def upper_digits(a):
+    """Return a number without its last 27 binary digits."""
+    return cut(a, LOWER_BITS)
 
 
 @ti.func
-def half(a):
-    """Return the upper half of the digits of a number below 1e300."""
-    c = ti.f64(SPLITTER) * a
-    return c - (c - a)
+def cut(a, bits: ti.template()):  # type: ignore[valid-type]
+    """Return a number without some of its last binary digits."""
+    return ti.bit_cast(ti.bit_cast(a, ti.i64) & ~ti.i64(bits), ti.f64)
 
 
 @ti.func
-def two_product(a, b):
-    """Return a * b, rounded, and the error; both are below 1e300."""
-    product, upper_a, upper_b = a * b, half(a), half(b)
+def exact_sum(a, b):
+    """Return a + b; a is the larger one."""
+    upper = upper_digits(a + b)
+    return upper, (a - upper) + b
+
+
+@ti.func
+def exact_product(a, b):
+    """Return a * b to 78 digits; both are below 1e300."""
+    upper, upper_a, upper_b = upper_digits(a * b), upper_digits(a), upper_digits(b)
     lower_a, lower_b = a - upper_a, b - upper_b
-    error = ((upper_a * upper_b - product) + upper_a * lower_b + lower_a * upper_b) + lower_a * lower_b
-    return product, error
+    # The last digit of the first product is 0, that of the others does not matter. Cut off, no compiler can
+    # put the products together again.
+    first, second, third = cut(upper_a * upper_b, 1), cut(upper_a * lower_b, 1), cut(lower_a * upper_b, 1)
+    return upper, ((first - upper) + second + third) + lower_a * lower_b
 
 
 @ti.func

@@ -1,0 +1,85 @@
+"""How fields lie in device memory.
+
+For Vulkan, Taichi 1.7.4 lays them out without gaps. A number of 8 bytes that does not begin at a multiple of
+8 then overwrites its neighbour, without a word. So there words are put in between that nobody uses.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+
+WORD = 8
+"""bytes of the widest number."""
+
+
+class Level:
+    """A level of memory has cells, each with all that is placed in it."""
+
+    def __init__(self, axes: Any = None, shape: Any = ()) -> None:
+        self.axes, self.shape, self.parts = axes, shape, []
+        self.cells = math.prod(shape) if isinstance(shape, tuple) else shape
+
+    def dense(self, axes: Any, shape: Any) -> Level:
+        """Return a level of so many cells in each cell of this one."""
+        level = Level(axes, shape)
+        self.parts.append(level)
+        return level
+
+    def place(self, *columns: Any) -> None:
+        """Put fields into each cell, one after the other."""
+        self.parts += columns
+
+    def lay(self, node: Any) -> None:
+        """Make this level in a node of Taichi, as it has been asked for."""
+        for part in self.parts:
+            if isinstance(part, Level):
+                part.lay(node.dense(part.axes, part.shape))
+            else:
+                node.place(part)
+
+    def fill_up(self) -> int:
+        """Put words of 4 bytes where a number of 8 would begin in between; return the bytes of all cells."""
+        parts, size = [], 0
+        for part in self.parts:
+            if size % WORD and _is_wide(part):
+                parts.append(ti.field(ti.i32))
+                size += 4
+            parts.append(part)
+            size += part.fill_up() if isinstance(part, Level) else _bytes(part)
+        if size % WORD and any(map(_is_wide, parts)):
+            parts.append(ti.field(ti.i32))
+            size += 4
+        self.parts = parts
+        return size * self.cells
+
+
+class Builder(Level):
+    """A builder makes device memory of what has been placed in it."""
+
+    def __init__(self) -> None:
+        super().__init__(shape=1)
+
+    def finalize(self) -> Any:
+        """Return the tree of Taichi that has all fields."""
+        if runtime.current().device == "vulkan":
+            self.fill_up()
+        builder = ti.FieldsBuilder()
+        self.lay(builder)
+        return builder.finalize()
+
+
+def _bytes(column: Any) -> int:
+    """Return the bytes of one number of a field for each of its components; asked before it is placed."""
+    kind = column.vars[0].ptr.get_dt()
+    return len(column.vars) * (WORD if kind in (ti.f64, ti.i64, ti.u64) else 4)
+
+
+def _is_wide(part: Any) -> bool:
+    """Return whether any number of a part has 8 bytes."""
+    if isinstance(part, Level):
+        return any(_is_wide(one) for one in part.parts)
+    return _bytes(part) // len(part.vars) == WORD
