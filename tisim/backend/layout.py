@@ -1,12 +1,14 @@
 """How fields lie in device memory.
 
-For Vulkan, Taichi 1.7.4 lays them out without gaps. A number of 8 bytes that does not begin at a multiple of
-8 then overwrites its neighbour, without a word. So there words are put in between that nobody uses.
+For Vulkan, Taichi 1.7.4 lays the parts of a cell out without gaps, in the order of their sizes. A number of 8
+bytes that does not begin at a multiple of 8 then overwrites its neighbour, without a word. So parts that
+nobody uses are put in between there.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import Any
 
 from tisim.backend import runtime
@@ -42,19 +44,16 @@ class Level:
                 node.place(part)
 
     def fill_up(self) -> int:
-        """Put words of 4 bytes where a number of 8 would begin in between; return the bytes of all cells."""
-        parts, size = [], 0
-        for part in self.parts:
-            if size % WORD and _is_wide(part):
-                parts.append(ti.field(ti.i32))
-                size += 4
-            parts.append(part)
-            size += part.fill_up() if isinstance(part, Level) else _bytes(part)
-        if size % WORD and any(map(_is_wide, parts)):
-            parts.append(ti.field(ti.i32))
-            size += 4
-        self.parts = parts
-        return size * self.cells
+        """Add parts that nobody uses, so that numbers of 8 bytes begin at multiples of 8; return the bytes of
+        all cells."""
+        sizes = [part.fill_up() if isinstance(part, Level) else _bytes(part) for part in self.parts]
+        if any(map(_is_wide, self.parts)):
+            # A part whose size is no multiple of 8 gets another of its size, unless there is one.
+            for size, number in Counter(size for size in sizes if size % WORD).items():
+                if number % 2:
+                    self.dense(ti.l, size // 4).place(ti.field(ti.i32))
+                    sizes.append(size)
+        return sum(sizes) * self.cells
 
 
 class Builder(Level):
@@ -74,8 +73,8 @@ class Builder(Level):
 
 def _bytes(column: Any) -> int:
     """Return the bytes of one number of a field for each of its components; asked before it is placed."""
-    kind = column.vars[0].ptr.get_dt()
-    return len(column.vars) * (WORD if kind in (ti.f64, ti.i64, ti.u64) else 4)
+    wide = column.vars[0].ptr.get_dt().to_string() in ("f64", "i64", "u64")
+    return len(column.vars) * (WORD if wide else 4)
 
 
 def _is_wide(part: Any) -> bool:
