@@ -22,7 +22,8 @@ class Level:
     """A level of memory has cells, each with all that is placed in it."""
 
     def __init__(self, axes: Any = None, shape: Any = ()) -> None:
-        self.axes, self.shape, self.parts = axes, shape, []
+        self.axes, self.shape = axes, shape
+        self.parts: list[Any] = []
         self.cells = math.prod(shape) if isinstance(shape, tuple) else shape
 
     def dense(self, axes: Any, shape: Any) -> Level:

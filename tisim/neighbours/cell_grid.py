@@ -11,6 +11,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.worlds.bound import Bound
+from tisim.worlds.prefix_sum import PrefixSum
 from tisim.worlds.program import Phase
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
@@ -50,12 +51,15 @@ class CellGrid:
         for column in (self.dims, self.cell):
             levels.dense(ti.k, 3).place(column)
         self.tree = Tree(builder)
+        # Where each cell ends among all: sums over the cells before it.
+        self.ends = PrefixSum(s, OfCells(self), self.cell_start, self.cell_start)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
         real = 8 if self.s.real == ti.f64 else 4
         per_world = real * (self.s.capacity + 8 + 5 * LEVELS)
-        return self.s.worlds * (per_world + 4 * (2 * self.s.capacity + self.max_cells + 2 + 5 * LEVELS))
+        cells = 4 * (2 * self.s.capacity + self.max_cells + 2 + 5 * LEVELS)
+        return self.s.worlds * (per_world + cells) + self.ends.bytes()
 
     @ti.func
     def level(self, w, radius):
@@ -211,18 +215,6 @@ class CountInCells(OfParticles):
         ti.atomic_add(g.cell_start[w, c], 1)
 
 
-class EndCells(OfGrid):
-    """This phase finds where each cell ends among all: sums over the cells before it."""
-
-    @ti.func
-    def run(self, w, _k):
-        g = self.g
-        total = 0
-        for c in range(g.total[w] + 1):
-            total += g.cell_start[w, c]
-            g.cell_start[w, c] = total
-
-
 class PlaceInCells(OfParticles):
     """This phase enters each particle, from the end of its cell on, in whatever order threads come."""
 
@@ -266,8 +258,5 @@ def measure_phases(grid: CellGrid) -> tuple[Phase, ...]:
 
 def cell_phases(grid: CellGrid) -> tuple[Phase, ...]:
     """Return the phases that sort the particles into cells; ``skin`` must be set."""
-    kinds: tuple[type[OfGrid], ...] = (
-        *(ShapeGrid, ClearCells, CountInCells),
-        *(EndCells, PlaceInCells, SortCells),
-    )
-    return tuple(kind(grid) for kind in kinds)
+    count = (ShapeGrid(grid), ClearCells(grid), CountInCells(grid))
+    return (*count, *grid.ends.phases(), PlaceInCells(grid), SortCells(grid))
