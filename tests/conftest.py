@@ -1,4 +1,4 @@
-"""One runtime for the whole suite: cpu, f64 unless TISIM_TEST_PRECISION says otherwise."""
+"""One runtime for the whole suite: cpu and f64 unless TISIM_DEVICE and TISIM_TEST_PRECISION say otherwise."""
 
 import json
 import os
@@ -23,7 +23,8 @@ def pytest_configure(config):
 @pytest.fixture(scope="session", autouse=True)
 def the_runtime():
     """The settings that every test in this process runs under."""
-    return runtime.init(device="cpu", precision=os.environ.get("TISIM_TEST_PRECISION", "f64"))
+    device = os.environ.get("TISIM_DEVICE", "cpu")
+    return runtime.init(device=device, precision=os.environ.get("TISIM_TEST_PRECISION", "f64"))
 
 
 @pytest.fixture

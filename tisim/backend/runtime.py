@@ -11,12 +11,12 @@ import threading
 from dataclasses import dataclass
 from typing import Any
 
-from tisim.backend import kernel_cache
+from tisim.backend import kernel_cache, loops
 from tisim.backend.taichi import BACKEND, check_backend, ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.errors import InputError, is_whole, must
 
-DEVICES = ("cpu", "cuda")
+DEVICES = ("cpu", "cuda", "vulkan")
 PRECISIONS = ("f64", "f32")
 THREADS = 1024
 """Taichi is asked for at most so many threads; it makes them all, whether there are cores for them or not."""
@@ -26,7 +26,7 @@ THREADS = 1024
 class Runtime:
     """A runtime says where and how kernels run.
 
-    device : "cpu" or "cuda".
+    device : "cpu", "cuda" or "vulkan".
     precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
         Time is f64 whatever the precision.
     threads : CPU threads, >= 1.
@@ -113,7 +113,7 @@ def _start(requested: Runtime) -> None:
         # Taichi announces the device on standard output, where results go.
         with kernel_cache.exclusive_access(), contextlib.redirect_stdout(io.StringIO()):
             ti.init(
-                arch=ti.cuda if requested.device == "cuda" else ti.cpu,
+                arch=getattr(ti, requested.device),
                 default_fp=requested.real,
                 cpu_max_num_threads=requested.threads,
                 fast_math=False,
@@ -130,6 +130,9 @@ def _start(requested: Runtime) -> None:
         raise InputError(
             f"device must be present on this machine; received {requested.device!r} ({failure})"
         ) from failure
+    if requested.device == "vulkan":
+        rule = "one whose driver ends loops where it should (Mesa's software device: from version 25 on)"
+        must(loops.end_where_they_should(), "device", rule, requested.device)
     _current = requested
 
 

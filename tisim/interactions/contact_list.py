@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
@@ -25,7 +26,7 @@ class ContactList:
     def __init__(self, s: State, domain: Bound[Domain], events: tuple[Bound[PairEvent], ...]) -> None:
         self.s, self.domain, self.events = s, domain, events
         self.capacity = CONTACTS_PER_PARTICLE * s.capacity
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         self.first, self.second = ti.field(ti.i32), ti.field(ti.i32)
         self.bid, self.best = ti.field(ti.i64), ti.field(ti.i64)
         self.size, self.waiting, self.overlaps = ti.field(ti.i32), ti.field(ti.i32), ti.field(ti.i32)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tisim.backend import runtime
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_chunks import OfChunks, PairChunks
@@ -31,7 +32,7 @@ class PairTerms:
     def __init__(self, pairs: PairChunks, components: int) -> None:
         self.pairs, self.components = pairs, components
         self.columns = tuple(ti.field(pairs.s.real) for _ in range(components))
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, pairs.s.worlds).dense(ti.j, pairs.room).place(*self.columns)
         self.tree = Tree(builder)
 

@@ -13,12 +13,14 @@ the particles, under the id of the other, from where a new list recalls it.
 from typing import TYPE_CHECKING
 
 from tisim.backend import runtime
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.neighbours.cell_grid import sort_row
 from tisim.neighbours.half_list import HalfList
-from tisim.worlds.program import Item, Phase, Repeat
+from tisim.worlds.prefix_sum import PrefixSum
+from tisim.worlds.program import Item, PerParticle, Phase, Repeat
 from tisim.worlds.status import WorldStatus
 
 if TYPE_CHECKING:
@@ -52,7 +54,7 @@ class PairChunks:
             ti.field(ti.i32) for _ in range(6)
         )
         self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         # A pair and its memory are one record: they are read together.
         records = (self.first, self.second, *(value for one in memories for value in one.fields()))
         builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
@@ -64,13 +66,17 @@ class PairChunks:
             builder.dense(ti.i, s.worlds).dense(ti.j, self.chunks).place(column)
         builder.dense(ti.i, s.worlds).place(self.unsaved)
         self.tree = Tree(builder)
+        # Where the pairs of each chunk end, and where those that each particle fetches do.
+        self.ends = PrefixSum(s, OfChunks(self), self.end, self.end)
+        self.fetch_ends = PrefixSum(s, PerParticle(s), self.fetch_count, self.fetch_begin)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
         s, real = self.s, 8 if self.s.real == ti.f64 else 4
         values = sum(one.size for one in self.memories)
         per_world = self.room * (16 + real * values) + 8 * s.capacity + 12 * self.chunks + 4
-        return s.worlds * per_world + self.half_list.bytes()
+        sums = self.ends.bytes() + self.fetch_ends.bytes()
+        return s.worlds * per_world + sums + self.half_list.bytes()
 
     @in_taichi_thread
     def forget(self) -> None:
@@ -90,10 +96,11 @@ class PairChunks:
 
     def phases(self) -> "tuple[Item, ...]":
         """Return the phases that bring the pairs up to date where the list is due."""
-        kinds = (CountPairs, PlacePairs, FillPairs, EndFetches, EnterFetches, SortFetches, EndRebuild)
         store = (StoreMemory(self),) if self.memories else ()
-        fill = (kind(self) for kind in kinds)
-        rebuild = RebuildPairs(self, (*store, BeginRebuild(self), *self.half_list.phases(), *fill))
+        place = (CountPairs(self), *self.ends.phases(), PlacePairs(self), FillPairs(self))
+        fetch = (*self.fetch_ends.phases(), EnterFetches(self), SortFetches(self))
+        rows = (*store, BeginRebuild(self), *self.half_list.phases())
+        rebuild = RebuildPairs(self, (*rows, *place, *fetch, EndRebuild(self)))
         return (*self.half_list.watch(), rebuild)
 
     @in_taichi_thread
@@ -192,28 +199,27 @@ class CountPairs(OfChunks):
         p = self.p
         n, inner, outer = p.half_list, 0, 0
         for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, self.s.count[w])):
-            p.fetch_begin[w, i] = 0
+            p.fetch_count[w, i] = 0
             for k in range(n.size[w, i]):
                 within = ti.cast(p.chunk_of(n.index[w, i, k]) == c, ti.i32)
                 inner, outer = inner + within, outer + 1 - within
-        p.outer[w, c], p.end[w, c] = inner, outer
+        p.outer[w, c], p.end[w, c] = inner, inner + outer
 
 
-class PlacePairs(OfWorld):
-    """This phase finds where the pairs of each chunk begin and end."""
+class PlacePairs(OfChunks):
+    """This phase finds where the pairs of each chunk begin, and where those do that are not within it."""
 
     @ti.func
-    def run(self, w, _k):
-        p, total = self.p, 0
-        for c in range((self.s.count[w] + p.chunk - 1) // p.chunk):
-            inner, outer = p.outer[w, c], p.end[w, c]
-            p.begin[w, c], p.outer[w, c] = total, total + inner
-            total += inner + outer
-            p.end[w, c] = total
-        if total > p.room:
+    def run(self, w, c):
+        p = self.p
+        if p.ends.total[w] > p.room:
             ti.atomic_max(self.s.failed[w], WorldStatus.LIST_OVERFLOW)
-            for c in range((self.s.count[w] + p.chunk - 1) // p.chunk):
-                p.begin[w, c], p.outer[w, c], p.end[w, c] = 0, 0, 0
+            p.begin[w, c], p.outer[w, c], p.end[w, c] = 0, 0, 0
+        else:
+            begin = 0
+            if c > 0:
+                begin = p.end[w, c - 1]
+            p.begin[w, c], p.outer[w, c] = begin, begin + p.outer[w, c]
 
 
 class FillPairs(OfChunks):
@@ -231,23 +237,11 @@ class FillPairs(OfChunks):
                     m = ti.select(within, inner, outer)
                     inner, outer = inner + ti.select(within, 1, 0), outer + ti.select(within, 0, 1)
                     if not within:
-                        ti.atomic_add(p.fetch_begin[w, j], 1)
+                        ti.atomic_add(p.fetch_count[w, j], 1)
                     ordered = s.id[w, i] < s.id[w, j]
                     p.first[w, m], p.second[w, m] = ti.select(ordered, i, j), ti.select(ordered, j, i)
                     for one in ti.static(p.memories):
                         one.recall(w, m, i, j)
-
-
-class EndFetches(OfWorld):
-    """This phase finds where the pairs that each particle fetches end, among all."""
-
-    @ti.func
-    def run(self, w, _k):
-        p, total = self.p, 0
-        for i in range(self.s.count[w]):
-            count = p.fetch_begin[w, i]
-            total += count
-            p.fetch_count[w, i], p.fetch_begin[w, i] = count, total
 
 
 class EnterFetches(OfChunks):

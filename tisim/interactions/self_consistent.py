@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
@@ -44,7 +45,7 @@ class SelfConsistentSolver(DerivedSolver):
         self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
         self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
         self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.next)
         for column in (self.pending, self.sweeps, self.again, self.largest, *self.changes):
             builder.dense(ti.i, s.worlds).place(column)

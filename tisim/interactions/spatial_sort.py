@@ -9,6 +9,7 @@ is in the order of ids, which is that of the start.
 
 from typing import Any
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_chunks import BeginRebuild, PairChunks, StoreMemory
@@ -72,7 +73,7 @@ class SpatialSort:
             self.slotted += ((column, slots, self.stages, column.dtype),)
             self.stages += -(-slots // TOGETHER)
         self.due, self.stage, self.spare = ti.field(ti.i32), ti.field(ti.i32), ti.field(ti.f64)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, s.worlds).place(self.due, self.stage)
         builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).dense(ti.k, TOGETHER).place(self.spare)
         self.tree = Tree(builder)

@@ -6,10 +6,12 @@ the ratio of sizes. Counts are integer sums, and each cell is sorted by index in
 neither on the threads nor on what was there before.
 """
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.worlds.bound import Bound
+from tisim.worlds.prefix_sum import PrefixSum
 from tisim.worlds.program import Phase
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
@@ -30,7 +32,7 @@ class CellGrid:
     def __init__(self, s: State, domain: Bound[Domain]) -> None:
         self.s, self.domain, self.joined = s, domain, domain.cyclic()
         self.max_cells = CELLS_PER_PARTICLE * s.capacity + SPARE_CELLS * LEVELS
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         self.near, self.skin, self.smallest = (ti.field(s.real) for _ in range(3))
         self.low, self.high, self.cell, self.widest, self.largest = (ti.field(s.real) for _ in range(5))
         self.cell_start, self.cell_of, self.order = (ti.field(ti.i32) for _ in range(3))
@@ -49,12 +51,15 @@ class CellGrid:
         for column in (self.dims, self.cell):
             levels.dense(ti.k, 3).place(column)
         self.tree = Tree(builder)
+        # Where each cell ends among all: sums over the cells before it.
+        self.ends = PrefixSum(s, OfCells(self), self.cell_start, self.cell_start)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
         real = 8 if self.s.real == ti.f64 else 4
         per_world = real * (self.s.capacity + 8 + 5 * LEVELS)
-        return self.s.worlds * (per_world + 4 * (2 * self.s.capacity + self.max_cells + 2 + 5 * LEVELS))
+        cells = 4 * (2 * self.s.capacity + self.max_cells + 2 + 5 * LEVELS)
+        return self.s.worlds * (per_world + cells) + self.ends.bytes()
 
     @ti.func
     def level(self, w, radius):
@@ -213,18 +218,6 @@ class CountInCells(OfParticles):
         ti.atomic_add(g.cell_start[w, c], 1)
 
 
-class EndCells(OfGrid):
-    """This phase finds where each cell ends among all: sums over the cells before it."""
-
-    @ti.func
-    def run(self, w, _k):
-        g = self.g
-        total = 0
-        for c in range(g.total[w] + 1):
-            total += g.cell_start[w, c]
-            g.cell_start[w, c] = total
-
-
 class PlaceInCells(OfParticles):
     """This phase enters each particle, from the end of its cell on, in whatever order threads come."""
 
@@ -268,8 +261,5 @@ def measure_phases(grid: CellGrid) -> tuple[Phase, ...]:
 
 def cell_phases(grid: CellGrid) -> tuple[Phase, ...]:
     """Return the phases that sort the particles into cells; ``skin`` must be set."""
-    kinds: tuple[type[OfGrid], ...] = (
-        *(ShapeGrid, ClearCells, CountInCells),
-        *(EndCells, PlaceInCells, SortCells),
-    )
-    return tuple(kind(grid) for kind in kinds)
+    count = (ShapeGrid(grid), ClearCells(grid), CountInCells(grid))
+    return (*count, *grid.ends.phases(), PlaceInCells(grid), SortCells(grid))

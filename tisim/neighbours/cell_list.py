@@ -2,6 +2,7 @@
 
 from tisim.backend.taichi import ti
 from tisim.neighbours.pair_list import NeighbourList
+from tisim.numerics import elementary
 from tisim.worlds.program import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
@@ -42,8 +43,10 @@ class BinParticles(Phase):
         least = s.radius[w, smallest]
         extent = ti.max(high - low, 1e-3 * least)
         # Root by root: in f32 a volume of 7000 million km cubed is infinite.
-        roots = ti.pow(extent, 1.0 / 3.0)
-        spacing = roots[0] * roots[1] * roots[2] / ti.pow(ti.cast(count, s.real), 1.0 / 3.0)
+        spacing = ti.cast(1.0, s.real)
+        for k in ti.static(range(3)):
+            spacing *= elementary.pow(extent[k], 1.0 / 3.0)
+        spacing /= elementary.pow(ti.cast(count, s.real), 1.0 / 3.0)
         n.skin[w] = ti.min(2.0 * n.ahead * ti.cast(s.axes(s.displacement, w), s.real), spacing)
         n.gap[w] = n.horizon(w)
         width = ti.max(spacing, 2.0 * least + n.gap[w])

@@ -8,6 +8,7 @@ never on whether the list was due: results do not depend on when lists were made
 
 from dataclasses import dataclass
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -68,7 +69,7 @@ class HalfList:
         self.made = ti.field(ti.f64)
         # Images that move past the box lie in other cells than the particles: they are looked for apart.
         self.images = 1 if domain.shears() else 0
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         particles = builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity)
         particles.place(self.size)
         particles.dense(ti.k, self.row).place(self.index)

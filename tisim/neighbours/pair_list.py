@@ -9,10 +9,12 @@ due: results do not depend on when lists were made, and a restarted run keeps it
 
 from __future__ import annotations
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
+from tisim.numerics import elementary
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
@@ -36,7 +38,7 @@ class NeighbourList:
         worlds, capacity = s.worlds, s.capacity
         self.max_cells = CELLS_PER_PARTICLE * capacity + 8
         self.room, self.ahead = MOST_NEIGHBOURS, STEPS_OF_SKIN
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         self.cell_start, self.cell_of, self.order, self.neighbour_count = (ti.field(ti.i32) for _ in range(4))
         self.neighbour_index = ti.field(ti.i32)
         self.dims = ti.Vector.field(3, ti.i32)
@@ -105,7 +107,7 @@ class NeighbourList:
     def spacing(self, w):
         """Return the mean distance (m) between particles: the cube root of the volume at the start for
         each."""
-        return ti.cast(ti.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
+        return ti.cast(elementary.pow(self.s.volume[w] / self.s.count[w], 1.0 / 3.0), self.s.real)
 
     @ti.func
     def horizon(self, w):

@@ -1,6 +1,7 @@
 """Langevin's function."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics import elementary
 
 TERMS = 9
 """So many terms of the continued fraction are taken; up to x = 1 the next one is below rounding in f64."""
@@ -20,6 +21,6 @@ def langevin_ratio(x):
             rest = (2.0 * k + 1.0) + square / rest
         ratio = 1.0 / rest
     else:
-        small = ti.exp(-2.0 * x)
+        small = elementary.exp(-2.0 * x)
         ratio = (1.0 - 1.0 / x + 2.0 * small / (1.0 - small)) / x
     return ratio

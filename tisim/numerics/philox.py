@@ -8,6 +8,7 @@ is stored and nothing is shared between threads, so the number of threads cannot
 from math import factorial, log, pi, sqrt
 
 from tisim.backend.taichi import ti
+from tisim.numerics import elementary
 
 PHILOX_ROUNDS = 10
 """Philox4x32-10 mixes the counter and the key so many times."""
@@ -67,9 +68,9 @@ def uniform(words):
 def normal(words):
     """Return two independent standard normal numbers (f64) from four words (Box and Muller 1958)."""
     u = uniform(words)
-    size = ti.sqrt(-2.0 * ti.log(u[0]))
+    size = ti.sqrt(-2.0 * elementary.log(u[0]))
     angle = ti.cast(6.283185307179586, ti.f64) * u[1]
-    return ti.Vector([size * ti.cos(angle), size * ti.sin(angle)], dt=ti.f64)
+    return ti.Vector([size * elementary.cos(angle), size * elementary.sin(angle)], dt=ti.f64)
 
 
 LOG_2, QUARTER, ROOT = log(2), pi / 2, sqrt(0.5)

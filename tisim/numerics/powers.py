@@ -1,6 +1,7 @@
 """Powers with an exponent that is compiled in."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics import elementary
 
 Exponent = int | float
 """This is the type of an exponent of an effect: an option, not a parameter per world. It is compiled in, and
@@ -15,7 +16,7 @@ def power(x, exponent: ti.template()):  # type: ignore[valid-type]
     if ti.static(float(exponent).is_integer()):
         result = whole_power(x, ti.static(int(exponent)))
     else:
-        result = ti.pow(x, exponent)
+        result = elementary.pow(x, exponent)
     return result
 
 

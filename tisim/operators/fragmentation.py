@@ -10,6 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import Impact
 from tisim.effects.impact.law import ImpactLaw
+from tisim.numerics import elementary
 from tisim.operators.base import Operator, parameter
 from tisim.worlds.bound import Peers
 from tisim.worlds.fields import Field
@@ -76,7 +77,7 @@ class Fragmentation(ImpactLaw, Operator):
         # A grain that an earlier impact of this step has broken does not break again, and bonds no more.
         broke = ti.cast(s.pieces[w, i] >= 2, ti.i32)
         if shrink * self.threshold(w) > 1.0 and pieces >= 2 and broke == 0:
-            energy = surface * (ti.pow(ti.cast(pieces, s.real), 1.0 / 3.0) - 1.0)
+            energy = surface * (elementary.pow(ti.cast(pieces, s.real), 1.0 / 3.0) - 1.0)
             s.pieces[w, i] = pieces
             s.fracture_energy[w, i] = s.fracture_energy[w, i] + energy
             for law in ti.static(self.heating):
@@ -112,7 +113,7 @@ class Fragmentation(ImpactLaw, Operator):
         centre = s.position[w, i]
         for field in ti.static(s.sums):
             field[w, i] /= n
-        s.radius[w, i] *= ti.pow(ti.cast(n, s.real), -1.0 / 3.0)
+        s.radius[w, i] *= elementary.pow(ti.cast(n, s.real), -1.0 / 3.0)
         for k in range(n):
             piece = i
             if k > 0:

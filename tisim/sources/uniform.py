@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
+from tisim.numerics import elementary
 from tisim.sources.base import Source, parameter
 
 STILL: Vector = (0.0, 0.0, 0.0)
@@ -22,7 +23,7 @@ class Uniform(Source):
         # A field that does not oscillate need not pay for sines.
         if self.amplitude(w).norm_sqr() > 0.0:
             # In f64, whatever the precision: omega t grows without bound.
-            value += self.amplitude(w) * ti.cast(ti.sin(self.omega(w) * t + self.phase(w)), float)
+            value += self.amplitude(w) * ti.cast(elementary.sin(self.omega(w) * t + self.phase(w)), float)
         return value
 
 

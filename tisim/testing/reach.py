@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -69,7 +70,7 @@ class _Distances:
         self.factors = (WITHIN, at, *FARTHER)
         self.number = len(self.factors)
         # In a field: a loop over constants would compile the law for each of them.
-        self.factor, self.size, builder = ti.field(ti.f64), ti.field(s.real), ti.FieldsBuilder()
+        self.factor, self.size, builder = ti.field(ti.f64), ti.field(s.real), Builder()
         builder.dense(ti.i, self.number).place(self.factor)
         builder.dense(ti.ijk, (s.capacity, s.capacity, self.number)).place(self.size)
         Tree(builder)

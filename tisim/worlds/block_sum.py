@@ -1,5 +1,6 @@
 """Sums over the particles of a world: by blocks, then over the blocks, so always in the same order."""
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.worlds.program import Phase
@@ -17,7 +18,7 @@ class BlockSums:
         self.s, self.terms = s, terms
         self.blocks = -(-s.capacity // BLOCK)
         self.partial = ti.Vector.field(terms, ti.f64)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, s.worlds).dense(ti.j, self.blocks).place(self.partial)
         self.tree = Tree(builder)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -15,7 +16,7 @@ class FiniteCheck:
 
     def __init__(self, s: State) -> None:
         self.s, self.broken = s, ti.field(ti.i32)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, s.worlds).place(self.broken)
         self.tree = Tree(builder)
         fields = [field for field in s.reported if not field.integer]

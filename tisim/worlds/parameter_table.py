@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -92,7 +93,7 @@ class ParameterTable:
     def __init__(self, parts: Sequence[Component], worlds: int, real: Any) -> None:
         self.slots = sum(_slots(part) for part in parts)
         self.field = ti.field(real)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, worlds).dense(ti.j, max(1, self.slots)).place(self.field)
         self.trees = [Tree(builder)]
         self._next, self.array_bytes = 0, 0
@@ -114,7 +115,7 @@ class ParameterTable:
     @in_taichi_thread
     def _place(self, values: np.ndarray) -> Any:
         """Return an array in device memory that holds these values."""
-        column, builder = ti.field(self.field.dtype), ti.FieldsBuilder()
+        column, builder = ti.field(self.field.dtype), Builder()
         builder.dense(ti.i, values.shape[0]).dense(ti.j, values.shape[1]).place(column)
         self.trees.append(Tree(builder))
         rounded = values.astype(np.float64 if self.field.dtype == ti.f64 else np.float32)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tisim.backend import runtime
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
@@ -55,7 +56,7 @@ class State:
         self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
         self.real, self.records = runtime.current().real, records
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:
             setattr(self, field.name, self._place(builder, field))

@@ -7,6 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.contact.power_law import Contact, ContactLaw
+from tisim.numerics import elementary
 
 
 class ContactSoftening(ContactLaw):
@@ -32,4 +33,4 @@ class ContactSoftening(ContactLaw):
     @ti.func
     def softened(self, s, w, i, stiffness):
         excess = s.temperature[w, i] / self.reference_temperature(w) - 1.0
-        return ti.max(stiffness * ti.exp(-self.sensitivity(w) * excess), self.floor(w))
+        return ti.max(stiffness * elementary.exp(-self.sensitivity(w) * excess), self.floor(w))

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Force, parameter
+from tisim.numerics import elementary
 from tisim.sources.base import sources
 from tisim.worlds.bound import Peers
 
@@ -107,11 +108,11 @@ class ChowDrag(Drag):
         if reynolds > 2e6:
             drag, power = 0.18 * reynolds, 1.0
         elif reynolds > 3e5:
-            drag, power = 0.000366 * ti.pow(reynolds, 1.4275), 1.4275
+            drag, power = 0.000366 * elementary.pow(reynolds, 1.4275), 1.4275
         elif reynolds > 400.0:
             drag, power = 0.5 * reynolds, 1.0
         elif reynolds > 1.0:
-            drag, power = 24.0 * ti.pow(reynolds, 0.354), 0.354
+            drag, power = 24.0 * elementary.pow(reynolds, 0.354), 0.354
         # 1/2 rho_a C_D |u| pi R^2 = pi/4 mu R (C_D Re).
         return 0.25 * ti.math.pi * self.viscosity(w) * radius * drag, power
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.impact.impact import Impact
 from tisim.effects.impact.law import ImpactLaw
+from tisim.numerics import elementary
 
 
 class Agglomeration(ImpactLaw):
@@ -30,7 +31,7 @@ class Agglomeration(ImpactLaw):
         s.position[w, i] = s.position[w, i] + share * separation
         for field in ti.static(s.means):
             field[w, i] = field[w, i] + share * (field[w, j] - field[w, i])
-        s.radius[w, i] = ti.pow(s.radius[w, i] ** 3 + s.radius[w, j] ** 3, 1.0 / 3.0)
+        s.radius[w, i] = elementary.pow(s.radius[w, i] ** 3 + s.radius[w, j] ** 3, 1.0 / 3.0)
         for field in ti.static(s.sums):
             field[w, i] = field[w, i] + field[w, j]
         s.remove(w, j)

@@ -10,6 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.law import ImpactLaw
+from tisim.numerics import elementary
 
 LARGEST_EXPONENT = 50.0
 """At this exponent hardness is 5e21 times H_0: nothing bonds, and it still fits f32 for any H_0 of a
@@ -35,4 +36,4 @@ class Softening(ImpactLaw):
     @ti.func
     def hardness_factor(self, w, temperature):
         coldest = self.activation_energy(w) / (R * LARGEST_EXPONENT) + 1e-30
-        return ti.exp(self.activation_energy(w) / (R * ti.max(temperature, coldest)))
+        return elementary.exp(self.activation_energy(w) / (R * ti.max(temperature, coldest)))

@@ -4,6 +4,7 @@ D = C C^T (B16 Eqs 6.15, 6.16), one of each world in every step, of 9 N^3 operat
 """
 
 from tisim.backend import runtime
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.errors import must
@@ -33,7 +34,7 @@ class Exact:
         fits = self.bytes() <= runtime.memory()
         must(fits, "memory for diffusion matrices", rule, f"{self.bytes() / 1e9:.0f} GB")
         self.matrix = ti.field(self.s.real)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, self.s.worlds).dense(ti.jk, (self.rows, self.rows)).place(self.matrix)
         self.tree = Tree(builder)
         # Pivots as small as rounding makes them are those of spheres in each other's place.

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tisim.backend.taichi import ti
+from tisim.numerics import elementary
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, length
@@ -154,7 +155,7 @@ class TakeStages(PerBlock):
         error = total.norm()
         if ti.static(self.control.at_end):
             factor, power = ti.static(self.stages.leading)
-            error = largest * ti.pow(factor * error / ti.select(largest > 0.0, largest, 1.0), power)
+            error = largest * elementary.pow(factor * error / ti.select(largest > 0.0, largest, 1.0), power)
         return error
 
 

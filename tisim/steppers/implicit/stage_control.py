@@ -5,6 +5,7 @@ from __future__ import annotations
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
+from tisim.numerics import elementary
 from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.implicit.step_control import LEAST_SAFETY, ImplicitControl
 from tisim.steppers.step_control import SHORTEST_STEP
@@ -81,6 +82,6 @@ class StageControl(ImplicitControl):
         """Return what the next step is to be multiplied by: the error falls as dt^order, the contraction as
         dt^2."""
         tolerance = ti.cast(self.error(w), ti.f64)
-        target = ti.cast(self.safety(w), ti.f64) * ti.pow(tolerance, 1.0 / order)
-        by_error = self.limited(w, target, ti.pow(error, 1.0 / order))
+        target = ti.cast(self.safety(w), ti.f64) * elementary.pow(tolerance, 1.0 / order)
+        by_error = self.limited(w, target, elementary.pow(error, 1.0 / order))
         return ti.min(by_error, self.limited(w, ti.sqrt(CONTRACTION), ti.sqrt(contraction)))

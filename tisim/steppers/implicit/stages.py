@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
@@ -32,7 +33,7 @@ class Stages(SavedState):
         self.c, self.estimate = ti.field(ti.f64), ti.field(ti.f64)
         self.speeds, self.places = ti.field(ti.f64), ti.field(ti.f64)
         self.predict, self.shape = ti.field(ti.f64), ti.field(ti.f64)
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, number).place(self.c, self.estimate)
         builder.dense(ti.i, number).dense(ti.j, number).place(self.speeds, self.places)
         builder.dense(ti.i, s.worlds).dense(ti.j, number).dense(ti.k, number).place(self.predict)

@@ -11,6 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.errors import must
+from tisim.numerics import elementary
 from tisim.steppers.implicit.excursion import Per, error_scale
 from tisim.steppers.step_control import SHORTEST_STEP, StepControl, shortest_representable
 
@@ -128,13 +129,13 @@ class IterationControl(ImplicitControl):
     @ti.func
     def aim(self, w):
         """Return TOL^(1/K_d), the same for all particles."""
-        return ti.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / self.iterations)
+        return elementary.pow(ti.cast(self.tolerance(w), ti.f64), 1.0 / self.iterations)
 
     @ti.func
     def factor(self, w, aim, change, k, error):
         """Return what the next step is to be multiplied by, after K = k iterations."""
         root = 1.0 / ti.cast(self.order(w), ti.f64)
-        return self.limited(w, ti.pow(aim, root), ti.pow(change, root / k))
+        return self.limited(w, elementary.pow(aim, root), elementary.pow(change, root / k))
 
     @ti.func
     def stays(self, w, dt, aim, change, k, error):

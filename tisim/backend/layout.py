@@ -1,0 +1,85 @@
+"""How fields lie in device memory.
+
+For Vulkan, Taichi 1.7.4 lays the parts of a cell out without gaps, in the order of their sizes. A number of 8
+bytes that does not begin at a multiple of 8 then overwrites its neighbour, without a word. So parts that
+nobody uses are put in between there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+
+WORD = 8
+"""bytes of the widest number."""
+
+
+class Level:
+    """A level of memory has cells, each with all that is placed in it."""
+
+    def __init__(self, axes: Any = None, shape: Any = ()) -> None:
+        self.axes, self.shape = axes, shape
+        self.parts: list[Any] = []
+        self.cells = math.prod(shape) if isinstance(shape, tuple) else shape
+
+    def dense(self, axes: Any, shape: Any) -> Level:
+        """Return a level of so many cells in each cell of this one."""
+        level = Level(axes, shape)
+        self.parts.append(level)
+        return level
+
+    def place(self, *columns: Any) -> None:
+        """Put fields into each cell, one after the other."""
+        self.parts += columns
+
+    def lay(self, node: Any) -> None:
+        """Make this level in a node of Taichi, as it has been asked for."""
+        for part in self.parts:
+            if isinstance(part, Level):
+                part.lay(node.dense(part.axes, part.shape))
+            else:
+                node.place(part)
+
+    def fill_up(self) -> int:
+        """Add parts that nobody uses, so that numbers of 8 bytes begin at multiples of 8; return the bytes of
+        all cells."""
+        sizes = [part.fill_up() if isinstance(part, Level) else _bytes(part) for part in self.parts]
+        if any(map(_is_wide, self.parts)):
+            # A part whose size is no multiple of 8 gets another of its size, unless there is one.
+            for size, number in Counter(size for size in sizes if size % WORD).items():
+                if number % 2:
+                    self.dense(ti.l, size // 4).place(ti.field(ti.i32))
+                    sizes.append(size)
+        return sum(sizes) * self.cells
+
+
+class Builder(Level):
+    """A builder makes device memory of what has been placed in it."""
+
+    def __init__(self) -> None:
+        super().__init__(shape=1)
+
+    def finalize(self) -> Any:
+        """Return the tree of Taichi that has all fields."""
+        if runtime.current().device == "vulkan":
+            self.fill_up()
+        builder = ti.FieldsBuilder()
+        self.lay(builder)
+        return builder.finalize()
+
+
+def _bytes(column: Any) -> int:
+    """Return the bytes of one number of a field for each of its components; asked before it is placed."""
+    wide = column.vars[0].ptr.get_dt().to_string() in ("f64", "i64", "u64")
+    return len(column.vars) * (WORD if wide else 4)
+
+
+def _is_wide(part: Any) -> bool:
+    """Return whether any number of a part has 8 bytes."""
+    if isinstance(part, Level):
+        return any(_is_wide(one) for one in part.parts)
+    return _bytes(part) // len(part.vars) == WORD

@@ -1,0 +1,32 @@
+"""Whether loops of kernels end where they should, on a device that may do otherwise.
+
+Mesa's software device for Vulkan ends them early in version 22.3, without a word: after 65535 rounds, and
+where threads of a block go through atomic operations unequally often, as it takes their memory barrier for
+one of the whole block. From version 25 on it does not.
+"""
+
+import numpy as np
+
+from tisim.backend.taichi import ti
+
+THREADS, ROUNDS, LONG = 256, 7, 70_000
+"""Of so many threads one adds so often and the others not at all; one goes through a long loop."""
+
+
+def end_where_they_should() -> bool:
+    """Return whether loops end where they should."""
+    counts = np.zeros(THREADS, np.int32)
+    _count(ROUNDS, LONG, counts)
+    expected = np.where(np.arange(THREADS) < ROUNDS, 1, 0)
+    expected[-1] = LONG
+    return bool((counts == expected).all())
+
+
+@ti.kernel
+def _count(rounds: ti.i32, long: ti.i32, counts: ti.types.ndarray()):  # type: ignore[valid-type]
+    for k in range(THREADS):
+        for m in range(rounds * (k == 0)):
+            ti.atomic_add(counts[m], 1)
+    for _ in range(1):
+        for _m in range(long):
+            counts[THREADS - 1] = counts[THREADS - 1] + 1
