@@ -9,6 +9,7 @@ from tisim.accuracy import timing
 from tisim.accuracy.sweep import in_steps_of_at_most
 from tisim.accuracy.timing import OBSERVATIONS, ROOM, ResultObserver, SimulationCache
 from tisim.backend import memory
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -68,7 +69,7 @@ class Memory:
 
     @in_taichi_thread
     def tree(self):
-        builder = ti.FieldsBuilder()
+        builder = Builder()
         builder.dense(ti.i, 4).place(ti.field(ti.f64))
         return Tree(builder)
 

@@ -15,6 +15,7 @@ from tests.scenes import scene
 from tests.throwaway import Trap
 from tisim import InputError, RunError, Scene, Simulation
 from tisim.backend import diagnostics, memory, runtime
+from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -186,7 +187,7 @@ def test_a_closed_simulation_says_so():
 @in_taichi_thread
 def tree():
     """A field in memory of its own."""
-    column, builder = ti.field(ti.f64), ti.FieldsBuilder()
+    column, builder = ti.field(ti.f64), Builder()
     builder.dense(ti.i, 4).place(column)
     return column, Tree(builder)
 

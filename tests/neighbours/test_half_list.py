@@ -6,7 +6,8 @@ import pytest
 from tests.neighbours.test_pair_list import DOMAINS, clouds, motion, near_pairs
 from tests.scenes import scene
 from tests.throwaway import SoftShell
-from tisim import Simulation
+from tisim import InputError, RunError, Simulation
+from tisim.backend import memory, runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
@@ -166,6 +167,28 @@ def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_th
 @in_taichi_thread
 def chosen_skin(simulation):
     return simulation.assembly.pairs.half_list.grid.skin[0]
+
+
+def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
+    """What is good is kept, and another simulation can still be made."""
+    made = burst()
+    simulation = Simulation(made)
+    simulation.load(made)
+    row = simulation.assembly.pairs.half_list.row
+    present = sum(tree.bytes for tree in memory.in_use())
+    monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
+    message = r"lists of \d+ pairs for a particle, .* memory of all fields must be within the \d+ GB"
+    with pytest.raises(RunError, match=message):
+        simulation.run()
+    assert simulation.assembly.pairs.half_list.row == row
+    (result,) = simulation.results()
+    assert 0 < result.time < made.duration
+    with pytest.raises(InputError, match=r"memory for 1 x \d+ particles must be within the \d+ GB"):
+        Simulation(made)
+    monkeypatch.undo()
+    simulation.run()
+    assert simulation.results()[0].status.ok
+    simulation.close()
 
 
 def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):

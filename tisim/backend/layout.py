@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 from tisim.backend import runtime
@@ -16,6 +17,8 @@ from tisim.backend.taichi import ti
 
 WORD = 8
 """bytes of the widest number."""
+WIDE = ("f64", "i64", "u64")
+"""These types of numbers have so many bytes, all others that are used have 4."""
 
 
 class Level:
@@ -44,6 +47,16 @@ class Level:
             else:
                 node.place(part)
 
+    def sizes(self, cells: int = 1) -> Iterator[tuple[int, int]]:
+        """Yield how many numbers each field has, and the bytes of one; ``cells``: those that hold this
+        level."""
+        for part in self.parts:
+            if isinstance(part, Level):
+                yield from part.sizes(cells * self.cells)
+            else:
+                for one in part.vars:
+                    yield cells * self.cells, WORD if _dtype(one) in WIDE else 4
+
     def fill_up(self) -> int:
         """Add parts that nobody uses, so that numbers of 8 bytes begin at multiples of 8; return the bytes of
         all cells."""
@@ -71,11 +84,23 @@ class Builder(Level):
         self.lay(builder)
         return builder.finalize()
 
+    def abandon(self) -> None:
+        """Have no memory made. A field that is placed nowhere, or in what is not finished, would be a fault
+        of every later kernel."""
+        builder = ti.FieldsBuilder()
+        self.lay(builder)
+        ti.lang.impl.get_runtime().finalize_fields_builder(builder)
+
+
+def _dtype(one: Any) -> str:
+    """Return the type of the numbers of a part of a field; asked before it is placed."""
+    name: str = one.ptr.get_dt().to_string()
+    return name
+
 
 def _bytes(column: Any) -> int:
     """Return the bytes of one number of a field for each of its components; asked before it is placed."""
-    wide = column.vars[0].ptr.get_dt().to_string() in ("f64", "i64", "u64")
-    return len(column.vars) * (WORD if wide else 4)
+    return len(column.vars) * (WORD if _dtype(column.vars[0]) in WIDE else 4)
 
 
 def _is_wide(part: Any) -> bool:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from tisim.backend import runtime
+from tisim.backend.layout import Builder
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.errors import RunError
@@ -22,6 +23,9 @@ MAX_TREES_PER_START = 300
 """Taichi is started anew after so many trees: it never gives back the memory of compiled kernels, some
 hundred kB to each tree, and takes longer to compile the more there are."""
 
+MOST_ENTRIES = 2**31 - 1
+"""A field has at most so many numbers: the kernel compiler counts them with 32 bits."""
+
 _tree_counts: Counter[int] = Counter()
 """This counts the trees that have been made, by the start of Taichi."""
 _collecting: list[list[Tree]] = []
@@ -31,14 +35,37 @@ _lost: deque[tuple[Any, int]] = deque()
 belongs to. It is a list, as the garbage collector may come at any time and in any thread."""
 
 
+class OutOfMemory(RunError):
+    """There is no room for fields. needed : what all fields that are in use come to with them, bytes."""
+
+    def __init__(self, needed: int) -> None:
+        self.needed = needed
+        super().__init__(f"memory of all fields must be {self.rule()}; received {needed / 1e9:.3g} GB")
+
+    @staticmethod
+    def rule() -> str:
+        """Return what the memory needed must be."""
+        return f"within the {runtime.memory() / 1e9:.0f} GB of this machine"
+
+
 class Tree:
     """A tree is fields that have been placed in one builder, in device memory from now on.
 
-    RunError is raised where too many are in use.
+    OutOfMemory is raised where there is no room for them, RunError where too many are in use, or one has too
+    many entries.
     """
 
     @in_taichi_thread
-    def __init__(self, builder: Any) -> None:
+    def __init__(self, builder: Builder) -> None:
+        sizes = list(builder.sizes())
+        self.bytes = sum(entries * each for entries, each in sizes)
+        needed = self.bytes + sum(tree.bytes for tree in in_use())
+        longest = max((entries for entries, _ in sizes), default=0)
+        if needed > runtime.memory() or longest > MOST_ENTRIES:
+            builder.abandon()
+            if needed > runtime.memory():
+                raise OutOfMemory(needed)
+            raise RunError(f"a field must have at most {MOST_ENTRIES} numbers; received {longest}")
         # Whatever comes next: a builder that has not been finalised is a fault of every later kernel.
         tree = builder.finalize()
         self.generation = runtime.generation()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tisim.backend import runtime
-from tisim.backend.memory import Tree, collected
+from tisim.backend.memory import OutOfMemory, Tree, collected
 from tisim.engine.assembly import Assembly, declared, needed_fields, picks_pairs
 from tisim.errors import must
 from tisim.neighbours.half_list import ListSizes
@@ -14,6 +14,10 @@ from tisim.worlds.bound import connected
 from tisim.worlds.fields import resolve_fields
 from tisim.worlds.parameter_table import ParameterTable
 from tisim.worlds.state import State
+
+COPIES = 3
+"""The fields of particles are in memory so many times: on the device, for what is asked for, and to go back
+to."""
 
 
 def parts(scene: Scene) -> list[Any]:
@@ -29,24 +33,36 @@ class Allocation:
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
-        # Fields and lists of a particle come to some hundred bytes; refused here, not in the compiler.
-        needed, there = 300 * worlds * capacity, runtime.memory()
-        rule = f"within the {there / 1e9:.0f} GB of this machine"
-        must(needed <= there, f"memory for {worlds} x {capacity} particles", rule, f"{needed / 1e9:.0f} GB")
         asked = (scene.effects, scene.stepper)
         counters, quantities, flags = (
             declared(*asked, what) for what in ("counters", "world_quantities", "flags")
         )
         fields = resolve_fields(needed_fields(*asked))
-        self.s = State(worlds, capacity, fields, counters, quantities, flags, picks_pairs(*asked))
-        self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
-        *effects, self.domain, self.stepper, self.control = (self.table.bind(part) for part in parts(scene))
-        self.s.domain, self.effects = self.domain, connected(effects)
+        real = 8 if runtime.current().precision == "f64" else 4
+        self.worlds, self.capacity = worlds, capacity
+        # Before anything is placed: the compiler cannot refuse what is too much for it.
+        self._require(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
-        self.assemble(ListSizes())
+        try:
+            self.s = State(worlds, capacity, fields, counters, quantities, flags, picks_pairs(*asked))
+            self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
+            bound = (self.table.bind(part) for part in parts(scene))
+            *effects, self.domain, self.stepper, self.control = bound
+            self.s.domain, self.effects = self.domain, connected(effects)
+            self.assemble(ListSizes())
+        except OutOfMemory as full:
+            self._require(full.needed)
+            raise
+
+    def _require(self, needed: int) -> None:
+        what = f"memory for {self.worlds} x {self.capacity} particles"
+        must(needed <= runtime.memory(), what, OutOfMemory.rule(), f"{needed / 1e9:.3g} GB")
 
     def assemble(self, sizes: ListSizes) -> None:
-        """Put a step together, with lists of these sizes; the memory of the one before is given back."""
+        """Put a step together, with lists of these sizes; the memory of the one before is given back.
+
+        Raise RunError where there is no room for them.
+        """
         for tree in self._trees:
             tree.destroy()
         self.s.before_reading.clear()

@@ -93,7 +93,7 @@ class Assembly:
         control: Bound[StepControl],
         sizes: ListSizes,
     ) -> None:
-        self.s, self.domain, self.effects = s, domain, effects
+        self.s, self.domain, self.effects, self.sizes = s, domain, effects, sizes
         events, operators = effects.of(PairEvent), effects.of(Operator)
         short_ranged = tuple(e for e in effects.of(PairForce, SelfConsistentQuantity) if e.data.short_ranged)
         surveyed = bool(events) or control.data.watches_pairs

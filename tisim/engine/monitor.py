@@ -123,13 +123,14 @@ class Monitor:
             live["failing_particle"][crowded], live["goal"][crowded] = NO_ONE, goals[crowded]
         finally:
             self.simulation.put(live)
-        if len(crowded):
-            self.simulation.grow_lists(sizes.joined(self.simulation.list_sizes()))
+        sizes = sizes.joined(self.simulation.list_sizes())
         for w in map(int, np.setdiff1d(worlds, crowded)):
             self.faults[w] = float(then["time"][w]), self._fault(w, then)
         self._behind[worlds] = False
         for name, good_values in self._good.items():
             good_values[worlds] = good[name][worlds]
+        if len(crowded):
+            self.simulation.grow_lists(sizes)
 
     def _not_finite(self, now: Image) -> Iterator[tuple[str, np.ndarray]]:
         """Yield each quantity with the live particles, (worlds, capacity), of which it is not finite."""

@@ -19,7 +19,7 @@ from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import is_number, is_whole, must
+from tisim.errors import RunError, is_number, is_whole, must
 from tisim.neighbours import pair_list
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.initial_state import Arrays
@@ -90,14 +90,26 @@ class Simulation:
 
     @in_taichi_thread
     def grow_lists(self, sizes: ListSizes) -> None:
-        """Make lists of pairs of these sizes, and compile the step anew for them."""
-        image = self.s.image()
+        """Make lists of pairs of these sizes, and compile the step anew for them.
+
+        Raise RunError where there is no room for them; lists are then as they were.
+        """
+        image, before = self.s.image(), self.assembly.sizes
         self.s.write("status", WorldStatus.ENDED)
+        try:
+            self._assemble(sizes)
+        except RunError as full:
+            self._assemble(before)
+            rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean"
+            raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
+        finally:
+            self.put(image)
+
+    def _assemble(self, sizes: ListSizes) -> None:
         with collected() as trees:
             self.allocation.assemble(sizes)
         self.trees += trees
         self._compile()
-        self.put(image)
 
     def _choose(self, capacity: int) -> str:
         if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):

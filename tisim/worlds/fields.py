@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -43,6 +44,11 @@ class Field:
     def shape(self, *particles: int) -> tuple[int, ...]:
         """Return the shape of an array that holds the field for an array of particles of this shape."""
         return (*particles, *((3,) if self.components == 3 else ()), *((self.slots,) if self.slots else ()))
+
+    def bytes(self, real: int, *particles: int) -> int:
+        """Return the bytes of the field for an array of particles of this shape; ``real``: those of a real
+        number."""
+        return math.prod(self.shape(*particles)) * (4 if self.integer else 8 if self.double else real)
 
 
 CORE = (

@@ -131,12 +131,8 @@ class State:
 
     def bytes(self) -> dict[str, int]:
         """Return the bytes of each particle field, all worlds together."""
-        size = 8 if self.real == ti.f64 else 4
-        return {
-            f.name: int(np.prod(f.shape(self.worlds, self.capacity)))
-            * (4 if f.integer else 8 if f.double else size)
-            for f in self.fields
-        }
+        real = 8 if self.real == ti.f64 else 4
+        return {f.name: f.bytes(real, self.worlds, self.capacity) for f in self.fields}
 
     def _exchange(self, names: tuple[str, ...]) -> Exchange:
         self.check()
