@@ -90,12 +90,18 @@ def reduced_far(x):
     mask, word_digits = ti.u64(2**32 - 1), ti.u64(32)
     lower, upper = ti.cast(m, ti.u64) & mask, ti.cast(m, ti.u64) >> word_digits
     lower, upper = lower << shift, upper << shift
-    factor = ti.Vector([lower & mask, (lower >> word_digits) + (upper & mask), upper >> word_digits])
-    product = ti.Vector.zero(ti.u64, WINDOW + 1)
+    factor = ti.Vector.zero(ti.u64, 3)
+    factor[0], factor[1] = lower & mask, (lower >> word_digits) + (upper & mask)
+    factor[2] = upper >> word_digits
+    # The last word first.
+    words, product = ti.Vector.zero(ti.u64, WINDOW), ti.Vector.zero(ti.u64, WINDOW + 1)
+    for place in range(begin + WINDOW):
+        for k in ti.static(range(WINDOW - 1, 0, -1)):
+            words[k] = words[k - 1]
+        words[0] = inverse_word(place)
     for k in ti.static(range(WINDOW)):
-        word = inverse_word(begin + WINDOW - 1 - k)
         for j in ti.static(range(min(3, WINDOW - k))):
-            both = factor[j] * word
+            both = factor[j] * words[k]
             product[k + j] += both & mask
             product[k + j + 1] += both >> word_digits
     for k in ti.static(range(WINDOW)):

@@ -2,7 +2,7 @@
 
 The compilers for CPU and CUDA have them for f64. That for Vulkan has none: there they are the ones of this
 package, in f64 whatever the precision, and rounded to it. Laws call these in place of ``ti.exp`` and the
-like; a law that does not works on CPU and CUDA.
+like, of one number at a time; a law that does not works on CPU and CUDA.
 """
 
 from typing import Any

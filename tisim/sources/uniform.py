@@ -23,7 +23,9 @@ class Uniform(Source):
         # A field that does not oscillate need not pay for sines.
         if self.amplitude(w).norm_sqr() > 0.0:
             # In f64, whatever the precision: omega t grows without bound.
-            value += self.amplitude(w) * ti.cast(elementary.sin(self.omega(w) * t + self.phase(w)), float)
+            amplitude, angle = self.amplitude(w), self.omega(w) * t + self.phase(w)
+            for k in ti.static(range(3)):
+                value[k] += amplitude[k] * ti.cast(elementary.sin(angle[k]), float)
         return value
 
 
