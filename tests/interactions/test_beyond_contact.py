@@ -78,6 +78,27 @@ def test_it_forms_at_contact_holds_beyond_it_and_breaks(simulation):
     assert held == pytest.approx(slow - PULL / reduced * scenes[1].duration, abs=1e-9)
 
 
+def test_more_than_a_particle_can_remember_is_reported(simulation):
+    """A grain that larger ones, which lie in each other, touch all around: no bridge is lost without a
+    word."""
+    angle = 2 * np.pi * np.arange(18) / 18
+    ring = 0.99 * (RADIUS + 1.1 * RADIUS) * np.stack([0 * angle, np.cos(angle), np.sin(angle)], axis=1)
+    position = np.concatenate([[[0.0, 0.0, 0.0]], ring])
+    made = scene(
+        position,
+        np.zeros_like(position),
+        (Bridge(pull=PULL, rupture=RUPTURE),),
+        radius=np.where(np.arange(19) > 0, 1.1 * RADIUS, RADIUS),
+        mass=MASS,
+        dt=STEP,
+        steps=50,
+    )
+    simulation.load([made])
+    simulation.run()
+    (result,) = simulation.results()
+    assert "more simultaneous contacts than there is room for, at particle 0" in result.status.reason
+
+
 def test_it_is_remembered_through_a_restart_between(simulation, tmp_path):
     """Where only the memory tells a wet pair from a dry one: beyond contact, with a list made anew."""
     made = pair(-1e-9, 1.0, 60)

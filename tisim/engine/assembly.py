@@ -32,9 +32,9 @@ from tisim.neighbours.lists import NeighbourLists
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import FinishStep
+from tisim.steppers.common import FinishStep, FirstStep
 from tisim.steppers.context import Buffer, Step, StepContext
-from tisim.steppers.step_control import StepControl
+from tisim.steppers.step_control import FixedStep, StepControl
 from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.fields import Field
 from tisim.worlds.program import Item
@@ -130,7 +130,8 @@ class Assembly:
         )
         self.failure_attribution = FailureAttribution(context.force_sum)
         own: Step = stepper.data.step(context)
-        step, first = fuse(own.items), [*lists, *self._summed(SumForcesAtStart)]
+        known = (FirstStep(s, control),) if isinstance(control.data, FixedStep) and context.forced else ()
+        step, first = fuse(own.items), [*known, *lists, *self._summed(SumForcesAtStart)]
         if near and contacts:
             survey = FindContacts(near, contacts, control)
             step += [ClearContacts(contacts), survey]

@@ -49,12 +49,14 @@ class SumForces(PairSum):
     that is ``fixed``, where the scene has that field, takes none. What pairs remember advances with the sum.
 
     trial : whether the state is one that may be given up. elapsed : whether pairs have gone on for ``dt``
-    since their memory was last brought up to date. commits : whether it now is.
+    since their memory was last brought up to date. commits : whether it now is. asks_step : whether laws are
+    asked besides if they can follow the step that is ahead.
     """
 
     trial: ClassVar[bool] = False
     elapsed: ClassVar[bool] = True
     commits: ClassVar[bool] = True
+    asks_step: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -139,7 +141,12 @@ class SumForces(PairSum):
         past = ti.Vector.zero(s.real, max(1, law.memory))
         if ti.static(law.memory > 0):
             past = law.past.read(w, m)
-        return law.interaction(s, w, i, j, separation, distance, past, dt, t)
+        force, turn, back, known = law.interaction(s, w, i, j, separation, distance, past, dt, t)
+        if ti.static(self.asks_step and law.data.offers("interaction")):
+            ahead = ti.cast(s.step_ahead[w], s.real)
+            later = law.interaction(s, w, i, j, separation, distance, past, ahead, t)
+            force = self.bearable(force, later[0])
+        return force, turn, back, known
 
     @ti.func
     def shares(self, values):
@@ -156,6 +163,11 @@ class SumForces(PairSum):
             for law, begin in ti.static(self.laws):
                 if ti.static(law.memory > 0):
                     law.past.write(w, m, piece(values, begin, law.memory))
+
+    @ti.func
+    def bearable(self, force, ahead):
+        """Return the force, or that over the step ahead where the law cannot follow it: it is not finite."""
+        return ti.select(ahead.norm_sqr() < ti.math.inf, force, ahead)
 
     @ti.func
     def gone_by(self, w):
@@ -197,6 +209,9 @@ class SumForces(PairSum):
     @ti.func
     def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
         force, torque = effect.load(self.s, w, i, t, self.gone_by(w), self.commits)
+        if ti.static(self.asks_step and effect.data.offers("load")):
+            ahead = ti.cast(self.s.step_ahead[w], self.s.real)
+            force = self.bearable(force, effect.load(self.s, w, i, t, ahead, False)[0])
         return self.wrench(force, torque)
 
     @ti.func
@@ -258,10 +273,19 @@ class SumTrialForces(SumForces):
 class SumForcesAtStart(SumForces):
     """Sum the forces that a first step begins with, at the start or after a world has been written to.
 
-    No time has gone by.
+    No time has gone by. What lies so deep in each other that the step ahead is too long for it would be far
+    apart after that step, and nobody would know: it is found here.
     """
 
-    elapsed = False
+    elapsed, asks_step = False, True
+
+    @ti.func
+    def check(self, w, i, total):
+        # Not below infinity: also true of NaN.
+        if not (total.norm_sqr() < ti.math.inf):
+            # The law at fault is found by a sum over the step.
+            self.s.dt[w] = self.s.step_ahead[w]
+            self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
 
 class SumForcesAgain(SumForces):

@@ -66,6 +66,18 @@ class BeginStep(Phase):
         s.events[w] = 0
 
 
+class FirstStep(Phase):
+    """This phase says how long the first step is, where all are of one length."""
+
+    def __init__(self, s, control) -> None:
+        self.s, self.control = s, control
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        s.step_ahead[w] = ti.min(self.control.next(s, w, ti.cast(0.0, s.real)), s.end[w] - s.time[w])
+
+
 @ti.func
 def advance_clock(s, w):
     """Move time on by dt, with the rounding error carried along (W. Kahan 1965)."""

@@ -70,9 +70,9 @@ class State:
                 setattr(self, name, column)
         self.seed = ti.field(ti.i64)
         builder.dense(ti.i, worlds).place(self.seed)
-        # The skin of its scene, m; 0 to have one chosen.
-        self.skin = ti.field(ti.f64)
-        builder.dense(ti.i, worlds).place(self.skin)
+        # The skin of its scene, m, 0 to have one chosen; and the first step, s, where that is known.
+        self.skin, self.step_ahead = ti.field(ti.f64), ti.field(ti.f64)
+        builder.dense(ti.i, worlds).place(self.skin, self.step_ahead)
         # Particles that its scene may ever have; the capacity may be that of a larger one.
         self.most = ti.field(ti.i32)
         builder.dense(ti.i, worlds).place(self.most)

@@ -66,6 +66,14 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
         ),
         "pair": (grains(couple, [[0, 0, 0], [-9, 0, 0]], **stiff), "hertz_mindlin"),
         "wall": (grains([[0, 0, 1.1]], [[0, 0, -9]], planes=[FLOOR], **stiff), "walls"),
+        "deep at the start": (
+            grains([[0, 0, 9], [1.9, 0, 9]], [[0, 0, 0]] * 2, law={"young": 1e10}, **far),
+            "hertz_mindlin",
+        ),
+        "in a wall at the start": (
+            grains([[0, 0, 0.9]], [[0, 0, 0]], planes=[FLOOR], law={"young": 1e10}, **far),
+            "walls",
+        ),
         "slow": (grains([[0, 0, 1.1]], [[0, 0, -9]], planes=[FLOOR], dt=0.05, steps=99), "walls"),
     }
     for (_, by), result in zip(made.values(), ends([one for one, _ in made.values()]), strict=True):
