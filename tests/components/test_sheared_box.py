@@ -19,6 +19,7 @@ from tests.effects.contact.sheared import (
 )
 from tests.scenes import by_id, compiled, scene
 from tisim import InputError, Recording, ShearedBox
+from tisim.accuracy.sweep import methods
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import HertzMindlin, Impact
@@ -262,6 +263,12 @@ WRONG = {
         r"effects.impact must be a force, and not sudden",
     ),
 }
+
+
+def test_what_does_not_go_with_shear_is_not_tried_by_a_study_of_cost(rng):
+    made = crowd(rng)
+    tried = {type(one.base.stepper) for one in methods(made, DT, 1.0, (0.0,), ("f64",), 1)}
+    assert tried == {Verlet}
 
 
 @pytest.mark.parametrize(("box", "more", "message"), WRONG.values(), ids=WRONG)

@@ -177,10 +177,18 @@ def _steppers(scene: Scene, dt: float) -> list[Stepper]:
     for stepper in rivals(scene.stepper, scene.effects, dt):
         if type(stepper.control) is type(scene.stepper.control):
             stepper = stepper.model_copy(update={"control": scene.stepper.control})
-        if _kind(stepper) not in kinds:
+        if _kind(stepper) not in kinds and _suits(stepper, scene):
             kinds.add(_kind(stepper))
             suitable.append(stepper)
     return suitable
+
+
+def _suits(stepper: Stepper, scene: Scene) -> bool:
+    try:
+        stepper.suits(scene.effects, scene.domain)
+    except InputError:
+        return False
+    return True
 
 
 def _kind(stepper: Stepper) -> tuple[Any, ...]:

@@ -59,7 +59,8 @@ class Grains:
     """Spheres and planes (point, normal), under one material and a constant acceleration.
 
     Between loads ``past`` and ``held`` keep what contacts remember, of pairs i < j and of grains at planes.
-    ``sliding`` and ``sticking`` count contacts of all loads so far.
+    ``sliding`` and ``sticking`` count contacts of all loads so far. ``virial`` is the sum of r F over
+    pairs, J, (3, 3), which presses outwards where it is positive.
     """
 
     def __init__(self, material, position, velocity, spin, radius, mass, planes=(), acceleration=(0, 0, 0)):
@@ -109,6 +110,7 @@ class Grains:
         self.past[:] = 0
         self.past[i, j] = known
         couple = np.cross(n, force)
+        self.virial = -gap[i, j].T @ force
         np.add.at(self.force, i, force)
         np.add.at(self.force, j, -force)
         np.add.at(self.torque, i, arm * couple)

@@ -39,15 +39,18 @@ def inside(box, place, velocity, time):
 
 
 class ShearedGrains(Grains):
-    """The grains of a scene of a crowd: each sees the image of another that is nearest, and its velocity."""
+    """The grains of a scene of a crowd: each sees the image of another that is nearest, and its velocity.
 
-    def __init__(self, made):
+    lag : images are where they should have been this time (s) ago.
+    """
+
+    def __init__(self, made, levers="contact", lag=0.0):
         start = made.particles.arrays(made.domain, made.seed)
         low, high = made.domain.bounds()
-        self.sides, self.rate, self.time = high - low, made.domain.rate, 0.0
+        self.sides, self.rate, self.time, self.lag = high - low, made.domain.rate, 0.0, lag
         (law,) = made.effects
         super().__init__(
-            Material(law.young, law.poisson, law.restitution, law.friction),
+            Material(law.young, law.poisson, law.restitution, law.friction, levers),
             *(start[name] for name in ("position", "velocity", "spin", "radius", "mass")),
         )
 
@@ -59,7 +62,7 @@ class ShearedGrains(Grains):
         gap, passing = super().apart()
         turns, length = -np.round(gap[..., ACROSS] / self.sides[ACROSS]), self.sides[ACROSS]
         gap[..., ACROSS] += turns * length
-        gap[..., ALONG] += turns * self.rate * length * self.time
+        gap[..., ALONG] += turns * self.rate * length * max(0.0, self.time - self.lag)
         passing[..., ALONG] += turns * self.rate * length
         for k in (0, 2):
             gap[..., k] -= self.sides[k] * np.round(gap[..., k] / self.sides[k])

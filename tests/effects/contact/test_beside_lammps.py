@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.benchmarks import granular_lammps as bench
+from tests.benchmarks import sheared_lammps
 
 pytestmark = [
     pytest.mark.slow,
@@ -38,6 +39,15 @@ def test_the_package_is_lammps_where_levers_do_not_matter():
     with friction that holds them."""
     assert compared(replace(bench.LAW, friction=0.0), True, 100, bench.by_package) < ROUNDING
     assert compared(replace(bench.LAW, friction=1e3), False, 0, bench.by_package, spinning=0.0) < ROUNDING
+
+
+def test_in_a_sheared_box_the_package_is_numpy_and_numpy_is_lammps():
+    """The latter with the levers of LAMMPS, and with images that lag a step behind, as there."""
+    made, steps = sheared_lammps.scene(), 300
+    ours, twin = (by(made, steps) for by in (sheared_lammps.by_package, sheared_lammps.by_numpy))
+    assert max(sheared_lammps.apart(ours, twin).values()) < ROUNDING
+    theirs = sheared_lammps.by_numpy(made, steps, "radius", sheared_lammps.STEP)
+    assert max(sheared_lammps.apart(theirs, sheared_lammps.by_lammps(made, steps)).values()) < ROUNDING
 
 
 def test_the_levers_are_what_makes_the_difference():

