@@ -11,6 +11,7 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.errors import must
+from tisim.numerics.ieee import same
 
 
 class Domain(Component):
@@ -121,8 +122,7 @@ class Box(Domain):
     @ti.func
     def lost(self, w, r):
         # A number so large that a thousandth of the side is below half of its last digit.
-        blurred = r + 1e-3 * self.side(w) == r
-        return blurred.any()
+        return same(r + 1e-3 * self.side(w), r).any()
 
     @ti.func
     def nearest(self, w, a, b):

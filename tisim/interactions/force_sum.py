@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
+from tisim.numerics.ieee import finite
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
 
@@ -163,8 +164,7 @@ class SumForces(PairSum):
 
     @ti.func
     def check(self, w, i, total):
-        # Not below infinity: also true of NaN.
-        if not (total.norm_sqr() < ti.math.inf):
+        if not finite(total.norm_sqr()):
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
     @ti.func
@@ -202,17 +202,17 @@ class SumForces(PairSum):
         most, index = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces):
             size = self.single(effect, w, i, t).norm()
-            if most < ti.math.inf and not (size <= most):
+            if finite(most) and not (size <= most):
                 most, index = size, effect.index
         for effect in ti.static(self.pair_forces):
             total = ti.Vector.zero(s.real, self.components)
             for j in range(s.count[w]):
                 if i != j:
                     total += self.by_other(effect, w, i, j, t)
-            if most < ti.math.inf and not (total.norm() <= most):
+            if finite(most) and not (total.norm() <= most):
                 most, index = total.norm(), effect.index
         for solver in ti.static(self.derived_solvers):
-            if not (solver.size(solver.value[w, i]) < ti.math.inf):
+            if not finite(solver.size(solver.value[w, i])):
                 index = solver.effect.index
         return index
 
