@@ -7,6 +7,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
 from tisim.numerics.ieee import finite
+from tisim.numerics.roots import estimates_roots
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
 
@@ -70,6 +71,8 @@ class SumForces(PairSum):
         self.turning = turning([effect.data for effect in effects])
         self.fixes = any(field.name == "fixed" for field in s.fields)
         self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
+        able = all(effect.data.offers("pair_force_by_inverse") for effect in self.long_ranged)
+        self.by_inverse = able and not self.turning and estimates_roots()
 
     @ti.func
     def start(self, w, i, t):
@@ -179,6 +182,10 @@ class SumForces(PairSum):
             effect.pair_force(s, w, i, j, separation, distance, t),
             effect.pair_torque(s, w, i, j, separation, distance, t),
         )
+
+    @ti.func
+    def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
+        return effect.pair_force_by_inverse(self.s, w, i, j, separation, inverse, t)
 
     @ti.func
     def by_other(self, effect: ti.template(), w, i, j, t):  # type: ignore[valid-type]
