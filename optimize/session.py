@@ -45,7 +45,7 @@ def run(
     goes on there when it is run again. Without one nothing is kept but what is returned. executor : "batch"
     (this process), "processes:N" or "dask://HOST:PORT". verbose : show tables and a bar on the terminal.
 
-    Device and precision are those of ``tisim.init``. Ctrl-C ends the search, which says so in
+    Device, precision and arithmetic are those of ``tisim.init``. Ctrl-C ends the search, which says so in
     ``Outcome.stopped``. Other threads that call ``tisim.run``, or ``tisim.init`` with other settings, wait
     until a search in this process is over. InputError for settings that cannot be, before anything runs.
     """
@@ -58,7 +58,7 @@ def run(
         current = runtime.current()
         threads = current.threads if in_this_process else 0
         evaluator = stack.enter_context(
-            closing(evaluator_named(executor, current.device, current.precision, threads))
+            closing(evaluator_named(executor, current.device, current.precision, threads, current.arithmetic))
         )
         if out is not None:
             say, bar = (standard_output(), err()) if verbose else (Console(quiet=True), Console(quiet=True))

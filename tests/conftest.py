@@ -1,4 +1,5 @@
-"""One runtime for the whole suite: cpu and f64 unless TISIM_DEVICE and TISIM_TEST_PRECISION say otherwise."""
+"""One runtime for the whole suite: cpu, f64 and strict arithmetic unless TISIM_DEVICE, TISIM_TEST_PRECISION and
+TISIM_TEST_ARITHMETIC say otherwise."""
 
 import json
 import os
@@ -23,8 +24,11 @@ def pytest_configure(config):
 @pytest.fixture(scope="session", autouse=True)
 def the_runtime():
     """The settings that every test in this process runs under."""
-    device = os.environ.get("TISIM_DEVICE", "cpu")
-    return runtime.init(device=device, precision=os.environ.get("TISIM_TEST_PRECISION", "f64"))
+    return runtime.init(
+        device=os.environ.get("TISIM_DEVICE", "cpu"),
+        precision=os.environ.get("TISIM_TEST_PRECISION", "f64"),
+        arithmetic=os.environ.get("TISIM_TEST_ARITHMETIC", "strict"),
+    )
 
 
 @pytest.fixture
@@ -91,13 +95,13 @@ def elsewhere(tmp_path_factory):
         return dict(arrays)
 
 
-@pytest.fixture(scope="module")
-def single():
-    """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
+def elsewhere_with(setting):
+    """Return what calls a function of a test module, MODULE.NAME, in a process with a setting of the runtime:
+    it returns what the function does."""
 
     def call(module, name):
         code = (
-            "import json; from tisim.backend import runtime; runtime.init(precision='f32'); "
+            f"import json; from tisim.backend import runtime; runtime.init({setting}); "
             f"from tests.{module} import {name}; print(json.dumps({name}()))"
         )
         command = [sys.executable, "-W", "error::RuntimeWarning", "-c", code]
@@ -106,3 +110,15 @@ def single():
         return json.loads(completed.stdout.splitlines()[-1])
 
     return call
+
+
+@pytest.fixture(scope="module")
+def single():
+    """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
+    return elsewhere_with("precision='f32'")
+
+
+@pytest.fixture(scope="module")
+def in_fast_arithmetic():
+    """Calls a function of a test module, MODULE.NAME, in a process of fast arithmetic: what it returns."""
+    return elsewhere_with("arithmetic='fast'")

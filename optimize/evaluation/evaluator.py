@@ -14,7 +14,7 @@ class BatchEvaluator:
     """Scenes to results, many worlds at a time; a start that cannot be made gives a failed Result.
 
     batch : most worlds that run side by side. settings : what decides the last bits of a result beside the
-    scene - precision, device, compiler; part of the key under which it is cached.
+    scene - precision, device, arithmetic, compiler; part of the key under which it is cached.
     """
 
     def __init__(self, batch: int = 256) -> None:

@@ -57,8 +57,8 @@ class Patchy(Trap):
     accuracy_parameters = (AccuracyParameter(grain=2),)
 
 
-def methods_of(scene, precisions=("f64",)):
-    return {m.name: m for m in methods(scene, 0.1, 1.0, LEVELS, precisions, 1)}
+def methods_of(scene, numbers=(("f64", "strict"),)):
+    return {m.name: m for m in methods(scene, 0.1, 1.0, LEVELS, numbers, 1)}
 
 
 def test_a_new_stepper_and_its_control_say_themselves_what_to_turn(monkeypatch):
@@ -86,11 +86,14 @@ def test_a_new_effect_says_so_too_and_is_as_fine_as_can_be_in_the_reference():
     assert reference.scene.stepper == reference.method.at(-2).stepper
 
 
-def test_the_scenes_own_method_is_first_and_in_other_precisions_too():
-    names = list(methods_of(oscillator(), ("f64", "f32")))
-    assert names[:2] == ["Verlet, FixedStep: dt", "Verlet, FixedStep: dt, f32"]
-    single = methods_of(oscillator(), ("f64", "f32"))[names[1]].settings[0]
-    assert options(oscillator(), single.scene, single.precision)[-2:] == ["--precision", "f32"]
+def test_the_scenes_own_method_is_first_and_in_other_numbers_too():
+    tried = methods_of(oscillator(), (("f64", "strict"), ("f32", "strict"), ("f64", "fast")))
+    first, *others = list(tried)[:3]
+    assert first == "Verlet, FixedStep: dt"
+    assert others == [f"{first}, f32", f"{first}, fast"]
+    single, fast = (tried[name].settings[0] for name in others)
+    assert options(oscillator(), single.scene, *single.numbers)[-2:] == ["--precision", "f32"]
+    assert options(oscillator(), fast.scene, *fast.numbers)[-2:] == ["--arithmetic", "fast"]
 
 
 def test_only_what_suits_a_scene_is_tried():
@@ -188,6 +191,7 @@ WRONG = [
     ({"coarser": 1.5}, "coarser must be a whole number of decades; received 1.5"),
     ({"coarser": 1, "finer": -2}, "must be at least 0; received -1"),
     ({"precisions": ("f32",)}, "precisions must be f64 and others"),
+    ({"arithmetics": ("fast",)}, "arithmetics must be strict, or strict and fast"),
     ({"precisions": ("f64", "f16")}, "precision must be f64 or f32; received 'f16'"),
     ({"starts": (8, 4)}, "starts must be given from few to many"),
     ({"starts": (1, 4)}, "starts must be at least 2"),

@@ -63,7 +63,7 @@ def test_more_starts_buy_a_smaller_error(drifts):
 def test_a_random_reference_is_no_better_than_its_starts(drifts):
     """The interval of its own mean counts, though the runs that check it agree to the last digit."""
     unknown = Quantity("kinetic energy", kinetic_energy, random=True)
-    references = attempts(methods(drift(), 0.05, 1.0, (0.0,), ("f64",), 1), 0.0)
+    references = attempts(methods(drift(), 0.05, 1.0, (0.0,), (), 1), 0.0)
     truth = compared(unknown, [drifts, drifts], references[:2])
     assert truth.estimate.uncertainty == estimate(unknown, drifts).uncertainty > 0
     # A stepper that errs, the same in every start, is not hidden by that interval.

@@ -246,9 +246,10 @@ def test_nothing_to_compare_is_reported(verlet_only):
         study(oscillator(), (still,), precisions=("f64",), coarser=0)
 
 
-def test_single_precision_is_a_line_of_its_own_and_the_runtime_as_before(verlet_only):
+def test_single_precision_and_fast_arithmetic_are_lines_of_their_own_and_the_runtime_as_before(verlet_only):
     before = runtime.current()
-    cost_study = study(oscillator(), (KNOWN,), precisions=("f64", "f32"), repeats=1, finer=2)
+    numbers = {"precisions": ("f64", "f32"), "arithmetics": ("strict", "fast")}
+    cost_study = study(oscillator(), (KNOWN,), **numbers, repeats=1, finer=2)
     assert runtime.current() == before
     single, double = cost_study.line("Verlet, FixedStep: dt, f32"), cost_study.line("Verlet, FixedStep: dt")
     assert [row.precision for row in single] == ["f32"] * 6
@@ -256,3 +257,7 @@ def test_single_precision_is_a_line_of_its_own_and_the_runtime_as_before(verlet_
     assert single[0].errors[0][0] == pytest.approx(double[0].errors[0][0], rel=1e-3)
     assert single[-1].errors[0][0] > 10 * double[-1].errors[0][0]
     assert single[-1].options.endswith("--precision f32")
+    fast = cost_study.line("Verlet, FixedStep: dt, fast")
+    assert [row.arithmetic for row in fast] == ["fast"] * 6
+    assert [row.errors[0][0] for row in fast] == pytest.approx([row.errors[0][0] for row in double], rel=1e-3)
+    assert fast[-1].options.endswith("--arithmetic fast")

@@ -27,6 +27,7 @@ from tisim.engine.batches import Batches, rounded
     [
         ({"device": "tpu"}, "device must be one of cpu, cuda; received 'tpu'"),
         ({"precision": "f16"}, "precision must be one of f64, f32; received 'f16'"),
+        ({"arithmetic": "loose"}, "arithmetic must be one of strict, fast; received 'loose'"),
         ({"threads": -1}, r"threads must be a whole number, at least 1 \(0 for all cores\); received -1"),
         ({"threads": 1.5}, r"threads must be a whole number, at least 1 \(0 for all cores\); received 1.5"),
     ],

@@ -1,6 +1,7 @@
 """Time of one sum of the forces between dipoles over all pairs, beside a numba loop.
 
     python tests/benchmarks/dipole_dipole.py [--number 1000] [--precision f64] [--threads 1] [--repeats 9]
+        [--arithmetic strict]
 
 Moments in any direction on a disturbed lattice. The time of tisim is that of a whole step, numba's that of
 the sum alone. Tries alternate; the ratio is the median over them. TISIM_BACKEND=quadrants chooses the other
@@ -56,10 +57,13 @@ def main() -> None:
     parser.add_argument("--number", type=int, default=1000)
     parser.add_argument("--precision", choices=("f64", "f32"), default="f64")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--arithmetic", choices=runtime.ARITHMETICS, default="strict")
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--steps", type=int, default=50, help="of each try")
     options = parser.parse_args()
-    settings = runtime.init(precision=options.precision, threads=options.threads).settings
+    settings = runtime.init(
+        precision=options.precision, threads=options.threads, arithmetic=options.arithmetic
+    ).settings
     numba.set_num_threads(options.threads)
     draw, n = np.random.default_rng(0), options.number
     side = int(np.ceil(n ** (1 / 3)))

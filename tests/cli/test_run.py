@@ -14,7 +14,7 @@ def test_run_leaves_its_files_and_overwrites_nothing(tisim, toml, tmp_path):
     assert "ok" in out
     rows = [line.split() for line in out.splitlines()]
     assert ["particle", "steps", "80000"] in rows
-    assert ["device", "cpu,", "f64"] in rows
+    assert ["device", "cpu,", "f64,", "strict"] in rows
     assert ["threads", str(runtime.current().threads)] in rows
     folder = tmp_path / "out" / "flow"
     assert {path.name for path in folder.iterdir()} == {

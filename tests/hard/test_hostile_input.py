@@ -83,7 +83,7 @@ NUMBERED = {
     ("optimize", "agglomeration"): ("--population", "--target", "--seed"),
 }
 NAMED = {
-    ("run", "SCENE"): ("--out", "--size", "--device", "--precision", "--without"),
+    ("run", "SCENE"): ("--out", "--size", "--device", "--precision", "--arithmetic", "--without"),
     ("optimize", "agglomeration"): ("--size", "--variant", "--method", "--out"),
 }
 TARGETS = ("run", "explain", "check", "cache", "plot", "export", "movie", "figures", "cost")

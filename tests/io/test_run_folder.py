@@ -42,7 +42,12 @@ def test_whole_run_is_in_the_folder(result, tmp_path):
     versions = json.loads((tmp_path / "versions.json").read_text())
     assert {"tisim", "backend", "numpy", "h5py", "python", "platform", *result.settings} == set(versions)
     current = runtime.current()
-    assert result.settings == {"precision": "f64", "device": "cpu", "threads": str(current.threads)}
+    assert result.settings == {
+        "precision": "f64",
+        "device": "cpu",
+        "arithmetic": "strict",
+        "threads": str(current.threads),
+    }
 
 
 def test_folder_that_holds_a_run_is_refused(tmp_path):

@@ -25,7 +25,8 @@ class Study:
 
     quantities : what errors are of; by default ``quantity.usual``.
     coarser, finer : decades of error on either side of what the scene asks for.
-    repeats : of each timing. precisions : "f64" and others to try.
+    repeats : of each timing. precisions : "f64" and others to try. arithmetics : "strict", and "fast" to try
+    it in f64.
     starts : numbers of random starts, for quantities that are random.
     budget : wall seconds of running, of which compiling takes nothing; what would not fit is left out.
     limit : wall seconds, without compiling, after which the run of a setting is stopped; its row says so.
@@ -34,7 +35,8 @@ class Study:
     rows, truths : what is known so far, in order; a truth for each quantity.
     complete : nothing is left to measure.
 
-    To measure another precision, tisim starts anew: simulations made before must not be used afterwards.
+    To measure another precision or arithmetic, tisim starts anew: simulations made before must not be used
+    afterwards.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class Study:
         finer: int = 0,
         repeats: int = 3,
         precisions: Sequence[str] = ("f64", "f32"),
+        arithmetics: Sequence[str] = ("strict",),
         starts: Sequence[int] = (8, 32, 128),
         budget: float = math.inf,
         limit: float = math.inf,
@@ -59,6 +62,8 @@ class Study:
         must(len(precisions) > 0 and precisions[0] == "f64", "precisions", "f64 and others", precisions)
         for precision in precisions:
             must(precision in runtime.PRECISIONS, "precision", "f64 or f32", precision)
+        rule = "strict, or strict and fast"
+        must(tuple(arithmetics) in (("strict",), runtime.ARITHMETICS), "arithmetics", rule, arithmetics)
         must(list(starts) == sorted(set(starts)), "starts", "given from few to many", list(starts))
         must(len(starts) > 0 and starts[0] > 1, "starts", "at least 2", list(starts))
         must(budget > 0, "budget", "greater than 0", budget)
@@ -71,16 +76,21 @@ class Study:
         must(len(kinds) == 1, "quantities", "all random, or none", sorted(kinds))
         self.random = kinds == {True}
         self.levels = tuple(float(k) for k in range(coarser, -finer - 1, -1))
-        self.repeats, self.precisions = repeats, tuple(precisions)
+        self.repeats, self.precisions, self.arithmetics = repeats, tuple(precisions), tuple(arithmetics)
         self.budget, self.limit, self.require_reference = budget, limit, require_reference
         self.starts = tuple(starts) if self.random else (1,)
         self.rows: list[Row] = []
         self.truths: tuple[Truth, ...] = ()
         self.complete = False
 
+    @property
+    def numbers(self) -> list[tuple[str, str]]:
+        """Precisions and arithmetics to try: each by itself."""
+        return [(p, "strict") for p in self.precisions] + [("f64", a) for a in self.arithmetics[1:]]
+
     def sweep_settings(self) -> dict[str, Any]:
         """Return what says which settings are measured; a study is complete for these only."""
-        return {"levels": self.levels, "precisions": self.precisions}
+        return {"levels": self.levels, "precisions": self.precisions, "arithmetics": self.arithmetics}
 
     def identity(self) -> dict[str, Any]:
         """Return what must agree for rows of an earlier study to be of use."""
@@ -108,7 +118,7 @@ class Study:
             try:
                 StudyRunner(self, progress or (lambda fraction, what: None), finished or (lambda: None)).run()
             finally:
-                runtime.init(before.device, before.precision, before.threads)
+                runtime.init(before.device, before.precision, before.threads, before.arithmetic)
 
     def cheapest(self, error: float, quantity: str | None = None) -> Row:
         """Return the cheapest setting whose error of a quantity (the first, unless named) is at most this; of

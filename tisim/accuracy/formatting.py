@@ -29,7 +29,7 @@ def expression(part: Component) -> str:
     return f"{type(part).__name__}({', '.join(arguments)})"
 
 
-def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
+def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: str = "strict") -> list[str]:
     """Return options with which ``tisim run`` runs ``changed`` where it would have run ``scene``."""
     old, new = ({effect.label: effect for effect in s.effects} for s in (scene, changed))
     arguments = [argument for name in old if name not in new for argument in ("--without", name)]
@@ -38,7 +38,8 @@ def options(scene: Scene, changed: Scene, precision: str = "f64") -> list[str]:
         settings += _differences(old.get(name), effect, f"effects.{name}")
     for key, value in settings:
         arguments += ["--set", f"{key}={value}"]
-    return arguments + (["--precision", precision] if precision != "f64" else [])
+    arguments += ["--precision", precision] if precision != "f64" else []
+    return arguments + (["--arithmetic", arithmetic] if arithmetic != "strict" else [])
 
 
 def shell_line(arguments: list[str]) -> str:

@@ -13,6 +13,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from tisim.accuracy.cost_study import Study
 from tisim.accuracy.row import Row, decades
+from tisim.accuracy.sweep import USUAL_NUMBERS
 from tisim.files.atomic import replace_file
 from tisim.plotting.style import empty, letters, plain
 
@@ -63,7 +64,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     for at, method in enumerate(lines):
         rows = [row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same]
         colour, marker = METHOD_COLOURS[at % len(METHOD_COLOURS)], MARKERS[at % len(MARKERS)]
-        style = "-" if all(row.precision == "f64" for row in rows) else "--"
+        style = "-" if all((row.precision, row.arithmetic) == USUAL_NUMBERS for row in rows) else "--"
         times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
         axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
         label = fill(_label(study, method), LEGEND_WIDTH)

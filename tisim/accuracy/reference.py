@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tisim.accuracy.quantity import Quantity, QuantityEstimate, estimate
-from tisim.accuracy.sweep import SettingSweep, finest
+from tisim.accuracy.sweep import USUAL_NUMBERS, SettingSweep, finest
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.scene import Scene
@@ -74,7 +74,7 @@ def attempts(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun
 
     level : that of the finest settings of the methods. InputError when none of them converges.
     """
-    able = [m for m in methods if m.converges and all(s.precision == "f64" for s in m.settings)]
+    able = [m for m in methods if m.converges and all(s.numbers == USUAL_NUMBERS for s in m.settings)]
     must(bool(able), "stepper", "one with an accuracy parameter that its error vanishes with", "none")
     best = max(able, key=lambda method: method.base.stepper.order)
     others = [

@@ -49,6 +49,7 @@ class Row:
     errors: tuple[tuple[float, float], ...] = ()
     failed: str = ""
     same: bool = False
+    arithmetic: str = "strict"
 
     @property
     def key(self) -> tuple[str, str]:

@@ -69,12 +69,13 @@ class StudyRunner:
         rest = sum(self._cost(m, k) for items in plan for m, k in items)
         self._truths(base, sweeps, rest)
         self._check_truths()
-        for precision in study.precisions:
-            if runtime.current().precision != precision:
+        for precision, arithmetic in study.numbers:
+            now = runtime.current()
+            if (now.precision, now.arithmetic) != (precision, arithmetic):
                 self.simulations.close()
-                runtime.init(where.device, precision, where.threads)
+                runtime.init(where.device, precision, where.threads, arithmetic)
             for items in plan:
-                self._round([(m, k) for m, k in items if m.settings[k].precision == precision])
+                self._round([(m, k) for m, k in items if m.settings[k].numbers == (precision, arithmetic)])
         self._compare_laws(sweeps)
         measured = {row.key for row in study.rows}
         study.complete = all(
@@ -87,7 +88,7 @@ class StudyRunner:
         ends = (result.start["position"], result.state["position"])
         extent = max(float(np.linalg.norm(r.max(axis=0) - r.min(axis=0))) for r in ends)
         dt = three_digits(study.scene.duration / max(base.work[0], 1.0))
-        sweeps = methods(study.scene, dt, extent, study.levels, study.precisions, study.starts[-1])
+        sweeps = methods(study.scene, dt, extent, study.levels, study.numbers, study.starts[-1])
         return [ensembles(study.scene, study.starts), *sweeps] if study.random else sweeps
 
     def _cost(self, method: SettingSweep, k: int) -> float:

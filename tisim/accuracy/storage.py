@@ -31,10 +31,10 @@ from tisim.files.atomic import replace_file
 from tisim.files.ownership import ensure_writable
 from tisim.io.run_folder import versions
 
-COST_FORMAT = "tisim cost 2"
+COST_FORMAT = "tisim cost 3"
 COST_CSV, HDF5, PICTURE = "cost.csv", "cost.h5", "cost.png"
 COST_FILES = (COST_CSV, HDF5, PICTURE, lock.LOCK)
-_TEXTS = ("method", "setting", "python", "options", "precision", "failed")
+_TEXTS = ("method", "setting", "python", "options", "precision", "arithmetic", "failed")
 _NUMBERS: dict[str, type] = {"starts": int, "steps": float, "sums": float, "rejections": float, "same": bool}
 
 
@@ -91,7 +91,12 @@ def _write_rows(study: Study, path: Path) -> None:
 
 def _settings(study: Study) -> dict[str, Any]:
     where = runtime.current()
-    return {"device": where.device, "threads": where.threads, "precisions": list(study.precisions)}
+    return {
+        "device": where.device,
+        "threads": where.threads,
+        "precisions": list(study.precisions),
+        "arithmetics": list(study.arithmetics),
+    }
 
 
 def _padded(rows: Sequence[Sequence[float]]) -> np.ndarray:

@@ -16,15 +16,25 @@ from tisim.errors import InputError
 from tisim.scene.scene import Scene
 from tisim.steppers.base import Stepper
 
+USUAL_NUMBERS = ("f64", "strict")
+"""The precision and the arithmetic that methods are compared with."""
+
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting is one way to run a scene: the scene with it, what it is, its precision and random starts."""
+    """A setting is one way to run a scene: the scene with it, what it is, its precision, arithmetic and
+    random starts."""
 
     scene: Scene
     description: str
     precision: str = "f64"
     starts: int = 1
+    arithmetic: str = "strict"
+
+    @property
+    def numbers(self) -> tuple[str, str]:
+        """The precision and the arithmetic."""
+        return self.precision, self.arithmetic
 
 
 @dataclass(frozen=True)
@@ -114,27 +124,31 @@ def finest(scene: Scene, decades: float) -> Scene:
 
 
 def methods(
-    scene: Scene, dt: float, extent: float, levels: Sequence[float], precisions: Sequence[str], starts: int
+    scene: Scene,
+    dt: float,
+    extent: float,
+    levels: Sequence[float],
+    numbers: Sequence[tuple[str, str]],
+    starts: int,
 ) -> list[SettingSweep]:
     """Return all methods for a scene with steps of about dt (s) and particles up to ``extent`` (m) apart.
 
     levels : decades of error, relative to what the scene asks for, that accuracy parameters are turned to.
-    The first method is the scene's own stepper. starts : random starts of each run.
+    The first method is the scene's own stepper. numbers : precisions and arithmetics, of which all but f64,
+    strict, are tried with that method. starts : random starts of each run.
     """
     sweeps = []
     own = sorted(parts(scene), key=lambda item: not item[0].startswith("stepper"))
     for path, part in own:
         sweeps += [
-            _turning(scene, path, accuracy_parameter, levels, "f64", starts)
+            _turning(scene, path, accuracy_parameter, levels, starts)
             for accuracy_parameter in part.accuracy_parameters
         ]
     if sweeps:
         first = sweeps[0]
-        for precision in precisions:
-            if precision != "f64" and first.accuracy_parameter:
-                sweeps.append(
-                    _turning(scene, first.path, first.accuracy_parameter, levels, precision, starts)
-                )
+        for kind in numbers:
+            if kind != USUAL_NUMBERS and first.accuracy_parameter:
+                sweeps.append(_turning(scene, first.path, first.accuracy_parameter, levels, starts, kind))
     for effect in scene.effects:
         laws = effect.approximations(extent)
         if laws:
@@ -146,9 +160,7 @@ def methods(
         other = exchanged(scene, "stepper", stepper)
         for path, part in _within("stepper", stepper):
             sweeps += [
-                _turning(other, path, k, levels, "f64", starts)
-                for k in part.accuracy_parameters
-                if k.converges
+                _turning(other, path, k, levels, starts) for k in part.accuracy_parameters if k.converges
             ]
     return [method for method in sweeps if method.settings]
 
@@ -201,8 +213,8 @@ def _turning(
     path: str,
     accuracy_parameter: AccuracyParameter,
     levels: Sequence[float],
-    precision: str,
     starts: int,
+    numbers: tuple[str, str] = USUAL_NUMBERS,
 ) -> SettingSweep:
     settings, weights = [], []
     for decades in levels:
@@ -212,10 +224,10 @@ def _turning(
             continue  # The part cannot be set so, such as to a shortest step above the longest.
         part = dict(parts(changed))[path]
         description = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
-        settings.append(Setting(changed, description, precision, starts))
+        settings.append(Setting(changed, description, numbers[0], starts, numbers[1]))
         weights.append(10.0 ** (-decades / scene.stepper.order) if path.startswith("stepper") else 1.0)
     name = f"{_title(scene, path)}: {', '.join(accuracy_parameter.orders)}"
-    name += "" if precision == "f64" else f", {precision}"
+    name += "".join(f", {kind}" for kind, plain in zip(numbers, USUAL_NUMBERS, strict=True) if kind != plain)
     return SettingSweep(name, tuple(settings), tuple(weights), scene, path, accuracy_parameter)
 
 

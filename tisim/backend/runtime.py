@@ -1,4 +1,4 @@
-"""The one place that starts Taichi: device, precision and threads. Nothing starts it at import."""
+"""The one place that starts Taichi: device, precision, threads, arithmetic. Nothing starts it at import."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from tisim.errors import InputError, is_whole, must
 
 DEVICES = ("cpu", "cuda", "vulkan")
 PRECISIONS = ("f64", "f32")
+ARITHMETICS = ("strict", "fast")
 THREADS = 1024
 """Taichi is asked for at most so many threads; it makes them all, whether there are cores for them or not."""
 
@@ -30,18 +31,22 @@ class Runtime:
     precision : "f64" or "f32"; the type of every floating-point particle field and parameter.
         Time is f64 whatever the precision.
     threads : CPU threads, >= 1.
-
-    Floating point is strict (no fast-math): a NaN stays visible, and the same scene gives the same bits.
+    arithmetic : "strict", where the same scene gives the same bits; or "fast", where compilers may regroup
+        sums, fuse products with them and take reciprocals and roots by estimates and Newton's method. What
+        is not a number, or infinite, is reported in both.
     """
 
     device: str = "cpu"
     precision: str = "f64"
     threads: int = 0
+    arithmetic: str = "strict"
 
     def __post_init__(self) -> None:
         check_backend()
         must(self.device in DEVICES, "device", f"one of {', '.join(DEVICES)}", self.device)
         must(self.precision in PRECISIONS, "precision", f"one of {', '.join(PRECISIONS)}", self.precision)
+        kinds = ", ".join(ARITHMETICS)
+        must(self.arithmetic in ARITHMETICS, "arithmetic", f"one of {kinds}", self.arithmetic)
         must(
             is_whole(self.threads, 0), "threads", "a whole number, at least 1 (0 for all cores)", self.threads
         )
@@ -54,8 +59,9 @@ class Runtime:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Return what decides the last bits of a result beside the scene: precision and kind of device."""
-        return {"precision": self.precision, "device": self.device}
+        """Return what decides the last bits of a result beside the scene: precision, kind of device and
+        arithmetic."""
+        return {"precision": self.precision, "device": self.device, "arithmetic": self.arithmetic}
 
     @property
     def described(self) -> dict[str, str]:
@@ -86,15 +92,17 @@ def memory() -> int:
         return sys.maxsize
 
 
-def init(device: str = "cpu", precision: str = "f64", threads: int = 0) -> Runtime:
+def init(
+    device: str = "cpu", precision: str = "f64", threads: int = 0, arithmetic: str = "strict"
+) -> Runtime:
     """Start Taichi with these settings, or keep it as it is when they have not changed.
 
-    threads : CPU threads; 0 for all cores.
+    threads : CPU threads; 0 for all cores. arithmetic : "strict" or "fast"; see ``Runtime``.
     Raises InputError when a setting is unknown or the device is absent. A change of settings waits until what
     ``tisim.run``, ``tisim.accuracy.study`` or ``optimize.run`` do in other threads is over. It invalidates
     every Simulation made before; those say so when used.
     """
-    requested = Runtime(device, precision, threads or cores())
+    requested = Runtime(device, precision, threads or cores(), arithmetic)
     if requested == _current:
         return requested
     with turn:
@@ -116,7 +124,8 @@ def _start(requested: Runtime) -> None:
                 arch=getattr(ti, requested.device),
                 default_fp=requested.real,
                 cpu_max_num_threads=requested.threads,
-                fast_math=False,
+                # Its flags for LLVM: sums regrouped and fused, no infinity, no sign of zero. NaN stays NaN.
+                fast_math=requested.arithmetic == "fast",
                 enable_fallback=False,
                 # With it, Quadrants 1.3.3 reads stale flags after nested loops, and Taichi 1.7.4 takes three
                 # times as long to compile; LLVM optimises the same code afterwards.

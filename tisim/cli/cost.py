@@ -90,6 +90,7 @@ def cost(
         float, typer.Option(metavar="MINUTES", help="Leave out what would run longer; compiling is free.")
     ] = math.inf,
     single: Annotated[bool, typer.Option("--f32/--no-f32", help="Also run in single precision.")] = True,
+    fast: Annotated[bool, typer.Option("--fast/--no-fast", help="Also run in fast arithmetic.")] = True,
     device: Device = "cpu",
     threads: Threads = 0,
     fresh: Fresh = None,
@@ -113,6 +114,7 @@ def cost(
         finer=(-1 if quick else 0) if finer is None else finer,
         repeats=(1 if quick else 3) if repeats is None else repeats,
         precisions=("f64", "f32") if single else ("f64",),
+        arithmetics=("strict", "fast") if fast else ("strict",),
         starts=((4, 16, 64) if quick else (8, 32, 128)) if starts is None else _whole_numbers(starts),
         budget=60 * budget,
         limit=(QUICK_LIMIT if quick else math.inf) if limit is None else limit,
@@ -157,7 +159,8 @@ def answer(
     # Stepper and effects as they have become, whoever has changed them; all else as it was given.
     _, base = scene_arguments.load_scene(target, size, seed)
     arguments = [target, *_run_options(size, seed, changes, device, threads, plugins)]
-    return table.recipe(row, arguments + options(base, measured_scene, row.precision), quantity)
+    arguments += options(base, measured_scene, row.precision, row.arithmetic)
+    return table.recipe(row, arguments, quantity)
 
 
 def _run_options(

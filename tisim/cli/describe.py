@@ -8,6 +8,7 @@ from tisim.backend import runtime
 from tisim.cli import scene_arguments, targets
 from tisim.cli.options import (
     Absent,
+    Arithmetic,
     CaseName,
     Changes,
     Device,
@@ -56,11 +57,12 @@ def explain(
 
 def check(
     case: CaseName, device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
+    arithmetic: Arithmetic = "strict",
     plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Run a case's own checks; exit code 1 when one fails."""
     checks = targets.case(case).check()
-    runtime.init(device, precision, threads)
+    runtime.init(device, precision, threads, arithmetic)
     table = plain_table("check", "measured", "expected", "off by", "allowed", "")
     failed = 0
     with err().status("checking") as status:

@@ -13,7 +13,18 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import targets
-from tisim.cli.options import CaseName, Device, Out, Overwrite, Plugins, Precision, Size, Threads, nameable
+from tisim.cli.options import (
+    Arithmetic,
+    CaseName,
+    Device,
+    Out,
+    Overwrite,
+    Plugins,
+    Precision,
+    Size,
+    Threads,
+    nameable,
+)
 from tisim.console import err, progress_bar
 from tisim.errors import InputError
 from tisim.files import lock, ownership, regular_file
@@ -73,7 +84,8 @@ def plot(
 
 def figures(
     case: CaseName, size: Size = None, folder: Out = None,
-    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0, overwrite: Overwrite = False,
+    device: Device = "cpu", precision: Precision = "f64", threads: Threads = 0,
+    arithmetic: Arithmetic = "strict", overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Make the figures of a case that take many runs, and the numbers in them.
@@ -87,7 +99,7 @@ def figures(
     chosen_case.size(size_name)
     if chosen_case.figures is None:
         raise InputError(f"case must be one with figures; received {case!r}")
-    runtime.init(device, precision, threads)
+    runtime.init(device, precision, threads, arithmetic)
     out_folder = folder or Path("out") / f"{chosen_case.name}-figures"
     ownership.check_all(out_folder, overwrite)
     resumes(

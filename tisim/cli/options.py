@@ -72,6 +72,10 @@ Seed = Annotated[int | None, typer.Option(help="Seed of all that is random.")]
 Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
 Device = Annotated[str, typer.Option(help="cpu or cuda.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]
+Arithmetic = Annotated[
+    str,
+    typer.Option(help="strict, or fast: fused, regrouped, by estimates; quicker, in other last bits."),
+]
 Threads = Annotated[int, typer.Option(help="CPU threads; 0 for all cores.")]
 Overwrite = Annotated[
     bool,

@@ -13,6 +13,7 @@ from tisim.backend import runtime
 from tisim.cli import scene_arguments
 from tisim.cli.options import (
     Absent,
+    Arithmetic,
     Changes,
     Device,
     Every,
@@ -40,15 +41,15 @@ from tisim.interrupt import Interrupt
 def run(
     target: Target, absent: Absent = None, changes: Changes = None, folder: Out = None,
     seed: Seed = None, size: Size = None, device: Device = "cpu", precision: Precision = "f64",
-    threads: Threads = 0, fresh: Fresh = None, overwrite: Overwrite = False,
-    frames: Frames = None, every: Every = None, plugins: Plugins = None,
+    arithmetic: Arithmetic = "strict", threads: Threads = 0, fresh: Fresh = None,
+    overwrite: Overwrite = False, frames: Frames = None, every: Every = None, plugins: Plugins = None,
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
     from tisim.io.trajectory import recording_from_options
 
     scene_arguments.checkpoint_seconds()
-    runtime.init(device, precision, threads)
+    runtime.init(device, precision, threads, arithmetic)
     name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
     out_folder = run_folder.RunFolder(folder or Path("out") / name)
     resume = out_folder.check(fresh, overwrite)
@@ -144,7 +145,7 @@ def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
     for name, value in result.measures.items():
         table.add_row(name.replace("_", " "), f"{value:.6g}")
     settings = result.settings
-    table.add_row("device", f"{settings['device']}, {settings['precision']}")
+    table.add_row("device", ", ".join(settings[name] for name in ("device", "precision", "arithmetic")))
     if "threads" in settings:
         table.add_row("threads", settings["threads"])
     table.add_row("wall time", f"{result.wall_s:.2f} s, after {setup_s:.2f} s to compile")

@@ -11,6 +11,7 @@ import typer
 
 from tisim.cli import scene_arguments, targets
 from tisim.cli.options import (
+    Arithmetic,
     Device,
     Fresh,
     Out,
@@ -65,6 +66,7 @@ def optimize(
     overwrite: Overwrite = False,
     device: Device = "cpu",
     precision: Precision = "f64",
+    arithmetic: Arithmetic = "strict",
     threads: Threads = 0,
     executor: Executor = "batch",
     plugins: Plugins = None,
@@ -96,7 +98,7 @@ def optimize(
     )
     fit(problem, settings)
     out_folder = folder or Path("out") / problem.name
-    with closing(evaluator_named(executor, device, precision, threads)) as evaluator:
+    with closing(evaluator_named(executor, device, precision, threads, arithmetic)) as evaluator:
         resume_or_clear(out_folder, fresh, overwrite)
         outcome = session(problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite)
     if outcome.interrupted:
@@ -127,6 +129,7 @@ def compare(
     overwrite: Overwrite = False,
     device: Device = "cpu",
     precision: Precision = "f64",
+    arithmetic: Arithmetic = "strict",
     threads: Threads = 0,
     executor: Executor = "batch",
     plugins: Plugins = None,
@@ -149,7 +152,7 @@ def compare(
     results = []
     with (
         # What cannot be is refused before anything in the folder is removed.
-        closing(evaluator_named(executor, device, precision, threads)) as evaluator,
+        closing(evaluator_named(executor, device, precision, threads, arithmetic)) as evaluator,
         comparison.claim(out_folder, fresh, overwrite) as resume,
         Cache(out_folder / comparison.COMPARISON_FILE) as run_cache,
         Interrupt(print_stopping) as ctrl_c,

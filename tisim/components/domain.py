@@ -11,6 +11,7 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.errors import must
+from tisim.numerics.ieee import same
 
 Axes = tuple[bool, bool, bool]
 """An answer for each axis: x, y and z."""
@@ -184,11 +185,11 @@ class Box(Domain):
     @ti.func
     def lost(self, w, r):
         # A number so large that a thousandth of the side is below half of its last digit.
-        side, blurred = self.side(w), 0
+        blurred, lost = same(r + 1e-3 * self.side(w), r), 0
         for k in ti.static(range(3)):
             if ti.static(self.periodic[k]):
-                blurred += ti.select(r[k] + 1e-3 * side[k] == r[k], 1, 0)
-        return blurred
+                lost += blurred[k]
+        return lost
 
     @ti.func
     def nearest(self, w, a, b, t):

@@ -221,6 +221,15 @@ class PairForce(Pairwise):
         return 0.0 * separation
 
     @ti.func
+    def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
+        """Return ``pair_force`` given 1/distance (1/m); 0 where that is 0.
+
+        A law that needs no more of the distance may define it as well: sums over all pairs in fast arithmetic
+        then make roots and divisions ahead.
+        """
+        return 0.0 * separation
+
+    @ti.func
     def pair_torque(self, s, w, i, j, separation, distance, t):
         """Return the torque on i by j, about the centre of i, in N m."""
         return 0.0 * separation

@@ -22,6 +22,7 @@ symmetric as the grains were: see docs/agglomeration.md.
 
 from tisim.backend.taichi import ti
 from tisim.interactions.contact_list import ContactList
+from tisim.numerics.ieee import finite
 from tisim.worlds.program import Phase, Repeat
 
 
@@ -71,7 +72,7 @@ class Resolve(PerContact):
                 for event in ti.static(c.events):
                     if event.contact(s, w, i, j, d) >= 0.0:
                         event.resolve(s, w, i, j, d)
-                        if not ((s.velocity[w, i] + s.velocity[w, j]).norm_sqr() < ti.math.inf):
+                        if not finite((s.velocity[w, i] + s.velocity[w, j]).norm_sqr()):
                             s.fault(w, i, event.index)
                         ti.atomic_max(s.events[w], 1)
 

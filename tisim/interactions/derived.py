@@ -3,6 +3,7 @@
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle
 from tisim.worlds.state import State
@@ -79,8 +80,7 @@ class SetDerived(PerParticle):
     @ti.func
     def check(self, w, i):
         a = self.solver
-        # Not below infinity: also true of NaN.
-        if not (a.size(a.value[w, i]) < ti.math.inf):
+        if not finite(a.size(a.value[w, i])):
             self.s.fault(w, i, a.effect.index)
 
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, Force, PairForce
 from tisim.interactions.pair_sum import PairSum
+from tisim.numerics.ieee import finite
+from tisim.numerics.roots import estimates_roots
 from tisim.numerics.vectors import piece
 from tisim.worlds.fields import Field
 from tisim.worlds.status import WorldStatus
@@ -78,6 +80,8 @@ class SumForces(PairSum):
             laws.append((law, self.pair_values))
             self.pair_values += law.data.memory if self.commits else 0
         self.laws = tuple(laws)
+        able = all(effect.data.offers("pair_force_by_inverse") for effect in self.long_ranged)
+        self.by_inverse = able and not self.turning and estimates_roots()
 
     @ti.func
     def start(self, w, i, t):
@@ -167,7 +171,7 @@ class SumForces(PairSum):
     @ti.func
     def bearable(self, force, ahead):
         """Return the force, or that over the step ahead where the law cannot follow it: it is not finite."""
-        return ti.select(ahead.norm_sqr() < ti.math.inf, force, ahead)
+        return ti.select(finite(ahead.norm_sqr()), force, ahead)
 
     @ti.func
     def gone_by(self, w):
@@ -202,8 +206,7 @@ class SumForces(PairSum):
 
     @ti.func
     def check(self, w, i, total):
-        # Not below infinity: also true of NaN.
-        if not (total.norm_sqr() < ti.math.inf):
+        if not finite(total.norm_sqr()):
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
     @ti.func
@@ -221,6 +224,10 @@ class SumForces(PairSum):
             effect.pair_force(s, w, i, j, separation, distance, t),
             effect.pair_torque(s, w, i, j, separation, distance, t),
         )
+
+    @ti.func
+    def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
+        return effect.pair_force_by_inverse(self.s, w, i, j, separation, inverse, t)
 
     @ti.func
     def by_other(self, effect: ti.template(), w, i, j, t):  # type: ignore[valid-type]
@@ -244,17 +251,17 @@ class SumForces(PairSum):
         most, index = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces):
             size = self.single(effect, w, i, t).norm()
-            if most < ti.math.inf and not (size <= most):
+            if finite(most) and not (size <= most):
                 most, index = size, effect.index
         for effect in ti.static(self.pair_forces):
             total = ti.Vector.zero(s.real, self.components)
             for j in range(s.count[w]):
                 if i != j:
                     total += self.by_other(effect, w, i, j, t)
-            if most < ti.math.inf and not (total.norm() <= most):
+            if finite(most) and not (total.norm() <= most):
                 most, index = total.norm(), effect.index
         for solver in ti.static(self.derived_solvers):
-            if not (solver.size(solver.value[w, i]) < ti.math.inf):
+            if not finite(solver.size(solver.value[w, i])):
                 index = solver.effect.index
         return index
 
@@ -282,7 +289,7 @@ class SumForcesAtStart(SumForces):
     @ti.func
     def check(self, w, i, total):
         # Not below infinity: also true of NaN.
-        if not (total.norm_sqr() < ti.math.inf):
+        if not finite(total.norm_sqr()):
             # The law at fault is found by a sum over the step.
             self.s.dt[w] = self.s.step_ahead[w]
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
+from tisim.numerics.roots import inverse_root
 from tisim.worlds.program import PerParticle
 
 if TYPE_CHECKING:
@@ -37,11 +38,13 @@ class PairSum(PerParticle):
     becomes of it, in ``finish``; ``components`` is its length. Where pairs are listed it also says where the
     sum is kept meanwhile, in ``put`` and ``get``, what a pair comes to, in ``of_pair``, a vector of
     ``pair_values``, and what of it each of the two is given, in ``shares``; ``commits`` says whether what
-    pairs remember is brought up to date with the sum, by ``keep``.
+    pairs remember is brought up to date with the sum, by ``keep``, ``by_inverse`` whether terms of all pairs
+    are made by ``term_by_inverse``.
     """
 
     components: int = 3
     pair_values: int = 0
+    by_inverse: bool = False
     commits: ClassVar[bool] = False
 
     def __init__(
@@ -68,6 +71,11 @@ class PairSum(PerParticle):
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
         """Return what j contributes to the sum of i; a vector of ``components``."""
+        return ti.Vector.zero(self.s.real, self.components)
+
+    @ti.func
+    def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
+        """Return what j contributes to the sum of i, given 1 / distance (1/m)."""
         return ti.Vector.zero(self.s.real, self.components)
 
     @ti.func
@@ -137,17 +145,30 @@ class PairSum(PerParticle):
         sums = [ti.Vector([0.0] * TILE, self.s.real) for _ in ti.static(range(self.components))]
         # Numbers of lanes as wide as the sums: comparing integers of 64 bits would halve the lanes in f32.
         number = ti.Vector([float(lane) for lane in range(TILE)], self.s.real)
+        inverses = ti.Vector([0.0] * TILE, self.s.real)
         for i in range(begin, end):
             total = self.start(w, i, t)
             for c in ti.static(range(self.components)):
                 sums[c][i - first] = total[c]
         for j in range(n):
             itself = ti.cast(j - first, self.s.real)
-            for lane in range(TILE):
-                terms = self.terms(self.long_ranged, w, first + lane, j, t)
-                for c in ti.static(range(self.components)):
-                    total = sums[c][lane]
-                    sums[c][lane] = ti.select(number[lane] != itself, total + terms[c], total)
+            if ti.static(self.by_inverse):
+                # By themselves: what waits for a root would keep the processor from starting the next.
+                for lane in range(TILE):
+                    inverse = inverse_root(self.separation(w, first + lane, j, t).norm_sqr())
+                    inverses[lane] = ti.select(number[lane] != itself, inverse, 0.0)
+                for lane in range(TILE):
+                    d = self.separation(w, first + lane, j, t)
+                    for effect in ti.static(self.long_ranged):
+                        terms = self.term_by_inverse(effect, w, first + lane, j, d, inverses[lane], t)
+                        for c in ti.static(range(self.components)):
+                            sums[c][lane] = sums[c][lane] + terms[c]
+            else:
+                for lane in range(TILE):
+                    terms = self.terms(self.long_ranged, w, first + lane, j, t)
+                    for c in ti.static(range(self.components)):
+                        total = sums[c][lane]
+                        sums[c][lane] = ti.select(number[lane] != itself, total + terms[c], total)
         for i in range(begin, end):
             total = ti.Vector.zero(self.s.real, self.components)
             for c in ti.static(range(self.components)):
@@ -163,9 +184,14 @@ class PairSum(PerParticle):
         return total
 
     @ti.func
+    def separation(self, w, i, j, t):
+        """Return r_j - r_i (m), as forces see it."""
+        return self.domain.separation(w, self.s.position[w, i], self.s.position[w, j], t)
+
+    @ti.func
     def terms(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
         """Return the terms of j for i, which are not the same."""
-        d = self.domain.separation(w, self.s.position[w, i], self.s.position[w, j], t)
+        d = self.separation(w, i, j, t)
         distance = d.norm()
         total = self.term(effects[0], w, i, j, d, distance, t)
         for effect in ti.static(effects[1:]):

@@ -14,6 +14,7 @@ from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.listed_pairs import PairTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
+from tisim.numerics.ieee import finite
 from tisim.numerics.vectors import piece
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Item, PerParticle, Phase, Repeat
@@ -76,7 +77,7 @@ class BeginSweeps(PerParticle):
             a.largest[w] = 0.0
             for change in ti.static(a.changes):
                 change[w] = 0.0
-        if not (a.size(a.value[w, i]) < ti.math.inf):
+        if not finite(a.size(a.value[w, i])):
             a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
 
 
@@ -151,8 +152,7 @@ class JacobiSweep(PairSum):
     def check(self, w, i, size):
         """Fail a world by what is not finite: in the first sweep it never was finite; what becomes so later
         has not converged."""
-        # Not below infinity: also true of NaN.
-        if not (size < ti.math.inf):
+        if not finite(size):
             if self.solver.sweeps[w] == 0:
                 self.s.fault(w, i, self.effect.index)
             else:
@@ -183,7 +183,7 @@ class TakeSweep(PerParticle):
             elif on:
                 if ti.static(self.trial):
                     # Forces that are not finite: the step is given up.
-                    a.value[w, i] *= ti.math.inf
+                    a.value[w, i] *= ti.math.nan
                 else:
                     fail_to_converge(s, w, i, self.effect)
 
@@ -205,7 +205,7 @@ class JudgeSweep(Phase):
         a, s = self.solver, self.solver.s
         s.mutual_sweeps[w] += 1
         now, last, before = ti.static(a.changes)
-        if before[w] > 0.0 and now[w] < ti.math.inf:
+        if before[w] > 0.0 and finite(now[w]):
             # Of two sweeps: where others act as much along as against, changes grow by turns.
             s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
         before[w], last[w], now[w] = last[w], now[w], 0.0

@@ -24,7 +24,7 @@ from tisim.errors import must
 from tisim.files import checksum
 from tisim.scene.initial_state import Arrays
 
-CHECKPOINT_FORMAT = "tisim checkpoint 4"
+CHECKPOINT_FORMAT = "tisim checkpoint 5"
 BEFORE_STEP = "before"
 
 
@@ -32,8 +32,7 @@ def _identity(simulation: Simulation) -> dict[str, Any]:
     """Return what a checkpoint must have in common with the simulation it is restored to."""
     return {
         "scenes": json.dumps([scene.digest() for scene in simulation.scenes]),
-        "precision": simulation.runtime.precision,
-        "device": simulation.runtime.device,
+        **simulation.runtime.settings,
         "backend": runtime.backend(),
         "worlds": simulation.worlds,
         "capacity": simulation.s.capacity,

@@ -10,6 +10,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
+from tisim.numerics.ieee import finite
 from tisim.worlds.bound import Bound
 from tisim.worlds.prefix_sum import PrefixSum
 from tisim.worlds.program import Phase
@@ -141,8 +142,8 @@ class FindExtent(OfParticles):
     def run(self, w, i):
         g, s = self.g, self.s
         r, radius = s.position[w, i], s.radius[w, i]
-        # Not below infinity: also true of NaN, which belongs to no cell.
-        if not (ti.abs(r).sum() + radius < ti.math.inf):
+        # What is not finite belongs to no cell.
+        if not finite(ti.abs(r).sum() + radius):
             s.fail(w, WorldStatus.NOT_FINITE, i)
         if radius < g.smallest[w]:
             ti.atomic_min(g.smallest[w], radius)

@@ -3,6 +3,7 @@
 from tisim.backend.taichi import ti
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.numerics import elementary
+from tisim.numerics.ieee import finite
 from tisim.worlds.program import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
@@ -33,8 +34,8 @@ class BinParticles(Phase):
         for i in range(count):
             low, high = ti.min(low, s.position[w, i]), ti.max(high, s.position[w, i])
             smallest = ti.select(s.radius[w, i] < s.radius[w, smallest], i, smallest)
-            # Not below infinity: also true of NaN, which belongs to no cell.
-            if not (ti.abs(s.position[w, i]).sum() + s.radius[w, i] < ti.math.inf):
+            # What is not finite belongs to no cell.
+            if not finite(ti.abs(s.position[w, i]).sum() + s.radius[w, i]):
                 s.fail(w, WorldStatus.NOT_FINITE, i)
         corner, side = n.domain.origin(w), n.domain.side(w)
         for k in ti.static(range(3)):

@@ -15,6 +15,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
 from tisim.effects.base import Pairwise
 from tisim.neighbours.cell_grid import LEVELS, CellGrid, OfGrid, OfParticles, cell_phases, measure_phases
+from tisim.numerics.ieee import far_away
 from tisim.worlds.bound import Bound
 from tisim.worlds.program import Phase
 from tisim.worlds.state import State
@@ -105,14 +106,14 @@ class HalfList:
 
     @ti.func
     def widest(self, w, i, j):
-        """Return the widest distance (m) at which a law acts between two; without limit in a world that looks
+        """Return the widest distance (m) at which a law acts between two; beyond all in a world that looks
         at all."""
         s, distance = self.s, self.s.radius[w, i] + self.s.radius[w, j]
         if ti.static(len(self.laws) > 0):
             a, b = s.radius[w, i], s.radius[w, j]
             first, second = self.reach(w, i), self.reach(w, j)
             distance += ti.select(a > b, first, ti.select(b > a, second, ti.max(first, second)))
-        return ti.select(s.listed_above[w] >= ALL_PAIRS, ti.math.inf, distance)
+        return ti.select(s.listed_above[w] >= ALL_PAIRS, ti.static(far_away()), distance)
 
     @ti.func
     def lists(self, w, i, j):

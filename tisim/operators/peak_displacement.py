@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator
 from tisim.worlds.fields import Field
 
@@ -29,7 +30,7 @@ class PeakDisplacement(Operator):
             shift += s.mass[w, i] * (s.position[w, i] - s.origin[w, i])
             mass += s.mass[w, i]
         farthest = ti.cast(shift.norm() / mass, ti.f64)
-        # Not below infinity: also true of NaN, which the maximum would drop.
-        if not (farthest < ti.math.inf):
+        # The maximum would drop NaN.
+        if not finite(farthest):
             s.fault_of_world(w, self.index)
         s.peak_displacement[w] = ti.max(s.peak_displacement[w], farthest)

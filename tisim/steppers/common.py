@@ -1,6 +1,7 @@
 """Phases that several steppers have in common."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import compensated_sum, finite
 from tisim.steppers.context import StepContext
 from tisim.worlds.program import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
@@ -22,8 +23,7 @@ def apply_displacement(s, domain: ti.template(), w, i, r, moved, grown, t):  # t
     f64) relative to the frame, and by ``grown`` (m, f64) in radius: for pair lists a surface that grows is
     one that moves."""
     change = ti.abs(moved) + ti.abs(grown)
-    # Not below infinity: also true of NaN.
-    if not (change.sum() < ti.math.inf):
+    if not finite(change.sum()):
         s.fail(w, WorldStatus.NOT_FINITE, i)
     elif domain.lost(w, r):
         s.fail(w, WorldStatus.POSITION_LOST, i)
@@ -80,12 +80,9 @@ class FirstStep(Phase):
 
 @ti.func
 def advance_clock(s, w):
-    """Move time on by dt, with the rounding error carried along (W. Kahan 1965)."""
+    """Move time on by dt."""
     last = s.dt[w] == s.end[w] - s.time[w]
-    step = s.dt[w] - s.time_carry[w]
-    time = s.time[w] + step
-    s.time_carry[w] = (time - s.time[w]) - step
-    s.time[w] = time
+    s.time[w], s.time_carry[w] = compensated_sum(s.time[w], s.dt[w], s.time_carry[w], s.count[w])
     if last:
         s.time[w], s.time_carry[w] = s.end[w], 0.0
 

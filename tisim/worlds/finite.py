@@ -6,6 +6,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.numerics.ieee import finite
 from tisim.worlds.state import State
 
 
@@ -37,15 +38,14 @@ class FiniteCheck:
             self.broken[w] = 0
         for w, i in ti.ndrange(self.s.worlds, self.s.capacity):
             if i < self.s.count[w]:
-                total = ti.cast(0.0, ti.f64)
+                broken = 0
                 for column in ti.static(self.scalars):
-                    total += 0.0 * column[w, i]
+                    broken += ti.cast(not finite(column[w, i]), ti.i32)
                 for column in ti.static(self.vectors):
                     for k in ti.static(range(3)):
-                        total += 0.0 * column[w, i][k]
+                        broken += ti.cast(not finite(column[w, i][k]), ti.i32)
                 for column in ti.static(self.slotted):
                     for k in range(column[1]):
-                        total += 0.0 * column[0][w, i, k]
-                # 0 times what is not finite is not a number, and with one no sum is.
-                if ti.math.isnan(total):
+                        broken += ti.cast(not finite(column[0][w, i, k]), ti.i32)
+                if broken > 0:
                     self.broken[w] = 1

@@ -11,7 +11,9 @@ RULE = "batch, processes:N or dask://HOST:PORT"
 """What the name of an executor must be, as error messages say it."""
 
 
-def evaluator_named(name: str, device: str = "cpu", precision: str = "f64", threads: int = 0) -> Evaluator:
+def evaluator_named(
+    name: str, device: str = "cpu", precision: str = "f64", threads: int = 0, arithmetic: str = "strict"
+) -> Evaluator:
     """Return the evaluator of that name. InputError for an unknown one, or when there is nobody behind it.
 
     "batch": this process, many worlds side by side. "processes:4": as many processes that this one starts.
@@ -23,13 +25,13 @@ def evaluator_named(name: str, device: str = "cpu", precision: str = "f64", thre
     must(kind in ("batch", "processes", "dask"), "executor", RULE, name)
     if kind == "batch":
         must(name == "batch", "executor", RULE, name)
-        runtime.init(device, precision, threads)
+        runtime.init(device, precision, threads, arithmetic)
         return BatchEvaluator()
     # Imported late: nobody needs the one for the other, and Dask may not be there at all.
     from optimize.evaluation.executors.remote import Remote
     from optimize.evaluation.executors.worker import WorkerSettings
 
-    worker_settings = WorkerSettings(device, precision, threads)
+    worker_settings = WorkerSettings(device, precision, threads, arithmetic)
     if kind == "processes":
         from optimize.evaluation.executors.processes import Processes
 

@@ -21,7 +21,8 @@ PACKAGES = ("tisim", "optimize", "cases")
 
 
 def program() -> dict[str, str]:
-    """Return what decides the bits of a result beside the scene, the precision and the device.
+    """Return what decides the bits of a result beside the scene, the precision, the device and the
+    arithmetic.
 
     Starts are drawn by NumPy and SciPy; ``sum`` of Python 3.12 rounds in another way than that of 3.11; other
     processors have other mathematical functions.

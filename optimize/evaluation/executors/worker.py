@@ -29,22 +29,28 @@ class WorkerSettings:
     device: str = "cpu"
     precision: str = "f64"
     threads: int = 0
+    arithmetic: str = "strict"
     files: tuple[PythonFile, ...] = field(default_factory=python_file.loaded_files)
 
     def __post_init__(self) -> None:
-        runtime.Runtime(self.device, self.precision, self.threads)
+        _ = self.runtime
+
+    @property
+    def runtime(self) -> runtime.Runtime:
+        """The runtime as asked for; InputError where there is no such setting."""
+        return runtime.Runtime(self.device, self.precision, self.threads, self.arithmetic)
 
     @property
     def settings(self) -> dict[str, str]:
         """As of the in-process evaluator: what a cached result depends on."""
-        return {"precision": self.precision, "device": self.device, "backend": runtime.backend()}
+        return {**self.runtime.settings, "backend": runtime.backend()}
 
     @property
     def made_by(self) -> dict[str, str]:
         """What an answer must say of itself, or its last bits may be others, and the cache would take them
         for the same.
         """
-        return {**handshake.program(), "precision": self.precision, "device": self.device}
+        return {**handshake.program(), **self.runtime.settings}
 
 
 def _name() -> str:
@@ -109,7 +115,8 @@ def _run_pickled(question: bytes, share: int) -> Answer:
 def _run(pickled: bytes, worker_settings: WorkerSettings, share: int) -> Answer:
     scenes = _unpack_scenes(pickled, worker_settings)
     before = runtime.generation()
-    runtime.init(worker_settings.device, worker_settings.precision, worker_settings.threads or share)
+    ask = worker_settings
+    runtime.init(ask.device, ask.precision, ask.threads or share, ask.arithmetic)
     if not _evaluator or runtime.generation() != before:
         _evaluator[:] = [BatchEvaluator()]
     results = dict(_evaluator[0].evaluate(scenes))

@@ -322,7 +322,7 @@ def test_cost_sets_exact_and_fast_noise_side_by_side():
     """Both noises, each with its length of steps, and no stepper of particles that have inertia; what is
     compared is a statistic."""
     scene = make(lattice(0), trap=20.0)
-    methods_ = methods(scene, 1e-4, 1e-6, (1.0, 0.0), ("f64",), 8)
+    methods_ = methods(scene, 1e-4, 1e-6, (1.0, 0.0), (), 8)
     turned = {
         (type(m.base.stepper), m.base.stepper.noise, *m.accuracy_parameter.orders)
         for m in methods_

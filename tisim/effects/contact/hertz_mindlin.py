@@ -36,7 +36,7 @@ class HertzMindlin(GranularContact):
 
     An impact at a speed v lasts 2.94 (15 m* / (16 E* sqrt(R* v)))^(2/5); a fiftieth of that as a step gives
     its restitution to 0.004. In a step beyond 2 sqrt(m* / S_n) the overlap would alternate and grow: the
-    force is then infinite, and the world stops.
+    force is then not a number, and the world stops.
 
     Source: H. Hertz (1882); R. D. Mindlin, J. Appl. Mech. 16 (1949) 259, in the incremental force form of
     O. R. Walton and R. L. Braun, J. Rheol. 30 (1986) 949, eased as by C. Thornton, S. J. Cummins and P. W.
@@ -86,7 +86,7 @@ class HertzMindlin(GranularContact):
         inertia = ti.sqrt(circle * mass)
         press = 2.0 / 3.0 * self.stiff(w) * circle * overlap - self.loss(w) * inertia * opening
         # Beyond this step the overlap would alternate and grow.
-        press = ti.select(self.stiff(w) * circle * dt * dt < 4.0 * mass, press, ti.math.inf)
+        press = ti.select(self.stiff(w) * circle * dt * dt < 4.0 * mass, press, ti.math.nan)
         drag = self.drag(w) * inertia * sliding
 
         elastic = ti.Vector([past[0], past[1], past[2]])

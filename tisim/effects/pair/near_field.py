@@ -81,6 +81,12 @@ class NearField(PairForce):
         return self.between(s, w, i, j, separation, distance)
 
     @ti.func
+    def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
+        attraction = self.alpha1(w) * power(inverse, 1 + self.beta1)
+        repulsion = self.alpha2(w) * power(inverse, 1 + self.beta2)
+        return self.own(s, w, i) * self.own(s, w, j) * (attraction - repulsion) * separation
+
+    @ti.func
     def between(self, s, w, i, j, separation, distance):
         """Return the force on i by j, in N."""
         # Each over d once more, for n_ij = separation / d; one division serves both whole powers.

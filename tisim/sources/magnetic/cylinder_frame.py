@@ -12,6 +12,7 @@ from decimal import Decimal, localcontext
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
+from tisim.numerics.ieee import rounded_vector
 
 DIGITS, BITS = 50, 24
 """These are the digits of what is found here, and the bits of a unit vector's leading part, whose product
@@ -64,13 +65,14 @@ def place(r, centre, lead, rest):
     rest : the direction, as of ``split_direction``.
     """
     # r - centre = d + lost, exactly (D. E. Knuth, The Art of Computer Programming, volume 2, 4.2.2).
-    d = r - centre
-    subtracted = r - d
-    rounding_error = (r - (d + subtracted)) + (subtracted - centre)
+    d = rounded_vector(r - centre, lead[0])
+    subtracted = rounded_vector(r - d, lead[0])
+    again = rounded_vector(d + subtracted, lead[0])
+    rounding_error = rounded_vector(r - again, lead[0]) + rounded_vector(subtracted - centre, lead[0])
     axis = lead + rest
     along = ti.min(ti.max(d.dot(axis), -LARGEST_PLACE), LARGEST_PLACE)
     foot = ti.cast(ti.cast(along, ti.f32), float)
-    near = (d - foot * lead) + (rounding_error - foot * rest)
+    near = rounded_vector(d - foot * lead, lead[0]) + (rounding_error - foot * rest)
     z = near.dot(axis)
     across = near - z * axis
     rho = across.norm()

@@ -10,6 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.errors import must
+from tisim.numerics.ieee import finite
 from tisim.steppers.step_control import SHORTEST_STEP, Controller
 from tisim.worlds.status import WorldStatus
 
@@ -21,7 +22,7 @@ LARGEST_DRIFT = 1e9
 def fault(rate):
     """Return the status that says what is wrong with a force that asks for steps of 1/rate which are too
     short."""
-    return ti.select(rate < ti.math.inf, WorldStatus.FORCE_TOO_STEEP, WorldStatus.NOT_FINITE)
+    return ti.select(finite(rate), WorldStatus.FORCE_TOO_STEEP, WorldStatus.NOT_FINITE)
 
 
 class DriftLimit(Controller):

@@ -6,6 +6,7 @@ intervals or steps a launch takes them through makes no difference to the noise 
 """
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import compensated_sum, finite
 from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import LITTLE, OWN_CLOCK, EndIntervals, beginning, duration
@@ -128,10 +129,7 @@ class IndependentBrownianSteps(PerParticle):
                     self.stop(w, i, fault(rate))
                     going = 0
             if going > 0:
-                # The rounding error of the sum is carried along (W. Kahan 1965).
-                step = dt - carry
-                total = elapsed + step
-                carry = (total - elapsed) - step
+                total, carry = compensated_sum(elapsed, dt, carry, self.s.count[w])
                 if dt * (1.0 + LITTLE) >= remaining:
                     dt, total = remaining, length
                 if steps > 0:
@@ -153,8 +151,7 @@ class IndependentBrownianSteps(PerParticle):
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]
-        # Not below infinity: also true of NaN.
-        if not (r.norm_sqr() < ti.math.inf):
+        if not finite(r.norm_sqr()):
             self.stop(w, i, WorldStatus.NOT_FINITE)
         elif self.domain.lost(w, r):
             self.stop(w, i, WorldStatus.POSITION_LOST)

@@ -8,6 +8,7 @@ the same.
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import TILE
+from tisim.numerics.ieee import finite
 from tisim.steppers.brownian.independent import IndependentBrownianSteps, euler_step
 from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import beginning
@@ -84,7 +85,7 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                 for k in ti.static(range(3)):
                     place[k][lane], drift[k][lane], force[k][lane] = r[k], v[k], f[k]
                 fine = self.able(w, i) > 0 and self.control.easy(s, w, i, push_velocity)
-                fine = fine and r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
+                fine = fine and finite(r.norm_sqr()) and not self.domain.lost(w, r)
                 halted += ti.select(fine, 0, 1)
             if halted == 0:
                 for lane in range(TILE):

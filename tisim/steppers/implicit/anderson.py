@@ -7,6 +7,7 @@ Forces enter the inner product as the displacement that they would cause. Torque
 """
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite
 from tisim.steppers.context import StepContext
 from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.fields import Field
@@ -89,8 +90,7 @@ class Mix(PerParticle):
         s = self.s
         total = self.sums.total(w)
         theta = ti.cast(0.0, ti.f64)
-        # Not so for a NaN.
-        if s.solver_iteration[w] > 1 and total[1] > 0.0 and ti.abs(total[0]) < ti.math.inf:
+        if s.solver_iteration[w] > 1 and total[1] > 0.0 and finite(total[0]):
             theta = total[0] / total[1]
         for column in ti.static(self.columns):
             new, last = column[0][w, i], column[2][w, i]

@@ -1,6 +1,7 @@
 """The verdict on an attempt at a step of collocation: from how its sweeps converge, and from its error."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite, infinity
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, report_failure
 from tisim.worlds.program import Phase
@@ -25,12 +26,12 @@ class JudgeStages(Phase):
         s, last = self.s, self.stages.number - 1
         total = self.sums.total(w)
         s.force_evaluations[w] += 1
-        # Not below infinity: also true of NaN, which a maximum would lose.
-        if not (total[0] < ti.math.inf) or s.out_of_range[w] > 0:
-            total[0] = ti.math.inf
+        # A maximum would lose NaN.
+        if not finite(total[0]) or s.out_of_range[w] > 0:
+            total[0] = infinity(s.count[w])
         s.sweep_change[w] = ti.max(s.sweep_change[w], total[0])
         stage = s.stage[w]
-        if stage < last and s.sweep_change[w] < ti.math.inf:
+        if stage < last and finite(s.sweep_change[w]):
             s.stage[w] = stage + 1
         else:
             self.judge(w, total)
@@ -59,10 +60,10 @@ class JudgeStages(Phase):
             s.contraction[w] = ti.select(resolved > contraction, resolved, contraction)
             s.measured_dt[w] = s.dt[w]
         s.last_change[w] = change
-        solved = change * contraction < ti.math.inf and self.control.solved(w, change * contraction)
+        solved = finite(change * contraction) and self.control.solved(w, change * contraction)
         if solved or (not first and not (contraction < 1.0)) or s.sweep[w] >= self.control.sweeps:
             self.decide(w, solved, contraction, error)
-        elif not (change < ti.math.inf):
+        elif not finite(change):
             self.decide(w, False, change, error)
 
     @ti.func

@@ -5,6 +5,7 @@ many intervals or attempts a launch takes them through makes no difference to wh
 """
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import compensated_sum, finite, infinity
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER
 from tisim.steppers.implicit.excursion import note_excursion
@@ -84,10 +85,7 @@ class IndependentSteps(PerParticle):
                 iterations += k
                 tries += 1
                 if verdict == ACCEPTED:
-                    # The rounding error of the sum is carried along (W. Kahan 1965).
-                    step = dt - carry
-                    total = elapsed + step
-                    carry = (total - elapsed) - step
+                    total, carry = compensated_sum(elapsed, dt, carry, s.count[w])
                     elapsed = ti.select(last, length, total)
                     steps += 1
                     if ti.static(self.control.at_end):
@@ -112,7 +110,7 @@ class IndependentSteps(PerParticle):
             self.force_sum.single_particle(w, i, end)
             new = solve.velocity(w, i, step, jacobian)
             k += 1
-            change, error = ti.cast(ti.math.inf, s.real), ti.cast(0.0, s.real)
+            change, error = ti.cast(infinity(s.count[w]), s.real), ti.cast(0.0, s.real)
             if solve.reachable(w, i, new, step):
                 change = solve.phi(w) * step * (new - v).norm()
                 v = new
@@ -124,8 +122,7 @@ class IndependentSteps(PerParticle):
                 error = error / ti.select(error > 0.0, self.control.scale(s, w, i, moved, step), 1.0)
             ratio, off = ti.cast(change, ti.f64), ti.cast(error, ti.f64)
             solved = self.control.solved(w, ratio)
-            # Not below infinity: also true of NaN.
-            if solved or k >= self.control.iterations or not (ratio < ti.math.inf):
+            if solved or k >= self.control.iterations or not finite(ratio):
                 iterating = 0
                 accepted = solved and self.control.accepts(w, off)
                 target = dt

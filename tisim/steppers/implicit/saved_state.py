@@ -1,6 +1,7 @@
 """The state at the beginning of a step, kept until the step is accepted."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite
 from tisim.steppers.context import StepContext
 from tisim.worlds.fields import Field
 
@@ -50,5 +51,4 @@ class SavedState:
     @ti.func
     def sound(self, w, r):
         """Return whether r (m) is a place that numbers can tell."""
-        # Below infinity: not true of NaN.
-        return r.norm_sqr() < ti.math.inf and not self.domain.lost(w, r)
+        return finite(r.norm_sqr()) and not self.domain.lost(w, r)

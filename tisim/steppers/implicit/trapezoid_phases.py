@@ -1,6 +1,7 @@
 """The phases of an attempt at a step of the trapezoidal rule: an iteration, and the verdict on it."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite, infinity
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, length, report_failure
@@ -69,7 +70,7 @@ class Correct(PerBlock):
         dt = ti.cast(s.dt[w], s.real)
         last = s.velocity[w, i]
         v = solve.velocity(w, i, dt, solve.jacobian(w, i, s.time[w]))
-        change = ti.cast(ti.math.inf, s.real)
+        change = ti.cast(infinity(s.count[w]), s.real)
         if solve.reachable(w, i, v, dt):
             step = solve.phi(w) * dt * (v - last)
             change = step.norm() + solve.advance(w, i, v, dt)
@@ -102,8 +103,7 @@ class JudgeIteration(Phase):
         s.force_evaluations[w] += 1
         s.verdict[w] = RETRY
         solved = self.control.solved(w, change)
-        # Not below infinity: also true of NaN.
-        if solved or k >= self.control.iterations or not (change < ti.math.inf):
+        if solved or k >= self.control.iterations or not finite(change):
             if solved and self.control.accepts(w, error):
                 s.verdict[w] = ACCEPTED
             elif self.control.hopeless(s, w, s.dt[w]):

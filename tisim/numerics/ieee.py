@@ -1,0 +1,91 @@
+"""What IEEE 754 says of numbers that are not finite and of rounding, in both arithmetics.
+
+In fast arithmetic compilers take it that nothing is infinite, and regroup sums as if numbers were not
+rounded; NaN stays NaN. Where that must not be taken, a number passes through integers here.
+"""
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+
+INFINITE_BITS, SIZE_BITS = 0x7FF0000000000000, 0x7FFFFFFFFFFFFFFF
+"""These are the bits of infinity as an f64 number, and those of any such number that are not its sign."""
+
+
+def far_away() -> float:
+    """Return a distance (m) beyond all others, whose square the precision that runs still holds."""
+    return 1e150 if runtime.current().precision == "f64" else 1e18
+
+
+def is_fast() -> bool:
+    """Return whether the arithmetic that runs is the fast one."""
+    return runtime.current().arithmetic == "fast"
+
+
+@ti.func
+def finite(x):
+    """Return whether a number is neither infinite nor NaN."""
+    return (ti.bit_cast(ti.cast(x, ti.f64), ti.i64) & ti.i64(SIZE_BITS)) < ti.i64(INFINITE_BITS)
+
+
+@ti.func
+def infinity(count):
+    """Return infinity (f64). count : an integer >= 0 that is read from a field.
+
+    A constant would not do in fast arithmetic: what compilers find to be infinite may become anything.
+    """
+    number = ti.cast(ti.math.inf, ti.f64)
+    if ti.static(is_fast()):
+        number = ti.bit_cast(ti.i64(INFINITE_BITS) ^ (ti.cast(count, ti.i64) >> 63), ti.f64)
+    return number
+
+
+@ti.func
+def rounded(x, count):
+    """Return an f64 number as it is, rounded, so that no sum that it is part of is regrouped with those that
+    it enters. count : an integer >= 0 that is read from a field."""
+    number = x
+    if ti.static(is_fast()):
+        number = ti.bit_cast(ti.bit_cast(x, ti.i64) ^ (ti.cast(count, ti.i64) >> 63), ti.f64)
+    return number
+
+
+@ti.func
+def compensated_sum(total, term, carry, count):
+    """Return a sum (f64) with one term more, and its rounding error, which is carried along (W. Kahan 1965).
+    count : as of ``rounded``."""
+    step = term - carry
+    new = rounded(total + step, count)
+    return new, rounded(new - total, count) - step
+
+
+@ti.func
+def rounded_vector(x, unit):
+    """Return three numbers of the precision that runs as they are, rounded; see ``rounded``. unit : a number
+    of that precision between -1 and 1 that is read from a field."""
+    numbers = x
+    if ti.static(is_fast() and runtime.current().precision == "f64"):
+        # The highest bit of the exponent is that of numbers from 2 on.
+        nothing = (ti.bit_cast(unit, ti.i64) >> 62) & ti.i64(1)
+        for k in ti.static(range(3)):
+            numbers[k] = ti.bit_cast(ti.bit_cast(x[k], ti.i64) ^ nothing, ti.f64)
+    elif ti.static(is_fast()):
+        nothing = (ti.bit_cast(unit, ti.i32) >> 30) & 1
+        for k in ti.static(range(3)):
+            numbers[k] = ti.bit_cast(ti.bit_cast(x[k], ti.i32) ^ nothing, ti.f32)
+    return numbers
+
+
+@ti.func
+def same(a, b):
+    """Return for each of three numbers of the precision that runs whether their bits are the same."""
+    return ti.Vector([ti.cast(_bits(a[k]) == _bits(b[k]), ti.i32) for k in range(3)])
+
+
+@ti.func
+def _bits(x):
+    bits = ti.i64(0)
+    if ti.static(runtime.current().precision == "f64"):
+        bits = ti.bit_cast(x, ti.i64)
+    else:
+        bits = ti.cast(ti.bit_cast(x, ti.i32), ti.i64)
+    return bits

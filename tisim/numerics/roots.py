@@ -1,0 +1,24 @@
+"""Reciprocal roots by estimates and Newton's method, for fast arithmetic."""
+
+from tisim.backend import runtime
+from tisim.backend.taichi import ti
+from tisim.numerics.ieee import is_fast
+
+
+def estimates_roots() -> bool:
+    """Return whether estimates pay: in fast arithmetic on a CPU in f64, where roots and divisions take four
+    times as long as in f32, which is left to the hardware."""
+    now = runtime.current()
+    return is_fast() and now.device == "cpu" and now.precision == "f64"
+
+
+@ti.func
+def inverse_root(x):
+    """Return 1/sqrt(x), f64, to rounding, for 1e-37 < x < 1e38: what is not in the range of f32 gives what is
+    not finite.
+
+    The hardware's in f32, and a step of third order (E. Halley): y (1 + h/2 + 3/8 h^2), h = 1 - x y^2.
+    """
+    y = ti.cast(ti.cast(1.0, ti.f32) / ti.sqrt(ti.cast(x, ti.f32)), ti.f64)
+    h = 1.0 - x * y * y
+    return y + y * (h * (0.5 + 0.375 * h))
