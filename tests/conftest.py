@@ -1,5 +1,5 @@
-"""One runtime for the whole suite: cpu, f64 and strict arithmetic unless TISIM_DEVICE, TISIM_TEST_PRECISION and
-TISIM_TEST_ARITHMETIC say otherwise."""
+"""One runtime for the whole suite: cpu, f64 and strict arithmetic unless TISIM_DEVICE,
+TISIM_TEST_PRECISION and TISIM_TEST_ARITHMETIC say otherwise."""
 
 import json
 import os
