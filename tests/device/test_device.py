@@ -69,8 +69,8 @@ def test_a_device_and_the_cpu_agree(name, on_cpu):
 
 
 def test_a_step_is_some_launches_and_reads_no_more_than_who_goes_on(monkeypatch):
-    """Two launches of all worlds, a number read for the step, who is not at its end, and one for a loop, whose
-    list is due. Nothing else is launched, and no field is read between two looks."""
+    """Two launches of all worlds, a number read for the step, of worlds that go on, and one for a loop, of
+    those whose list is due. Nothing else is launched, and no field is read between two looks."""
     loaded, kernels, copies = simulation("grains"), Counter(), []
     launch = ti.lang.kernel_impl.Kernel.__call__
 
