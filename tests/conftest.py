@@ -12,7 +12,26 @@ import numpy as np
 import pytest
 
 from tisim.backend import runtime
+from tisim.errors import InputError
 from tisim.files import python_file
+
+ON_DEVICES = (
+    *("numerics/test_elementary.py", "numerics/test_philox.py", "neighbours/test_half_list.py"),
+    *("effects/contact/test_hertz_mindlin.py", "effects/contact/test_granular_impacts.py"),
+    *("effects/contact/test_walls.py", "effects/contact/test_contact.py", "effects/pair/test_near_field.py"),
+    *("effects/pair/test_mie.py", "effects/external/test_drag.py", "effects/magnetic/test_dipole_dipole.py"),
+    *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
+    "test_testing.py",
+)
+"""These files hold on every device: the contracts, and the physics of each kind of law."""
+
+
+def pytest_collection_modifyitems(items):
+    """Mark what is for devices too; TISIM_DEVICE names the one to run on."""
+    folder = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(folder).as_posix() in ON_DEVICES:
+            item.add_marker(pytest.mark.gpu)
 
 
 def pytest_configure(config):
@@ -24,11 +43,14 @@ def pytest_configure(config):
 @pytest.fixture(scope="session", autouse=True)
 def the_runtime():
     """The settings that every test in this process runs under."""
-    return runtime.init(
-        device=os.environ.get("TISIM_DEVICE", "cpu"),
-        precision=os.environ.get("TISIM_TEST_PRECISION", "f64"),
-        arithmetic=os.environ.get("TISIM_TEST_ARITHMETIC", "strict"),
-    )
+    try:
+        return runtime.init(
+            device=os.environ.get("TISIM_DEVICE", "cpu"),
+            precision=os.environ.get("TISIM_TEST_PRECISION", "f64"),
+            arithmetic=os.environ.get("TISIM_TEST_ARITHMETIC", "strict"),
+        )
+    except InputError as absent:
+        pytest.skip(str(absent))
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from tisim.engine.batches import Batches, rounded
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"device": "tpu"}, "device must be one of cpu, cuda; received 'tpu'"),
+        ({"device": "tpu"}, "device must be one of cpu, cuda, vulkan; received 'tpu'"),
         ({"precision": "f16"}, "precision must be one of f64, f32; received 'f16'"),
         ({"arithmetic": "loose"}, "arithmetic must be one of strict, fast; received 'loose'"),
         ({"threads": -1}, r"threads must be a whole number, at least 1 \(0 for all cores\); received -1"),

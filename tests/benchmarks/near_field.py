@@ -43,9 +43,9 @@ def start(n: int) -> tuple[np.ndarray, np.ndarray]:
     return lattice + draw.uniform(-0.2, 0.2, (n, 3)), draw.normal(size=n)
 
 
-def by_tisim(position: np.ndarray, charge: np.ndarray, schedule: str | None) -> Sums:
+def scene(position: np.ndarray, charge: np.ndarray) -> Scene:
     """Verlet steps so short that nothing moves."""
-    scene = Scene(
+    return Scene(
         particles=Particles(
             position=position,
             velocity=np.zeros_like(position),
@@ -58,8 +58,13 @@ def by_tisim(position: np.ndarray, charge: np.ndarray, schedule: str | None) -> 
         stepper=Verlet(control=FixedStep(dt=1e-12)),
         duration=1.0,
     )
-    simulation = Simulation(scene, schedule=schedule)
-    simulation.load([scene])
+
+
+def by_tisim(position: np.ndarray, charge: np.ndarray, schedule: str | None) -> Sums:
+    """Steps of the package."""
+    steady = scene(position, charge)
+    simulation = Simulation(steady, schedule=schedule)
+    simulation.load(steady)
     return simulation.program.advance, lambda: simulation.s.read("force")[0]
 
 

@@ -33,7 +33,7 @@ WRONG = [
     (["vibration", "--budget", "-1"], "budget must be greater than 0; received -60.0"),
     (["agglomeration", "--starts", "4,x"], "--starts must be whole numbers with commas between; received"),
     (["agglomeration", "--starts", "1"], "starts must be at least 2; received [1]"),
-    (["agglomeration", "--device", "abacus"], "device must be one of cpu, cuda; received 'abacus'"),
+    (["agglomeration", "--device", "abacus"], "device must be one of cpu, cuda, vulkan; received 'abacus'"),
 ]
 
 

@@ -30,7 +30,7 @@ WRONG = [
     (["run", "agglomeration", "--without", "heating"], "must be used together with effects.heating"),
     (["explain", "agglomeration", "--without", "impact"], "must be used together with effects.impact"),
     (["run", "FLOW", "--without", "impact", "--set", "effects.impact.hardness=1"], "a setting of this scene"),
-    (["run", "FLOW", "--device", "abacus"], "device must be one of cpu, cuda; received 'abacus'"),
+    (["run", "FLOW", "--device", "abacus"], "device must be one of cpu, cuda, vulkan; received 'abacus'"),
     (["run", "FLOW", "--precision", "f16"], "precision must be one of f64, f32; received 'f16'"),
     (["run", "FLOW", "--resume"], "output folder must be one that an interrupted run has left"),
     (["run", "agglomeration", "--size", "huge"], "size must be one of small, default, paper; received"),

@@ -130,14 +130,16 @@ def processor_support(cpu: dict[str, str], llvm: str) -> str:
 
 
 def findings() -> list[Finding]:
-    """Return the report. This takes some seconds, and starts nothing in this process but looks at CUDA."""
+    """Return the report. This takes some seconds, and starts nothing in this process but looks at CUDA
+    and Vulkan."""
     cpu, llvm = processor(), llvm_version()
     report = [
         Finding("backend", runtime.backend(), f"LLVM {llvm}"),
         Finding("processor", cpu.get("model name", "unknown"), processor_support(cpu, llvm)),
         Finding("cores", str(runtime.cores()), f"{os.cpu_count()} in the machine"),
         Finding("memory", _memory()),
-        Finding("cuda", "present" if _cuda() else "absent", "" if _cuda() else "--device cpu only"),
+        Finding("cuda", "present" if _cuda() else "absent", "" if _cuda() else "no --device cuda"),
+        Finding("vulkan", "present" if _vulkan() else "absent", "" if _vulkan() else "no --device vulkan"),
     ]
     rates = {name: rate_of(name) for name in ("taichi", "quadrants")}
     for name, rate in rates.items():
@@ -166,6 +168,11 @@ def _advice(rates: dict[str, float | None]) -> Finding:
 def _cuda() -> bool:
     """Return whether a CUDA driver is there that a kernel could run on."""
     return any(Path(device).exists() for device in ("/dev/nvidia0", "/dev/dxg")) and ti._lib.core.with_cuda()
+
+
+def _vulkan() -> bool:
+    """Return whether a Vulkan driver is there; whether its loops end where they should, a start tells."""
+    return bool(ti._lib.core.with_vulkan())
 
 
 def _memory() -> str:

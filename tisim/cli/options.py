@@ -70,7 +70,7 @@ Out = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed of all that is random.")]
 Size = Annotated[str | None, typer.Option(help="Size of the case; 'tisim cases' lists those of each.")]
-Device = Annotated[str, typer.Option(help="cpu or cuda.")]
+Device = Annotated[str, typer.Option(help="cpu, cuda or vulkan.")]
 Precision = Annotated[str, typer.Option(help="f64 or f32.")]
 Arithmetic = Annotated[
     str,

@@ -1,0 +1,92 @@
+"""A device makes of a scene what the CPU makes of it, to rounding; and how often a step has to wait for it.
+
+TISIM_DEVICE=cuda python -m pytest -n 0 -m gpu
+"""
+
+import os
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from tests.device.scenes import SCENES, STEPS
+from tests.scenes import compiled
+from tisim.backend.taichi import ti
+from tisim.worlds.program import Launch, Loop
+from tisim.worlds.state import State
+
+pytestmark = [
+    pytest.mark.gpu,
+    pytest.mark.skipif(
+        os.environ.get("TISIM_DEVICE", "cpu") == "cpu", reason="TISIM_DEVICE names no device: cuda or vulkan"
+    ),
+]
+MAGNIFIED = {"grains": 1e-11, "impacts": 1e-9, "fast": 1e-11}
+"""What rounding may have grown to in so few steps, relative to the largest value."""
+ON_CPU = """
+import sys
+import numpy as np
+from tests.device.scenes import SCENES
+from tisim import Simulation
+
+for name, scene in SCENES.items():
+    simulation = Simulation(scene())
+    simulation.load(scene())
+    simulation.run()
+    (result,) = simulation.results()
+    np.savez(f"{sys.argv[1]}/{name}.npz", **result.state)
+"""
+
+
+@pytest.fixture(scope="module")
+def on_cpu(tmp_path_factory):
+    """The states that the CPU makes, by name of the scene."""
+    folder = tmp_path_factory.mktemp("cpu")
+    command = [sys.executable, "-c", ON_CPU, str(folder)]
+    subprocess.run(command, check=True, env={**os.environ, "TISIM_DEVICE": "cpu"})
+    return {name: dict(np.load(folder / f"{name}.npz")) for name in SCENES}
+
+
+def simulation(name):
+    """The compiled simulation of a scene, loaded with it."""
+    scene = SCENES[name]()
+    loaded = compiled(scene, capacity=scene.capacity())
+    loaded.load(scene)
+    return loaded
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_device_and_the_cpu_agree(name, on_cpu):
+    loaded = simulation(name)
+    loaded.run()
+    (result,) = loaded.results()
+    assert result.status.ok, result.status.reason
+    for field, expected in on_cpu[name].items():
+        tolerance = MAGNIFIED[name] * np.abs(expected).max()
+        np.testing.assert_allclose(result.state[field], expected, rtol=0, atol=tolerance, err_msg=field)
+
+
+def test_a_step_is_some_launches_and_reads_no_more_than_who_goes_on(monkeypatch):
+    """Two launches of all worlds, a number read for the step, of worlds that go on, and one for a loop, of
+    those whose list is due. Nothing else is launched, and no field is read between two looks."""
+    loaded, kernels, copies = simulation("grains"), Counter(), []
+    launch = ti.lang.kernel_impl.Kernel.__call__
+
+    def counted(kernel, *args, **options):
+        kernels[kernel.func.__name__] += 1
+        return launch(kernel, *args, **options)
+
+    monkeypatch.setattr(ti.lang.kernel_impl.Kernel, "__call__", counted)
+    monkeypatch.setattr(State, "snapshot", lambda *_: copies.append(1))
+    loaded.program.advance(STEPS)
+    plan = loaded.program.plan
+    loops, direct = (sum(isinstance(item, kind) for item in plan) for kind in (Loop, Launch))
+    rebuilds = kernels["count"] - STEPS * loops
+    assert direct == 2
+    assert rebuilds < STEPS / 2
+    assert kernels["run"] == STEPS * direct + rebuilds
+    assert kernels["_count_going_on"] == STEPS
+    assert kernels.total() == kernels["run"] + kernels["count"] + STEPS + 1
+    assert not copies

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# What a device is tried with: the tests marked gpu, then a dated record of speed; within 8 minutes on a card.
+#
+#     tests/gpu.sh [cuda|vulkan]
+#
+# On vulkan sizes are small: Mesa's software device compiles a step for a minute.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+device=${1:-cuda}
+export TISIM_DEVICE=$device
+if [ "$device" = cuda ]; then
+    limits=(--most 1000000 --worlds 4096 --limit 180)
+    tests=(tests)
+else
+    limits=(--most 1000 --worlds 16 --limit 120)
+    tests=(tests/device tests/numerics)
+fi
+timeout 270 python -m pytest -q -rs -n 0 -m "gpu and not slow" "${tests[@]}"
+tested=$?
+TISIM_DEVICE= python tests/benchmarks/scaling.py --device "$device" "${limits[@]}" || exit
+exit $tested
