@@ -210,6 +210,7 @@ def test_a_list_that_overflows_at_one_time_and_not_at_another_stops_no_world(mon
     """Run once more from an image the list is made in other steps, none of them in the ring: the world is as
     good as any."""
     monkeypatch.setattr(replay, "EVERY", 0.0)
+    monkeypatch.setattr(replay, "IMAGES", np.inf)
     made = through_a_ring()
     simulation = Simulation(made)
     row = simulation.assembly.pairs.half_list.row

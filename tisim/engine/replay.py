@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
 Image = dict[str, np.ndarray]
 EVERY = 10.0
-"""This wall time (s) passes between images of the whole state, from which worlds can go on."""
+"""This wall time (s) passes at least between images of the whole state, from which worlds can go on."""
+IMAGES = 0.05
+"""At most this part of the time goes into making images: one of a million grains takes seconds."""
 
 
 class Replay:
@@ -39,12 +41,14 @@ class Replay:
     """
 
     def __init__(self, simulation: Simulation, base: Image | None) -> None:
-        self.simulation, self.base, self.saved_at = simulation, base, time.perf_counter()
+        self.simulation, self.base, self.saved_at, self.pause = simulation, base, time.perf_counter(), EVERY
 
     def save_image(self) -> None:
         """Make the image anew, where that is due; every world that runs must be good."""
-        if time.perf_counter() - self.saved_at > EVERY:
+        began = time.perf_counter()
+        if began - self.saved_at > self.pause:
             self.base, self.saved_at = self.whole(), time.perf_counter()
+            self.pause = max(EVERY, (self.saved_at - began) / IMAGES)
 
     def whole(self) -> Image:
         """Return an image of worlds as they are, or as they were, where a step is under way."""

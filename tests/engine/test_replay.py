@@ -1,0 +1,24 @@
+"""Images of the whole state, from which a failed world is run once more."""
+
+import time
+from types import SimpleNamespace
+
+import numpy as np
+
+from tisim.engine import replay
+
+
+def test_images_that_take_long_are_made_seldom(monkeypatch):
+    """Of a million grains one takes seconds, which would be most of the time."""
+    made = []
+
+    def image():
+        made.append(time.sleep(0.02))
+        return {"underway": np.zeros(1)}
+
+    monkeypatch.setattr(replay, "EVERY", 0.0)
+    one = replay.Replay(SimpleNamespace(s=SimpleNamespace(image=image)), None)
+    began = time.perf_counter()
+    while time.perf_counter() - began < 0.3:
+        one.save_image()
+    assert len(made) == 1
