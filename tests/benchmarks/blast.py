@@ -1,6 +1,7 @@
 """Particle-steps per second of the blast without interaction, beside a numba program of the same scheme.
 
     python tests/benchmarks/blast.py [--numbers 2000 100000] [--duration 0.2] [--repeats 7] [--threads 2]
+        [--arithmetic strict]
 
 Runs of the two alternate, after both have compiled; the ratio is the median over pairs of runs.
 TISIM_BACKEND=quadrants chooses the other kernel compiler.
@@ -86,8 +87,9 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=0.2)
     parser.add_argument("--repeats", type=int, default=7)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--arithmetic", choices=runtime.ARITHMETICS, default="strict")
     args = parser.parse_args()
-    runtime.init(threads=args.threads)
+    runtime.init(threads=args.threads, arithmetic=args.arithmetic)
     numba.set_num_threads(args.threads)
     for number in args.numbers:
         compare(number, args.duration * min(1.0, 5000 / number), args.repeats)

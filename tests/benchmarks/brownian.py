@@ -1,6 +1,6 @@
 """Brownian steps per second beside numba and LAPACK, all in one run.
 
-    python tests/benchmarks/brownian.py [--repeats 5] [--threads 2] [--small]
+    python tests/benchmarks/brownian.py [--repeats 5] [--threads 2] [--small] [--arithmetic strict]
 
 Spheres in a trap. Without interaction: 100 in each of 30 worlds, and many in one. With Rotne and Prager's
 tensor: 100 in each of 30 worlds, noise exact and fast. Peers: brownian_numba.py. Times are medians of runs
@@ -103,12 +103,14 @@ def main() -> None:
     ask.add_argument("--repeats", type=int, default=5)
     ask.add_argument("--threads", type=int, default=runtime.cores())
     ask.add_argument("--small", action="store_true", help="a tenth of the steps")
+    ask.add_argument("--arithmetic", choices=runtime.ARITHMETICS, default="strict")
     options = ask.parse_args()
-    runtime.init(threads=options.threads)
+    runtime.init(threads=options.threads, arithmetic=options.arithmetic)
     numba.set_num_threads(options.threads)
     less = 10 if options.small else 1
     print(
-        f"{runtime.backend()}, numba {numba.__version__}, numpy {np.__version__}, {options.threads} threads"
+        f"{runtime.backend()}, {options.arithmetic}, numba {numba.__version__}, numpy {np.__version__}, "
+        f"{options.threads} threads"
     )
 
     for worlds, number, steps in ((WORLDS, NUMBER, 4000 // less), (1, 100_000, 100 // less)):

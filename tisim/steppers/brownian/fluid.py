@@ -73,6 +73,15 @@ class Fluid:
     @ti.func
     def normals(self, w, i, step):
         """Return three independent standard normal numbers, those of a particle in a step."""
-        s = self.s
-        g = philox.normals(philox.bits(s.seed[w], BROWNIAN_MOTION, s.id[w, i], step))
-        return ti.cast(ti.Vector([g[0], g[1], g[2]]), s.real)
+        return self.normals_of(self.words(w, i, step))
+
+    @ti.func
+    def words(self, w, i, step):
+        """Return the four random words of a particle in a step."""
+        return philox.bits(self.s.seed[w], BROWNIAN_MOTION, self.s.id[w, i], step)
+
+    @ti.func
+    def normals_of(self, words):
+        """Return the three normal numbers that four words make."""
+        g = philox.normals(words)
+        return ti.cast(ti.Vector([g[0], g[1], g[2]]), self.s.real)

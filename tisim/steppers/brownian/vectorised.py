@@ -63,6 +63,8 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
         place = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         drift = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         force = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
+        words = [ti.Vector([0] * TILE, ti.u32) for _ in ti.static(range(4))]
+        noise = [ti.Vector([0.0] * TILE, s.real) for _ in ti.static(range(3))]
         intervals, finished, halted = ti.cast(s.launch_intervals[w], ti.i32), 0, 0
         while finished < intervals and halted == 0:
             begin = beginning(s, self.control, w, s.intervals[w] + finished)
@@ -70,6 +72,16 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
             number, step = self.number(s.intervals[w] + finished), ti.cast(dt, s.real)
             if not (dt > 0.0):
                 halted = 1
+            # In loops of their own: one long chain of operations for each particle would fill the processor's
+            # queues, so that the next ones could not begin.
+            for lane in range(TILE):
+                drawn = self.lane_fluid.words(w, first + lane, number)
+                for k in ti.static(range(4)):
+                    words[k][lane] = drawn[k]
+            for lane in range(TILE):
+                g = self.lane_fluid.normals_of(ti.Vector([words[k][lane] for k in ti.static(range(4))]))
+                for k in ti.static(range(3)):
+                    noise[k][lane] = g[k]
             for lane in range(TILE):
                 i = first + lane
                 f = 0.0 * s.force[w, i]
@@ -78,7 +90,7 @@ class VectorisedBrownianSteps(IndependentBrownianSteps):
                     self.lane_force_sum.single_particle(w, i, begin)
                 mobility = self.lane_fluid.mobility(w, i)
                 push_velocity = self.lane_fluid.push_velocity(w, i, mobility)
-                g = self.lane_fluid.normals(w, i, number)
+                g = ti.Vector([noise[k][lane] for k in ti.static(range(3))])
                 v, r = euler_step(
                     self.lane_state, self.lane_fluid, w, i, mobility, push_velocity, begin, step, g
                 )
