@@ -6,6 +6,7 @@ import pytest
 from tests.scenes import HEAT_CAPACITY, by_id, check_sums, scene, simulate
 from tisim import Box, InputError
 from tisim.effects import Heating, Impact
+from tisim.engine.loading import check_sides
 from tisim.steppers import ApproachTime, Verlet
 
 
@@ -67,6 +68,21 @@ def test_a_rounding_below_the_near_face_is_the_near_face():
 def test_a_start_outside_the_box_is_refused():
     with pytest.raises(InputError, match=r"particles.position must be inside the domain; received"):
         run([drift([[5.0, 0, 0]], [[0.0, 0, 0]])])
+
+
+def test_a_box_in_which_two_could_touch_twice_is_refused():
+    """Of another particle each sees one image. Without images, or open, a box may be narrower."""
+    for settings in ({}, {"images": False}, {"periodic": (True, False, True)}):
+        box = Box(low=(0.0,) * 3, high=(2.0, 1.0, 2.0), **settings)
+        made = scene([[0.5] * 3, [1.5, 0.5, 0.5]], np.zeros((2, 3)), (Impact(hardness=1e9),), 0.3, domain=box)
+        start = made.particles.arrays(box, 0)
+        if settings:
+            check_sides(made, start)
+        else:
+            with pytest.raises(
+                InputError, match=r"box must be at least 1.2 m wide where it is periodic, twice"
+            ):
+                check_sides(made, start)
 
 
 @pytest.mark.long

@@ -71,7 +71,7 @@ def clouds(rng):
     yield "in a plane", anywhere(200) * [1, 1, 0] + [0, 0, 0.5], 0.02
     yield "in a line", anywhere(200) * [1, 0, 0] + [0, 0, 0.5], 0.001
     yield "one", anywhere(1), 0.1
-    yield "two", anywhere(2), 0.4
+    yield "two", anywhere(2), 0.24
     yield "last without a list", anywhere(pair_list.SMALL_WORLD), 0.1
     yield "first with a list", anywhere(pair_list.SMALL_WORLD + 1), 0.1
 

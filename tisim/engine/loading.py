@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tisim.backend import runtime
-from tisim.effects.base import PairEvent
+from tisim.effects.base import PairEvent, Pairwise
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -26,6 +26,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     if low is not None:
         inside = (start["position"] >= low) & (start["position"] < high) | ~np.array(scene.domain.joined())
         must(bool(inside.all()), "particles.position", "inside the domain", "a particle outside")
+        check_sides(scene, start)
     field_names = {f.name for f in fields} | SHARED.keys()
     for name in start:
         must(
@@ -56,6 +57,21 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     worst = float(farthest[coarse][0]) if coarse.any() else 0.0
     rule = f"so near the origin that {runtime.current().precision} rounds it by less than a radius"
     must(not coarse.any(), "particles.position", rule, worst)
+
+
+def check_sides(scene: Scene, start: Arrays) -> None:
+    """Raise InputError where one could touch another and its image at once: it sees the nearest alone."""
+    low, high = scene.domain.bounds()
+    near = any(
+        isinstance(effect, PairEvent) or (isinstance(effect, Pairwise) and effect.short_ranged)
+        for effect in scene.effects
+    )
+    if low is None or high is None or not near or len(start["radius"]) < 2:
+        return
+    reach = 2 * float(np.partition(start["radius"], -2)[-2:].sum())
+    narrow = np.array(scene.domain.imaged()) & (high - low < reach)
+    rule = f"at least {reach:g} m wide where it is periodic, twice what two of its particles that touch take"
+    must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 
 def check_field(f: Field, values: np.ndarray, n: int) -> None:
