@@ -31,7 +31,7 @@ from tisim.steppers.common import BeginStep
 from tisim.steppers.verlet import Advance
 from tisim.testing import assert_fields, assert_lists, assert_reach
 from tisim.worlds.fields import Field
-from tisim.worlds.program import PerParticle
+from tisim.worlds.phases import PerParticle
 
 SHELL = SoftShell(stiffness=1.0, width=0.3)
 

@@ -14,7 +14,7 @@ import pytest
 from tests.device.scenes import SCENES, STEPS
 from tests.scenes import compiled
 from tisim.backend.taichi import ti
-from tisim.worlds.program import Launch, Loop
+from tisim.worlds.launches import Launch, Loop
 from tisim.worlds.state import State
 
 pytestmark = [

@@ -13,7 +13,7 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
 from tisim.engine import replay
 from tisim.interactions import pair_chunks
-from tisim.neighbours import half_list
+from tisim.neighbours import half_list, search_rows
 from tisim.steppers import Boris, FixedStep
 
 WORLDS, CAPACITY, STEPS, DT, GAP, SLOTS = 18, 300, 4, 1.0, 0.02, 32
@@ -159,7 +159,7 @@ def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_th
     u = speed * dt / 2 / diameter / (1 - half_list.REACH_PART)
     # The least of 2 u / x * REBUILD_COST + n (1 + x)^3, of what a skin of x diameters costs.
     x = np.linspace(0.01, 0.5, 4901)
-    cost = 2 * u / x * half_list.REBUILD_COST + half_list.FEWEST_PAIRS * (1 + x) ** 3
+    cost = 2 * u / x * search_rows.REBUILD_COST + search_rows.FEWEST_PAIRS * (1 + x) ** 3
     assert chosen_skin(simulation) == pytest.approx(diameter * x[np.argmin(cost)], rel=1e-2)
     simulation.close()
 

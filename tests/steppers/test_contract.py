@@ -12,7 +12,7 @@ from tisim.backend.taichi import ti
 from tisim.effects import parameter
 from tisim.steppers import Controller, Step, Stepper
 from tisim.worlds.fields import Field
-from tisim.worlds.program import PerParticle, Phase, Repeat
+from tisim.worlds.phases import PerParticle, Phase, Repeat
 
 
 class Begin(Phase):

@@ -24,6 +24,7 @@ from tisim.interactions.force_sum import (
 from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, PairTerms, fuse, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import Rearrange, StoreBefore
+from tisim.interactions.rebuild_pairs import update_pairs
 from tisim.interactions.self_consistent import SelfConsistentSolver, solver
 from tisim.interactions.spatial_sort import SpatialSort
 from tisim.neighbours.cell_list import list_phases
@@ -37,7 +38,7 @@ from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.step_control import FixedStep, StepControl
 from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.fields import Field
-from tisim.worlds.program import Item
+from tisim.worlds.phases import Item
 from tisim.worlds.state import State
 
 
@@ -110,7 +111,7 @@ class Assembly:
         components = 6 if turning([effect.data for effect in effects]) else 3
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
         self.left = PairTerms(self.pairs, components) if self.pairs and listed else None
-        pairs = self.pairs.phases() if self.pairs else ()
+        pairs = update_pairs(self.pairs) if self.pairs else ()
         events_lists = list_phases(near) if near else ()
         lists = (*events_lists, *pairs)
         force_sum = self._sum(SumForces)

@@ -24,7 +24,8 @@ from tisim.neighbours import pair_list
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.program import Nest, Program
+from tisim.worlds.phases import Nest
+from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16

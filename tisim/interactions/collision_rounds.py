@@ -23,7 +23,7 @@ symmetric as the grains were: see docs/agglomeration.md.
 from tisim.backend.taichi import ti
 from tisim.interactions.contact_list import ContactList
 from tisim.numerics.ieee import finite
-from tisim.worlds.program import Phase, Repeat
+from tisim.worlds.phases import Phase, Repeat
 
 
 class PerContact(Phase):

@@ -9,7 +9,7 @@ from tisim.components.domain import Domain
 from tisim.effects.base import PairEvent
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.worlds.bound import Bound
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
 from tisim.worlds.bound import Bound
-from tisim.worlds.program import Item, PerParticle
+from tisim.worlds.phases import Item, PerParticle
 from tisim.worlds.state import State
 
 

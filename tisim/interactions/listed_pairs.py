@@ -13,7 +13,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_chunks import OfChunks, PairChunks
-from tisim.worlds.program import Item, PerParticle, Phase
+from tisim.worlds.phases import Item, PerParticle, Phase
 
 if TYPE_CHECKING:
     from tisim.interactions.force_sum import SumForces

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.numerics.roots import inverse_root
-from tisim.worlds.program import PerParticle
+from tisim.worlds.phases import PerParticle
 
 if TYPE_CHECKING:
     from tisim.components.domain import Domain

@@ -4,10 +4,11 @@ from typing import Any
 
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.interactions.pair_chunks import PairChunks, StoreMemory
+from tisim.interactions.pair_chunks import PairChunks
+from tisim.interactions.rebuild_pairs import StoreMemory
 from tisim.neighbours.lists import NeighbourLists
 from tisim.worlds.bound import Bound
-from tisim.worlds.program import Phase
+from tisim.worlds.phases import Phase
 from tisim.worlds.state import State
 
 

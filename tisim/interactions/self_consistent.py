@@ -17,7 +17,7 @@ from tisim.interactions.pair_sum import PairSum
 from tisim.numerics.ieee import finite
 from tisim.numerics.vectors import piece
 from tisim.worlds.bound import Bound
-from tisim.worlds.program import Item, PerParticle, Phase, Repeat
+from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 

@@ -12,11 +12,12 @@ from typing import Any
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.interactions.pair_chunks import BeginRebuild, PairChunks, StoreMemory
+from tisim.interactions.pair_chunks import PairChunks
+from tisim.interactions.rebuild_pairs import BeginRebuild, StoreMemory
 from tisim.neighbours.cell_grid import CellGrid, OfGrid, OfParticles, cell_phases, measure_phases
-from tisim.neighbours.half_list import NoteReach
 from tisim.neighbours.lists import NeighbourLists
-from tisim.worlds.program import Item, Repeat
+from tisim.neighbours.search_rows import NoteReach
+from tisim.worlds.phases import Item, Repeat
 
 SORTED_FROM = 4096
 """Worlds of at least this many particles are sorted: where all fit into the cache, order is worth nothing."""

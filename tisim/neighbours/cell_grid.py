@@ -12,8 +12,8 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.numerics.ieee import finite
 from tisim.worlds.bound import Bound
+from tisim.worlds.phases import Phase
 from tisim.worlds.prefix_sum import PrefixSum
-from tisim.worlds.program import Phase
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
 

@@ -4,7 +4,7 @@ from tisim.backend.taichi import ti
 from tisim.neighbours.pair_list import NeighbourList
 from tisim.numerics import elementary
 from tisim.numerics.ieee import finite
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
 

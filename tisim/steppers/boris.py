@@ -20,7 +20,7 @@ from tisim.steppers.context import Step, StepContext
 from tisim.steppers.implicit.one_particle import solved, summed_jacobian, with_jacobian
 from tisim.steppers.step_control import Controller, FixedStep
 from tisim.worlds.fields import Field
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 
 
 class Boris(Stepper):

@@ -3,7 +3,7 @@
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import compensated_sum, finite
 from tisim.steppers.context import StepContext
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
 

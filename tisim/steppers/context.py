@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tisim.interactions.force_sum import SumForces
     from tisim.neighbours.lists import NeighbourLists
     from tisim.worlds.bound import Bound, Peers
-    from tisim.worlds.program import Item
+    from tisim.worlds.phases import Item
     from tisim.worlds.state import State
 
 

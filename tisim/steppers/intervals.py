@@ -8,7 +8,7 @@ end anywhere: where each particle is on its way is in its own clock.
 from tisim.backend.taichi import ti
 from tisim.steppers.context import StepContext
 from tisim.worlds.fields import Field
-from tisim.worlds.program import Phase
+from tisim.worlds.phases import Phase
 from tisim.worlds.status import WorldStatus
 
 LAUNCH_ATTEMPTS = 2**20

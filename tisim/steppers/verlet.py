@@ -14,7 +14,7 @@ from tisim.steppers.base import Stepper
 from tisim.steppers.common import BeginStep, advance_clock, apply_displacement, drift
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 
 
 class Verlet(Stepper):

@@ -7,7 +7,7 @@ from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.worlds.program import Phase
+from tisim.worlds.phases import Phase
 from tisim.worlds.state import State
 
 LEAST_BLOCK = {"cpu": 4096}

@@ -4,7 +4,7 @@ from tisim.backend.taichi import ti
 from tisim.steppers.brownian.drift_limit import fault
 from tisim.steppers.common import advance_clock, apply_displacement
 from tisim.steppers.context import StepContext
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 
 
 @ti.data_oriented

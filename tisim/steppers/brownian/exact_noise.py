@@ -10,7 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.errors import must
 from tisim.interactions.pair_sum import PairSum
 from tisim.worlds.fields import Field
-from tisim.worlds.program import PerParticle, Phase
+from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.status import WorldStatus
 
 GAUSS = Field("gauss", "", 3, "keep", scratch=True)

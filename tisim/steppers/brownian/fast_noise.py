@@ -17,7 +17,7 @@ from tisim.backend.taichi import ti
 from tisim.interactions.pair_sum import PairSum
 from tisim.steppers.brownian.exact_noise import GAUSS, Draw
 from tisim.worlds.fields import Field
-from tisim.worlds.program import Phase
+from tisim.worlds.phases import Phase
 from tisim.worlds.status import WorldStatus
 
 SUMS = (

@@ -12,7 +12,7 @@ from tisim.steppers.context import StepContext
 from tisim.steppers.intervals import LITTLE, OWN_CLOCK, EndIntervals, beginning, duration
 from tisim.steppers.registers import Registers
 from tisim.worlds.fields import Field
-from tisim.worlds.program import PerParticle
+from tisim.worlds.phases import PerParticle
 from tisim.worlds.status import WorldStatus
 
 OWN_BROWNIAN_FIELDS = (

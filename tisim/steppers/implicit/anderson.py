@@ -11,7 +11,7 @@ from tisim.numerics.ieee import finite
 from tisim.steppers.context import StepContext
 from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.fields import Field
-from tisim.worlds.program import Item, PerParticle
+from tisim.worlds.phases import Item, PerParticle
 
 
 def memory_of_iterates(turning: bool) -> tuple[Field, ...]:

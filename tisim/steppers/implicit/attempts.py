@@ -4,7 +4,7 @@ from tisim.backend.taichi import ti
 from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.saved_state import SavedState
-from tisim.worlds.program import Item, PerParticle, Phase, Repeat
+from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 from tisim.worlds.status import WorldStatus
 
 RETRY, ACCEPTED, HOPELESS = range(3)

@@ -27,7 +27,7 @@ from tisim.steppers.implicit.stage_control import StageControl
 from tisim.steppers.implicit.stages import Stages
 from tisim.worlds.block_sum import BlockSums
 from tisim.worlds.fields import Field
-from tisim.worlds.program import Item
+from tisim.worlds.phases import Item
 
 
 class Collocation(Stepper):

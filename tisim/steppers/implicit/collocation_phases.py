@@ -8,7 +8,7 @@ from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, length
 from tisim.worlds.block_sum import PerBlock
-from tisim.worlds.program import Item, PerParticle, Phase, Repeat
+from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 
 
 class Forget(Phase):

@@ -10,7 +10,7 @@ from typing import Literal
 
 from tisim.backend.taichi import ti
 from tisim.worlds.fields import Field
-from tisim.worlds.program import PerParticle
+from tisim.worlds.phases import PerParticle
 
 Per = Literal["step", "run"]
 """This says what an error that is asked for is of: a step, over the displacement in it, or the end of a run,

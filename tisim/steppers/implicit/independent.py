@@ -12,7 +12,7 @@ from tisim.steppers.implicit.excursion import note_excursion
 from tisim.steppers.implicit.saved_state import saved_fields
 from tisim.steppers.intervals import LITTLE, beginning, duration
 from tisim.steppers.registers import Registers
-from tisim.worlds.program import PerParticle
+from tisim.worlds.phases import PerParticle
 
 
 class IndependentSteps(PerParticle):

@@ -33,7 +33,7 @@ from tisim.steppers.intervals import (
 )
 from tisim.worlds.block_sum import BlockSums
 from tisim.worlds.fields import Field
-from tisim.worlds.program import Item
+from tisim.worlds.phases import Item
 
 OWN_STEP_FIELDS = (Field("own_dt", "s", 1, "keep", scratch=True), *OWN_CLOCK)
 """These are the fields of a particle that takes steps of its own: the length of the next one, and its

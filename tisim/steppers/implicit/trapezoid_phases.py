@@ -6,7 +6,7 @@ from tisim.steppers.common import note_displacement
 from tisim.steppers.context import StepContext
 from tisim.steppers.implicit.attempts import ACCEPTED, HOPELESS, RETRY, SHORTER, length, report_failure
 from tisim.worlds.block_sum import PerBlock
-from tisim.worlds.program import Item, PerParticle, Phase, Repeat
+from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 
 
 class Iteration(Repeat):
