@@ -67,14 +67,13 @@ def timed(scenes: list[tisim.Scene]) -> tuple[float, float]:
     simulation.load(scenes)
     simulation.run(steps=2)
     compiling = time.perf_counter() - began
-    steps, taken, done = 4, 0.0, 0
-    while taken < SECONDS / 4 and len(simulation.ended()) < len(scenes):
+    steps, taken, done = 4, 0.0, -sum(result.work["particle_steps"] for result in simulation.results())
+    while taken < SECONDS / 2 and len(simulation.ended()) < len(scenes):
         steps *= 2
-        before = sum(result.work["particle_steps"] for result in simulation.results())
         began = time.perf_counter()
         simulation.run(steps=steps)
-        taken = time.perf_counter() - began
-        done = sum(result.work["particle_steps"] for result in simulation.results()) - before
+        taken += time.perf_counter() - began
+    done += sum(result.work["particle_steps"] for result in simulation.results())
     simulation.close()
     return taken / max(done, 1) * 1e9, compiling
 

@@ -15,6 +15,7 @@ from tisim.engine import replay
 from tisim.interactions import pair_chunks
 from tisim.neighbours import half_list, search_rows
 from tisim.steppers import Boris, FixedStep
+from tisim.worlds import prefix_sum
 
 WORLDS, CAPACITY, STEPS, DT, GAP, SLOTS = 18, 300, 4, 1.0, 0.02, 32
 
@@ -63,6 +64,8 @@ def listed(simulation):
 def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
     """At the start, and after steps in which some move far and most do not; crowds make the list grow."""
     monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", SLOTS)
+    # Sums of many blocks.
+    monkeypatch.setitem(prefix_sum.LEAST_BLOCK, "cpu", 2)
     domain, names, scenes = DOMAINS[domain], [], []
     for name, position, radius in clouds(rng):
         names.append(name)

@@ -9,24 +9,24 @@ import numpy as np
 
 from tisim.backend.taichi import ti
 
-THREADS, ROUNDS, LONG = 256, 7, 70_000
+COUNTED_THREADS, COUNTED_ROUNDS, LONG_LOOP = 256, 7, 70_000
 """Of so many threads one adds so often and the others not at all; one goes through a long loop."""
 
 
 def end_where_they_should() -> bool:
     """Return whether loops end where they should."""
-    counts = np.zeros(THREADS, np.int32)
-    _count(ROUNDS, LONG, counts)
-    expected = np.where(np.arange(THREADS) < ROUNDS, 1, 0)
-    expected[-1] = LONG
+    counts = np.zeros(COUNTED_THREADS, np.int32)
+    _count(COUNTED_ROUNDS, LONG_LOOP, counts)
+    expected = np.where(np.arange(COUNTED_THREADS) < COUNTED_ROUNDS, 1, 0)
+    expected[-1] = LONG_LOOP
     return bool((counts == expected).all())
 
 
 @ti.kernel
 def _count(rounds: ti.i32, long: ti.i32, counts: ti.types.ndarray()):  # type: ignore[valid-type]
-    for k in range(THREADS):
+    for k in range(COUNTED_THREADS):
         for m in range(rounds * (k == 0)):
             ti.atomic_add(counts[m], 1)
     for _ in range(1):
         for _m in range(long):
-            counts[THREADS - 1] = counts[THREADS - 1] + 1
+            counts[COUNTED_THREADS - 1] = counts[COUNTED_THREADS - 1] + 1

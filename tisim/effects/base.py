@@ -40,7 +40,9 @@ What Taichi asks of a method with ``ti.func``:
 - In ``pair_force`` and what it calls, over all pairs, ``ti.select`` in place of ``if`` keeps the loop without
   a branch, so that it is vectorised; both values are computed, so neither may be harmful.
 - Positions, forces and parameters are ``s.real``, f32 or f64. Times are f64 always: cast what is made of
-  them, ``ti.cast(ti.sin(omega * t), s.real)``.
+  them, ``ti.cast(elementary.sin(omega * t), s.real)``.
+- ``exp``, ``log``, ``pow``, ``sin`` and ``cos`` are those of ``tisim.numerics.elementary``, of one number: a
+  law with ``ti.exp`` and the like does not run on Vulkan.
 - What is known when it is compiled is asked with ``ti.static``: ``if ti.static(self.option)``, ``for source
   in ti.static(self.applied)``. A loop over particles or lists is a plain ``range``.
 """

@@ -11,9 +11,9 @@ from math import factorial
 from tisim.backend.taichi import ti
 from tisim.numerics.double_double import exact_product, exact_sum, series, upper_digits
 
-SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(1, 10))
-COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(2, 10))
-"""SINE and COSINE are the coefficients of (sin(x) - x)/x^3 and (cos x - 1 + x^2/2)/x^4 in x^2."""
+SINE_TAIL = tuple((-1) ** k / factorial(2 * k + 1) for k in range(1, 10))
+COSINE_TAIL = tuple((-1) ** k / factorial(2 * k) for k in range(2, 10))
+"""SINE_TAIL and COSINE_TAIL are the coefficients of (sin(x) - x)/x^3 and (cos x - 1 + x^2/2)/x^4 in x^2."""
 EXACT_TURNS = 2.0**20
 """An argument up to here is so few quarter turns that their product with one of the ``PARTS`` is exact."""
 WINDOW = 7
@@ -28,14 +28,14 @@ def _arctan_of_inverse(n: int, digits: int) -> int:
     return total
 
 
-DIGITS = 1400
-QUARTER_TURN = 2 * (4 * _arctan_of_inverse(5, DIGITS) - _arctan_of_inverse(239, DIGITS))
-"""pi/2 in units of 2^-DIGITS (J. Machin 1706)."""
+DIGITS_OF_PI = 1400
+QUARTER_TURN = 2 * (4 * _arctan_of_inverse(5, DIGITS_OF_PI) - _arctan_of_inverse(239, DIGITS_OF_PI))
+"""pi/2 in units of 2^-DIGITS_OF_PI (J. Machin 1706)."""
 SPARE_WORDS = 2
 INVERSE_WORDS = (
     *(0,) * SPARE_WORDS,
     *(
-        (((1 << (DIGITS + 1280)) // QUARTER_TURN) >> (1280 - 32 * k)) & 0xFFFFFFFF
+        (((1 << (DIGITS_OF_PI + 1280)) // QUARTER_TURN) >> (1280 - 32 * k)) & 0xFFFFFFFF
         for k in range(1, 31 + WINDOW)
     ),
 )
@@ -44,7 +44,7 @@ INVERSE_WORDS = (
 
 def _parts() -> tuple[float, ...]:
     """Return pi/2 as a sum: three numbers of 33 digits each, and the rest."""
-    parts, left = [], Fraction(QUARTER_TURN, 1 << DIGITS)
+    parts, left = [], Fraction(QUARTER_TURN, 1 << DIGITS_OF_PI)
     for k in range(1, 4):
         unit = 33 * k - 1
         parts.append(float(Fraction(int(left * 2**unit), 2**unit)))
@@ -53,8 +53,8 @@ def _parts() -> tuple[float, ...]:
 
 
 PARTS = _parts()
-QUARTER_TURN_UPPER = float(Fraction(QUARTER_TURN, 1 << DIGITS))
-QUARTER_TURN_LOWER = float(Fraction(QUARTER_TURN, 1 << DIGITS) - Fraction(QUARTER_TURN_UPPER))
+QUARTER_TURN_UPPER = float(Fraction(QUARTER_TURN, 1 << DIGITS_OF_PI))
+QUARTER_TURN_LOWER = float(Fraction(QUARTER_TURN, 1 << DIGITS_OF_PI) - Fraction(QUARTER_TURN_UPPER))
 
 
 @ti.func
@@ -141,13 +141,13 @@ def sine_of_turned(x, quarters):
         fine = upper + rest
         square = fine * fine
         if (n & 1) == 0:
-            result = upper + (rest + fine * square * series(square, ti.static(SINE)))
+            result = upper + (rest + fine * square * series(square, ti.static(SINE_TAIL)))
         else:
             # The square of the upper digits is exact, and so is what is left of 1.
             middle = ti.f64(0.5) * upper * upper
             most = upper_digits(middle)
             lost = (middle - most) + ti.f64(0.5) * rest * (upper + fine)
-            result = (ti.f64(1.0) - most) + (square * square * series(square, ti.static(COSINE)) - lost)
+            result = (ti.f64(1.0) - most) + (square * square * series(square, ti.static(COSINE_TAIL)) - lost)
         if (n & 2) != 0:
             result = -result
     return result

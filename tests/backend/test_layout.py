@@ -1,0 +1,56 @@
+"""Where fields lie on a device that leaves no gaps: a number of 8 bytes begins at a multiple of 8."""
+
+import pytest
+
+from tisim.backend.layout import WORD, Builder, Level
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+
+
+def size(part):
+    """Bytes of a part, all cells of a level together."""
+    if not isinstance(part, Level):
+        return sum(WORD if kind in ("f64", "i64") else 4 for kind in kinds(part))
+    return part.cells * sum(map(size, part.parts))
+
+
+def kinds(column):
+    """The types of the numbers of a field."""
+    return [number.ptr.get_dt().to_string() for number in column.vars]
+
+
+def wide_places(level, begin=0):
+    """Where numbers of 8 bytes begin, as Taichi lays parts out: in the order of their sizes."""
+    for cell in range(level.cells):
+        at = begin + cell * size(level) // level.cells
+        for part in sorted(level.parts, key=size):
+            if isinstance(part, Level):
+                yield from wide_places(part, at)
+            elif kinds(part)[0] in ("f64", "i64"):
+                yield at
+            at += size(part)
+
+
+def mixed():
+    """A builder with fields of both widths, side by side and in one cell, in numbers that are not even."""
+    builder = Builder()
+    for cells, kind in ((3, ti.i32), (2, ti.f64), (1, ti.i32), (5, ti.i32), (1, ti.i64)):
+        builder.dense(ti.i, cells).place(ti.field(kind))
+    together = builder.dense(ti.i, 3)
+    for column in (ti.field(ti.i32), ti.Vector.field(3, ti.f64), ti.Vector.field(3, ti.i32)):
+        together.place(column)
+    together.dense(ti.j, 3).place(ti.field(ti.i32))
+    together.dense(ti.j, 3).place(ti.field(ti.f64))
+    return builder
+
+
+@pytest.mark.skipif(ti.__name__ != "taichi", reason="what Vulkan needs is asked of Taichi")
+@in_taichi_thread
+def test_numbers_of_eight_bytes_begin_at_multiples_of_eight():
+    builder = mixed()
+    assert any(place % WORD for place in wide_places(builder))
+    assert builder.fill_up() == size(builder)
+    assert not any(place % WORD for place in wide_places(builder))
+    # Taichi must have placed what has been made.
+    Tree(builder).destroy()
