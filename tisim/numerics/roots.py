@@ -14,8 +14,8 @@ def estimates_roots() -> bool:
 
 @ti.func
 def inverse_root(x):
-    """Return 1/sqrt(x), f64, to rounding, for 1e-37 < x < 1e38: what is not in the range of f32 gives what is
-    not finite.
+    """Return 1/sqrt(x), f64, to rounding, for 1e-37 < x < 1e38; below the range of f32 it is not finite, and
+    above it 0.
 
     The hardware's in f32, and a step of third order (E. Halley): y (1 + h/2 + 3/8 h^2), h = 1 - x y^2.
     """
