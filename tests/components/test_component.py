@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tisim import InputError
-from tisim.components.component import LEAST_ROWS, Component, Vector, option, parameter
+from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.invalid import text_of, unit_of
 from tisim.errors import must
 
@@ -121,7 +121,7 @@ class SampleList(Component):
 
 def test_a_list_of_rows_varies_in_number_too():
     """Rows are no structure, up to the room that there is for them; messages say which row is wrong."""
-    few, many = ([SampleRow(radius=1)] * n for n in (0, LEAST_ROWS))
+    few, many = ([SampleRow(radius=1)] * n for n in (0, SampleRow.least_rows))
     assert list(SampleList.lists()) == [("rows", SampleRow)]
     assert [name for name, _, _ in SampleList.parameters()] == ["scale"]
     assert SampleList(rows=few).structure() == SampleList(rows=many, scale=2).structure()

@@ -34,8 +34,6 @@ def _encodable(text: str) -> str:
 
 Text = Annotated[str, AfterValidator(_encodable)]
 """A text can be held by a file: it is without halves of surrogate pairs."""
-LEAST_ROWS = 32
-"""Every list has room for at least this many rows."""
 
 
 class Checked(BaseModel):
@@ -159,12 +157,22 @@ class Component(AccuracyHints, Checked):
             spread.extend(value if size == 3 else (value,))
         return spread
 
+    @classmethod
+    def room(cls, rows: int) -> int:
+        """Return how many rows of this kind a list has room for, so that scenes with lists of like lengths
+        run as one batch."""
+        return max(cls.least_rows, 1 << (rows - 1).bit_length())
+
     def structure(self) -> tuple[Any, ...]:
         """Return what is compiled in: class, every option that is not a per-world parameter, room for
         lists."""
         varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
         fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
-        return (type(self), *fixed, *((name, room(len(getattr(self, name)))) for name, _ in self.lists()))
+        return (
+            type(self),
+            *fixed,
+            *((name, kind.room(len(getattr(self, name)))) for name, kind in self.lists()),
+        )
 
     def lookups(self) -> dict[str, np.ndarray]:
         """Return the numbers that a kernel looks up, the same in every world, ``self.NAME[i, j]``; they are
@@ -180,6 +188,8 @@ class Component(AccuracyHints, Checked):
     """These are the effects that cannot be in a scene with this one."""
     incompatible_controls: ClassVar[tuple[str, ...]] = ()
     """These kinds of step control do not see what this effect needs them to."""
+    least_rows: ClassVar[int] = 32
+    """Every list of parts of this kind has room for at least so many."""
 
 
 def _descendants(cls: type[Any]) -> Iterator[type[Any]]:
@@ -218,9 +228,3 @@ def option(text: str, default: Any = ..., **rules: Any) -> Any:
 def _bounded(info: FieldInfo) -> bool:
     """Return whether the rules of a number say how large it may be."""
     return any(hasattr(rule, "le") or hasattr(rule, "lt") for rule in info.metadata)
-
-
-def room(rows: int) -> int:
-    """Return how many rows a world's table has room for, so that scenes with lists of like lengths run as one
-    batch."""
-    return max(LEAST_ROWS, 1 << (rows - 1).bit_length())

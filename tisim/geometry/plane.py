@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import ClassVar
 
 from pydantic import model_validator
 
@@ -18,6 +19,9 @@ class Plane(Shape):
 
     Its signed distance is d(r) = (r - point) . normal / |normal|.
     """
+
+    # What a grain remembers of each wall takes memory, for every wall that there is room for.
+    least_rows: ClassVar[int] = 8
 
     point: Vector = parameter("m", "a point of the plane", (0.0, 0.0, 0.0))
     normal: Vector = parameter("", "direction of the normal, towards the particles", (0.0, 0.0, 1.0))

@@ -16,7 +16,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.components.component import Component, room
+from tisim.components.component import Component
 from tisim.errors import must
 from tisim.worlds.bound import Bound, Kind
 
@@ -70,7 +70,7 @@ def _slots(part: Component) -> int:
     """Return the number of slots of a part in the table of a world: its own, and for each list its length and
     room for its rows."""
     return _width(type(part)) + sum(
-        1 + _width(kind) * room(len(getattr(part, n))) for n, kind in part.lists()
+        1 + _width(kind) * kind.room(len(getattr(part, n))) for n, kind in part.lists()
     )
 
 
@@ -83,7 +83,7 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
         yield f"{where}.{name}", float(len(rows))
         for k, row in enumerate(rows):
             yield from _entries(row, f"{where}.{name}.{k}")
-        spare = _width(kind) * (room(len(rows)) - len(rows))
+        spare = _width(kind) * (kind.room(len(rows)) - len(rows))
         yield from [(f"{where}.{name}", 0.0)] * spare
 
 
@@ -106,7 +106,7 @@ class ParameterTable:
             slot += size
         for name, kind in part.lists():
             setattr(bound, name, self._bind_rows(kind, slot))
-            slot += 1 + _width(kind) * room(len(getattr(part, name)))
+            slot += 1 + _width(kind) * kind.room(len(getattr(part, name)))
         self._next = slot
         for name, values in part.lookups().items():
             setattr(bound, name, self._place(values))

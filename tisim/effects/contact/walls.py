@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.component import room
 from tisim.effects.base import Effect, Force, option
 from tisim.effects.contact.granular import GranularContact
 from tisim.geometry.plane import Plane
@@ -29,7 +28,7 @@ class Walls(Force):
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
-        past = Field(f"{self.label}_past", "", 1, "keep", slots=max(1, room(len(self.planes)) * values))
+        past = Field(f"{self.label}_past", "", 1, "keep", slots=max(1, Plane.room(len(self.planes)) * values))
         return past, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
