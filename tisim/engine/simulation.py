@@ -8,24 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from tisim.backend import runtime
-from tisim.backend.memory import Tree, collected
-from tisim.backend.thread import in_taichi_thread
-from tisim.engine import law_errors
-from tisim.engine.allocation import Allocation, parts
-from tisim.engine.assembly import Assembly
+from tisim.engine.allocation import parts
+from tisim.engine.compiled_worlds import CompiledWorlds
 from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import RunError, is_number, is_whole, must
+from tisim.errors import is_number, is_whole, must
 from tisim.neighbours import pair_list
-from tisim.neighbours.half_list import ListSizes
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.phases import Nest
-from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
 
 CHUNK_SECONDS, FIRST = 0.25, 2**16
@@ -33,7 +26,7 @@ CHUNK_SECONDS, FIRST = 0.25, 2**16
 finite; the second is the number of steps of all particles together before the first look."""
 
 
-class Simulation:
+class Simulation(CompiledWorlds):
     """A simulation is compiled for the structure of a scene, a number of worlds and a capacity of particles.
 
     scene : any scene of the structure; its values do not matter here.
@@ -46,79 +39,12 @@ class Simulation:
     ) -> None:
         must(isinstance(scene, Scene), "scene", "a Scene", scene)
         must(is_whole(worlds, 1), "worlds", "a whole number, at least 1", worlds)
-        began = time.perf_counter()
-        self.runtime, self.worlds = runtime.current(), worlds
-        self.structure = scene.structure()
         must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
-        self.trees = self._make(scene, worlds, capacity or scene.capacity(), schedule)
+        began = time.perf_counter()
+        super().__init__(scene, worlds, capacity or scene.capacity(), schedule)
         self.scenes: list[Scene] = []
         self.edits: list[list[str]] = []
         self.wall_s, self.setup_s = 0.0, time.perf_counter() - began
-
-    @in_taichi_thread
-    def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
-        """Place all fields, which are returned, and compile the kernels of a step."""
-        with collected() as trees:
-            self.allocation = Allocation(scene, worlds, capacity)
-        self.s, self.table = self.allocation.s, self.allocation.table
-        self.schedule = schedule or self._choose(capacity)
-        self.s.write("status", WorldStatus.ENDED)
-        self._compile()
-        return trees
-
-    def _compile(self) -> None:
-        """Compile the kernels of a step; no world may be running."""
-        sort = self.assembly.sort
-        self.program = Program(self.s, self.assembly.step, self.schedule, sort.every if sort else NEVER)
-        self.sort = Program(self.s, sort.items(), "particle") if sort else None
-        self.first = Program(self.s, self.assembly.first, self.schedule)
-        with law_errors.in_a_line():
-            self.program.compile()
-            if self.first.items:
-                self.first.compile()
-            if self.sort:
-                self.sort.compile()
-
-    @property
-    def assembly(self) -> Assembly:
-        """Return what a step consists of."""
-        return self.allocation.assembly
-
-    def list_sizes(self) -> ListSizes:
-        """Return sizes in which the lists of pairs last made would have room."""
-        pairs = self.assembly.pairs
-        return pairs.half_list.wanted() if pairs else ListSizes()
-
-    @in_taichi_thread
-    def grow_lists(self, sizes: ListSizes) -> None:
-        """Make lists of pairs of these sizes, and compile the step anew for them.
-
-        Raise RunError where there is no room for them; lists are then as they were.
-        """
-        image, before = self.s.image(), self.assembly.sizes
-        self.s.write("status", WorldStatus.ENDED)
-        try:
-            self._assemble(sizes)
-        except RunError as full:
-            self._assemble(before)
-            rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean"
-            raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
-        finally:
-            self.put(image)
-
-    def _assemble(self, sizes: ListSizes) -> None:
-        with collected() as trees:
-            self.allocation.assemble(sizes)
-        self.trees += trees
-        self._compile()
-
-    def _choose(self, capacity: int) -> str:
-        if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):
-            return "particle"
-        # A world per thread needs as many worlds as threads; one small world is faster without launches.
-        small = capacity * self.worlds <= 20_000
-        many = self.worlds >= self.runtime.threads
-        return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
 
     def load(self, scenes: Scene | Sequence[Scene], starts: Sequence[Arrays] | None = None) -> None:
         """Put one scene in each of the first worlds, or one in the first; the others stay empty. Nothing is
@@ -182,16 +108,6 @@ class Simulation:
         if self.first.items:
             self.first.advance(1)
 
-    def put(self, image: Mapping[str, np.ndarray]) -> None:
-        """Put all worlds where they were when ``s.image()`` was made of them."""
-        self.s.fill(image)
-        self.forget_lists()
-
-    def forget_lists(self) -> None:
-        """Have pair lists made anew before they are used again."""
-        if self.assembly.lists is not None:
-            self.assembly.lists.forget()
-
     def run(
         self,
         until: float | None = None,
@@ -243,13 +159,6 @@ class Simulation:
                 chunk = max(chunk // 2, 1)
             watching.observe(self)
             yield
-
-    def advance(self, steps: int) -> None:
-        """Take at most ``steps`` steps of every running world; large ones are sorted first, where it is their
-        turn."""
-        if self.sort:
-            self.sort.advance(1)
-        self.program.advance(steps)
 
     def in_order(self, w: int, good: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the indices of the live particles of a world, in the order in which they are shown: that of
@@ -339,8 +248,3 @@ class Simulation:
 
         self._check_loaded()
         checkpoint.restore(self, path)
-
-    def close(self) -> None:
-        """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""
-        for tree in self.trees:
-            tree.destroy()

@@ -1,0 +1,117 @@
+"""Worlds of one structure in device memory, and the kernels of their steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from tisim.backend import runtime
+from tisim.backend.memory import Tree, collected
+from tisim.backend.thread import in_taichi_thread
+from tisim.engine import law_errors
+from tisim.engine.allocation import Allocation
+from tisim.engine.assembly import Assembly
+from tisim.errors import RunError
+from tisim.neighbours.half_list import ListSizes
+from tisim.scene.scene import Scene
+from tisim.worlds.phases import Nest
+from tisim.worlds.program import Program
+from tisim.worlds.status import NEVER, WorldStatus
+
+
+class CompiledWorlds:
+    """Compiled worlds are fields and kernels for the structure of a scene, a number of worlds and a capacity
+    of particles. They know neither scenes nor results."""
+
+    def __init__(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> None:
+        self.runtime, self.worlds = runtime.current(), worlds
+        self.structure = scene.structure()
+        self.trees = self._make(scene, worlds, capacity, schedule)
+
+    @in_taichi_thread
+    def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
+        """Place all fields, which are returned, and compile the kernels of a step."""
+        with collected() as trees:
+            self.allocation = Allocation(scene, worlds, capacity)
+        self.s, self.table = self.allocation.s, self.allocation.table
+        self.schedule = schedule or self._choose(capacity)
+        self.s.write("status", WorldStatus.ENDED)
+        self._compile()
+        return trees
+
+    def _compile(self) -> None:
+        """Compile the kernels of a step; no world may be running."""
+        sort = self.assembly.sort
+        self.program = Program(self.s, self.assembly.step, self.schedule, sort.every if sort else NEVER)
+        self.sort = Program(self.s, sort.items(), "particle") if sort else None
+        self.first = Program(self.s, self.assembly.first, self.schedule)
+        with law_errors.in_a_line():
+            self.program.compile()
+            if self.first.items:
+                self.first.compile()
+            if self.sort:
+                self.sort.compile()
+
+    @property
+    def assembly(self) -> Assembly:
+        """Return what a step consists of."""
+        return self.allocation.assembly
+
+    def list_sizes(self) -> ListSizes:
+        """Return sizes in which the lists of pairs last made would have room."""
+        pairs = self.assembly.pairs
+        return pairs.half_list.wanted() if pairs else ListSizes()
+
+    @in_taichi_thread
+    def grow_lists(self, sizes: ListSizes) -> None:
+        """Make lists of pairs of these sizes, and compile the step anew for them.
+
+        Raise RunError where there is no room for them; lists are then as they were.
+        """
+        image, before = self.s.image(), self.assembly.sizes
+        self.s.write("status", WorldStatus.ENDED)
+        try:
+            self._assemble(sizes)
+        except RunError as full:
+            self._assemble(before)
+            rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean"
+            raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
+        finally:
+            self.put(image)
+
+    def _assemble(self, sizes: ListSizes) -> None:
+        with collected() as trees:
+            self.allocation.assemble(sizes)
+        self.trees += trees
+        self._compile()
+
+    def _choose(self, capacity: int) -> str:
+        if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):
+            return "particle"
+        # A world per thread needs as many worlds as threads; one small world is faster without launches.
+        small = capacity * self.worlds <= 20_000
+        many = self.worlds >= self.runtime.threads
+        return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
+
+    def put(self, image: Mapping[str, np.ndarray]) -> None:
+        """Put all worlds where they were when ``s.image()`` was made of them."""
+        self.s.fill(image)
+        self.forget_lists()
+
+    def forget_lists(self) -> None:
+        """Have pair lists made anew before they are used again."""
+        if self.assembly.lists is not None:
+            self.assembly.lists.forget()
+
+    def advance(self, steps: int) -> None:
+        """Take at most ``steps`` steps of every running world; large ones are sorted first, where it is their
+        turn."""
+        if self.sort:
+            self.sort.advance(1)
+        self.program.advance(steps)
+
+    def close(self) -> None:
+        """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""
+        for tree in self.trees:
+            tree.destroy()
