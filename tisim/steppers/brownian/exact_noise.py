@@ -139,8 +139,8 @@ class Factor(Phase):
         """Take what earlier columns account for off ``COLUMNS``, in a tile of rows."""
         matrix = ti.static(self.m.matrix)
         left = [ti.Vector([0.0] * TILE_ROWS, self.s.real) for _ in ti.static(range(COLUMNS))]
-        for c in ti.static(range(COLUMNS)):
-            for lane in range(TILE_ROWS):
+        for lane in range(TILE_ROWS):
+            for c in ti.static(range(COLUMNS)):
                 left[c][lane] = matrix[w, column + c, row + lane]
         for k in range(column):
             factors = ti.Vector([matrix[w, k, column + c] for c in ti.static(range(COLUMNS))])
@@ -148,8 +148,8 @@ class Factor(Phase):
                 value = matrix[w, k, row + lane]
                 for c in ti.static(range(COLUMNS)):
                     left[c][lane] -= factors[c] * value
-        for c in ti.static(range(COLUMNS)):
-            for lane in range(TILE_ROWS):
+        for lane in range(TILE_ROWS):
+            for c in ti.static(range(COLUMNS)):
                 matrix[w, column + c, row + lane] = left[c][lane]
 
     @ti.func
