@@ -1,22 +1,27 @@
-"""A sweep over the settings of a case as one batch, and one run after the other.
+"""A sweep as one batch; one run after the other; and so in two processes side by side, half of it in each.
 
-    python tests/benchmarks/sweep.py vibration    # the eight frequencies of Z13 Fig. 3, 343 particles
-    python tests/benchmarks/sweep.py capture      # 13 angles of a cylinder, 30 starts each (B16 section 6.3)
+    python tests/benchmarks/sweep.py vibration       # the eight frequencies of Z13 Fig. 3, 343 particles
+    python tests/benchmarks/sweep.py capture         # 13 angles of a cylinder, 30 starts each (B16 6.3)
+    python tests/benchmarks/sweep.py agglomeration   # Z04's six designs, 8 starts of 100 grains each
 
-Both ways compile once, before the clock starts; they alternate, and the ratio is the median over pairs.
-TISIM_BACKEND=quadrants chooses the other kernel compiler.
+Every way compiles once, before the clock starts; they alternate, and ratios are medians over turns. Each of
+the two processes has one thread. TISIM_BACKEND=quadrants chooses the other kernel compiler.
 """
 
 import argparse
+import multiprocessing
 import platform
 import sys
 import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
+from cases.agglomeration import scene as agglomeration
+from cases.agglomeration.published_strings import designs
 from cases.capture import scene as capture
 from cases.vibration import scene as vibration
 from tisim import Result, Scene, Simulation
@@ -29,7 +34,11 @@ SWEEPS = {
         for angle in np.linspace(0.0, 90.0, 13)
         for seed in range(30)
     ],
+    "agglomeration": lambda: [
+        agglomeration.scene(design, seed, 100) for seed in range(8) for design in designs()
+    ],
 }
+PROCESSES = 2
 
 
 def timed(simulation: Simulation, scenes: list[Scene]) -> tuple[float, list[Result]]:
@@ -38,6 +47,30 @@ def timed(simulation: Simulation, scenes: list[Scene]) -> tuple[float, list[Resu
     simulation.load(scenes)
     simulation.run()
     return time.perf_counter() - began, simulation.results()
+
+
+def worker(case: str, first: int, pipe: Connection) -> None:
+    """Take every second run of a sweep, one after the other, as often as asked to."""
+    runtime.init(threads=1)
+    scenes = SWEEPS[case]()[first::PROCESSES]
+    single = Simulation(scenes[0], 1)
+    single.load(scenes[:1])
+    single.run()
+    pipe.send(None)
+    while pipe.recv():
+        for one in scenes:
+            timed(single, [one])
+        pipe.send(None)
+
+
+def through(pipes: list[Connection]) -> float:
+    """Wall seconds in which all processes go through their runs once, side by side."""
+    began = time.perf_counter()
+    for pipe in pipes:
+        pipe.send(True)
+    for pipe in pipes:
+        pipe.recv()
+    return time.perf_counter() - began
 
 
 def spread(values: list[float]) -> str:
@@ -53,27 +86,46 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
     args = parser.parse_args()
+    # Before Taichi has threads, which a copy of this process would lack.
+    start = multiprocessing.get_context("spawn")
+    pipes, processes = [], []
+    for k in range(PROCESSES):
+        pipe, end = start.Pipe()
+        processes.append(start.Process(target=worker, args=(args.case, k, end), daemon=True))
+        processes[k].start()
+        pipe.recv()
+        pipes.append(pipe)
     runtime.init(threads=args.threads)
     scenes = SWEEPS[args.case]()
     batch, single = Simulation(scenes[0], len(scenes)), Simulation(scenes[0], 1)
-    together, apart = [], []
+    for simulation, some in ((batch, scenes), (single, scenes[:1])):
+        simulation.load(some)
+        simulation.run(steps=1)
+    together, apart, side_by_side = [], [], []
     for _ in range(args.repeats):
+        side_by_side.append(through(pipes))
         seconds, results = timed(batch, scenes)
         together.append(seconds)
         runs = [timed(single, [one]) for one in scenes]
         apart.append(sum(seconds for seconds, _ in runs))
+    for pipe, process in zip(pipes, processes, strict=True):
+        pipe.send(False)
+        process.join()
     same = all(
         np.array_equal(a.state["position"], b.state["position"])
         for a, (_, (b,)) in zip(results, runs, strict=True)
     )
     steps = sum(result.work["particle_steps"] for result in results)
     print(
-        f"{args.case}, {len(scenes)} runs of {len(results[0].state['mass'])} particles, "
+        f"{args.case}, {len(scenes)} runs of {scenes[0].capacity()} particles, "
         f"{steps} particle-steps; {args.repeats} pairs: median (range)"
     )
     print(f"  one batch, schedule '{batch.schedule}'             {spread(together)} s")
     print(f"  one after the other, schedule '{single.schedule}'   {spread(apart)} s")
+    print(f"  one after the other in {PROCESSES} processes         {spread(side_by_side)} s")
     print(f"  one after the other / batch   {spread([b / a for a, b in zip(together, apart, strict=True)])}")
+    reference = [b / a for a, b in zip(together, side_by_side, strict=True)]
+    print(f"  {PROCESSES} processes / batch           {spread(reference)}")
     print(f"  the same bits: {same}; all reached the end: {all(r.status.ok for r in results)}")
     print(f"{platform.machine()}, {args.threads} threads ({runtime.cores()} cores); {runtime.backend()}")
 
