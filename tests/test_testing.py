@@ -8,7 +8,7 @@ from tests.scenes import compiled, fixed, flow, scene
 from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
-from tisim.effects import Force, Lorentz, PairForce, Tether
+from tisim.effects import Force, Lorentz, PairForce, Tether, option
 from tisim.engine.explain import known_effects
 from tisim.interactions.force_sum import FORCE
 from tisim.operators import Capture, Operator
@@ -29,7 +29,7 @@ from tisim.steppers import (
 )
 from tisim.steppers.common import BeginStep
 from tisim.steppers.verlet import Advance
-from tisim.testing import assert_fields, assert_lists, assert_reach
+from tisim.testing import assert_contracts, assert_fields, assert_lists, assert_pair_forces, assert_reach
 from tisim.worlds.fields import Field
 from tisim.worlds.phases import PerParticle
 
@@ -220,6 +220,69 @@ def test_every_law_is_zero_beyond_its_reach():
     most = assert_reach(joined(SHORT))
     assert most.keys() == {kind.kind() for kind in SHORT}
     assert {name for name, size in most.items() if size == 0} <= {"contact_friction"}
+
+
+class Tally(SoftShell):
+    """Sums up how often pairs have been pressed: once for each time that they are computed."""
+
+    fields = (Field("pressed", "", 1, "keep"),)
+
+    @ti.func
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        force = self.pair_force(s, w, i, j, separation, distance, t)
+        if force.norm() > 0.0:
+            s.pressed[w, i] += 1.0
+        return force, 0.0 * force, 0.0 * force, past
+
+
+class InverseSquare(PairForce):
+    """Attracts by 1/d^2, and over the inverse of the distance by a power of it."""
+
+    power: int = option("power", 3)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        return separation / distance**3
+
+    @ti.func
+    def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
+        return inverse ** ti.static(self.power) * separation
+
+
+class NeverZero(InverseSquare):
+    """Is not 0 where the inverse is."""
+
+    @ti.func
+    def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
+        return separation / (1.0 / inverse) ** 3 + ti.select(inverse > 0.0, 0.0, 1.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (Tally(stiffness=1.0, width=1.0), "tally must write nothing between two .* received another pressed"),
+        (
+            InverseSquare(power=2),
+            r"must be pair_force, 0.44\d+ N on particle 0 by 1 .*; received 0.6",
+        ),
+        (NeverZero(), "must be 0 where the inverse is; received 1 N on particle 0 by 1 along axis 0"),
+    ],
+)
+def test_a_force_that_writes_or_is_another_by_the_inverse_is_reported(law, said):
+    """By the assertion of all contracts too, before it runs anything."""
+    with pytest.raises(AssertionError, match=said):
+        assert_contracts(two(law))
+
+
+PAIR_FORCES = [kind for kind in known_effects() if issubclass(kind, PairForce)]
+
+
+@pytest.mark.long
+def test_pair_forces_write_nothing_and_are_the_same_by_the_inverse():
+    assert {kind.kind() for kind in PAIR_FORCES if kind.offers("pair_force_by_inverse")}
+    assert_pair_forces(two(InverseSquare()))
+    assert_pair_forces(joined(PAIR_FORCES))
 
 
 class ChargeOfOthers(Force):

@@ -78,6 +78,27 @@ class SoftShellOfAll(SoftShell):
     short_ranged = False
 
 
+class Bridge(PairForce):
+    """Grains that have touched pull each other with a constant force, until they are too far apart."""
+
+    fields = ("radius",)
+    short_ranged = True
+    memory = 1
+    pull: float = parameter("N", "pull", gt=0)
+    rupture: float = parameter("m", "gap at which it breaks", gt=0)
+
+    @ti.func
+    def reach(self, s, w, i):
+        return self.rupture(w)
+
+    @ti.func
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        gap = distance - s.radius[w, i] - s.radius[w, j]
+        wet = (gap <= 0.0) | ((past[0] > 0.0) & (gap <= self.rupture(w)))
+        force = ti.select(wet, self.pull(w) / distance, 0.0) * separation
+        return force, 0.0 * force, 0.0 * force, ti.Vector([ti.select(wet, 1.0, 0.0)])
+
+
 WORLDS, CAPACITY = 40, 32
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.scenes import scene
-from tests.throwaway import SoftShell
+from tests.scenes import by_id, compiled, scene
+from tests.throwaway import Bridge, SoftShell, Trap
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import PairForce, parameter
@@ -14,27 +14,6 @@ from tisim.steppers import Trapezoid
 from tisim.steppers.implicit.step_control import ErrorControl
 
 RADIUS, MASS, PULL, RUPTURE, STEP = 0.1, 2.0, 3.0, 0.05, 1e-3
-
-
-class Bridge(PairForce):
-    """Grains that have touched pull each other with a constant force, until they are too far apart."""
-
-    fields = ("radius",)
-    short_ranged = True
-    memory = 1
-    pull: float = parameter("N", "pull", gt=0)
-    rupture: float = parameter("m", "gap at which it breaks", gt=0)
-
-    @ti.func
-    def reach(self, s, w, i):
-        return self.rupture(w)
-
-    @ti.func
-    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
-        gap = distance - s.radius[w, i] - s.radius[w, j]
-        wet = (gap <= 0.0) | ((past[0] > 0.0) & (gap <= self.rupture(w)))
-        force = ti.select(wet, self.pull(w) / distance, 0.0) * separation
-        return force, 0.0 * force, 0.0 * force, ti.Vector([ti.select(wet, 1.0, 0.0)])
 
 
 def pair(gap, speed, others=0, steps=150):
@@ -118,29 +97,46 @@ def test_it_is_remembered_through_a_restart_between(simulation, tmp_path):
         np.testing.assert_array_equal(again.state[name], whole.state[name])
 
 
+def tried(made, effects, **control):
+    """A scene in steps found by trial; and what all of these are run by."""
+    stepper = Trapezoid(control=ErrorControl(**{"shortest": 1e-9, **control}))
+    changed = made.model_copy(update={"effects": effects, "stepper": stepper})
+    return changed, compiled(changed, worlds=2, capacity=80)
+
+
 @pytest.mark.long
 def test_a_trial_that_is_given_up_takes_no_memory_away():
     """The first attempt throws a wet pair far out of reach, and is rejected: the pair stays wet, and swings
     about where the bridge holds what a soft shell presses, as it does from a short first step."""
-    ends, simulation = [], None
+    ends = []
+    laws = Bridge(pull=PULL, rupture=RUPTURE), SoftShell(stiffness=500.0, width=0.02), Trap(stiffness=0.0)
     for first in (1e-4, 0.5):
-        made = pair(-1e-9, 0.0, steps=400).model_copy(
-            update={
-                "effects": (Bridge(pull=PULL, rupture=RUPTURE), SoftShell(stiffness=500.0, width=0.02)),
-                "stepper": Trapezoid(
-                    control=ErrorControl(error=1e-4, tolerance=1e-5, first=first, longest=1.0, shortest=1e-9)
-                ),
-            }
-        )
-        simulation = simulation or Simulation(made)
+        made = pair(-1e-9, 0.0, steps=400)
+        made, simulation = tried(made, laws, error=1e-4, tolerance=1e-5, first=first, longest=1.0)
         simulation.load(made)
         simulation.run()
         (result,) = simulation.results()
         assert result.work["rejections"] > 0
         ends.append(np.diff(result.state["position"][:, 0])[0] - 2 * RADIUS)
-    simulation.close()
     assert 0 < ends[0] < RUPTURE
     assert ends[1] == pytest.approx(ends[0], abs=1e-4)
+
+
+@pytest.mark.long
+def test_a_pair_that_meets_between_the_last_trial_and_the_end_of_a_step_is_remembered():
+    """Pairs are pulled together from 40 distances, in steps of a single trial, which is far from their ends:
+    with lists that are made anew whenever something moves as with those that hold more."""
+    gap, rows = np.linspace(1e-4, 1.5e-2, 40), 10.0 * np.arange(40)
+    sides = [np.stack([side * (RADIUS + 0.5 * gap), rows, 0 * rows], axis=1) for side in (-1, 1)]
+    laws = Bridge(pull=1e-3, rupture=1e-9), SoftShell(stiffness=1e-9, width=1e-9), Trap(stiffness=100.0)
+    made = scene(np.concatenate(sides), np.zeros((80, 3)), laws, radius=RADIUS, mass=1.0, steps=1)
+    made = made.model_copy(update={"duration": 0.5})
+    made, simulation = tried(made, laws, error=1.0, tolerance=0.5, first=0.05, longest=0.05)
+    simulation.load([made, made.model_copy(update={"skin": 1e-6})])
+    simulation.run(steps=6)
+    usual, narrow = (by_id(result)["bridge_past"] for result in simulation.results())
+    assert 20 < (usual > 0).sum() < 40
+    np.testing.assert_array_equal(narrow, usual)
 
 
 class Afar(PairForce):

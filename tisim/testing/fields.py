@@ -86,7 +86,7 @@ class _Hooks:
         self.s = view
         self.single = offered(effect, "force", "torque", "velocity_jacobian")
         self.reach = offered(effect, "reach")
-        self.pair = offered(effect, "pair_force", "pair_torque", "influence")
+        self.pair = offered(effect, "pair_force", "pair_force_by_inverse", "pair_torque", "influence")
         self.load, self.interaction = offered(effect, "load"), offered(effect, "interaction")
         self.memory = max(1, getattr(effect.data, "memory", 0))
         self.response = offered(effect, "response")

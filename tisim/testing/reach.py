@@ -9,10 +9,8 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import DerivedQuantity, PairForce, Pairwise
-from tisim.engine.allocation import parts
-from tisim.engine.loading import check_start, laid_out, world_columns
 from tisim.scene.scene import Scene
-from tisim.testing.uncompiled import allocated
+from tisim.testing.uncompiled import started
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
@@ -33,14 +31,8 @@ def assert_reach(scene: Scene) -> dict[str, float]:
     this is 0, the scene shows nothing of the law.
     """
     largest: dict[str, float] = {}
-    start = scene.particles.arrays(scene.domain, scene.seed)
-    factors = np.resize(RADIUS_FACTORS, len(start["radius"]))
-    with allocated(scene) as allocation:
-        s = allocation.s
-        check_start(s.fields, scene, start)
-        allocation.table.write([parts(scene)])
-        s.fill({f.name: laid_out(f, [start], 1, s.capacity) for f in s.fields})
-        s.fill(world_columns([scene], [start], 1))
+    with started(scene) as (allocation, start):
+        s, factors = allocation.s, np.resize(RADIUS_FACTORS, len(start["radius"]))
         s.fill({effect.data.quantity: 1.0 for effect in allocation.assembly.effects.of(DerivedQuantity)})
         for effect in allocation.assembly.effects.of(Pairwise):
             if effect.data.short_ranged:

@@ -6,7 +6,9 @@ from typing import Any
 
 from tisim.backend.memory import collected
 from tisim.effects.base import Effect
-from tisim.engine.allocation import Allocation
+from tisim.engine.allocation import Allocation, parts
+from tisim.engine.loading import check_start, laid_out, world_columns
+from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.bound import Bound
 
@@ -21,6 +23,19 @@ def allocated(scene: Scene) -> Iterator[Allocation]:
         finally:
             for tree in trees:
                 tree.destroy()
+
+
+@contextmanager
+def started(scene: Scene) -> Iterator[tuple[Allocation, Arrays]]:
+    """Yield the fields of one world at its start, with the parameters of the scene, and this start."""
+    start = scene.particles.arrays(scene.domain, scene.seed)
+    with allocated(scene) as made:
+        s = made.s
+        check_start(s.fields, scene, start)
+        made.table.write([parts(scene)])
+        s.fill({f.name: laid_out(f, [start], 1, s.capacity) for f in s.fields})
+        s.fill(world_columns([scene], [start], 1))
+        yield made, start
 
 
 def offered(effect: Bound[Effect], *names: str) -> tuple[Callable[..., Any], ...]:

@@ -1,0 +1,136 @@
+"""Pair forces must write nothing, and be the same whichever way they are asked for."""
+
+from typing import Any
+
+import numpy as np
+
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+from tisim.backend.thread import in_taichi_thread
+from tisim.effects.base import DerivedQuantity, PairForce
+from tisim.scene.scene import Scene
+from tisim.testing.uncompiled import started
+from tisim.worlds.bound import Bound
+from tisim.worlds.state import State
+
+TOUCHING = 0.9
+"""A law is evaluated where two particles are in the scene, and on the same line at this part of the distance
+at which they touch."""
+COMPARED_AT = (0.5, 1.0, 2.0)
+"""The force by the inverse of the distance is compared at these distances, relative to that in the scene."""
+
+
+@in_taichi_thread
+def assert_pair_forces(scene: Scene) -> None:
+    """Assert that each pair force of a scene writes nothing, and that one which defines
+    ``pair_force_by_inverse`` comes to the same by it, to rounding, and to 0 at no inverse at all.
+
+    Several pairs are computed at once, and some twice: what a law writes would be counted twice, or be lost.
+    It is evaluated at the start of the scene, for each two particles; derived quantities are taken to be 1.
+    """
+    with started(scene) as (allocation, start):
+        s, n = allocation.s, len(start["radius"])
+        s.fill({effect.data.quantity: 1.0 for effect in allocation.assembly.effects.of(DerivedQuantity)})
+        for effect in allocation.assembly.effects.of(PairForce):
+            _assert_nothing_written(s, effect, scene.duration)
+            if effect.data.offers("pair_force_by_inverse"):
+                _assert_same_by_inverse(effect, _ByInverse(s, effect).forces()[:n, :n])
+
+
+def _assert_nothing_written(s: State, effect: Bound[Any], duration: float) -> None:
+    call, before = _Calls(s, effect), s.image()
+    for remembered in (0.0, 1.0):
+        call.all(remembered, duration)
+    for name, values in s.image().items():
+        same = np.array_equal(values, before[name], equal_nan=values.dtype.kind == "f")
+        assert same, f"{effect.data.label} must write nothing between two particles; received another {name}"
+
+
+def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
+    """forces : of each two particles and factor by distance, by its inverse, and by an inverse of 0."""
+    by_distance, by_inverse, by_none = (forces[..., k, :] for k in range(3))
+    # Forces that pass through 0 at some distance are compared with what they are at others.
+    size = np.abs(by_distance).max(axis=(2, 3), keepdims=True)
+    wrong = ~(np.abs(by_inverse - by_distance) <= np.sqrt(np.finfo(forces.dtype).eps) * size)
+    for i, j, k, c in np.argwhere(wrong)[:1]:
+        raise AssertionError(
+            f"{effect.data.label}.pair_force_by_inverse must be pair_force, {by_distance[i, j, k, c]:g} N on "
+            f"particle {i} by {j} along axis {c}; received {by_inverse[i, j, k, c]:g}"
+        )
+    for i, j, k, c in np.argwhere(by_none != 0)[:1]:
+        raise AssertionError(
+            f"{effect.data.label}.pair_force_by_inverse must be 0 where the inverse is; "
+            f"received {by_none[i, j, k, c]:g} N on particle {i} by {j} along axis {c}"
+        )
+
+
+@ti.data_oriented
+class _Calls:
+    """This kernel asks a law for each two particles of the first world, and makes no use of the answer."""
+
+    def __init__(self, s: State, effect: Bound[Any]) -> None:
+        self.s, self.effect = s, effect
+        self.memory = max(1, effect.data.memory)
+
+    @ti.kernel
+    def all(self, remembered: ti.f64, duration: ti.f64):
+        for i, j in ti.ndrange(self.s.count[0], self.s.count[0]):
+            if i != j:
+                self.pair(i, j, remembered, duration)
+
+    @ti.func
+    def pair(self, i, j, remembered, duration):
+        s = self.s
+        apart = s.position[0, j] - s.position[0, i]
+        length, touching = apart.norm(), ti.cast(TOUCHING, s.real) * (s.radius[0, i] + s.radius[0, j])
+        past = ti.Vector.zero(s.real, self.memory) + ti.cast(remembered, s.real)
+        # A loop, so that the law is compiled once.
+        for k in range(2):
+            distance = ti.select(k == 0, length, touching)
+            self.effect.interaction(
+                s, 0, i, j, distance / length * apart, distance, past, ti.cast(duration, s.real), s.time[0]
+            )
+
+
+@ti.data_oriented
+class _ByInverse:
+    """This kernel evaluates a law for each two particles of the first world, given distances and given their
+    inverse."""
+
+    def __init__(self, s: State, effect: Bound[Any]) -> None:
+        self.s, self.effect, self.number = s, effect, len(COMPARED_AT)
+        self.factor, self.force, builder = ti.field(ti.f64), ti.field(s.real), Builder()
+        builder.dense(ti.i, self.number).place(self.factor)
+        shape = (s.capacity, s.capacity, self.number, 9)
+        builder.dense(ti.ijkl, shape).place(self.force)
+        Tree(builder)
+        self.factor.from_numpy(np.array(COMPARED_AT))
+
+    def forces(self) -> np.ndarray:
+        """Return the forces by index of the particle, of the other one, of the factor and of the way, (...,
+        3)."""
+        self.measure()
+        found = self.force.to_numpy()
+        return found.reshape(*found.shape[:3], 3, 3)
+
+    @ti.kernel
+    def measure(self):
+        for i, j in ti.ndrange(self.s.count[0], self.s.count[0]):
+            if i != j:
+                self.pair(i, j)
+
+    @ti.func
+    def pair(self, i, j):
+        s, t = self.s, self.s.time[0]
+        apart = s.position[0, j] - s.position[0, i]
+        for k in range(self.number):
+            d = ti.cast(self.factor[k], s.real) * apart
+            distance = d.norm()
+            one = self.effect.pair_force(s, 0, i, j, d, distance, t)
+            other = self.effect.pair_force_by_inverse(s, 0, i, j, d, 1.0 / distance, t)
+            none = self.effect.pair_force_by_inverse(s, 0, i, j, d, 0.0 * distance, t)
+            for c in ti.static(range(3)):
+                self.force[i, j, k, c] = one[c]
+                self.force[i, j, k, 3 + c] = other[c]
+                self.force[i, j, k, 6 + c] = none[c]
