@@ -258,6 +258,21 @@ def test_a_few_worlds_of_a_small_scene_compile_nothing_after_one():
     batches.close()
 
 
+def test_what_is_kept_for_later_is_given_up_where_there_is_no_room():
+    """Simulations that are idle, and those that nobody has any more but the garbage collector."""
+    kept = Batches()
+    assert all(result.status.ok for _, result in kept.run([grains(3000)]))
+    for _ in range(3):
+        forgotten = Simulation(grains(3000))
+        forgotten.itself = forgotten
+        del forgotten
+    before = sum(tree.bytes for tree in memory.in_use())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runtime, "memory", lambda: before)
+        Simulation(grains(3000)).close()
+    assert not kept._idle
+
+
 def test_rounded_sizes():
     """At least as large, by less than a quarter."""
     for number in range(1, 5000):

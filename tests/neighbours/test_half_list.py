@@ -11,7 +11,7 @@ from tisim.backend import memory, runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
-from tisim.engine import replay
+from tisim.engine import monitor, replay
 from tisim.interactions import pair_chunks
 from tisim.neighbours import half_list, search_rows
 from tisim.steppers import Boris, FixedStep
@@ -117,6 +117,13 @@ def burst(seed=2, n=240):
     )
 
 
+@pytest.fixture(scope="module")
+def simulation_of_bursts():
+    simulation = Simulation(burst())
+    yield simulation
+    simulation.close()
+
+
 def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit():
     """Beside a run whose list was long enough from the start, and others of skins that the scene says."""
     ends = []
@@ -192,6 +199,27 @@ def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
     simulation.run()
     assert simulation.results()[0].status.ok
     simulation.close()
+
+
+def test_the_first_list_of_a_run_knows_nothing_of_the_run_before(simulation_of_bursts):
+    simulation, made = simulation_of_bursts, burst()
+    skins = []
+    for _ in range(2):
+        simulation.load(made)
+        skins.append(chosen_skin(simulation))
+        simulation.run(steps=100)
+    assert skins[0] == skins[1] < chosen_skin(simulation)
+
+
+def test_what_is_asked_for_at_each_load_is_made_once(simulation_of_bursts, monkeypatch):
+    """Many particles are looked at on the device."""
+    monkeypatch.setattr(monitor, "LARGE", 1)
+    simulation = simulation_of_bursts
+    for _ in range(3):
+        simulation.load(burst())
+    trees = len(simulation.trees)
+    simulation.load(burst())
+    assert len(simulation.trees) == trees
 
 
 def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):

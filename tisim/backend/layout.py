@@ -17,7 +17,7 @@ from tisim.backend.taichi import ti
 
 WORD = 8
 """bytes of the widest number."""
-WIDE = ("f64", "i64", "u64")
+EIGHT_BYTES = ("f64", "i64", "u64")
 """These types of numbers have so many bytes, all others that are used have 4."""
 
 
@@ -55,7 +55,7 @@ class Level:
                 yield from part.sizes(cells * self.cells)
             else:
                 for one in part.vars:
-                    yield cells * self.cells, WORD if _dtype(one) in WIDE else 4
+                    yield cells * self.cells, WORD if _dtype(one) in EIGHT_BYTES else 4
 
     def fill_up(self) -> int:
         """Add parts that nobody uses, so that numbers of 8 bytes begin at multiples of 8; return the bytes of
@@ -100,7 +100,7 @@ def _dtype(one: Any) -> str:
 
 def _bytes(column: Any) -> int:
     """Return the bytes of one number of a field for each of its components; asked before it is placed."""
-    return len(column.vars) * (WORD if _dtype(column.vars[0]) in WIDE else 4)
+    return len(column.vars) * (WORD if _dtype(column.vars[0]) in EIGHT_BYTES else 4)
 
 
 def _is_wide(part: Any) -> bool:

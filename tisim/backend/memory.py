@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import weakref
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,6 +25,9 @@ hundred kB to each tree, and takes longer to compile the more there are."""
 
 MOST_ENTRIES = 2**31 - 1
 """A field has at most so many numbers: the kernel compiler counts them with 32 bits."""
+
+reclaimers: list[Callable[[], None]] = []
+"""These functions give back memory that is kept for later only."""
 
 _tree_counts: Counter[int] = Counter()
 """This counts the trees that have been made, by the start of Taichi."""
@@ -123,6 +126,15 @@ def tree_count() -> int:
 def needs_restart() -> bool:
     """Return whether so many trees have been made that Taichi should be started anew."""
     return _tree_counts[runtime.generation()] >= MAX_TREES_PER_START
+
+
+@in_taichi_thread
+def reclaim() -> None:
+    """Give back what nobody uses: what is kept for later, and what has been forgotten, but not collected."""
+    for give_back in reclaimers:
+        give_back()
+    gc.collect()
+    _release_lost()
 
 
 @in_taichi_thread

@@ -103,7 +103,7 @@ class Batches:
         if simulation is None:
             _renew()
             capacity = rounded(capacity)
-            few = min(FEW_WORLDS, SPARE // capacity)
+            few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE else 1
             worlds = max(1, min(max(few, rounded(worlds)), self.limit, BATCH_PARTICLES // capacity))
             simulation = Simulation(scenes[0], worlds, capacity)
         try:
@@ -169,8 +169,15 @@ def _give_up() -> None:
     """Forget what all Batches keep idle, unless something else is in use."""
     with _lock:
         idle = [each for batches in _all for each in batches._idle]
-        if memory.in_use() <= {tree for each in idle for tree in each.trees}:
-            for batches in _all:
-                batches._idle = []
-            for each in idle:
-                each.close()
+        needed = not memory.in_use() <= {tree for each in idle for tree in each.trees}
+    if not needed:
+        _close_idle()
+
+
+def _close_idle() -> None:
+    """Give the memory back of what all Batches keep idle."""
+    for batches in list(_all):
+        batches.close()
+
+
+memory.reclaimers.append(_close_idle)

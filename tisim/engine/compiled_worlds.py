@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
-from tisim.backend import runtime
-from tisim.backend.memory import Tree, collected
+from tisim.backend import memory, runtime
+from tisim.backend.memory import OutOfMemory, Tree, collected
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine import law_errors
 from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
-from tisim.errors import RunError
+from tisim.errors import InputError, RunError
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
+from tisim.worlds.finite import FiniteCheck
 from tisim.worlds.phases import Nest
 from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
@@ -32,12 +34,28 @@ class CompiledWorlds:
     @in_taichi_thread
     def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
         """Place all fields, which are returned, and compile the kernels of a step."""
-        with collected() as trees:
-            self.allocation = Allocation(scene, worlds, capacity)
+        try:
+            trees = self._allocate(scene, worlds, capacity)
+        except OutOfMemory:
+            # Once more, without what is only kept for later.
+            memory.reclaim()
+            try:
+                trees = self._allocate(scene, worlds, capacity)
+            except OutOfMemory as full:
+                needed, others = f"{full.needed / 1e9:.3g} GB", sum(tree.bytes for tree in memory.in_use())
+                rule = f"{full.rule()}, with {others / 1e9:.3g} GB that others use" if others else full.rule()
+                raise InputError(
+                    f"memory for {worlds} x {capacity} particles must be {rule}; received {needed}"
+                ) from None
         self.s, self.table = self.allocation.s, self.allocation.table
         self.schedule = schedule or self._choose(capacity)
         self.s.write("status", WorldStatus.ENDED)
         self._compile()
+        return trees
+
+    def _allocate(self, scene: Scene, worlds: int, capacity: int) -> list[Tree]:
+        with collected() as trees:
+            self.allocation = Allocation(scene, worlds, capacity)
         return trees
 
     def _compile(self) -> None:
@@ -110,6 +128,15 @@ class CompiledWorlds:
         if self.sort:
             self.sort.advance(1)
         self.program.advance(steps)
+
+    @cached_property
+    @in_taichi_thread
+    def finite_check(self) -> FiniteCheck:
+        """Return what asks on the device whether all is finite, made when it is first asked for."""
+        with collected() as trees:
+            check = FiniteCheck(self.s)
+        self.trees += trees
+        return check
 
     def close(self) -> None:
         """Give the device memory back. Whatever is asked of it later is a RunError, but for closing."""

@@ -6,11 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tisim.backend.memory import collected
-from tisim.backend.thread import in_taichi_thread
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import Status
-from tisim.worlds.finite import FiniteCheck
 from tisim.worlds.status import ASKED, NO_ONE, WorldStatus
 
 if TYPE_CHECKING:
@@ -57,14 +54,7 @@ class Monitor:
         # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
         shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
         large = self.s.worlds * self.s.capacity >= LARGE
-        self.check = self._device_check() if large and shared_clock else None
-
-    @in_taichi_thread
-    def _device_check(self) -> FiniteCheck:
-        with collected() as trees:
-            check = FiniteCheck(self.s)
-        self.simulation.trees += trees
-        return check
+        self.check = simulation.finite_check if large and shared_clock else None
 
     @property
     def good(self) -> Image:

@@ -42,10 +42,12 @@ class ContactMemory:
         partners, past = memory_fields(law.data)
         self.s, self.size = s, law.data.memory
         self.partners, self.past = getattr(s, partners.name), getattr(s, past.name)
-        self.values = tuple(ti.field(s.real) for _ in range(self.size))
+        self.values: tuple[Any, ...] = ()
 
-    def fields(self) -> tuple[Any, ...]:
-        """Return the fields to place with the pairs."""
+    def make_fields(self) -> tuple[Any, ...]:
+        """Make the fields, to be placed with the pairs, and return them. Not before that: one that is placed
+        nowhere, as there is no room for what comes first, would be a fault of every later kernel."""
+        self.values = tuple(ti.field(self.s.real) for _ in range(self.size))
         return self.values
 
     @ti.func

@@ -54,7 +54,7 @@ class PairChunks:
         self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
         builder = Builder()
         # A pair and its memory are one record: they are read together.
-        records = (self.first, self.second, *(value for one in memories for value in one.fields()))
+        records = (self.first, self.second, *(value for one in memories for value in one.make_fields()))
         builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
         for column in (self.sorted, self.fetched):
             builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(column)

@@ -83,9 +83,11 @@ class HalfList:
         return self.sizes.joined(ListSizes(row, mean))
 
     def forget(self) -> None:
-        """Have every list made anew before it is used again: how long the last one lasted is not known."""
+        """Have every list made anew before it is used again, as the first of a run: nothing is known of how
+        fast particles move."""
         self.stale.fill(1)
         self.moves.fill(0)
+        self.pace.fill(0.0)
 
     @ti.func
     def reach(self, w, i):

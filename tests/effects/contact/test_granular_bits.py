@@ -8,12 +8,13 @@ import pytest
 
 from tests.effects.contact.grains import heap, twin
 from tests.scenes import by_id
-from tisim import Simulation
-from tisim.backend import runtime
+from tisim import RunError, Simulation
+from tisim.backend import memory, runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import parameter
 from tisim.interactions import pair_chunks
+from tisim.neighbours.half_list import ListSizes
 from tisim.operators import Operator
 
 GRAINS, STEPS, DT = 200, 200, 2e-4
@@ -156,3 +157,15 @@ def test_of_one_thread_and_two_and_nearly_those_of_single_precision(usual, tmp_p
                 np.testing.assert_array_equal(stored[f"two/{k}/{name}"], values)
             moved = np.abs(expected["velocity"] - stored[f"f32/{k}/velocity"])
             assert 0 < np.median(moved) < 1e-3
+
+
+def test_no_room_for_longer_lists_is_no_fault_of_what_follows(simulation, monkeypatch):
+    """Grains remember beside their pairs, in fields that are made before there is room for them or not."""
+    row = simulation.assembly.pairs.half_list.row
+    present = sum(tree.bytes for tree in memory.in_use())
+    monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
+    with pytest.raises(RunError, match=r"lists of 99 pairs for a particle"):
+        simulation.grow_lists(ListSizes(99, 99))
+    monkeypatch.undo()
+    assert simulation.assembly.pairs.half_list.row == row
+    assert len(ends(simulation, [bed(1)])) == 1
