@@ -25,6 +25,11 @@ registers, and loops over fewer are unrolled before they are vectorised. From 96
 vectorised."""
 
 
+VECTOR = 8
+"""The lanes of a tile that are computed begin and end at multiples of this, those of the widest vectors used
+(256 bits, f32)."""
+
+
 MANY = 1000
 """With so many others, the pairs of a world are work enough for more threads than one (measured on 2 cores:
 launches cost a step 0.2 ms, as much as the pairs of 400)."""
@@ -139,6 +144,8 @@ class PairSum(PerParticle):
         nobody reads."""
         n = self.s.count[w]
         first, end = ti.min(begin, self.s.capacity - TILE), ti.min(begin + TILE, n)
+        # Vectors of lanes in which none has a particle are left out.
+        low, high = (begin - first) // VECTOR * VECTOR, (end - first + VECTOR - 1) // VECTOR * VECTOR
         # An array for each component: with one of 96 numbers for all, some kernels read parameters again for
         # each pair and did not vectorise (presumably it has more uses than LLVM follows to see that nothing
         # else points to it; each number it starts with is one).
@@ -164,7 +171,7 @@ class PairSum(PerParticle):
                         for c in ti.static(range(self.components)):
                             sums[c][lane] = sums[c][lane] + terms[c]
             else:
-                for lane in range(TILE):
+                for lane in range(low, high):
                     terms = self.terms(self.long_ranged, w, first + lane, j, t)
                     for c in ti.static(range(self.components)):
                         total = sums[c][lane]

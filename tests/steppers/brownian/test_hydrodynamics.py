@@ -142,8 +142,9 @@ def shifts(scenes, steps):
 
 @tensors
 def test_exact_noise_has_the_covariance_2_d_dt(hydrodynamics):
-    """C C^T = D to rounding; and noise that C^-1 takes apart is standard normal, and not correlated."""
-    cases = [lattice(k) if hydrodynamics == "oseen" else crowd(k, 10) for k in range(WORLDS)]
+    """C C^T = D to rounding; and noise that C^-1 takes apart is standard normal, and not correlated. 11: the
+    decomposition takes particles in twos."""
+    cases = [lattice(k) if hydrodynamics == "oseen" else crowd(k, 11) for k in range(WORLDS)]
     scenes = [make(c, hydrodynamics, dt=1e-6, steps=1000, seed=k) for k, c in enumerate(cases)]
     displacements, normals, places = shifts(scenes, 60)
     whitened = np.zeros_like(displacements)
