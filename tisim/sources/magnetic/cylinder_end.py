@@ -144,8 +144,9 @@ def off_axis(rho, u, radius):
     gamma = ti.select(inside, -size, size)
     over_gamma = 1.0 / gamma
     kc = ti.max(ti.sqrt(u * u + gap * gap) * over_s, least)
-    k, sigma, third, other = elliptic(kc, reach * over_product, size, n * (size * size + beta * beta))
-    k /= ti.math.pi
+    k, sigma, third, other = elliptic(
+        kc, reach * over_product, size, ti.abs(over_gamma), n * (size * size + beta * beta)
+    )
     # The same difference twice: each loses digits where the other does not.
     lift = ti.select(
         gamma < 0.5,
