@@ -24,18 +24,21 @@ def limits() -> tuple[float, float]:
 
 
 @ti.func
-def elliptic(kc, over_m, gamma, rest):
-    """Return K, sigma with E = K (1 - m/2 - m^2 sigma/2), 2 gamma^2 (Pi - K) / (n K), and 1 less the last.
+def elliptic(kc, over_m, gamma, over_gamma, rest):
+    """Return K / pi, sigma with E = K (1 - m/2 - m^2 sigma/2), 2 gamma^2 (Pi - K) / (n K), and 1 less the
+    last.
 
-    Two kc go side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0. over_m : 1/m. rest :
-    n - m + gamma^2 n, which the caller knows without cancellation. sigma = sum_i 2^i c_i^2 / m^2, i >= 1.
+    Two kc go side by side: all but gamma are vectors. kc > 0; gamma in 0..1, not 0. over_m : 1/m.
+    over_gamma : 1/gamma. rest : n - m + gamma^2 n, which the caller knows without cancellation.
+    sigma = sum_i 2^i c_i^2 / m^2, i >= 1.
     """
     tolerance = ti.static(limits()[0])
     square = gamma * gamma
-    over_pole, over_both = 1.0 / (square + kc), 1.0 / (1.0 + kc)
+    pole = square + kc
+    over_pole, over_both = 1.0 / pole, 1.0 / (1.0 + kc)
     sigma = 0.5 * over_both * over_both
     third, weight = 2.0 * square * over_pole, 0.5 * rest * over_pole * over_pole
-    other, p = 0.0 * kc, 0.5 / (gamma * over_pole)
+    other, p = 0.0 * kc, 0.5 * pole * over_gamma
     a, g, scale = 0.5 * (1.0 + kc), ti.sqrt(kc), over_m * over_m
     k = 0
     while (ti.abs(a - g) - tolerance * a).max() > 0.0 and k < ITERATIONS:
@@ -55,4 +58,4 @@ def elliptic(kc, over_m, gamma, rest):
     mean = 0.5 * (a + g)
     # The means have met: the rest of the sums over p in closed form.
     last = 2.0 * weight / (mean + p)
-    return 0.5 * ti.math.pi / mean, sigma, third + last * mean, other + last * p
+    return 0.5 / mean, sigma, third + last * mean, other + last * p

@@ -39,7 +39,8 @@ def two_ends(rho, u, radius):
     both = ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)])
     if not (slim[0] and slim[1]):
         both = off_axis(rho, u, radius)
-    for k in range(2):
+    # One question for most points, which are far from the axis of both.
+    for k in range(ti.select(slim[0] or slim[1], 2, 0)):
         first = k == 0
         if ti.select(first, slim[0], slim[1]):
             one = near_axis(rho, ti.select(first, u[0], u[1]), radius, ti.select(first, far[0], far[1]))
@@ -143,8 +144,9 @@ def off_axis(rho, u, radius):
     gamma = ti.select(inside, -size, size)
     over_gamma = 1.0 / gamma
     kc = ti.max(ti.sqrt(u * u + gap * gap) * over_s, least)
-    k, sigma, third, other = elliptic(kc, reach * over_product, size, n * (size * size + beta * beta))
-    k /= ti.math.pi
+    k, sigma, third, other = elliptic(
+        kc, reach * over_product, size, ti.abs(over_gamma), n * (size * size + beta * beta)
+    )
     # The same difference twice: each loses digits where the other does not.
     lift = ti.select(
         gamma < 0.5,
