@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from tests.device.launches import assert_launches
 from tests.effects.contact.grains import heap, twin
 from tests.scenes import by_id
 from tisim import Simulation
@@ -101,6 +102,12 @@ def test_of_any_skin(simulation, usual):
 @in_taichi_thread
 def skin_of(simulation, w):
     return simulation.assembly.pairs.half_list.grid.skin[w]
+
+
+def test_a_step_is_few_launches_and_reads_no_more_than_who_goes_on(simulation):
+    """One more than a step has without what takes grains away, after which forces may be summed again."""
+    simulation.load([bed(k) for k in range(3)])
+    assert_launches(simulation, 20, each=3)
 
 
 @pytest.mark.slow
