@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from tisim.backend import runtime
-from tisim.backend.memory import OutOfMemory, Tree, collected
+from tisim.backend.memory import NoRoom, Tree, collected, require_memory
 from tisim.engine.assembly import Assembly, declared, needed_fields, picks_pairs
-from tisim.errors import must
+from tisim.errors import InputError
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.bound import connected
@@ -29,7 +29,7 @@ class Allocation:
     """An allocation is the state of worlds of the structure of a scene, the table of their parameters, and
     the parts of a step.
 
-    It must be made in the thread of Taichi. It raises InputError where the machine has not the memory.
+    It must be made in the thread of Taichi. It raises InputError where there is no room for it.
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
@@ -40,28 +40,24 @@ class Allocation:
         fields = resolve_fields(needed_fields(*asked))
         real = 8 if runtime.current().precision == "f64" else 4
         self.worlds, self.capacity = worlds, capacity
-        # Before anything is placed: the compiler cannot refuse what is too much for it.
-        self._require(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
         try:
+            # Before anything is placed: the compiler cannot refuse what is too much for it.
+            require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
             self.s = State(worlds, capacity, fields, counters, quantities, flags, picks_pairs(*asked))
             self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
             bound = (self.table.bind(part) for part in parts(scene))
             *effects, self.domain, self.stepper, self.control = bound
             self.s.domain, self.effects = self.domain, connected(effects)
             self.assemble(ListSizes())
-        except OutOfMemory as full:
-            self._require(full.needed)
-            raise
-
-    def _require(self, needed: int) -> None:
-        what = f"memory for {self.worlds} x {self.capacity} particles"
-        must(needed <= runtime.memory(), what, OutOfMemory.rule(), f"{needed / 1e9:.3g} GB")
+        except NoRoom as no:
+            what = f"{no.what} for {worlds} x {capacity} particles"
+            raise InputError(f"{what} must be {no.rule}; received {no.received}") from None
 
     def assemble(self, sizes: ListSizes) -> None:
         """Put a step together, with lists of these sizes; the memory of the one before is given back.
 
-        Raise RunError where there is no room for them.
+        Raise NoRoom where there is none for them.
         """
         for tree in self._trees:
             tree.destroy()
