@@ -280,7 +280,7 @@ PAIR_FORCES = [kind for kind in known_effects() if issubclass(kind, PairForce)]
 
 @pytest.mark.long
 def test_pair_forces_write_nothing_and_are_the_same_by_the_inverse():
-    assert {kind.kind() for kind in PAIR_FORCES if kind.offers("pair_force_by_inverse")}
+    assert {kind.kind() for kind in PAIR_FORCES if kind.offers_inverse()}
     assert_pair_forces(two(InverseSquare()))
     assert_pair_forces(joined(PAIR_FORCES))
 

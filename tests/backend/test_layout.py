@@ -10,24 +10,25 @@ from tisim.backend.thread import in_taichi_thread
 
 def size(part):
     """Bytes of a part, all cells of a level together."""
-    if not isinstance(part, Level):
-        return sum(WORD if kind in ("f64", "i64") else 4 for kind in kinds(part))
-    return part.cells * sum(map(size, part.parts))
+    if isinstance(part, Level):
+        return part.cells * sum(map(size, parts(part)))
+    return WORD if part.ptr.get_dt().to_string() in ("f64", "i64") else 4
 
 
-def kinds(column):
-    """The types of the numbers of a field."""
-    return [number.ptr.get_dt().to_string() for number in column.vars]
+def parts(level):
+    """What Taichi lays out in a cell: levels, and each component of a field by itself."""
+    for part in level.parts:
+        yield from [part] if isinstance(part, Level) else part.vars
 
 
 def wide_places(level, begin=0):
     """Where numbers of 8 bytes begin, as Taichi lays parts out: in the order of their sizes."""
     for cell in range(level.cells):
         at = begin + cell * size(level) // level.cells
-        for part in sorted(level.parts, key=size):
+        for part in sorted(parts(level), key=size):
             if isinstance(part, Level):
                 yield from wide_places(part, at)
-            elif kinds(part)[0] in ("f64", "i64"):
+            elif size(part) == WORD:
                 yield at
             at += size(part)
 
@@ -45,10 +46,19 @@ def mixed():
     return builder
 
 
+def narrow_vector():
+    """A builder with a vector of narrow numbers beside a wide one, whose components come one by one."""
+    builder = Builder()
+    together = builder.dense(ti.i, 2)
+    together.place(ti.Vector.field(3, ti.f32), ti.field(ti.f64))
+    return builder
+
+
+@pytest.mark.parametrize("made", [mixed, narrow_vector])
 @pytest.mark.skipif(ti.__name__ != "taichi", reason="what Vulkan needs is asked of Taichi")
 @in_taichi_thread
-def test_numbers_of_eight_bytes_begin_at_multiples_of_eight():
-    builder = mixed()
+def test_numbers_of_eight_bytes_begin_at_multiples_of_eight(made):
+    builder = made()
     assert any(place % WORD for place in wide_places(builder))
     assert builder.fill_up() == size(builder)
     assert not any(place % WORD for place in wide_places(builder))

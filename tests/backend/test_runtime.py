@@ -266,7 +266,7 @@ def test_what_is_kept_for_later_is_given_up_where_there_is_no_room():
         forgotten = Simulation(grains(3000))
         forgotten.itself = forgotten
         del forgotten
-    before = sum(tree.bytes for tree in memory.in_use())
+    before = memory.bytes_in_use()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runtime, "memory", lambda: before)
         Simulation(grains(3000)).close()

@@ -6,16 +6,13 @@ TISIM_DEVICE=cuda python -m pytest -n 0 -m gpu
 import os
 import subprocess
 import sys
-from collections import Counter
 
 import numpy as np
 import pytest
 
+from tests.device.launches import assert_launches
 from tests.device.scenes import SCENES, STEPS
 from tests.scenes import compiled
-from tisim.backend.taichi import ti
-from tisim.worlds.launches import Launch, Loop
-from tisim.worlds.state import State
 
 pytestmark = [
     pytest.mark.gpu,
@@ -28,6 +25,7 @@ MAGNIFIED = {"grains": 1e-11, "impacts": 1e-9, "fast": 1e-11}
 ON_CPU = """
 import sys
 import numpy as np
+from tests.device.launches import assert_launches
 from tests.device.scenes import SCENES
 from tisim import Simulation
 
@@ -68,25 +66,5 @@ def test_a_device_and_the_cpu_agree(name, on_cpu):
         np.testing.assert_allclose(result.state[field], expected, rtol=0, atol=tolerance, err_msg=field)
 
 
-def test_a_step_is_some_launches_and_reads_no_more_than_who_goes_on(monkeypatch):
-    """Two launches of all worlds, a number read for the step, of worlds that go on, and one for a loop, of
-    those whose list is due. Nothing else is launched, and no field is read between two looks."""
-    loaded, kernels, copies = simulation("grains"), Counter(), []
-    launch = ti.lang.kernel_impl.Kernel.__call__
-
-    def counted(kernel, *args, **options):
-        kernels[kernel.func.__name__] += 1
-        return launch(kernel, *args, **options)
-
-    monkeypatch.setattr(ti.lang.kernel_impl.Kernel, "__call__", counted)
-    monkeypatch.setattr(State, "snapshot", lambda *_: copies.append(1))
-    loaded.program.advance(STEPS)
-    plan = loaded.program.plan
-    loops, direct = (sum(isinstance(item, kind) for item in plan) for kind in (Loop, Launch))
-    rebuilds = kernels["count"] - STEPS * loops
-    assert direct == 2
-    assert rebuilds < STEPS / 2
-    assert kernels["run"] == STEPS * direct + rebuilds
-    assert kernels["_count_going_on"] == STEPS
-    assert kernels.total() == kernels["run"] + kernels["count"] + STEPS + 1
-    assert not copies
+def test_a_step_is_two_launches_and_reads_no_more_than_who_goes_on():
+    assert_launches(simulation("grains"), STEPS, each=2)

@@ -9,7 +9,9 @@ from tests.scenes import fixed, scene, simulate
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import DipoleDipole, Force, NearField, parameter
+from tisim.numerics import elementary
 from tisim.numerics.ieee import compensated_sum, finite, infinity, same
+from tisim.numerics.powers import power
 from tisim.sources import Cylinder, MagneticCylinders, sample
 
 CLOSE = 1e-12
@@ -26,6 +28,33 @@ class Wall(Force):
     def force(self, s, w, i, t):
         stiffness = ti.select(s.position[w, i][0] > self.place(w), self.stiffness(w), 0.0)
         return -1e3 * stiffness * s.position[w, i]
+
+
+class Screened(NearField):
+    """A near field that decays; what it inherits for sums by the inverse of the distance does not."""
+
+    length: float = parameter("m", "length of decay", 0.1)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        decay = elementary.exp(-distance / self.length(w))
+        return decay * self.between(s, w, i, j, separation, distance)
+
+
+class Reversed(NearField):
+    """A near field of the other sign, which changes what the law calls."""
+
+    @ti.func
+    def between(self, s, w, i, j, separation, distance):
+        attraction = self.alpha1(w) * power(distance, -1 - self.beta1)
+        return -self.own(s, w, i) * self.own(s, w, j) * attraction * separation
+
+
+class Named(NearField):
+    """A near field that changes no device function."""
+
+    def approximations(self, extent):
+        return ()
 
 
 @in_taichi_thread
@@ -107,10 +136,19 @@ def beside_a_long_cylinder():
     return sample(source, "magnetic_flux_density", places)[0].tolist()
 
 
+def derived():
+    """The forces (N) on one of two, a distance of 1 m apart, by laws derived from the near field."""
+    forces = []
+    for law in (Screened(alpha1=1.0), Reversed(alpha1=1.0)):
+        (result,) = simulate([scene([[0.0, 0, 0], [1, 0, 0]], np.zeros((2, 3)), (law,), dt=1e-15)])
+        forces.append(float(result.state["force"][0, 0]))
+    return forces
+
+
 def everything():
     """All of this, from one process."""
     settings = tisim.run(scene([[0.0, 0, 0]], [[1.0, 0, 0]])).settings
-    return [settings["arithmetic"], numbers(), twins(), failure(), beside_a_long_cylinder()]
+    return [settings["arithmetic"], numbers(), twins(), failure(), beside_a_long_cylinder(), derived()]
 
 
 @pytest.fixture(scope="module")
@@ -132,6 +170,13 @@ def test_what_is_not_finite_is_found_and_sums_carry_their_rounding_error_along(f
 
 def test_forces_are_those_of_their_twins(fast):
     assert max(fast[2]) < CLOSE
+
+
+def test_a_law_derived_from_one_by_the_inverse_is_its_own(fast):
+    np.testing.assert_allclose(fast[5], [np.exp(-10.0), -1.0], rtol=1e-9)
+    assert not Screened.offers_inverse()
+    assert NearField.offers_inverse()
+    assert Named.offers_inverse()
 
 
 def test_a_force_that_becomes_infinite_is_reported_and_worlds_end_on_time(fast):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import tisim
-from tests.scenes import flow
+from tests.scenes import flow, scene, simulate
 from tisim import Box, Cloud, InputError, Lattice, Particles, RandomAroundCylinder, Scene, Simulation
+from tisim.backend import memory
 from tisim.effects import Impact, Mie
 from tisim.operators import Cooling, Fragmentation
 from tisim.steppers import ApproachTime, FixedStep, Verlet
@@ -285,3 +286,15 @@ def test_more_than_the_machine_holds_is_refused_before_anything_runs():
     scene = flow(seed=1, grains=20).replace({"effects.fragmentation.grain_mass": 1e-20})
     with pytest.raises(InputError, match=r"memory for 1 x \d+ particles must be within the \d+ GB"):
         Simulation(scene)
+
+
+def test_more_numbers_than_a_field_can_have_are_refused_like_too_much_memory(monkeypatch):
+    """What has been begun is given back: the next simulation is made, and runs."""
+    one = scene([[0.0, 0, 0]], [[1.0, 0, 0]])
+    monkeypatch.setattr(memory, "MOST_ENTRIES", 50)
+    rule = r"^numbers for 1 x 64 particles must be at most 50 in each field; received \d+"
+    with pytest.raises(InputError, match=rule):
+        Simulation(one, capacity=64)
+    monkeypatch.undo()
+    (result,) = simulate([one], capacity=64)
+    assert result.status.ok

@@ -185,7 +185,7 @@ def test_lists_do_not_grow_beyond_the_memory_of_the_machine(monkeypatch):
     simulation = Simulation(made)
     simulation.load(made)
     row = simulation.assembly.pairs.half_list.row
-    present = sum(tree.bytes for tree in memory.in_use())
+    present = memory.bytes_in_use()
     monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
     message = r"lists of \d+ pairs for a particle, .* memory of all fields must be within the \d+ GB"
     with pytest.raises(RunError, match=message):

@@ -55,19 +55,26 @@ class Level:
                 yield from part.sizes(cells * self.cells)
             else:
                 for one in part.vars:
-                    yield cells * self.cells, WORD if _dtype(one) in EIGHT_BYTES else 4
+                    yield cells * self.cells, _bytes(one)
 
     def fill_up(self) -> int:
         """Add parts that nobody uses, so that numbers of 8 bytes begin at multiples of 8; return the bytes of
         all cells."""
-        sizes = [part.fill_up() if isinstance(part, Level) else _bytes(part) for part in self.parts]
-        if any(map(_is_wide, self.parts)):
+        # Taichi places each component of a vector as a part of its own.
+        sizes: list[int] = []
+        for part in self.parts:
+            sizes += [part.fill_up()] if isinstance(part, Level) else map(_bytes, part.vars)
+        if self._is_wide():
             # A part whose size is no multiple of 8 gets another of its size, unless there is one.
             for size, number in Counter(size for size in sizes if size % WORD).items():
                 if number % 2:
                     self.dense(ti.l, size // 4).place(ti.field(ti.i32))
                     sizes.append(size)
         return sum(sizes) * self.cells
+
+    def _is_wide(self) -> bool:
+        """Return whether any number in it has 8 bytes."""
+        return any(size == WORD for _, size in self.sizes())
 
 
 class Builder(Level):
@@ -92,19 +99,6 @@ class Builder(Level):
         ti.lang.impl.get_runtime().finalize_fields_builder(builder)
 
 
-def _dtype(one: Any) -> str:
-    """Return the type of the numbers of a part of a field; asked before it is placed."""
-    name: str = one.ptr.get_dt().to_string()
-    return name
-
-
-def _bytes(column: Any) -> int:
-    """Return the bytes of one number of a field for each of its components; asked before it is placed."""
-    return len(column.vars) * (WORD if _dtype(column.vars[0]) in EIGHT_BYTES else 4)
-
-
-def _is_wide(part: Any) -> bool:
-    """Return whether any number of a part has 8 bytes."""
-    if isinstance(part, Level):
-        return any(_is_wide(one) for one in part.parts)
-    return _bytes(part) // len(part.vars) == WORD
+def _bytes(one: Any) -> int:
+    """Return the bytes of a number of a field, of one of its components; asked before it is placed."""
+    return WORD if one.ptr.get_dt().to_string() in EIGHT_BYTES else 4

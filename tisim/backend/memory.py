@@ -38,37 +38,42 @@ _lost: deque[tuple[Any, int]] = deque()
 belongs to. It is a list, as the garbage collector may come at any time and in any thread."""
 
 
-class OutOfMemory(RunError):
-    """There is no room for fields. needed : what all fields that are in use come to with them, bytes."""
+class NoRoom(RunError):
+    """There is no room for fields: ``what`` they need of it must be as ``rule`` says; it is ``received``."""
 
-    def __init__(self, needed: int) -> None:
-        self.needed = needed
-        super().__init__(f"memory of all fields must be {self.rule()}; received {needed / 1e9:.3g} GB")
+    def __init__(self, what: str, rule: str, received: str) -> None:
+        self.what, self.rule, self.received = what, rule, received
+        super().__init__(f"{what} of all fields must be {rule}; received {received}")
 
-    @staticmethod
-    def rule() -> str:
-        """Return what the memory needed must be."""
-        return f"within the {runtime.memory() / 1e9:.0f} GB of this machine"
+
+def require_memory(needed: int) -> None:
+    """Raise NoRoom unless this machine has so many bytes of memory."""
+    there = runtime.memory()
+    if needed > there:
+        raise NoRoom("memory", f"within the {there / 1e9:.0f} GB of this machine", f"{needed / 1e9:.3g} GB")
+
+
+def _require_entries(longest: int) -> None:
+    if longest > MOST_ENTRIES:
+        raise NoRoom("numbers", f"at most {MOST_ENTRIES} in each field", str(longest))
 
 
 class Tree:
     """A tree is fields that have been placed in one builder, in device memory from now on.
 
-    OutOfMemory is raised where there is no room for them, RunError where too many are in use, or one has too
-    many entries.
+    NoRoom is raised where there is none for them, RunError where too many are in use.
     """
 
     @in_taichi_thread
     def __init__(self, builder: Builder) -> None:
         sizes = list(builder.sizes())
         self.bytes = sum(entries * each for entries, each in sizes)
-        needed = self.bytes + sum(tree.bytes for tree in in_use())
-        longest = max((entries for entries, _ in sizes), default=0)
-        if needed > runtime.memory() or longest > MOST_ENTRIES:
+        try:
+            require_memory(self.bytes + bytes_in_use())
+            _require_entries(max((entries for entries, _ in sizes), default=0))
+        except NoRoom:
             builder.abandon()
-            if needed > runtime.memory():
-                raise OutOfMemory(needed)
-            raise RunError(f"a field must have at most {MOST_ENTRIES} numbers; received {longest}")
+            raise
         # Whatever comes next: a builder that has not been finalised is a fault of every later kernel.
         tree = builder.finalize()
         self.generation = runtime.generation()
@@ -101,6 +106,11 @@ class Tree:
 def in_use() -> set[Tree]:
     """Return all trees whose memory is there."""
     return {tree for tree in _live if tree.alive}
+
+
+def bytes_in_use() -> int:
+    """Return the bytes of all fields that are in use."""
+    return sum(tree.bytes for tree in in_use())
 
 
 @contextmanager

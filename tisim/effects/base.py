@@ -54,7 +54,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from tisim.backend.taichi import ti
+from tisim.backend.taichi import is_device_function, ti
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.cost_hints import LawHints
@@ -227,9 +227,20 @@ class PairForce(Pairwise):
         """Return ``pair_force`` given 1/distance (1/m); 0 where that is 0.
 
         A law that needs no more of the distance may define it as well: sums over all pairs in fast arithmetic
-        then make roots and divisions ahead.
+        then make roots and divisions ahead. A subclass that changes the law, ``pair_force`` or what that
+        calls, defines it anew, or is summed without it.
         """
         return 0.0 * separation
+
+    @classmethod
+    def offers_inverse(cls) -> bool:
+        """Return whether ``pair_force_by_inverse`` is the law of this class: no class derived from the one
+        that defines it has changed a device function."""
+        classes = cls.__mro__
+        definer = next(base for base in classes if "pair_force_by_inverse" in vars(base))
+        later = classes[: classes.index(definer)]
+        changed = (n for base in later for n, own in vars(base).items() if is_device_function(own))
+        return cls.offers("pair_force_by_inverse") and not any(hasattr(definer, name) for name in changed)
 
     @ti.func
     def pair_torque(self, s, w, i, j, separation, distance, t):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tisim.backend import runtime
-from tisim.backend.memory import OutOfMemory, Tree, collected
+from tisim.backend.memory import Tree, collected, require_memory
 from tisim.engine.assembly import Assembly, declared, needed_fields, picks_pairs
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
@@ -28,7 +28,7 @@ class Allocation:
     """An allocation is the state of worlds of the structure of a scene, the table of their parameters, and
     the parts of a step.
 
-    It must be made in the thread of Taichi. It raises OutOfMemory where the machine has not the memory.
+    It must be made in the thread of Taichi. It raises NoRoom where there is none for it.
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
@@ -39,9 +39,7 @@ class Allocation:
         fields = resolve_fields(needed_fields(*asked))
         real = 8 if runtime.current().precision == "f64" else 4
         # Before anything is placed: the compiler cannot refuse what is too much for it.
-        least = COPIES * sum(field.bytes(real, worlds, capacity) for field in fields)
-        if least > runtime.memory():
-            raise OutOfMemory(least)
+        require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
         self.s = State(worlds, capacity, fields, counters, quantities, flags, picks_pairs(*asked))
         self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
@@ -53,7 +51,7 @@ class Allocation:
     def assemble(self, sizes: ListSizes) -> None:
         """Put a step together, with lists of these sizes; the memory of the one before is given back.
 
-        Raise OutOfMemory where there is no room for them.
+        Raise NoRoom where there is none for them.
         """
         for tree in self._trees:
             tree.destroy()

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from tisim.backend import memory, runtime
-from tisim.backend.memory import OutOfMemory, Tree, collected
+from tisim.backend.memory import NoRoom, Tree, collected
 from tisim.backend.thread import in_taichi_thread
 from tisim.engine import law_errors
 from tisim.engine.allocation import Allocation
@@ -36,17 +36,15 @@ class CompiledWorlds:
         """Place all fields, which are returned, and compile the kernels of a step."""
         try:
             trees = self._allocate(scene, worlds, capacity)
-        except OutOfMemory:
+        except NoRoom:
             # Once more, without what is only kept for later.
             memory.reclaim()
             try:
                 trees = self._allocate(scene, worlds, capacity)
-            except OutOfMemory as full:
-                needed, others = f"{full.needed / 1e9:.3g} GB", sum(tree.bytes for tree in memory.in_use())
-                rule = f"{full.rule()}, with {others / 1e9:.3g} GB that others use" if others else full.rule()
-                raise InputError(
-                    f"memory for {worlds} x {capacity} particles must be {rule}; received {needed}"
-                ) from None
+            except NoRoom as no:
+                what, others = f"{no.what} for {worlds} x {capacity} particles", memory.bytes_in_use()
+                rule = f"{no.rule}, with {others / 1e9:.3g} GB that others use" if others else no.rule
+                raise InputError(f"{what} must be {rule}; received {no.received}") from None
         self.s, self.table = self.allocation.s, self.allocation.table
         self.schedule = schedule or self._choose(capacity)
         self.s.write("status", WorldStatus.ENDED)

@@ -80,7 +80,7 @@ class SumForces(PairSum):
             laws.append((law, self.pair_values))
             self.pair_values += law.data.memory if self.commits else 0
         self.laws = tuple(laws)
-        able = all(effect.data.offers("pair_force_by_inverse") for effect in self.long_ranged)
+        able = all(effect.data.offers_inverse() for effect in self.long_ranged)
         self.by_inverse = able and not self.turning and estimates_roots()
 
     @ti.func

@@ -34,7 +34,7 @@ def assert_pair_forces(scene: Scene) -> None:
         s.fill({effect.data.quantity: 1.0 for effect in allocation.assembly.effects.of(DerivedQuantity)})
         for effect in allocation.assembly.effects.of(PairForce):
             _assert_nothing_written(s, effect, scene.duration)
-            if effect.data.offers("pair_force_by_inverse"):
+            if effect.data.offers_inverse():
                 _assert_same_by_inverse(effect, _ByInverse(s, effect).forces()[:n, :n])
 
 

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from tests.device.launches import assert_launches
 from tests.effects.contact.grains import heap, twin
 from tests.scenes import by_id
 from tisim import RunError, Simulation
@@ -104,6 +105,12 @@ def skin_of(simulation, w):
     return simulation.assembly.pairs.half_list.grid.skin[w]
 
 
+def test_a_step_is_few_launches_and_reads_no_more_than_who_goes_on(simulation):
+    """One more than a step has without what takes grains away, after which forces may be summed again."""
+    simulation.load([bed(k) for k in range(3)])
+    assert_launches(simulation, 20, each=3)
+
+
 @pytest.mark.slow
 def test_of_both_schedules(usual):
     simulation = simulated("world")
@@ -162,7 +169,7 @@ def test_of_one_thread_and_two_and_nearly_those_of_single_precision(usual, tmp_p
 def test_no_room_for_longer_lists_is_no_fault_of_what_follows(simulation, monkeypatch):
     """Grains remember beside their pairs, in fields that are made before there is room for them or not."""
     row = simulation.assembly.pairs.half_list.row
-    present = sum(tree.bytes for tree in memory.in_use())
+    present = memory.bytes_in_use()
     monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
     with pytest.raises(RunError, match=r"lists of 99 pairs for a particle"):
         simulation.grow_lists(ListSizes(99, 99))
