@@ -18,13 +18,13 @@ from tests.effects.contact.sheared import (
     inside,
 )
 from tests.scenes import by_id, compiled, scene
-from tisim import InputError, Recording, ShearedBox
-from tisim.accuracy.sweep import methods
+from tisim import Recording, ShearedBox
+from tisim.accuracy.quantity import usual, velocity
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects import HertzMindlin, Impact
+from tisim.effects import HertzMindlin
 from tisim.io.export import export
-from tisim.steppers import ApproachTime, Boris, ErrorControl, FixedStep, Trapezoid, Verlet
+from tisim.steppers import Boris, FixedStep, Verlet
 from tisim.testing import assert_lists
 
 WORLDS, CAPACITY = 2, 64
@@ -139,6 +139,15 @@ def test_a_pair_across_the_face_is_one_in_the_middle(stepper):
             np.testing.assert_allclose(by_id(here)[name], touched[name], rtol=0, atol=1e-11 * scale + 1e-9)
 
 
+def test_what_a_study_compares_does_not_jump_at_a_face():
+    """The velocity of a pair relative to the flow is the same wherever it is, also after it has crossed."""
+    (there,), (here,) = run(pair(np.zeros(3))), run(pair(np.array([0.0, -0.75, 0.0])))
+    (quantity,) = usual(here.scene)
+    assert quantity.name == "velocity relative to the flow"
+    assert np.abs(velocity(here) - velocity(there)).max() > 1
+    np.testing.assert_allclose(quantity.value(here), quantity.value(there), rtol=0, atol=1e-10)
+
+
 def layers(rate=RATE, steps=3000):
     """Layers of grains that follow the flow, and touch where one layer has slid far enough past the next."""
     sites = np.stack(np.meshgrid(*3 * [np.arange(4)], indexing="ij"), axis=-1).reshape(-1, 3)
@@ -235,44 +244,3 @@ def test_files_say_where_images_are(rng, tmp_path):
     np.testing.assert_array_equal(edges[:, [0, 1, 2], [0, 1, 2]], np.tile(SIDES, (5, 1)))
     for atoms, rows in zip(ase.io.read(export(path, "xyz", tmp_path), index=":"), edges, strict=True):
         np.testing.assert_array_equal(atoms.cell[...], rows)
-
-
-BOX = {"low": (0, 0, 0), "high": (1, 1, 1), "rate": 1.0}
-IMPLICIT = Trapezoid(control=ErrorControl())
-WRONG = {
-    "axes": (
-        {"gradient": "x"},
-        {},
-        r"sheared_box.gradient must be another axis than sheared_box.flow; rec",
-    ),
-    "open": ({"periodic": (True, False, True)}, {}, r"sheared_box.periodic must be true along flow and grad"),
-    "images": ({"images": False}, {}, r"sheared_box.images must be true; received False"),
-    "stepper": (
-        {},
-        {"stepper": IMPLICIT},
-        r"stepper must be one that follows shear, such as verlet or boris",
-    ),
-    "control": (
-        {},
-        {"stepper": Verlet(control=ApproachTime()), "effects": ()},
-        r"stepper.control must be one that does not look at pairs, such as fixed_step, in a sheared_box; rec",
-    ),
-    "sudden": (
-        {},
-        {"effects": (Impact(hardness=1.0),)},
-        r"effects.impact must be a force, and not sudden",
-    ),
-}
-
-
-def test_what_does_not_go_with_shear_is_not_tried_by_a_study_of_cost(rng):
-    made = crowd(rng)
-    tried = {type(one.base.stepper) for one in methods(made, DT, 1.0, (0.0,), (("f64", "strict"),), 1)}
-    assert tried == {Verlet}
-
-
-@pytest.mark.parametrize(("box", "more", "message"), WRONG.values(), ids=WRONG)
-def test_what_does_not_go_with_shear_is_refused(box, more, message):
-    settings = {"effects": (HertzMindlin(**LAW),), "quantities": {"spin": np.zeros((1, 3))}, **more}
-    with pytest.raises(InputError, match=message):
-        scene([[0, 0, 0]], [[0, 0, 0]], domain=ShearedBox(**{**BOX, **box}), **settings)

@@ -12,7 +12,7 @@ from PIL import Image
 
 import tisim
 from tests.scenes import scene
-from tisim import Box, InputError, Open, Recording
+from tisim import Box, InputError, Open, Recording, ShearedBox
 from tisim.io.reader import Frames, frames
 from tisim.io.trajectory import Trajectory
 from tisim.plotting.cloud import start_and_end
@@ -73,6 +73,25 @@ def test_a_number_of_particles_that_changes_has_a_panel():
     *_, number = figure.axes
     assert number.lines[0].get_ydata().tolist() == [3, 2]
     assert (number.get_title("left"), figure.get_suptitle()) == ("(c)", "")
+
+
+def test_nothing_jumps_where_a_particle_crosses_the_face_of_a_sheared_box():
+    """It moves with the flow and 1 m/s up the gradient; the rate is 10 /s, and sides are 2 m."""
+    box = ShearedBox(low=(-1, -1, -1), high=(1, 1, 1), rate=10.0)
+
+    class Seen(list):
+        times = np.array([0.0, 1.0])
+        scene = SimpleNamespace(domain=box)
+
+    frames = Seen()
+    for height in (0.9, -0.9):
+        arrays = {"position": np.array([[0.0, height, 0.0]]), "velocity": np.array([[10 * height, 1.0, 0.0]])}
+        frames.append(SimpleNamespace(arrays={**arrays, "mass": np.array([2.0])}))
+    series = history(frames)
+    np.testing.assert_allclose(series.kinetic_energy, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(series.drift, [[0.0, 1.0, 0.0]] * 2, rtol=0, atol=1e-12)
+    for axis in quantities(frames).axes:
+        assert "relative" in axis.get_ylabel()
 
 
 @pytest.mark.parametrize(("speeds", "scale"), [((0.0, 1e-3, 1.0), "log"), ((0.0, 0.9, 1.0), "linear")])

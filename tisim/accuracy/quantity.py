@@ -84,6 +84,13 @@ def velocity(result: Result) -> np.ndarray:
     return result.state["velocity"][np.argsort(result.state["id"])]
 
 
+def velocity_in_shear(result: Result) -> np.ndarray:
+    """Return the ``velocity`` relative to the flow that the images of a sheared box take part in, m/s, shape
+    (n, 3)."""
+    place = result.state["position"][np.argsort(result.state["id"])]
+    return velocity(result) - result.scene.domain.streaming_velocity(place)
+
+
 def kinetic_energy(result: Result) -> float:
     """Return the kinetic energy of all particles at the end, without rotation, J."""
     return 0.5 * float((result.state["mass"] * (result.state["velocity"] ** 2).sum(axis=1)).sum())
@@ -105,9 +112,12 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
         must(not any(scene.domain.joined()), "quantities", "given for random paths in a box", "none")
         return (Quantity("mean square displacement", mean_square, random=True),)
     if not any(isinstance(effect, Operator | PairEvent) for effect in scene.effects):
-        # Where opposite faces are joined a place jumps; a velocity does not.
-        jumps = any(scene.domain.joined())
-        name, value = ("velocity", velocity) if jumps else ("displacement", displacement)
+        # Across joined faces a place jumps, and so does a velocity where these move past each other.
+        name, value = "displacement", displacement
+        if scene.domain.shears():
+            name, value = "velocity relative to the flow", velocity_in_shear
+        elif any(scene.domain.joined()):
+            name, value = "velocity", velocity
         return (Quantity(name, value, returns=True),)
     starts = [scene.particles.arrays(scene.domain, scene.seed + k) for k in (0, 1)]
     differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))

@@ -50,6 +50,10 @@ class Domain(Component):
         low, high = self.bounds()
         return np.zeros((3, 3)) if low is None or high is None else np.diag(high - low)
 
+    def streaming_velocity(self, position: np.ndarray) -> np.ndarray:
+        """Return ``streaming`` (m/s) at places (m), shape (n, 3)."""
+        return np.zeros_like(position)
+
     @ti.func
     def wrap(self, w, r, t):
         """Return the place (m) inside the domain, at time t (s), of a particle that has moved to r."""
@@ -166,21 +170,25 @@ class Box(Domain):
 
     @ti.func
     def wrap(self, w, r, t):
-        return self.wrapped(w, r)
+        low, side, place = self.low(w), self.side(w), r
+        for k in ti.static(range(3)):
+            if ti.static(self.periodic[k]):
+                place[k], _turns = self.enter(low[k], side[k], r[k])
+        return place
 
     @ti.func
-    def wrapped(self, w, r):
-        """Return the place (m) of r between the faces, of those axes that are periodic."""
-        low, side = self.low(w), self.side(w)
-        inside = r
-        for k in ti.static(range(3)):
-            # Not x - side * floor(...) for all: that would round what has not moved across a face.
-            if ti.static(self.periodic[k]) and not (r[k] >= low[k] and r[k] < low[k] + side[k]):
-                inside[k] = r[k] - side[k] * ti.floor((r[k] - low[k]) / side[k])
-                # Rounding can land exactly on the upper face, which is the lower one.
-                if inside[k] >= low[k] + side[k]:
-                    inside[k] = low[k]
-        return inside
+    def enter(self, low, side, x):
+        """Return the place (m) of x between two faces a ``side`` apart, and how many sides up it was."""
+        inside, turns = x, 0.0 * x
+        # Not x - side * floor(...) for all: that would round what has not moved across a face.
+        if not (x >= low and x < low + side):
+            turns = ti.floor((x - low) / side)
+            inside = x - side * turns
+            # Rounding can land exactly on the upper face, which is the lower one.
+            if inside >= low + side:
+                inside = low
+                turns += 1.0
+        return inside, turns
 
     @ti.func
     def lost(self, w, r):

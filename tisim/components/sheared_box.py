@@ -28,7 +28,8 @@ class ShearedBox(Box):
 
     Nothing but the images sets the particles in motion: give a start the flow u, or wait for it to spread.
     What depends on the velocities of two particles takes that of the image. What acts on a particle by itself
-    must not tell one layer from another: gravity does not, a fluid or a wall at rest does.
+    must not tell one layer from another: gravity does not, and goes with this box; a fluid or a wall at rest
+    does, and is refused, as is what does not say that it is ``homogeneous``.
 
     Source: A. W. Lees, S. F. Edwards, J. Phys. C 5 (1972) 1921.
     """
@@ -75,6 +76,11 @@ class ShearedBox(Box):
         edges[self.across, self.along] = way - length * np.round(way / length)
         return edges
 
+    def streaming_velocity(self, position: np.ndarray) -> np.ndarray:
+        u, middle = np.zeros_like(position), 0.5 * (self.low[self.across] + self.high[self.across])
+        u[:, self.along] = self.rate * (position[:, self.across] - middle)
+        return u
+
     @ti.func
     def shear_rate(self, w):
         return self.rate(w)
@@ -98,27 +104,26 @@ class ShearedBox(Box):
         return ti.cast(way - side[self.along] * ti.round(way / side[self.along]), self.real)
 
     @ti.func
-    def crossed(self, w, r):
-        """Return how many sides up the gradient r lies."""
-        x, low, side = r[self.across], self.low(w)[self.across], self.side(w)[self.across]
-        turns = 0.0 * x
-        if not (x >= low and x < low + side):
-            turns = ti.floor((x - low) / side)
-            # What is put on the upper face by rounding is put on the lower one, as in a box.
-            if x - side * turns >= low + side:
-                turns += 1.0
-        return turns
+    def cross(self, w, r, t):
+        """Return the place (m) inside the box of the image of r, and how many sides up the gradient r is."""
+        low, side, place = self.low(w), self.side(w), r
+        # Both come of one look at the faces: worked out twice they might be those of different images.
+        place[self.across], turns = self.enter(low[self.across], side[self.across], r[self.across])
+        place[self.along] -= turns * self.offset(w, t)
+        for k in ti.static(range(3)):
+            if ti.static(self.periodic[k] and k != self.across):
+                place[k], _turns = self.enter(low[k], side[k], place[k])
+        return place, turns
 
     @ti.func
     def wrap(self, w, r, t):
-        inside = r
-        inside[self.along] -= self.crossed(w, r) * self.offset(w, t)
-        return self.wrapped(w, inside)
+        place, _turns = self.cross(w, r, t)
+        return place
 
     @ti.func
     def put(self, s, w, i, r, t):
-        s.position[w, i] = self.wrap(w, r, t)
-        s.velocity[w, i][self.along] = s.velocity[w, i][self.along] - self.crossed(w, r) * self.speed(w)
+        s.position[w, i], turns = self.cross(w, r, t)
+        s.velocity[w, i][self.along] = s.velocity[w, i][self.along] - turns * self.speed(w)
 
     @ti.func
     def turn(self, w, a, b):

@@ -9,7 +9,8 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    that no other effect has ever needed is declared by putting a ``Field`` there; effects that share one
    declare it alike. Where the options decide, ``required_fields`` returns those of this one.
    ``depends_on_velocity`` says whether it reads or changes velocities or spins, which steppers without
-   inertia do not have.
+   inertia do not have; ``homogeneous`` whether it goes with a sheared box, which forces on single particles,
+   sources and operators do only where they say so.
 4. ``counters`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
    back. Of several effects of one kind they are summed, as all write the same.
@@ -83,10 +84,11 @@ class Effect(LawHints, Component):
     two of a kind where they make sense: each acts with its own parameters, and what both count is added up.
 
     fields : the particle fields that it reads or writes, by name or as a ``Field``. depends_on_velocity :
-    whether it reads or changes velocities or spins. counters : names of the integer counters that it keeps of
-    a world. world_quantities : names of the quantities that it keeps of a
-    world. requires_source : the quantities of which a scene must have at least one source. repeatable :
-    whether a scene can hold two of its kind.
+    whether it reads or changes velocities or spins. homogeneous : whether it would be the same for particles
+    that are all elsewhere, or all faster by one velocity, as those in each layer of a sheared box are.
+    counters : names of the integer counters that it keeps of a world. world_quantities : names of the
+    quantities that it keeps of a world. requires_source : the quantities of which a scene must have at least
+    one source. repeatable : whether a scene can hold two of its kind.
     """
 
     contract: ClassVar[bool] = True
@@ -100,6 +102,7 @@ class Effect(LawHints, Component):
 
     fields: ClassVar[tuple[str | Field, ...]] = ()
     depends_on_velocity: ClassVar[bool] = False
+    homogeneous: ClassVar[bool] = True
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
     requires_source: ClassVar[tuple[str, ...]] = ()
@@ -141,6 +144,7 @@ class Force(Effect):
 
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
+    homogeneous: ClassVar[bool] = False
 
     @ti.func
     def force(self, s, w, i, t):

@@ -20,6 +20,7 @@ class Operator(Effect):
     """An operator changes the state between steps."""
 
     contract: ClassVar[bool] = True
+    homogeneous: ClassVar[bool] = False
 
     @ti.func
     def particle(self, s, w, i, t, dt):

@@ -21,6 +21,8 @@ AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
 class TimeSeries:
     """A time series is what is drawn against time, with a value for each frame.
 
+    In a sheared box velocities, also those of the kinetic energy, are relative to the flow of its images.
+
     time : s. kinetic_energy : J. number : of particles.
     shift : of the centre of gravity from where it was at the start, m, shape (frames, 3).
     drift : velocity of the centre of gravity, m/s, shape (frames, 3).
@@ -38,6 +40,7 @@ def history(frames: Frames) -> TimeSeries:
     energy, centre, drift, number = [], [], [], []
     for frame in frames:
         mass, velocity = frame.arrays["mass"].astype(float), frame.arrays["velocity"].astype(float)
+        velocity -= frames.scene.domain.streaming_velocity(frame.arrays["position"].astype(float))
         energy.append(0.5 * float((mass * (velocity**2).sum(axis=1)).sum()))
         centre.append(np.average(frame.arrays["position"], axis=0, weights=mass))
         drift.append(np.average(velocity, axis=0, weights=mass))
@@ -66,7 +69,8 @@ def quantities(frames: Frames) -> Figure:
     2 frames.
 
     Where particles re-enter through opposite faces, the centre of gravity jumps with them; its velocity is
-    drawn instead. A number of particles that stays the same is written above.
+    drawn instead, and in a sheared box what is drawn is relative to the flow. A number of particles that
+    stays the same is written above.
     """
     must(len(frames) > 1, "file", "one with 2 frames or more to draw against time", f"{len(frames)} frames")
     series = history(frames)
@@ -81,14 +85,15 @@ def quantities(frames: Frames) -> Figure:
         energy.set_yscale("log", nonpositive="mask")
     else:
         energy.set_ylim(0, 1.08 * series.kinetic_energy.max() or 1.0)
-    quantity(energy.yaxis, "kinetic energy", "J")
+    relative = ", relative\nto the flow" if frames.scene.domain.shears() else ""
+    quantity(energy.yaxis, f"kinetic energy{relative}", "J")
     jumps = any(frames.scene.domain.joined())
     for k, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         values = (series.drift if jumps else series.shift)[:, k]
         # Dashes, so that a line under the last one is seen.
         centre.plot(series.time, values, "--" if name == "z" else "-", color=colour, label=name, **dots)
     what = ("velocity", "m/s") if jumps else ("shift", "m")
-    quantity(centre.yaxis, f"{what[0]} of the\ncentre of gravity", what[1])
+    quantity(centre.yaxis, f"{what[0]} of the\ncentre of gravity{relative}", what[1])
     legend_above(centre)
     for axis in more:
         axis.step(series.time, series.number, where="post", color=AXIS_COLOURS[0])

@@ -23,6 +23,7 @@ class Source(Effect):
 
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
+    homogeneous: ClassVar[bool] = False
     quantity: ClassVar[str]
 
     @ti.func

@@ -16,6 +16,7 @@ class Uniform(Source):
     """This is the contract of a field constant + amplitude sin(omega t + phase), each component by itself."""
 
     contract: ClassVar[bool] = True
+    homogeneous: ClassVar[bool] = True
 
     @ti.func
     def value(self, w, r, t):

@@ -61,6 +61,8 @@ class Stepper(StepperHints, Component):
             for effect in effects:
                 name = f"effects.{effect.label}"
                 must(not isinstance(effect, PairEvent), name, f"a force, and not sudden, {where}", name)
+                rule = f"one that acts on all layers alike (homogeneous), as gravity does, {where}"
+                must(effect.homogeneous, name, rule, effect.kind())
 
     def countable(self, effects: Sequence[Effect]) -> float:
         """Return the number of steps that the stepper can count in a scene of these effects."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from scipy.constants import g
 
 from tisim.backend.taichi import ti
@@ -14,6 +16,8 @@ class Gravity(Force):
 
     Source: L21 section 2.3.
     """
+
+    homogeneous: ClassVar[bool] = True
 
     acceleration: Vector = parameter("m/s^2", "acceleration g of free fall", (0.0, 0.0, -g))
 

@@ -1,0 +1,83 @@
+"""What does not go with a box in simple shear."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.sheared import DT, LAW, crowd
+from tests.scenes import scene
+from tests.throwaway import Trap
+from tisim import InputError, ShearedBox
+from tisim.accuracy.sweep import methods
+from tisim.effects import Gravity, HertzMindlin, Impact, StokesDrag, Walls
+from tisim.operators import PeakDisplacement
+from tisim.sources import ElectricField, UniformFlow
+from tisim.steppers import ApproachTime, ErrorControl, Trapezoid, Verlet
+
+BOX = {"low": (0, 0, 0), "high": (1, 1, 1), "rate": 1.0}
+IMPLICIT = Trapezoid(control=ErrorControl())
+WRONG = {
+    "axes": (
+        {"gradient": "x"},
+        {},
+        r"sheared_box.gradient must be another axis than sheared_box.flow; rec",
+    ),
+    "open": ({"periodic": (True, False, True)}, {}, r"sheared_box.periodic must be true along flow and grad"),
+    "images": ({"images": False}, {}, r"sheared_box.images must be true; received False"),
+    "stepper": (
+        {},
+        {"stepper": IMPLICIT},
+        r"stepper must be one that follows shear, such as verlet or boris",
+    ),
+    "control": (
+        {},
+        {"stepper": Verlet(control=ApproachTime()), "effects": ()},
+        r"stepper.control must be one that does not look at pairs, such as fixed_step, in a sheared_box; rec",
+    ),
+    "sudden": (
+        {},
+        {"effects": (Impact(hardness=1.0),)},
+        r"effects.impact must be a force, and not sudden",
+    ),
+    "walls": (
+        {},
+        {"effects": (HertzMindlin(**LAW), Walls())},
+        r"effects.walls must be one that acts on all layers alike \(homogeneous\), as gravity does, in a she",
+    ),
+    "drag": (
+        {},
+        {"effects": (StokesDrag(viscosity=1e-3),)},
+        r"effects.stokes_drag must be one that acts on all layers alike",
+    ),
+    "flow": (
+        {},
+        {"effects": (UniformFlow(velocity=(0.0, 0.0, 0.0)),)},
+        r"effects.uniform_flow must be one that acts on all layers alike",
+    ),
+    "a force that does not say so": (
+        {},
+        {"effects": (Trap(stiffness=1.0),)},
+        r"effects.trap must be one that acts on all layers alike",
+    ),
+    "an operator": (
+        {},
+        {"effects": (PeakDisplacement(),)},
+        r"effects.peak_displacement must be one that acts on all layers alike",
+    ),
+}
+
+
+@pytest.mark.parametrize(("box", "more", "message"), WRONG.values(), ids=WRONG)
+def test_what_does_not_go_with_shear_is_refused(box, more, message):
+    settings = {"effects": (HertzMindlin(**LAW),), "quantities": {"spin": np.zeros((1, 3))}, **more}
+    with pytest.raises(InputError, match=message):
+        scene([[0, 0, 0]], [[0, 0, 0]], domain=ShearedBox(**{**BOX, **box}), **settings)
+
+
+def test_what_is_the_same_in_every_layer_goes_with_shear():
+    scene([[0, 0, 0]], [[0, 0, 0]], (Gravity(), ElectricField()), domain=ShearedBox(**BOX))
+
+
+def test_what_does_not_go_with_shear_is_not_tried_by_a_study_of_cost(rng):
+    made = crowd(rng)
+    tried = {type(one.base.stepper) for one in methods(made, DT, 1.0, (0.0,), (("f64", "strict"),), 1)}
+    assert tried == {Verlet}
