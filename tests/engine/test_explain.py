@@ -2,14 +2,26 @@
 
 import io
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from cases.agglomeration.scene import BEST
 from cases.agglomeration.scene import scene as agglomeration
 from cases.vibration.scene import scene as vibration
+from tests.effects.contact.grains import heap
+from tests.interactions.test_self_consistent import Potential
+from tests.scenes import scene
+from tests.steppers.brownian.colloids import colloids
+from tests.throwaway import SoftShell
 from tisim import Simulation
+from tisim.backend import memory
+from tisim.backend.thread import in_taichi_thread
+from tisim.engine.allocation import Allocation
 from tisim.engine.explain import explain, known_effects, render
+from tisim.interactions.spatial_sort import SORTED_FROM
+from tisim.neighbours.half_list import ListSizes
+from tisim.steppers import Collocation, Trapezoid
 
 
 def text(scene):
@@ -62,6 +74,38 @@ def test_memory_is_what_is_allocated():
     assert sizes["position"] == 3 * sizes["radius"]
     assert explain(flow).phases == tuple(simulation.program.names())
     simulation.close()
+
+
+def pair(*effects, **more):
+    """Two particles that do not move, under these effects."""
+    return scene([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)), effects, **more)
+
+
+SHELL = SoftShell(stiffness=1.0, width=1.0)
+BESIDE = {
+    "impacts": (lambda: agglomeration(BEST, 1, grains=60), 60),
+    "grains": (lambda: heap(np.random.default_rng(1)), 40),
+    "sorted": (lambda: heap(np.random.default_rng(1)), SORTED_FROM),
+    "sweeps": (lambda: pair(Potential(strength=1.0), SHELL), 2),
+    "trapezoid": (lambda: pair(SHELL, stepper=Trapezoid(acceleration="anderson")), 2),
+    "collocation": (lambda: pair(SHELL, stepper=Collocation()), 2),
+    "diffusion": (lambda: colloids([[0.0, 0, 0]], together=True, hydrodynamics="rotne-prager"), 2),
+}
+"""Scenes, and room for particles, whose steps have all memory beside the state that there is."""
+
+
+@pytest.mark.parametrize("kind", BESIDE)
+@in_taichi_thread
+def test_memory_beside_the_state_is_what_is_allocated_for_a_step(kind):
+    made, capacity = BESIDE[kind]
+    with memory.collected() as trees:
+        allocation = Allocation(made(), 3, capacity)
+        with memory.collected() as beside:
+            allocation.assemble(ListSizes())
+    known = sum(buffer.memory.bytes() for buffer in allocation.assembly.buffers)
+    assert known == sum(tree.bytes for tree in beside) > 0
+    for tree in trees:
+        tree.destroy()
 
 
 def test_parameters_have_units_and_sources():

@@ -39,7 +39,7 @@ class ContactList:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        return self.s.worlds * (16 * self.capacity + 8 * self.s.capacity + 12)
+        return self.tree.bytes
 
     @ti.func
     def add(self, w, i, j, due):

@@ -38,8 +38,7 @@ class PairTerms:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        s = self.pairs.s
-        return s.worlds * self.pairs.room * self.components * (8 if s.real == ti.f64 else 4)
+        return self.tree.bytes
 
     @ti.func
     def leave(self, w, m, term):

@@ -70,11 +70,7 @@ class PairChunks:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        s, real = self.s, 8 if self.s.real == ti.f64 else 4
-        values = sum(one.size for one in self.memories)
-        per_world = self.room * (16 + real * values) + 8 * s.capacity + 12 * self.chunks + 4
-        sums = self.ends.bytes() + self.fetch_ends.bytes()
-        return s.worlds * per_world + sums + self.half_list.bytes()
+        return self.tree.bytes + self.ends.bytes() + self.fetch_ends.bytes() + self.half_list.bytes()
 
     @in_taichi_thread
     def forget(self) -> None:

@@ -57,9 +57,7 @@ class SelfConsistentSolver(DerivedSolver):
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        real = 8 if self.s.real == ti.f64 else 4
-        left = self.left.bytes() if self.left else 0
-        return self.s.worlds * (real * (4 + self.components * self.s.capacity) + 12) + left
+        return self.tree.bytes + (self.left.bytes() if self.left else 0)
 
 
 class BeginSweeps(PerParticle):

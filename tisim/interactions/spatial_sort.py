@@ -81,7 +81,7 @@ class SpatialSort:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        return self.s.worlds * (8 + 8 * TOGETHER * self.s.capacity) + self.grid.bytes()
+        return self.tree.bytes + self.grid.bytes()
 
     def items(self) -> tuple[Item, ...]:
         """Return the items that sort the worlds whose turn it is; between two steps."""

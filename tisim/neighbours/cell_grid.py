@@ -57,10 +57,7 @@ class CellGrid:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        real = 8 if self.s.real == ti.f64 else 4
-        per_world = real * (self.s.capacity + 8 + 5 * LEVELS)
-        cells = 4 * (2 * self.s.capacity + self.max_cells + 2 + 5 * LEVELS)
-        return self.s.worlds * (per_world + cells) + self.ends.bytes()
+        return self.tree.bytes + self.ends.bytes()
 
     @ti.func
     def level(self, w, radius):

@@ -72,8 +72,7 @@ class HalfList:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        per_world = 56 + 4 * self.s.capacity * (1 + self.row)
-        return self.s.worlds * per_world + self.grid.bytes()
+        return self.tree.bytes + self.grid.bytes()
 
     @in_taichi_thread
     def wanted(self) -> ListSizes:

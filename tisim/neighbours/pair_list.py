@@ -65,9 +65,7 @@ class NeighbourList:
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        real = 8 if self.s.real == ti.f64 else 4
-        per_world = 4 * (self.max_cells + 5 + self.s.capacity * (4 + self.room))
-        return self.s.worlds * (per_world + real * (10 + 4 * self.s.capacity))
+        return self.tree.bytes
 
     @in_taichi_thread
     def forget(self) -> None:

@@ -24,7 +24,7 @@ class BlockSums:
 
     def bytes(self) -> int:
         """Return the device memory that the sums take, in bytes."""
-        return 8 * self.s.worlds * self.blocks * self.terms
+        return self.tree.bytes
 
     @ti.func
     def number(self, w):

@@ -34,7 +34,7 @@ class PrefixSum:
 
     def bytes(self) -> int:
         """Return the device memory that the sums of the blocks take, in bytes."""
-        return 4 * self.s.worlds * (self.blocks + 1)
+        return self.tree.bytes
 
     def phases(self) -> tuple[Phase, ...]:
         """Return the phases that make the sums."""

@@ -60,8 +60,7 @@ class Stages(SavedState):
 
     def bytes(self) -> int:
         """Return the device memory that the coefficients take, in bytes."""
-        n = self.number
-        return 8 * (2 * n + 2 * n * n + self.s.worlds * n * (n + 1))
+        return self.tree.bytes
 
     @ti.func
     def extrapolate(self, w, ratio):
