@@ -257,10 +257,21 @@ class NeverZero(InverseSquare):
         return separation / (1.0 / inverse) ** 3 + ti.select(inverse > 0.0, 0.0, 1.0)
 
 
+class Damped(PairForce):
+    """Damps the difference of two velocities, which is not that of images that move."""
+
+    depends_on_velocity = True
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        return s.velocity[w, j] - s.velocity[w, i]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("law", "said"),
     [
+        (Damped(), "damped must take the velocity of particle 1 relative to 0 from s.relative_velocity"),
         (Tally(stiffness=1.0, width=1.0), "tally must write nothing between two .* received another pressed"),
         (
             InverseSquare(power=2),
@@ -269,7 +280,7 @@ class NeverZero(InverseSquare):
         (NeverZero(), "must be 0 where the inverse is; received 1 N on particle 0 by 1 along axis 0"),
     ],
 )
-def test_a_force_that_writes_or_is_another_by_the_inverse_is_reported(law, said):
+def test_a_force_that_writes_or_is_another_by_the_inverse_or_of_images_is_reported(law, said):
     """By the assertion of all contracts too, before it runs anything."""
     with pytest.raises(AssertionError, match=said):
         assert_contracts(two(law))

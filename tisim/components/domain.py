@@ -130,10 +130,13 @@ class Box(Domain):
     what is drawn as the box.
 
     With images, particles also see each other across joined faces: a periodic system, in which each sees the
-    nearest image of another. So twice the reach of a law must fit into the sides. Without images it is the
-    control volume of Z04 section 7: a grain that leaves comes back on the other side with the same velocity,
-    and meets there whatever is there. (The paper reverses the coordinate; the two differ by twice the
-    overshoot, and translation keeps the particle inside.)
+    nearest image of another, and no other. Two that could touch on both sides at once are refused. Of a force
+    that reaches farther than half a side only the part of the nearest image is summed, and it jumps where
+    another becomes the nearest: its reach must be chosen to fit, which nothing checks.
+
+    Without images it is the control volume of Z04 section 7: a grain that leaves comes back on the other side
+    with the same velocity, and meets there whatever is there. (The paper reverses the coordinate; the two
+    differ by twice the overshoot, and translation keeps the particle inside.)
 
     Source: Z04 section 7.
     """

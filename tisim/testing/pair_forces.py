@@ -1,4 +1,5 @@
-"""Pair forces must write nothing, and be the same whichever way they are asked for."""
+"""Pair forces must write nothing, and be the same whichever way they are asked for, and of images that
+move."""
 
 from typing import Any
 
@@ -10,6 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects.base import DerivedQuantity, PairForce
 from tisim.scene.scene import Scene
+from tisim.testing.image_velocities import ImageVelocities, assert_same
 from tisim.testing.uncompiled import started
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
@@ -23,28 +25,39 @@ COMPARED_AT = (0.5, 1.0, 2.0)
 
 @in_taichi_thread
 def assert_pair_forces(scene: Scene) -> None:
-    """Assert that each pair force of a scene writes nothing, and that one which defines
-    ``pair_force_by_inverse`` comes to the same by it, to rounding, and to 0 at no inverse at all.
+    """Assert that each pair force of a scene writes nothing, takes velocities from ``s.relative_velocity``
+    alone, if it is ``homogeneous``, and comes to the same by ``pair_force_by_inverse``, if it defines that:
+    to rounding, and to 0 at no inverse at all.
 
     Several pairs are computed at once, and some twice: what a law writes would be counted twice, or be lost.
-    It is evaluated at the start of the scene, for each two particles; derived quantities are taken to be 1.
+    Images in a sheared box have other velocities than their particles. A law is evaluated for each two
+    particles where they are at the start of the scene, with velocities of that size; derived quantities are
+    taken to be 1.
     """
     with started(scene) as (allocation, start):
         s, n = allocation.s, len(start["radius"])
         s.fill({effect.data.quantity: 1.0 for effect in allocation.assembly.effects.of(DerivedQuantity)})
+        images, speed = ImageVelocities(s), float(np.abs(start["velocity"]).max())
+        s.domain = images
         for effect in allocation.assembly.effects.of(PairForce):
-            _assert_nothing_written(s, effect, scene.duration)
+            call, found = _Calls(s, effect), []
+            for moving in (False, True) if effect.data.homogeneous else (False,):
+                images.set(s, speed, moving)
+                found.append(_written_nothing(s, call, scene.duration))
+            for here, there in zip(found[0], found[-1], strict=True):
+                assert_same(effect.data.label, here, there)
             if effect.data.offers_inverse():
                 _assert_same_by_inverse(effect, _ByInverse(s, effect).forces()[:n, :n])
 
 
-def _assert_nothing_written(s: State, effect: Bound[Any], duration: float) -> None:
-    call, before = _Calls(s, effect), s.image()
-    for remembered in (0.0, 1.0):
-        call.all(remembered, duration)
+def _written_nothing(s: State, call: "_Calls", duration: float) -> list[np.ndarray]:
+    """Return what a law gives for pairs that remember nothing, and something; it must write nothing."""
+    before, label = s.image(), call.effect.data.label
+    found = [call.results(remembered, duration) for remembered in (0.0, 1.0)]
     for name, values in s.image().items():
         same = np.array_equal(values, before[name], equal_nan=values.dtype.kind == "f")
-        assert same, f"{effect.data.label} must write nothing between two particles; received another {name}"
+        assert same, f"{label} must write nothing between two particles; received another {name}"
+    return found
 
 
 def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
@@ -67,11 +80,20 @@ def _assert_same_by_inverse(effect: Bound[Any], forces: np.ndarray) -> None:
 
 @ti.data_oriented
 class _Calls:
-    """This kernel asks a law for each two particles of the first world, and makes no use of the answer."""
+    """This kernel asks a law for each two particles of the first world, at two distances."""
 
     def __init__(self, s: State, effect: Bound[Any]) -> None:
-        self.s, self.effect = s, effect
+        self.s, self.effect, self.found, builder = s, effect, ti.field(s.real), Builder()
         self.memory = max(1, effect.data.memory)
+        builder.dense(ti.ijkl, (s.capacity, s.capacity, 2, 9)).place(self.found)
+        Tree(builder)
+
+    def results(self, remembered: float, duration: float) -> np.ndarray:
+        """Return force and both torques by index of the particle, of the other one and of the distance, (...,
+        9)."""
+        self.all(remembered, duration)
+        found: np.ndarray = self.found.to_numpy()
+        return found
 
     @ti.kernel
     def all(self, remembered: ti.f64, duration: ti.f64):
@@ -88,9 +110,13 @@ class _Calls:
         # A loop, so that the law is compiled once.
         for k in range(2):
             distance = ti.select(k == 0, length, touching)
-            self.effect.interaction(
+            force, turn, back, _ = self.effect.interaction(
                 s, 0, i, j, distance / length * apart, distance, past, ti.cast(duration, s.real), s.time[0]
             )
+            for c in ti.static(range(3)):
+                self.found[i, j, k, c] = force[c]
+                self.found[i, j, k, 3 + c] = turn[c]
+                self.found[i, j, k, 6 + c] = back[c]
 
 
 @ti.data_oriented
