@@ -5,7 +5,9 @@ import pytest
 from scipy.constants import mu_0
 
 import tisim
-from tests.scenes import fixed, scene, simulate
+from tests.effects.contact import sheared
+from tests.effects.contact.grains import grains, heap, twin
+from tests.scenes import by_id, fixed, scene, simulate
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import DipoleDipole, Force, NearField, parameter
@@ -16,6 +18,9 @@ from tisim.sources import Cylinder, MagneticCylinders, sample
 
 CLOSE = 1e-12
 """Forces in fast arithmetic differ from those of their twins by less than this part of the largest."""
+
+GRANULAR_STEPS = 100
+"""So few that rounding grows to no more than 1e-12 of what grains do."""
 
 
 class Wall(Force):
@@ -145,6 +150,33 @@ def derived():
     return forces
 
 
+def error(result, place, velocity, spin):
+    """The largest error of grains beside NumPy, over the largest value."""
+    expected, state = {"position": place, "velocity": velocity, "spin": spin}, by_id(result)
+    return max(float(np.abs(state[name] - x).max() / np.abs(x).max()) for name, x in expected.items())
+
+
+def piled():
+    """The error of a heap in a cell, and how many contacts slid; how a world beside it ends that begins too
+    deep for its step."""
+    pile = heap(np.random.default_rng(5), steps=GRANULAR_STEPS)
+    couple = grains([[0, 0, 9], [1.9, 0, 9]], np.zeros((2, 3)), law={"young": 1e10}, dt=1e-3)
+    result, deep = simulate([pile, couple], worlds=2)
+    known = twin(pile)
+    known.run(GRANULAR_STEPS, pile.stepper.control.dt)
+    return [error(result, known.x, known.v, known.w), int(known.sliding), deep.status.reason, deep.time]
+
+
+def flowing():
+    """The error of a crowd in shear, and how many contacts slid."""
+    crowd = sheared.crowd(np.random.default_rng(5), n=40, steps=GRANULAR_STEPS)
+    (result,) = simulate([crowd])
+    known = sheared.ShearedGrains(crowd)
+    known.run(GRANULAR_STEPS, sheared.DT)
+    place, velocity = sheared.inside(crowd.domain, known.x, known.v, result.time)
+    return [error(result, place, velocity, known.w), int(known.sliding)]
+
+
 def everything():
     """All of this, from one process."""
     settings = tisim.run(scene([[0.0, 0, 0]], [[1.0, 0, 0]])).settings
@@ -191,3 +223,20 @@ def test_a_force_that_becomes_infinite_is_reported_and_worlds_end_on_time(fast):
 
 def test_the_field_beside_a_long_cylinder_keeps_its_digits(fast):
     np.testing.assert_allclose(fast[4], beside_a_long_cylinder(), rtol=1e-12)
+
+
+@pytest.mark.long
+def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_reported(in_fast_arithmetic):
+    off, sliding, reason, time = in_fast_arithmetic("engine.test_fast", "piled")
+    assert off < CLOSE
+    assert sliding > 1000
+    for word in ("not finite", "effects.hertz_mindlin", "particle 0"):
+        assert word in reason
+    assert time == 0.0
+
+
+@pytest.mark.slow
+def test_a_crowd_in_shear_is_that_of_its_twin(in_fast_arithmetic):
+    off, sliding = in_fast_arithmetic("engine.test_fast", "flowing")
+    assert off < CLOSE
+    assert sliding > 1000
