@@ -17,8 +17,8 @@ from tisim.backend.taichi import ti
 
 WORD = 8
 """bytes of the widest number."""
-EIGHT_BYTES = ("f64", "i64", "u64")
-"""These types of numbers have so many bytes, all others that are used have 4."""
+WIDE_TYPES = ("f64", "i64", "u64")
+"""Numbers of these types have 8 bytes, those of all others that are used have 4."""
 
 
 class Level:
@@ -101,4 +101,4 @@ class Builder(Level):
 
 def _bytes(one: Any) -> int:
     """Return the bytes of a number of a field, of one of its components; asked before it is placed."""
-    return WORD if one.ptr.get_dt().to_string() in EIGHT_BYTES else 4
+    return WORD if one.ptr.get_dt().to_string() in WIDE_TYPES else 4
