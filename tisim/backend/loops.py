@@ -10,7 +10,8 @@ import numpy as np
 from tisim.backend.taichi import ti
 
 COUNTED_THREADS, COUNTED_ROUNDS, LONG_LOOP = 256, 7, 70_000
-"""Of so many threads one adds so often and the others not at all; one goes through a long loop."""
+"""These are the numbers of threads, of rounds in which one of them adds while the others do not, and of
+rounds of a long loop."""
 
 
 def end_where_they_should() -> bool:
