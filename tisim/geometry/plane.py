@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from operator import mul
 from typing import ClassVar
 
 from pydantic import model_validator
@@ -38,12 +39,14 @@ class Plane(Shape):
     def columns(cls) -> Iterator[tuple[str, int]]:
         yield from super().columns()
         yield "direction", 3
+        yield "offset", 1
 
     def values(self) -> list[float]:
         length = math.hypot(*self.normal)
-        return [*super().values(), *(component / length for component in self.normal)]
+        direction = [component / length for component in self.normal]
+        return [*super().values(), *direction, math.fsum(map(mul, self.point, direction))]
 
     @ti.func
     def distance(self, w, k, r):
         """Return the signed distance (m) of r from plane k, positive where particles are."""
-        return (r - self.point(w, k)).dot(self.direction(w, k))
+        return r.dot(self.direction(w, k)) - self.offset(w, k)
