@@ -17,10 +17,10 @@ from tisim.interactions.force_sum import (
     TORQUE,
     SumForces,
     SumForcesAgain,
-    SumForcesAtStart,
     SumTrialForces,
     turning,
 )
+from tisim.interactions.forces_at_start import SumForcesAtStart
 from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, PairTerms, fuse, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import Rearrange, StoreBefore

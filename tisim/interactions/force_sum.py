@@ -51,14 +51,12 @@ class SumForces(PairSum):
     that is ``fixed``, where the scene has that field, takes none. What pairs remember advances with the sum.
 
     trial : whether the state is one that may be given up. elapsed : whether pairs have gone on for ``dt``
-    since their memory was last brought up to date. commits : whether it now is. asks_step : whether laws are
-    asked besides if they can follow the step that is ahead.
+    since their memory was last brought up to date. commits : whether it now is.
     """
 
     trial: ClassVar[bool] = False
     elapsed: ClassVar[bool] = True
     commits: ClassVar[bool] = True
-    asks_step: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -141,16 +139,19 @@ class SumForces(PairSum):
     @ti.func
     def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         """Return force, torques and new memory of one law between listed pair m."""
-        s, dt = self.s, self.gone_by(w)
-        past = ti.Vector.zero(s.real, max(1, law.memory))
+        past = self.past(law, w, m)
+        force, turn, back, known = law.interaction(
+            self.s, w, i, j, separation, distance, past, self.gone_by(w), t
+        )
+        return force, turn, back, known
+
+    @ti.func
+    def past(self, law: ti.template(), w, m):  # type: ignore[valid-type]
+        """Return what listed pair m remembers of one law; one 0 where that is nothing."""
+        past = ti.Vector.zero(self.s.real, max(1, law.memory))
         if ti.static(law.memory > 0):
             past = law.past.read(w, m)
-        force, turn, back, known = law.interaction(s, w, i, j, separation, distance, past, dt, t)
-        if ti.static(self.asks_step and law.data.offers("interaction")):
-            ahead = ti.cast(s.step_ahead[w], s.real)
-            later = law.interaction(s, w, i, j, separation, distance, past, ahead, t)
-            force = self.bearable(force, later[0])
-        return force, turn, back, known
+        return past
 
     @ti.func
     def shares(self, values):
@@ -167,11 +168,6 @@ class SumForces(PairSum):
             for law, begin in ti.static(self.laws):
                 if ti.static(law.memory > 0):
                     law.past.write(w, m, piece(values, begin, law.memory))
-
-    @ti.func
-    def bearable(self, force, ahead):
-        """Return the force, or that over the step ahead where the law cannot follow it: it is not finite."""
-        return ti.select(finite(ahead.norm_sqr()), force, ahead)
 
     @ti.func
     def gone_by(self, w):
@@ -212,9 +208,6 @@ class SumForces(PairSum):
     @ti.func
     def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
         force, torque = effect.load(self.s, w, i, t, self.gone_by(w), self.commits)
-        if ti.static(self.asks_step and effect.data.offers("load")):
-            ahead = ti.cast(self.s.step_ahead[w], self.s.real)
-            force = self.bearable(force, effect.load(self.s, w, i, t, ahead, False)[0])
         return self.wrench(force, torque)
 
     @ti.func
@@ -229,42 +222,6 @@ class SumForces(PairSum):
     def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
         return effect.pair_force_by_inverse(self.s, w, i, j, separation, inverse, t)
 
-    @ti.func
-    def by_other(self, effect: ti.template(), w, i, j, t):  # type: ignore[valid-type]
-        """Return what j does to i by one law, given what they have stored of each other."""
-        s = self.s
-        d = self.domain.separation(w, s.position[w, i], s.position[w, j], t)
-        first, second, sign = i, j, ti.cast(1.0, s.real)
-        if s.id[w, i] > s.id[w, j]:
-            first, second, sign = j, i, ti.cast(-1.0, s.real)
-        past, dt = ti.Vector.zero(s.real, max(1, effect.memory)), self.gone_by(w)
-        if ti.static(effect.memory > 0):
-            past = effect.past.stored(w, i, j) + effect.past.stored(w, j, i)
-        force, turn, back, _ = effect.interaction(s, w, first, second, sign * d, d.norm(), past, dt, t)
-        return self.wrench(sign * force, ti.select(first == i, turn, back))
-
-    @ti.func
-    def largest(self, w, i, t):
-        """Return the index of the effect whose force on i is largest, or not finite, or is set to nothing
-        finite."""
-        s = self.s
-        most, index = ti.cast(-1.0, s.real), 0
-        for effect in ti.static(self.forces):
-            size = self.single(effect, w, i, t).norm()
-            if finite(most) and not (size <= most):
-                most, index = size, effect.index
-        for effect in ti.static(self.pair_forces):
-            total = ti.Vector.zero(s.real, self.components)
-            for j in range(s.count[w]):
-                if i != j:
-                    total += self.by_other(effect, w, i, j, t)
-            if finite(most) and not (total.norm() <= most):
-                most, index = total.norm(), effect.index
-        for solver in ti.static(self.derived_solvers):
-            if not finite(solver.size(solver.value[w, i])):
-                index = solver.effect.index
-        return index
-
 
 class SumTrialForces(SumForces):
     """This phase sums the forces of a trial state, which may be one that is to be given up: whatever is not
@@ -275,24 +232,6 @@ class SumTrialForces(SumForces):
     @ti.func
     def check(self, w, i, total):
         pass
-
-
-class SumForcesAtStart(SumForces):
-    """Sum the forces that a first step begins with, at the start or after a world has been written to.
-
-    No time has gone by. What lies so deep in each other that the step ahead is too long for it would be far
-    apart after that step, and nobody would know: it is found here.
-    """
-
-    elapsed, asks_step = False, True
-
-    @ti.func
-    def check(self, w, i, total):
-        # Not below infinity: also true of NaN.
-        if not finite(total.norm_sqr()):
-            # The law at fault is found by a sum over the step.
-            self.s.dt[w] = self.s.step_ahead[w]
-            self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
 
 class SumForcesAgain(SumForces):
