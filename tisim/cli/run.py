@@ -46,7 +46,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
-    from tisim.io.trajectory import recording_from_options
+    from tisim.io.recording import recording_from_options
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads, arithmetic)
