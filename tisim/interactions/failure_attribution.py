@@ -39,11 +39,13 @@ class FailureAttribution:
         first, second, sign = i, j, ti.cast(1.0, s.real)
         if s.id[w, i] > s.id[w, j]:
             first, second, sign = j, i, ti.cast(-1.0, s.real)
-        past, dt = ti.Vector.zero(s.real, max(1, effect.memory)), self.forces.gone_by(w)
+        past, dt = ti.Vector.zero(s.real, max(1, effect.memory)), self.forces.elapsed_time(w)
         if ti.static(effect.memory > 0):
             past = effect.past.stored(w, i, j) + effect.past.stored(w, j, i)
-        force, turn, back, _ = effect.interaction(s, w, first, second, sign * d, d.norm(), past, dt, t)
-        return self.forces.wrench(sign * force, ti.select(first == i, turn, back))
+        force, torque_i, torque_j, _ = effect.interaction(
+            s, w, first, second, sign * d, d.norm(), past, dt, t
+        )
+        return self.forces.wrench(sign * force, ti.select(first == i, torque_i, torque_j))
 
     @ti.func
     def find_failing_effect(self, w, i, t):
@@ -52,7 +54,7 @@ class FailureAttribution:
         s = self.s
         most, index = ti.cast(-1.0, s.real), 0
         for effect in ti.static(self.forces.forces):
-            size = self.forces.single(effect, w, i, t).norm()
+            size = self.forces.load_by(effect, w, i, t).norm()
             if finite(most) and not (size <= most):
                 most, index = size, effect.index
         for effect in ti.static(self.forces.pair_forces):

@@ -18,16 +18,18 @@ class SumForcesAtStart(SumForces):
     @ti.func
     def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         s, past = self.s, self.past(law, w, m)
-        force, turn, back, known = law.interaction(s, w, i, j, separation, distance, past, self.gone_by(w), t)
+        force, torque_i, torque_j, memory = law.interaction(
+            s, w, i, j, separation, distance, past, self.elapsed_time(w), t
+        )
         if ti.static(law.data.offers("interaction")):
             ahead = ti.cast(s.step_ahead[w], s.real)
             later = law.interaction(s, w, i, j, separation, distance, past, ahead, t)
             force = self.unless_not_finite(force, later[0])
-        return force, turn, back, known
+        return force, torque_i, torque_j, memory
 
     @ti.func
-    def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
-        force, torque = effect.load(self.s, w, i, t, self.gone_by(w), self.commits)
+    def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
+        force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.commits)
         if ti.static(effect.data.offers("load")):
             ahead = ti.cast(self.s.step_ahead[w], self.s.real)
             force = self.unless_not_finite(force, effect.load(self.s, w, i, t, ahead, False)[0])

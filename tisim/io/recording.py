@@ -58,7 +58,7 @@ class Recording:
         """
         scenes, real = simulation.scenes, simulation.runtime.precision
         if resume:
-            time = float(simulation.monitor.good["time"][0])
+            time = float(simulation.monitor.last_good["time"][0])
             trajectory_file = Trajectory.resume(self, scenes[0], time, real)
         else:
             trajectory_file = self.create(scenes, real)

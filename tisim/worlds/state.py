@@ -91,13 +91,13 @@ class State(StateMemory):
         self.failure_time[w] = t
 
     @ti.func
-    def fault(self, w, i, effect):
+    def fail_by_effect(self, w, i, effect):
         """Stop a world in which an effect, by its index in the scene, has made something not finite."""
         self.fail(w, WorldStatus.NOT_FINITE, i)
         ti.atomic_min(self.failing_effect[w], effect)
 
     @ti.func
-    def fault_of_world(self, w, effect):
+    def fail_world_by_effect(self, w, effect):
         """Stop a world in which an effect, by its index in the scene, has made a quantity of the world not
         finite."""
         ti.atomic_max(self.failed[w], WorldStatus.NOT_FINITE)

@@ -18,7 +18,14 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.transfer import Exchange
 from tisim.errors import RunError
-from tisim.worlds.columns import BOOKS, CLOCK, MOTION, OWN, TALLIES, check_names
+from tisim.worlds.columns import (
+    WORLD_COUNTERS,
+    WORLD_INTEGERS,
+    WORLD_QUANTITIES,
+    WORLD_SETTINGS,
+    WORLD_VECTORS,
+    check_names,
+)
 from tisim.worlds.fields import Field
 
 
@@ -43,7 +50,7 @@ class StateMemory:
         # Before anything is placed: fields that are left half made are a fault of every later kernel.
         check_names(type(self), (*(field.name for field in fields), *counters, *world_quantities, *flags))
         self.worlds, self.capacity = worlds, capacity
-        self.fields, self.counters = fields, (*TALLIES, *counters)
+        self.fields, self.counters = fields, (*WORLD_COUNTERS, *counters)
         self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
         self.real, self.records = runtime.current().real, records
@@ -53,7 +60,7 @@ class StateMemory:
             setattr(self, field.name, self._place(builder, field))
         if self._record:
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
-        quantities, integers = (*CLOCK, *world_quantities), (*BOOKS, *flags)
+        quantities, integers = (*WORLD_QUANTITIES, *world_quantities), (*WORLD_INTEGERS, *flags)
         for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (self.counters, ti.i64)):
             for name in names:
                 column = ti.field(dtype)
@@ -75,7 +82,7 @@ class StateMemory:
         self.listed_above = ti.field(ti.i32)
         for column in (self.pause_time, self.paused, self.goal, self.step_limit, self.listed_above):
             builder.dense(ti.i, worlds).place(column)
-        for name in MOTION:
+        for name in WORLD_VECTORS:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
             column = ti.field(ti.f64)
             builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
@@ -84,7 +91,7 @@ class StateMemory:
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
         self.domain: Any = None
         self.before_reading: list[Callable[[], None]] = []
-        self.columns = (*quantities, *integers, *MOTION, *self.counters, *OWN)
+        self.columns = (*quantities, *integers, *WORLD_VECTORS, *self.counters, *WORLD_SETTINGS)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -153,7 +160,7 @@ class StateMemory:
         """Return the names of all that decides how a simulation goes on, pair lists apart: these may be made
         anew."""
         fields = (field.name for field in self.fields)
-        worlds = (*CLOCK, *BOOKS, *self.counters, *self.world_quantities, *self.flags)
+        worlds = (*WORLD_QUANTITIES, *WORLD_INTEGERS, *self.counters, *self.world_quantities, *self.flags)
         return (*fields, *worlds, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
