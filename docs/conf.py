@@ -35,7 +35,7 @@ OTHERS = (
 TYPES = ("Bound", "Buffer", "Domain", "Item", "NeighbourLists", "Peers", "State", "SumForces")
 INNER = "|".join(
     (
-        r"tisim\.(io\.(trajectory|recorder)|engine\.particle_state|backend\.runtime)\.\w+",
+        r"tisim\.(io\.(recording|trajectory|recorder)|engine\.particle_state|backend\.runtime)\.\w+",
         r"(tisim\.(steppers\.context|worlds\.(bound|program|state)|neighbours\.(lists|half_list)|engine\.assembly|interactions\.force_sum)|optimize\.methods\.\w+)\.\w+",
     )
 )

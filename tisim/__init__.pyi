@@ -32,7 +32,7 @@ from .errors import InputError as InputError
 from .errors import RunError as RunError
 from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.read import read as read
-from .io.trajectory import Recording as Recording
+from .io.recording import Recording as Recording
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
 from .packing.placement import (
     Lattice as Lattice,

@@ -18,7 +18,7 @@ from cases.blast.accuracy import half_axes
 from cases.blast.shape import contacts, extents
 from cases.case import size_named
 from tisim import Recording, RunError, run
-from tisim.engine.batches import Progress, share
+from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
 from tisim.plotting.style import empty, legend_above, letters, plain
@@ -178,7 +178,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
             path = Path(folder) / "trajectory.h5"
             result = run(
                 blast.scene(**settings),
-                share(progress, finished, len(RUNS)),
+                progress_of_part(progress, finished, len(RUNS)),
                 Recording(path, frames=50),
             )
             if not result.status.ok:

@@ -25,7 +25,7 @@ from cases.capture.statistics import (
 )
 from cases.statistics import Mean
 from tisim import Result
-from tisim.engine.batches import Progress, share
+from tisim.engine.batches import Progress, progress_of_part
 from tisim.plotting.style import empty, legend_beside, letters, plain
 
 CURVE_REPEATS = 10
@@ -53,7 +53,7 @@ def figures(progress: Progress) -> Mapping[str, Figure | str]:
     ]
     parts = []
     for finished, settings in enumerate((angles, sizes, aspects)):
-        groups = results(settings, CURVE_REPEATS, share(progress, finished, 3))
+        groups = results(settings, CURVE_REPEATS, progress_of_part(progress, finished, 3))
         parts.append(list(zip(settings, groups, strict=True)))
     return {"capture.png": captured(*parts), "capture.csv": table([row for part in parts for row in part])}
 

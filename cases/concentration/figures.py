@@ -21,7 +21,7 @@ from cases.concentration.scene import coupling
 from cases.concentration.statistics import CAPTURE, chain, held_fraction
 from tisim import Recording, run
 from tisim.analysis import head_to_tail, labels
-from tisim.engine.batches import Progress, share
+from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames, frames
 from tisim.plotting.style import empty, letters, plain
 from tisim.scene.initial_state import Arrays
@@ -79,14 +79,14 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     keys = [(size, c) for c in (0.5, 2.0) for size in (25, 75)]
     scenes = [concentration.scene(nanometres=n, concentration=c, **SNAPSHOT) for n, c in keys]
     figure = empty(8.8, 8.4)
-    results = run(scenes, share(progress, 0, 2))
+    results = run(scenes, progress_of_part(progress, 0, 2))
     grid = figure.subplots(2, 2)
     for axis, (n, c), result in zip(grid.flat, keys, results, strict=True):
         snapshot(axis, result.state)
         length = chain(result.state, result.state["moment"])
         axis.set_title(f"{n} nm, {c:g} g/mL\ncoupling Γ = {coupling(n):.3g}, mean chain {length:.1f}")
     letters(grid.flat)
-    curves = captured(share(progress, 1, 2))
+    curves = captured(progress_of_part(progress, 1, 2))
     return {"snapshots.png": figure, "captured.png": captured_figure(curves), "captured.csv": table(curves)}
 
 

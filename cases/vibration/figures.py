@@ -24,7 +24,7 @@ from cases.vibration.response import (
     fast_scenes,
     slow_scenes,
 )
-from tisim.engine.batches import Progress, share
+from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, legend_above, letters, plain, quantity
 
@@ -98,7 +98,8 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
         fast_scenes(vibration.RATIOS, near, sites=3),
     )
     fast, slow, arrays = (
-        Sweep.of(scenes, share(progress, finished, len(lots))) for finished, scenes in enumerate(lots)
+        Sweep.of(scenes, progress_of_part(progress, finished, len(lots)))
+        for finished, scenes in enumerate(lots)
     )
     return {
         "resonance.png": resonance_figure(slow, fast, arrays, near, beats()),

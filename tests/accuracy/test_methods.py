@@ -17,7 +17,8 @@ from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import decades, tied
-from tisim.accuracy.sweep import exchanged, finest, methods, parts, rivals
+from tisim.accuracy.scene_parts import exchanged, finest, parts
+from tisim.accuracy.sweep import methods, rivals
 from tisim.accuracy.table import notes
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter

@@ -13,7 +13,7 @@ from tisim.components.arrays import Numbers
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.invalid import text_of, unit_of
 from tisim.effects import Force
-from tisim.engine import reference, template
+from tisim.engine import docstrings, reference, template
 from tisim.engine.explain import known_effects
 
 ENTRIES = [entry for entry in reference.entries() if entry.kind.__module__.startswith("tisim.")]
@@ -61,7 +61,7 @@ def test_every_setting_has_a_text_and_every_quantity_a_unit(entry):
 @ALL
 def test_what_is_cited_in_short_is_known_in_full(entry):
     short = set(re.findall(r"\b[BLZ]\d\d\b", f"{entry.source} {entry.body}"))
-    assert short <= set(reference.PUBLICATIONS)
+    assert short <= set(docstrings.PUBLICATIONS)
 
 
 @pytest.mark.parametrize("entry", TABLES, ids=lambda entry: entry.name)

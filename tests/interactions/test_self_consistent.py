@@ -1,4 +1,4 @@
-"""Quantities that particles settle among themselves, in the field of a source: rules 6 and 7 of base.py."""
+"""Quantities that follow from each other, in the field of a source: rules 6 and 7 of tisim/effects/base."""
 
 import numpy as np
 import pytest

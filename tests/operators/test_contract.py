@@ -1,4 +1,4 @@
-"""What the core promises operators: rules 8 and 12 of tisim/effects/base.py."""
+"""What the core promises operators: rules 8 and 12 of tisim/effects/base."""
 
 from __future__ import annotations
 

@@ -128,11 +128,11 @@ def test_steps_ahead():
     ]
     simulation = compiled(scenes[0], WORLDS, PARTICLES, "world")
     simulation.load(scenes)
-    assert simulation.ahead() == pytest.approx(1000, abs=1)
+    assert simulation.remaining_steps() == pytest.approx(1000, abs=1)
     simulation.run(steps=40)
-    assert simulation.ahead() == pytest.approx(960, abs=1)
+    assert simulation.remaining_steps() == pytest.approx(960, abs=1)
     simulation.run()
-    assert simulation.ahead() == 0
+    assert simulation.remaining_steps() == 0
 
 
 @pytest.mark.parametrize("name", ["trapezoid, iteration", "brownian"])

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tisim.accuracy.quantity import Quantity, QuantityEstimate, estimate
-from tisim.accuracy.sweep import USUAL_NUMBERS, SettingSweep, finest
+from tisim.accuracy.scene_parts import finest
+from tisim.accuracy.sweep import USUAL_NUMBERS, SettingSweep
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.scene.scene import Scene

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tisim.accuracy import reference
-from tisim.accuracy.sweep import SettingSweep, ensembles, in_steps_of_at_most, methods
+from tisim.accuracy.scene_parts import in_steps_of_at_most
+from tisim.accuracy.sweep import SettingSweep, ensembles, methods
 from tisim.accuracy.timing import OBSERVATIONS, Limit, OutOfTime, ResultCallback, SimulationCache, Timed
 from tisim.accuracy.trial import Trial
 from tisim.backend import runtime

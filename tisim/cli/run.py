@@ -46,7 +46,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scene; write result.h5, scene.toml, versions.json and the picture cloud.png."""
     from tisim.io import checkpoint, run_folder
-    from tisim.io.trajectory import recording_from_options
+    from tisim.io.recording import recording_from_options
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads, arithmetic)
@@ -95,7 +95,7 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
         task = bar.add_task(name, total=1.0)
 
         def report(simulation: Simulation) -> None:
-            description = f"{name}, {simulation.ahead():.3g} steps ahead"
+            description = f"{name}, {simulation.remaining_steps():.3g} steps ahead"
             bar.update(task, completed=simulation.fraction(), description=description)
             ctrl_c.check()
 

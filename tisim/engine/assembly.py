@@ -9,19 +9,19 @@ from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, Effect, Force, PairEvent, PairForce, SelfConsistentQuantity
 from tisim.interactions import spatial_sort
 from tisim.interactions.collision_rounds import Rounds
-from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts, FindContactsAgain
+from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts, FindContactsAfterEvents
 from tisim.interactions.contact_memory import ContactMemory, memory_fields
 from tisim.interactions.failure_attribution import FailureAttribution
 from tisim.interactions.force_sum import (
     FORCE,
     TORQUE,
     SumForces,
-    SumForcesAgain,
-    SumForcesAtStart,
+    SumForcesAfterEvents,
     SumTrialForces,
     turning,
 )
-from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, PairTerms, fuse, sum_phases
+from tisim.interactions.forces_at_start import SumForcesAtStart
+from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, ExportedTerms, fuse, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import Rearrange, StoreBefore
 from tisim.interactions.rebuild_pairs import update_pairs
@@ -110,7 +110,7 @@ class Assembly:
                 setattr(force, name, value)
         components = 6 if turning([effect.data for effect in effects]) else 3
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
-        self.left = PairTerms(self.pairs, components) if self.pairs and listed else None
+        self.exported = ExportedTerms(self.pairs, components) if self.pairs and listed else None
         pairs = update_pairs(self.pairs) if self.pairs else ()
         events_lists = list_phases(near) if near else ()
         lists = (*events_lists, *pairs)
@@ -144,9 +144,9 @@ class Assembly:
                 step += [StoreBefore(self.pairs, operators)]
             step += [Rearrange(s, domain, operators, self.lists)]
             if near and contacts and control.data.watches_pairs:
-                step += [*lists, FindContactsAgain(near, contacts, control)]
+                step += [*lists, FindContactsAfterEvents(near, contacts, control)]
             if context.sum_forces:
-                step += [*lists, *self._summed(SumForcesAgain)]
+                step += [*lists, *self._summed(SumForcesAfterEvents)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
         # Events tell pairs apart by index, and operators on a world may add and remove particles.
@@ -158,7 +158,7 @@ class Assembly:
             (near, "neighbour list", sudden),
             (contacts, "contact list", sudden),
             (self.pairs, "pair list", steady),
-            (self.left, "forces between chunks", steady),
+            (self.exported, "forces between chunks", steady),
             (self.sort, "sorting by place", steady),
         )
         self.buffers = (
@@ -191,8 +191,8 @@ class Assembly:
         Of pairs that are listed at the end of the step: the last trial state need not be so near to it.
         """
         items: list[Item] = []
-        if self.pairs and self.pairs.memories and self.left:
-            items += [*pairs, AdvancePairs(force_sum, self.left)]
+        if self.pairs and self.pairs.memories and self.exported:
+            items += [*pairs, AdvancePairs(force_sum, self.exported)]
         if any(force.data.offers("load") for force in self.effects.of(Force)):
             items.append(AdvanceParticles(force_sum))
         return tuple(items)
@@ -201,9 +201,9 @@ class Assembly:
         """Set derived quantities, then sum the forces."""
         items: list[Item] = []
         for part in self.derived_solvers:
-            items += part.phases(again=kind.conditional, trial=kind.trial)
+            items += part.phases(after_events=kind.conditional, trial=kind.trial)
         if self.effects.of(Force, PairForce):
-            items += sum_phases(self._sum(kind), self.left)
+            items += sum_phases(self._sum(kind), self.exported)
         return tuple(items)
 
     def _sum(self, kind: type[SumForces]) -> SumForces:

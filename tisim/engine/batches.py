@@ -31,7 +31,7 @@ FEW_WORLDS = 8
 Progress = Callable[[float], None]
 
 
-def share(progress: Progress, finished_parts: int, parts: int) -> Progress:
+def progress_of_part(progress: Progress, finished_parts: int, parts: int) -> Progress:
     """Return the function that reports the progress of one of several equal parts as that of the whole.
 
     finished_parts : how many of the ``parts`` are over already.
@@ -101,7 +101,7 @@ class Batches:
         worlds = max(1, min(len(scenes), self.limit, BATCH_PARTICLES // capacity))
         simulation = self._reusable(scenes[0].structure(), worlds, capacity)
         if simulation is None:
-            _renew()
+            _restart_taichi()
             capacity = rounded(capacity)
             few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE else 1
             worlds = max(1, min(max(few, rounded(worlds)), self.limit, BATCH_PARTICLES // capacity))
@@ -158,15 +158,15 @@ def rounded(number: int) -> int:
     return -(-number // unit) * unit
 
 
-def _renew() -> None:
+def _restart_taichi() -> None:
     """Start Taichi anew where it has grown, and nothing would be lost but simulations that are kept idle."""
     if memory.needs_restart():
-        _give_up()
+        _close_if_nothing_runs()
         memory.renew()
 
 
-def _give_up() -> None:
-    """Forget what all Batches keep idle, unless something else is in use."""
+def _close_if_nothing_runs() -> None:
+    """Close the simulations that all Batches keep idle, unless something else is in use."""
     with _lock:
         idle = [each for batches in _all for each in batches._idle]
         needed = not memory.in_use() <= {tree for each in idle for tree in each.trees}

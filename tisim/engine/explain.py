@@ -12,7 +12,7 @@ from rich.text import Text
 from tisim.components.component import Component
 from tisim.components.invalid import text_of, unit_of
 from tisim.effects.base import Effect
-from tisim.engine import reference
+from tisim.engine import docstrings, reference
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.scene.scene import Scene
@@ -147,7 +147,7 @@ def _part(spec: Component) -> Part:
 
 
 def _what(kind: type[Component], values: tuple[tuple[str, str, str, str], ...] = ()) -> Part:
-    return Part(kind.kind(), reference.summary(kind), reference.source(kind), values)
+    return Part(kind.kind(), docstrings.summary(kind), docstrings.source(kind), values)
 
 
 def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, str]]:

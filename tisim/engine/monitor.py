@@ -1,4 +1,4 @@
-"""Look whether every quantity is finite, and keep the last good state of every world."""
+"""Monitors ask whether every quantity is finite, and keep the last good state of every world."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ LARGE = 4096
 class Monitor:
     """A monitor holds the last good state of a loaded batch, and what has gone wrong in it.
 
-    good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
+    last_good : arrays by field name, with ``time`` (s) and ``count``, of all worlds: those of the last look
         between two steps; those of the last good step, where a world has failed.
     faults : world -> (time found, s; what is wrong).
     """
@@ -48,36 +48,42 @@ class Monitor:
         self.simulation, self.s = simulation, simulation.s
         self.replay = Replay(simulation, image)
         names = (*self._names(), "time", "count")
-        self._good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
-        self._behind = np.zeros(self.s.worlds, bool)
+        self._last_good = (
+            self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
+        )
+        self._outdated = np.zeros(self.s.worlds, bool)
         self.faults: dict[int, tuple[float, str]] = {}
         # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
         shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
         large = self.s.worlds * self.s.capacity >= LARGE
-        self.check = simulation.finite_check if large and shared_clock else None
+        self.finite_check = simulation.finite_check if large and shared_clock else None
 
     @property
-    def good(self) -> Image:
+    def last_good(self) -> Image:
         """Read what is good from the device, where it has gone on since."""
-        if self._behind.any():
-            behind, self._behind = self._behind, np.zeros_like(self._behind)
-            now = self.s.snapshot(self._good)
-            for name, good_values in self._good.items():
-                good_values[behind] = now[name][behind]
-        return self._good
+        if self._outdated.any():
+            outdated, self._outdated = self._outdated, np.zeros_like(self._outdated)
+            now = self.s.snapshot(self._last_good)
+            for name, good_values in self._last_good.items():
+                good_values[outdated] = now[name][outdated]
+        return self._last_good
 
     def check_worlds(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
-        now = self._snapshot() if self.check is None else self.s.snapshot(self.s.columns)
-        finite = self._finite(now) if self.check is None else (now["failed"] == 0) & self.check.worlds()
+        now = self._snapshot() if self.finite_check is None else self.s.snapshot(self.s.columns)
+        finite = (
+            self._finite(now)
+            if self.finite_check is None
+            else (now["failed"] == 0) & self.finite_check.finite_worlds()
+        )
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
         wrong = ~finite | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
         known = ~wrong & (now["underway"] == 0)
-        if self.check is None:
-            for name, good_values in self._good.items():
+        if self.finite_check is None:
+            for name, good_values in self._last_good.items():
                 good_values[known] = now[name][known]
         else:
-            self._behind |= known
+            self._outdated |= known
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))
@@ -116,8 +122,8 @@ class Monitor:
         sizes = sizes.joined(self.simulation.list_sizes())
         for w in map(int, np.setdiff1d(worlds, crowded)):
             self.faults[w] = float(then["time"][w]), self._fault(w, then)
-        self._behind[worlds] = False
-        for name, good_values in self._good.items():
+        self._outdated[worlds] = False
+        for name, good_values in self._last_good.items():
             good_values[worlds] = good[name][worlds]
         if len(crowded):
             self.simulation.grow_lists(sizes)
@@ -139,7 +145,9 @@ class Monitor:
         """Return how a world whose status field holds ``code`` has ended, or that it runs."""
         if w in self.faults:
             when, why = self.faults[w]
-            return Status(False, f"found at t = {when:.6g} s: {why}; kept t = {self.good['time'][w]:.6g} s")
+            return Status(
+                False, f"found at t = {when:.6g} s: {why}; kept t = {self.last_good['time'][w]:.6g} s"
+            )
         return Status(code == WorldStatus.ENDED, REASONS[code])
 
     def _fault(self, w: int, then: Image) -> str:

@@ -39,11 +39,11 @@ class ParticleState(Mapping[str, np.ndarray]):
     @property
     def time(self) -> float:
         """Return the time (s) that the world has come to."""
-        return float(self._simulation.monitor.good["time"][self._world])
+        return float(self._simulation.monitor.last_good["time"][self._world])
 
     def __getitem__(self, name: str) -> np.ndarray:
         must(name in self, "quantity of particles", f"one of {', '.join(self)}", name)
-        good = self._simulation.monitor.good
+        good = self._simulation.monitor.last_good
         values: np.ndarray = good[name][self._world, self._simulation.in_order(self._world, good)]
         values.flags.writeable = False
         return values

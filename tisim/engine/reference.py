@@ -1,13 +1,10 @@
 """What there is to make a scene of, read from the code: ``tisim effects`` and the reference print it.
 
-A part's docstring says what it is in its first sentence, then its equations, indented, and what must be known
-of them; its last paragraph names the source. Parameters and options have their texts with them.
+A part's docstring says what it is (docstrings.py); parameters and options have their texts with them.
 """
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
@@ -20,7 +17,7 @@ from tisim.components.component import Checked, Component
 from tisim.components.domain import Domain
 from tisim.components.invalid import text_of, unit_of
 from tisim.effects.base import Effect
-from tisim.engine import template
+from tisim.engine import docstrings, template
 from tisim.errors import InputError, abbreviated, did_you_mean
 from tisim.geometry.shape import Shape
 from tisim.operators.base import Operator
@@ -33,19 +30,6 @@ from tisim.sources.magnetic.magnets import Body
 from tisim.steppers.base import Stepper
 from tisim.steppers.step_control import StepControl
 from tisim.worlds.fields import resolve_fields
-
-PUBLICATIONS = {
-    "Z04": "T. I. Zohdi, A computational framework for agglomeration in thermochemically reacting granular "
-    "flows, Proc. R. Soc. Lond. A 460 (2004) 3421-3445, doi 10.1098/rspa.2004.1277",
-    "Z13": "T. I. Zohdi, Electromagnetically-induced vibration in particulate-functionalized materials, "
-    "J. Vib. Acoust. (2013), doi 10.1115/1.4023251",
-    "Z16": "T. I. Zohdi, Comput. Methods Appl. Mech. Engrg. 308 (2016) 47-72",
-    "B16": "R. J. Baars, Random porous media and magnetic separation of magnetic colloids, thesis, Utrecht "
-    "University (2016)",
-    "L21": "T. Leps, Simulation of magnetic granular media using open source soft sphere DEM, thesis, "
-    "University of Maryland (2021)",
-}
-"""These are the works that docstrings cite in short."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +104,7 @@ class Entry:
 
     def publications(self) -> list[str]:
         """Return the works that its source cites in short, in full."""
-        return [f"{short}: {work}" for short, work in PUBLICATIONS.items() if short in self.source]
+        return [f"{short}: {work}" for short, work in docstrings.PUBLICATIONS.items() if short in self.source]
 
 
 def entries() -> list[Entry]:
@@ -164,9 +148,9 @@ def describe(kind: type[Component], family: str) -> Entry:
         name=kind.kind(),
         kind=kind,
         family=family,
-        summary=summary(kind),
-        body=_body(kind),
-        source=source(kind),
+        summary=docstrings.summary(kind),
+        body=docstrings.body(kind),
+        source=docstrings.source(kind),
         settings=settings(kind),
         fields=tuple((field.name, field.unit) for field in declared if field.name in wanted),
         needs=tuple(_needs(kind)),
@@ -187,8 +171,8 @@ def _needs(kind: type[Component]) -> Iterator[str]:
         yield "a stepper with inertia, not brownian"
     if kind.incompatible_controls:
         yield f"another step control than {' or '.join(kind.incompatible_controls)}"
-    for source_ in FAMILIES["sources"].kinds().values():
-        yield from (f"{source_.kind()}, a row of its {name}" for name, row in source_.lists() if row is kind)
+    for source in FAMILIES["sources"].kinds().values():
+        yield from (f"{source.kind()}, a row of its {name}" for name, row in source.lists() if row is kind)
     if issubclass(kind, Stepper):
         control = kind.model_fields["control"].annotation
         yield f"a step control: {' or '.join(_suiting(control))}"
@@ -237,30 +221,3 @@ def shown(value: object) -> str:
     if isinstance(value, bool | None):
         return {True: "true", False: "false", None: "none"}[value]
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def summary(kind: type) -> str:
-    """Return the first sentence of the docstring, without its source."""
-    return re.split(r"\s*\((?=[A-Z]\d\d)|\.\s|\.$", " ".join(_docstring(kind)[0].split("\n\n")[0].split()))[0]
-
-
-def _body(kind: type) -> str:
-    """Return the docstring but for its first sentence and its source."""
-    first, *rest = _docstring(kind)[0].split("\n\n")
-    opening = " ".join(first.split())[len(summary(kind)) :].lstrip(". ")
-    return "\n\n".join(part for part in (opening, *rest) if part)
-
-
-def source(kind: type) -> str:
-    """Return what the docstring names as source; else the first work that its module cites in brackets."""
-    if found := _docstring(kind)[1]:
-        return found
-    module = " ".join((getattr(inspect.getmodule(kind), "__doc__", None) or "").split())
-    cited = re.search(r"\(([A-Z]\d\d[^()]*(?:\([^)]*\)[^()]*)*)\)", module)
-    return cited.group(1) if cited else ""
-
-
-def _docstring(kind: type) -> tuple[str, str]:
-    """Return the docstring of a class itself: what stands before its source, and the source."""
-    text, _, named = inspect.cleandoc(kind.__doc__ or "").partition("Source: ")
-    return text.strip(), " ".join(named.split()).removesuffix(".")

@@ -12,7 +12,7 @@ from tisim.errors import must
 from tisim.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from tisim.io.trajectory import Recording
+    from tisim.io.recording import Recording
 
 _batches = Batches()
 

@@ -136,15 +136,15 @@ class Simulation(CompiledWorlds):
         rule = "a number of s of simulated time, at least 0"
         must(until is None or (is_number(until) and until >= 0), "until", rule, until)
         must(steps is None or is_whole(steps, 0), "steps", "a whole number, at least 0", steps)
-        watching, stop = Observers(observers), np.inf if until is None else until
+        all_observers, stop = Observers(observers), np.inf if until is None else until
         self.s.write("goal", NEVER if steps is None else self.s.read("steps") + steps)
-        watching.observe(self)
+        all_observers.observe(self)
         yield
         # Short enough to be heard from soon, long enough that looking costs little.
         chunk = max(8, FIRST // (self.worlds * self.s.capacity))
         pauses_on_device = self.s.read("pause_time")
         while self.is_running(stop):
-            pauses = watching.pauses(self, stop)
+            pauses = all_observers.pauses(self, stop)
             if not np.array_equal(pauses, pauses_on_device):
                 self.s.write("pause_time", pauses)
                 pauses_on_device = pauses
@@ -157,7 +157,7 @@ class Simulation(CompiledWorlds):
                 chunk = min(2 * chunk, 100_000)
             elif seconds > 2 * CHUNK_SECONDS:
                 chunk = max(chunk // 2, 1)
-            watching.observe(self)
+            all_observers.observe(self)
             yield
 
     def in_order(self, w: int, good: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -180,7 +180,7 @@ class Simulation(CompiledWorlds):
         fractions = np.maximum(now["time"], now["reached"])[:n] / now["end"][:n]
         return float(np.where(now["status"][:n] != WorldStatus.RUNNING, 1.0, fractions).mean())
 
-    def ahead(self) -> float:
+    def remaining_steps(self) -> float:
         """Return the steps before the world that has most of them, if they go on as long as its last one;
         those that it takes at least where there was none."""
         n = len(self.scenes)
@@ -198,7 +198,7 @@ class Simulation(CompiledWorlds):
     def results(self, worlds: Sequence[int] | None = None) -> list[Result]:
         """Return what has become of the loaded worlds: of those asked for, or of all, in order."""
         self._check_loaded()
-        now, good = self.s.snapshot(self.s.columns), self.monitor.good
+        now, good = self.s.snapshot(self.s.columns), self.monitor.last_good
         counts = {name: now[name] for name in self.s.counters}
         measures = {name: now[name] for e in self.scenes[0].effects for name in e.world_quantities}
         status = now["status"]

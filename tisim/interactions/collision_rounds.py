@@ -73,7 +73,7 @@ class Resolve(PerContact):
                     if event.contact(s, w, i, j, d) >= 0.0:
                         event.resolve(s, w, i, j, d)
                         if not finite((s.velocity[w, i] + s.velocity[w, j]).norm_sqr()):
-                            s.fault(w, i, event.index)
+                            s.fail_by_effect(w, i, event.index)
                         ti.atomic_max(s.events[w], 1)
 
 

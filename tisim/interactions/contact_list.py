@@ -55,7 +55,7 @@ class ContactList:
             self.overflow(w)
 
     @ti.func
-    def count(self, w, overlaps):
+    def count_overlaps(self, w, overlaps):
         """Count pairs of a particle that overlap; stop a world in which there are too many."""
         if ti.atomic_add(self.overlaps[w], overlaps) + overlaps > CONTACTS_PER_PARTICLE * self.s.count[w]:
             self.overflow(w)
@@ -111,10 +111,10 @@ class FindContacts(PerParticle):
                 soonest = ti.min(soonest, self.control.pair(self.s, w, i, j, d))
         self.control.note(self.s, w, i, soonest)
         if ti.static(self.hard):
-            self.contacts.count(w, overlaps)
+            self.contacts.count_overlaps(w, overlaps)
 
 
-class FindContactsAgain(FindContacts):
+class FindContactsAfterEvents(FindContacts):
     """After events, this phase looks at every near pair once more, for the control only."""
 
     conditional = True

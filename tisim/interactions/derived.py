@@ -51,11 +51,13 @@ class DerivedSolver:
         self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)
         self.size = _length if vector else _magnitude
 
-    def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
-        """Return the phases that set the quantity; ``again``, only in worlds where events have changed who is
-        where; ``trial``, in a state that may be far from any solution: what is not finite is then left to the
-        forces to show."""
-        return ((SetDerivedAgain if again else SetDerived)(self, trial),)
+    def phases(self, after_events: bool = False, trial: bool = False) -> tuple[Item, ...]:
+        """Return the phases that set the quantity.
+
+        after_events : whether only in worlds where events have changed who is where. trial : whether in a
+        state that may be far from any solution; what is not finite is then left to the forces to show.
+        """
+        return ((SetDerivedAfterEvents if after_events else SetDerived)(self, trial),)
 
     @ti.func
     def set(self, s, w, i, t):
@@ -81,10 +83,10 @@ class SetDerived(PerParticle):
     def check(self, w, i):
         a = self.solver
         if not finite(a.size(a.value[w, i])):
-            self.s.fault(w, i, a.effect.index)
+            self.s.fail_by_effect(w, i, a.effect.index)
 
 
-class SetDerivedAgain(SetDerived):
+class SetDerivedAfterEvents(SetDerived):
     """This phase sets the quantity anew in worlds where events have changed who is where."""
 
     conditional: ClassVar[bool] = True

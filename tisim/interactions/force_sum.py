@@ -34,12 +34,12 @@ def turning(effects: Sequence[Effect]) -> bool:
 
 
 @ti.func
-def _both(force, torque):
+def _force_and_torque(force, torque):
     return ti.Vector([force[0], force[1], force[2], torque[0], torque[1], torque[2]])
 
 
 @ti.func
-def _force(force, torque):
+def _force_alone(force, torque):
     return force
 
 
@@ -51,14 +51,12 @@ class SumForces(PairSum):
     that is ``fixed``, where the scene has that field, takes none. What pairs remember advances with the sum.
 
     trial : whether the state is one that may be given up. elapsed : whether pairs have gone on for ``dt``
-    since their memory was last brought up to date. commits : whether it now is. asks_step : whether laws are
-    asked besides if they can follow the step that is ahead.
+    since their memory was last brought up to date. commits : whether it now is.
     """
 
     trial: ClassVar[bool] = False
     elapsed: ClassVar[bool] = True
     commits: ClassVar[bool] = True
-    asks_step: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -72,8 +70,8 @@ class SumForces(PairSum):
         super().__init__(s, domain, self.pair_forces, pairs)
         self.derived_solvers = derived_solvers
         self.turning = turning([effect.data for effect in effects])
-        self.fixes = any(field.name == "fixed" for field in s.fields)
-        self.wrench, self.components = (_both, 6) if self.turning else (_force, 3)
+        self.has_fixed = any(field.name == "fixed" for field in s.fields)
+        self.wrench, self.components = (_force_and_torque, 6) if self.turning else (_force_alone, 3)
         # A listed pair comes to a force, torques on both, and what each law has it remember.
         self.pair_values, laws = 9 if self.turning else 3, []
         for law in self.short_ranged:
@@ -85,11 +83,11 @@ class SumForces(PairSum):
 
     @ti.func
     def start(self, w, i, t):
-        return self.singles(w, i, t)
+        return self.external_load(w, i, t)
 
     @ti.func
     def finish(self, w, i, total, t):
-        taken = ti.select(self.moves(w, i), total, 0.0)
+        taken = ti.select(self.is_free(w, i), total, 0.0)
         self.write(w, i, taken)
         self.check(w, i, taken)
 
@@ -98,25 +96,25 @@ class SumForces(PairSum):
         """Set the force on i, at a time of its own, where particles do not feel each other."""
         for solver in ti.static(self.derived_solvers):
             solver.set(self.s, w, i, t)
-        self.write(w, i, self.singles(w, i, t))
+        self.write(w, i, self.external_load(w, i, t))
 
     @ti.func
-    def singles(self, w, i, t):
-        """Return the sum of the forces on i by itself."""
+    def external_load(self, w, i, t):
+        """Return the sum of the forces on i that no other particle exerts, with their torques."""
         s = self.s
         total = self.wrench(0.0 * s.velocity[w, i], 0.0 * s.velocity[w, i])
-        if self.moves(w, i):
+        if self.is_free(w, i):
             for effect in ti.static(self.forces):
-                total += self.single(effect, w, i, t)
+                total += self.load_by(effect, w, i, t)
         return total
 
     @ti.func
-    def put(self, w, i, total):
+    def write_sum(self, w, i, total):
         # Not +=, which would be atomic.
         self.write(w, i, total)
 
     @ti.func
-    def get(self, w, i):
+    def read_sum(self, w, i):
         s = self.s
         total = self.wrench(s.force[w, i], s.force[w, i])
         if ti.static(self.turning):
@@ -124,36 +122,39 @@ class SumForces(PairSum):
         return total
 
     @ti.func
-    def of_pair(self, w, m, i, j, separation, distance, t):
+    def compute_pair(self, w, m, i, j, separation, distance, t):
         values = ti.Vector.zero(self.s.real, self.pair_values)
         for law, begin in ti.static(self.laws):
-            force, turn, back, known = self.interaction(law, w, m, i, j, separation, distance, t)
+            force, torque_i, torque_j, memory = self.interaction(law, w, m, i, j, separation, distance, t)
             for k in ti.static(range(3)):
                 values[k] += force[k]
                 if ti.static(self.turning):
-                    values[3 + k] += turn[k]
-                    values[6 + k] += back[k]
+                    values[3 + k] += torque_i[k]
+                    values[6 + k] += torque_j[k]
             if ti.static(self.commits):
                 for k in ti.static(range(law.memory)):
-                    values[begin + k] = known[k]
+                    values[begin + k] = memory[k]
         return values
 
     @ti.func
     def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         """Return force, torques and new memory of one law between listed pair m."""
-        s, dt = self.s, self.gone_by(w)
-        past = ti.Vector.zero(s.real, max(1, law.memory))
-        if ti.static(law.memory > 0):
-            past = law.past.read(w, m)
-        force, turn, back, known = law.interaction(s, w, i, j, separation, distance, past, dt, t)
-        if ti.static(self.asks_step and law.data.offers("interaction")):
-            ahead = ti.cast(s.step_ahead[w], s.real)
-            later = law.interaction(s, w, i, j, separation, distance, past, ahead, t)
-            force = self.bearable(force, later[0])
-        return force, turn, back, known
+        past = self.past(law, w, m)
+        force, torque_i, torque_j, memory = law.interaction(
+            self.s, w, i, j, separation, distance, past, self.elapsed_time(w), t
+        )
+        return force, torque_i, torque_j, memory
 
     @ti.func
-    def shares(self, values):
+    def past(self, law: ti.template(), w, m):  # type: ignore[valid-type]
+        """Return what listed pair m remembers of one law; one 0 where that is nothing."""
+        past = ti.Vector.zero(self.s.real, max(1, law.memory))
+        if ti.static(law.memory > 0):
+            past = law.past.read(w, m)
+        return past
+
+    @ti.func
+    def pair_contributions(self, values):
         force = piece(values, 0, 3)
         here, there = self.wrench(force, force), self.wrench(-force, force)
         if ti.static(self.turning):
@@ -162,19 +163,14 @@ class SumForces(PairSum):
         return here, there
 
     @ti.func
-    def keep(self, w, m, values):
+    def write_memory(self, w, m, values):
         if ti.static(self.commits):
             for law, begin in ti.static(self.laws):
                 if ti.static(law.memory > 0):
                     law.past.write(w, m, piece(values, begin, law.memory))
 
     @ti.func
-    def bearable(self, force, ahead):
-        """Return the force, or that over the step ahead where the law cannot follow it: it is not finite."""
-        return ti.select(finite(ahead.norm_sqr()), force, ahead)
-
-    @ti.func
-    def gone_by(self, w):
+    def elapsed_time(self, w):
         """Return the time (s) since what particles remember was last brought up to date."""
         dt = ti.cast(0.0, self.s.real)
         if ti.static(self.elapsed):
@@ -189,10 +185,10 @@ class SumForces(PairSum):
                     effect.past.forget(w, m)
 
     @ti.func
-    def moves(self, w, i):
+    def is_free(self, w, i):
         """Return whether forces may move i."""
         free = True
-        if ti.static(self.fixes):
+        if ti.static(self.has_fixed):
             free = self.s.fixed[w, i] == 0
         return free
 
@@ -210,11 +206,9 @@ class SumForces(PairSum):
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
     @ti.func
-    def single(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
-        force, torque = effect.load(self.s, w, i, t, self.gone_by(w), self.commits)
-        if ti.static(self.asks_step and effect.data.offers("load")):
-            ahead = ti.cast(self.s.step_ahead[w], self.s.real)
-            force = self.bearable(force, effect.load(self.s, w, i, t, ahead, False)[0])
+    def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
+        """Return the force on i by one law that no other particle exerts, with its torque."""
+        force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.commits)
         return self.wrench(force, torque)
 
     @ti.func
@@ -229,42 +223,6 @@ class SumForces(PairSum):
     def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
         return effect.pair_force_by_inverse(self.s, w, i, j, separation, inverse, t)
 
-    @ti.func
-    def by_other(self, effect: ti.template(), w, i, j, t):  # type: ignore[valid-type]
-        """Return what j does to i by one law, given what they have stored of each other."""
-        s = self.s
-        d = self.domain.separation(w, s.position[w, i], s.position[w, j], t)
-        first, second, sign = i, j, ti.cast(1.0, s.real)
-        if s.id[w, i] > s.id[w, j]:
-            first, second, sign = j, i, ti.cast(-1.0, s.real)
-        past, dt = ti.Vector.zero(s.real, max(1, effect.memory)), self.gone_by(w)
-        if ti.static(effect.memory > 0):
-            past = effect.past.stored(w, i, j) + effect.past.stored(w, j, i)
-        force, turn, back, _ = effect.interaction(s, w, first, second, sign * d, d.norm(), past, dt, t)
-        return self.wrench(sign * force, ti.select(first == i, turn, back))
-
-    @ti.func
-    def largest(self, w, i, t):
-        """Return the index of the effect whose force on i is largest, or not finite, or is set to nothing
-        finite."""
-        s = self.s
-        most, index = ti.cast(-1.0, s.real), 0
-        for effect in ti.static(self.forces):
-            size = self.single(effect, w, i, t).norm()
-            if finite(most) and not (size <= most):
-                most, index = size, effect.index
-        for effect in ti.static(self.pair_forces):
-            total = ti.Vector.zero(s.real, self.components)
-            for j in range(s.count[w]):
-                if i != j:
-                    total += self.by_other(effect, w, i, j, t)
-            if finite(most) and not (total.norm() <= most):
-                most, index = total.norm(), effect.index
-        for solver in ti.static(self.derived_solvers):
-            if not finite(solver.size(solver.value[w, i])):
-                index = solver.effect.index
-        return index
-
 
 class SumTrialForces(SumForces):
     """This phase sums the forces of a trial state, which may be one that is to be given up: whatever is not
@@ -277,25 +235,7 @@ class SumTrialForces(SumForces):
         pass
 
 
-class SumForcesAtStart(SumForces):
-    """Sum the forces that a first step begins with, at the start or after a world has been written to.
-
-    No time has gone by. What lies so deep in each other that the step ahead is too long for it would be far
-    apart after that step, and nobody would know: it is found here.
-    """
-
-    elapsed, asks_step = False, True
-
-    @ti.func
-    def check(self, w, i, total):
-        # Not below infinity: also true of NaN.
-        if not finite(total.norm_sqr()):
-            # The law at fault is found by a sum over the step.
-            self.s.dt[w] = self.s.step_ahead[w]
-            self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
-
-
-class SumForcesAgain(SumForces):
+class SumForcesAfterEvents(SumForces):
     """After events have changed who is where, this phase sums the forces that the next step begins with."""
 
     conditional, elapsed, commits = True, False, False

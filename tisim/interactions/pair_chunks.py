@@ -35,7 +35,7 @@ class PairChunks:
     lower id first.
 
     Chunk c has its inner pairs from ``begin[w, c]`` to ``outer[w, c]``, and the others up to ``end[w, c]``.
-    ``sorted`` has room for the same slots in the order of a sum: those of pairs within reach come first.
+    ``partitioned`` has room for the same slots in the order of a sum: those of pairs within reach come first.
     Particle i fetches ``fetched[w, m]``, slots of pairs, for m from ``fetch_begin[w, i]`` on. ``unsaved[w]``
     says whether pairs remember what the particles have not stored: sums that bring memory up to date set it.
     A list that is made for a trial state may lack pairs of the last good one, whose memory stays stored.
@@ -48,7 +48,7 @@ class PairChunks:
         self.chunk = CHUNK_SLOTS if runtime.current().device == "cpu" else 1
         self.chunks = -(-s.capacity // self.chunk)
         self.room = half_list.sizes.mean * s.capacity
-        self.first, self.second, self.sorted, self.fetched, self.fetch_begin, self.fetch_count = (
+        self.first, self.second, self.partitioned, self.fetched, self.fetch_begin, self.fetch_count = (
             ti.field(ti.i32) for _ in range(6)
         )
         self.begin, self.outer, self.end, self.unsaved = (ti.field(ti.i32) for _ in range(4))
@@ -56,7 +56,7 @@ class PairChunks:
         # A pair and its memory are one record: they are read together.
         records = (self.first, self.second, *(value for one in memories for value in one.make_fields()))
         builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(*records)
-        for column in (self.sorted, self.fetched):
+        for column in (self.partitioned, self.fetched):
             builder.dense(ti.i, s.worlds).dense(ti.j, self.room).place(column)
         for column in (self.fetch_begin, self.fetch_count):
             builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
@@ -65,7 +65,7 @@ class PairChunks:
         builder.dense(ti.i, s.worlds).place(self.unsaved)
         self.tree = Tree(builder)
         # Where the pairs of each chunk end, and where those that each particle fetches do.
-        self.ends = PrefixSum(s, OfChunks(self), self.end, self.end)
+        self.ends = PrefixSum(s, PerChunk(self), self.end, self.end)
         self.fetch_ends = PrefixSum(s, PerParticle(s), self.fetch_count, self.fetch_begin)
 
     def bytes(self) -> int:
@@ -109,11 +109,11 @@ class PairChunks:
         for m in range(self.begin[w, c], self.end[w, c]):
             i, j = self.first[w, m], self.second[w, m]
             # Within a chunk either may store it; else the one whose chunk this is.
-            keeper, other = i, j
+            owner, other = i, j
             if self.chunk_of(i) != c or (m < self.outer[w, c] and self.half_list.lists(w, j, i)):
-                keeper, other = j, i
+                owner, other = j, i
             for one in ti.static(self.memories):
-                one.store(w, m, keeper, other)
+                one.store(w, m, owner, other)
 
     @ti.func
     def invalidate(self, w):
@@ -121,14 +121,14 @@ class PairChunks:
         self.half_list.stale[w], self.unsaved[w] = 1, 0
 
 
-class OfWorld(Phase):
+class PerWorld(Phase):
     """This phase works on the pairs of a world."""
 
     def __init__(self, pairs: PairChunks) -> None:
         self.p, self.s = pairs, pairs.s
 
 
-class OfChunks(OfWorld):
+class PerChunk(PerWorld):
     """This phase works on the pairs of each chunk."""
 
     light = False

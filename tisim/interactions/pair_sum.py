@@ -41,10 +41,12 @@ class PairSum(PerParticle):
 
     A subclass says what the sum begins with, in ``start``, what one other contributes, in ``term``, and what
     becomes of it, in ``finish``; ``components`` is its length. Where pairs are listed it also says where the
-    sum is kept meanwhile, in ``put`` and ``get``, what a pair comes to, in ``of_pair``, a vector of
-    ``pair_values``, and what of it each of the two is given, in ``shares``; ``commits`` says whether what
-    pairs remember is brought up to date with the sum, by ``keep``, ``by_inverse`` whether terms of all pairs
-    are made by ``term_by_inverse``.
+    sum is kept meanwhile, in ``write_sum`` and ``read_sum``, what is computed for a pair, a vector of
+    ``pair_values``, in ``compute_pair``, and what of it is added to the sums of the two, in
+    ``pair_contributions``.
+
+    commits : whether what pairs remember is brought up to date with the sum, by ``write_memory``.
+    by_inverse : whether terms of all pairs are made by ``term_by_inverse``.
     """
 
     components: int = 3
@@ -88,29 +90,29 @@ class PairSum(PerParticle):
         """Make use of the sum of i."""
 
     @ti.func
-    def put(self, w, i, total):
-        """Keep the sum of i so far."""
+    def write_sum(self, w, i, total):
+        """Store the sum of i so far."""
 
     @ti.func
-    def get(self, w, i):
+    def read_sum(self, w, i):
         """Return the sum of i so far."""
         return ti.Vector.zero(self.s.real, self.components)
 
     @ti.func
-    def of_pair(self, w, m, i, j, separation, distance, t):
-        """Return what listed pair m of i and j comes to; i has the lower id. It writes nothing: pairs are
-        computed side by side, and some more than once."""
+    def compute_pair(self, w, m, i, j, separation, distance, t):
+        """Return what is summed or remembered of listed pair m of i and j, a vector of ``pair_values``; i has
+        the lower id. It writes nothing: pairs are computed side by side, and some more than once."""
         return ti.Vector.zero(self.s.real, self.pair_values)
 
     @ti.func
-    def shares(self, values):
-        """Return what a pair gives to the sums of i and of j, by what it comes to."""
+    def pair_contributions(self, values):
+        """Return what the values computed for a pair add to the sums of i and of j."""
         nothing = ti.Vector.zero(self.s.real, self.components)
         return nothing, nothing
 
     @ti.func
-    def keep(self, w, m, values):
-        """Keep what listed pair m remembers from now on, by what it comes to."""
+    def write_memory(self, w, m, values):
+        """Store what listed pair m remembers from now on, by the values computed for it."""
 
     @ti.func
     def out_of_reach(self, w, m):
@@ -126,15 +128,15 @@ class PairSum(PerParticle):
             total = self.start(w, i, t)
             if ti.static(len(self.long_ranged) > 0):
                 for j in range(self.s.count[w]):
-                    total += self.of(self.long_ranged, w, i, j, t)
-            self.close(w, i, total, t)
+                    total += self.terms_of(self.long_ranged, w, i, j, t)
+            self.end_sum(w, i, total, t)
 
     @ti.func
-    def close(self, w, i, total, t):
-        """End the sum of i over all others: keep it for the listed pairs, or finish it where there are
+    def end_sum(self, w, i, total, t):
+        """End the sum of i over all others: store it for the listed pairs, or finish it where there are
         none."""
         if ti.static(len(self.short_ranged) > 0):
-            self.put(w, i, total)
+            self.write_sum(w, i, total)
         else:
             self.finish(w, i, total, t)
 
@@ -180,10 +182,10 @@ class PairSum(PerParticle):
             total = ti.Vector.zero(self.s.real, self.components)
             for c in ti.static(range(self.components)):
                 total[c] = sums[c][i - first]
-            self.close(w, i, total, t)
+            self.end_sum(w, i, total, t)
 
     @ti.func
-    def of(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
+    def terms_of(self, effects: ti.template(), w, i, j, t):  # type: ignore[valid-type]
         """Return the terms of j for i; none of itself."""
         total = ti.Vector.zero(self.s.real, self.components)
         if i != j:

@@ -1,7 +1,7 @@
 """The phases that lay listed pairs out anew, where the list is due, with what they remember."""
 
 from tisim.backend.taichi import ti
-from tisim.interactions.pair_chunks import OfChunks, OfWorld, PairChunks
+from tisim.interactions.pair_chunks import PairChunks, PerChunk, PerWorld
 from tisim.neighbours.cell_grid import sort_row
 from tisim.neighbours.search_rows import search_rows, watch_reach
 from tisim.worlds.phases import Item, Phase, Repeat
@@ -30,7 +30,7 @@ class RebuildPairs(Repeat):
         return self.p.half_list.stale[w]
 
 
-class StoreMemory(OfChunks):
+class StoreMemory(PerChunk):
     """This phase stores what pairs remember with the particles, where these have not stored it yet."""
 
     conditional = True
@@ -44,7 +44,7 @@ class StoreMemory(OfChunks):
         self.p.store_chunk(w, c)
 
 
-class BeginRebuild(OfWorld):
+class BeginRebuild(PerWorld):
     """After this phase the particles have stored what there is to remember."""
 
     @ti.func
@@ -52,7 +52,7 @@ class BeginRebuild(OfWorld):
         self.p.unsaved[w] = 0
 
 
-class CountPairs(OfChunks):
+class CountPairs(PerChunk):
     """This phase counts how many pairs of a chunk are within it, and how many not."""
 
     @ti.func
@@ -67,7 +67,7 @@ class CountPairs(OfChunks):
         p.outer[w, c], p.end[w, c] = inner, inner + outer
 
 
-class PlacePairs(OfChunks):
+class PlacePairs(PerChunk):
     """This phase finds where the pairs of each chunk begin, and where those do that are not within it."""
 
     @ti.func
@@ -83,7 +83,7 @@ class PlacePairs(OfChunks):
             p.begin[w, c], p.outer[w, c] = begin, begin + p.outer[w, c]
 
 
-class FillPairs(OfChunks):
+class FillPairs(PerChunk):
     """This phase enters the pairs of a chunk, in the order of who lists them, and what they remember."""
 
     @ti.func
@@ -105,7 +105,7 @@ class FillPairs(OfChunks):
                         one.recall(w, m, i, j)
 
 
-class EnterFetches(OfChunks):
+class EnterFetches(PerChunk):
     """This phase tells the other particle of each pair that is not within a chunk, in whatever order threads
     come."""
 
@@ -117,7 +117,7 @@ class EnterFetches(OfChunks):
             p.fetched[w, ti.atomic_sub(p.fetch_begin[w, j], 1) - 1] = m
 
 
-class SortFetches(OfChunks):
+class SortFetches(PerChunk):
     """This phase orders what each particle fetches by place in the list."""
 
     @ti.func
@@ -127,7 +127,7 @@ class SortFetches(OfChunks):
             sort_row(p.fetched, w, p.fetch_begin[w, i], p.fetch_begin[w, i] + p.fetch_count[w, i])
 
 
-class EndRebuild(OfWorld):
+class EndRebuild(PerWorld):
     """This phase declares the list as good as new."""
 
     @ti.func

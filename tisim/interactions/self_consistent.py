@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import DerivedQuantity, SelfConsistentQuantity
 from tisim.interactions.derived import DerivedSolver
-from tisim.interactions.listed_pairs import PairTerms, sum_phases
+from tisim.interactions.listed_pairs import ExportedTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
 from tisim.numerics.ieee import finite
@@ -42,22 +42,25 @@ class SelfConsistentSolver(DerivedSolver):
         super().__init__(s, effect)
         self.domain, self.pairs = domain, pairs
         listed = pairs is not None and effect.data.short_ranged
-        self.left = PairTerms(pairs, self.components) if pairs and listed else None
+        self.exported = ExportedTerms(pairs, self.components) if pairs and listed else None
         self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
-        self.pending, self.sweeps, self.again = (ti.field(ti.i32) for _ in range(3))
+        self.pending, self.sweeps, self.unconverged = (ti.field(ti.i32) for _ in range(3))
         self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
         builder = Builder()
         builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.next)
-        for column in (self.pending, self.sweeps, self.again, self.largest, *self.changes):
+        for column in (self.pending, self.sweeps, self.unconverged, self.largest, *self.changes):
             builder.dense(ti.i, s.worlds).place(column)
         self.tree = Tree(builder)
 
-    def phases(self, again: bool = False, trial: bool = False) -> tuple[Item, ...]:
-        return ((BeginSweepsAgain if again else BeginSweeps)(self), SweepUntilConverged(self, trial))
+    def phases(self, after_events: bool = False, trial: bool = False) -> tuple[Item, ...]:
+        return (
+            (BeginSweepsAfterEvents if after_events else BeginSweeps)(self),
+            SweepUntilConverged(self, trial),
+        )
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        return self.tree.bytes + (self.left.bytes() if self.left else 0)
+        return self.tree.bytes + (self.exported.bytes() if self.exported else 0)
 
 
 class BeginSweeps(PerParticle):
@@ -71,7 +74,7 @@ class BeginSweeps(PerParticle):
     def run(self, w, i):
         a = self.solver
         if i == 0:
-            a.pending[w], a.sweeps[w], a.again[w] = 1, 0, 0
+            a.pending[w], a.sweeps[w], a.unconverged[w] = 1, 0, 0
             a.largest[w] = 0.0
             for change in ti.static(a.changes):
                 change[w] = 0.0
@@ -79,7 +82,7 @@ class BeginSweeps(PerParticle):
             a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
 
 
-class BeginSweepsAgain(BeginSweeps):
+class BeginSweepsAfterEvents(BeginSweeps):
     """This phase begins sweeps in worlds where events have changed who is where."""
 
     conditional: ClassVar[bool] = True
@@ -93,8 +96,8 @@ class SweepUntilConverged(Repeat):
     """This item repeats sweeps of a world until it has converged."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
-        sweep = sum_phases(JacobiSweep(solver, trial), solver.left)
-        super().__init__((*sweep, TakeSweep(solver, trial), JudgeSweep(solver)))
+        sweep = sum_phases(JacobiSweep(solver, trial), solver.exported)
+        super().__init__((*sweep, ReplaceValues(solver, trial), CheckConvergence(solver)))
         self.solver = solver
 
     @ti.func
@@ -115,15 +118,15 @@ class JacobiSweep(PairSum):
         return self.solver.packed(effect.influence(self.s, w, i, j, separation, distance, t))
 
     @ti.func
-    def put(self, w, i, total):
+    def write_sum(self, w, i, total):
         self.solver.next[w, i] = self.solver.unpacked(total)
 
     @ti.func
-    def get(self, w, i):
+    def read_sum(self, w, i):
         return self.solver.packed(self.solver.next[w, i])
 
     @ti.func
-    def of_pair(self, w, m, i, j, separation, distance, t):
+    def compute_pair(self, w, m, i, j, separation, distance, t):
         here = self.term(self.effect, w, i, j, separation, distance, t)
         there = self.term(self.effect, w, j, i, -separation, distance, t)
         values = ti.Vector.zero(self.s.real, self.pair_values)
@@ -132,7 +135,7 @@ class JacobiSweep(PairSum):
         return values
 
     @ti.func
-    def shares(self, values):
+    def pair_contributions(self, values):
         return piece(values, 0, self.components), piece(values, self.components, self.components)
 
     @ti.func
@@ -152,12 +155,12 @@ class JacobiSweep(PairSum):
         has not converged."""
         if not finite(size):
             if self.solver.sweeps[w] == 0:
-                self.s.fault(w, i, self.effect.index)
+                self.s.fail_by_effect(w, i, self.effect.index)
             else:
                 fail_to_converge(self.s, w, i, self.effect)
 
 
-class TakeSweep(PerParticle):
+class ReplaceValues(PerParticle):
     """This phase puts the new values in the place of the old, and compares the two."""
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
@@ -177,7 +180,7 @@ class TakeSweep(PerParticle):
             tolerance = ti.max(self.effect.relaxation(w) * self.effect.tolerance(w), self.least)
             on = change > tolerance * a.largest[w]
             if on and a.sweeps[w] + 1 < self.effect.sweeps:
-                ti.atomic_max(a.again[w], 1)
+                ti.atomic_max(a.unconverged[w], 1)
             elif on:
                 if ti.static(self.trial):
                     # Forces that are not finite: the step is given up.
@@ -192,8 +195,8 @@ def fail_to_converge(s, w, i, effect: ti.template()):  # type: ignore[valid-type
     ti.atomic_min(s.failing_effect[w], effect.index)
 
 
-class JudgeSweep(Phase):
-    """This phase decides on one sweep more, or none."""
+class CheckConvergence(Phase):
+    """This phase decides by the changes of a sweep whether there is another."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
         self.solver = solver
@@ -208,8 +211,8 @@ class JudgeSweep(Phase):
             s.sweep_factor[w] = ti.sqrt(now[w] / before[w])
         before[w], last[w], now[w] = last[w], now[w], 0.0
         a.sweeps[w] += 1
-        a.pending[w] = a.again[w]
-        a.again[w], a.largest[w] = 0, 0.0
+        a.pending[w] = a.unconverged[w]
+        a.unconverged[w], a.largest[w] = 0, 0.0
 
 
 def solver(

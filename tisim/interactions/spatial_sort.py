@@ -23,7 +23,7 @@ SORTED_FROM = 4096
 """Worlds of at least this many particles are sorted: where all fit into the cache, order is worth nothing."""
 SORT_EVERY = 4096
 """A world is sorted each time after so many steps, which take some hundred times as long."""
-TOGETHER = 8
+COLUMNS_AT_ONCE = 8
 """So many numbers of a particle are moved at once."""
 BRICK = 8
 """A brick has so many cells along each axis."""
@@ -53,7 +53,7 @@ class BrickGrid(CellGrid):
 class SpatialSort:
     """A spatial sort permutes all fields of the particles, some columns of numbers after the others.
 
-    due : whether a world is being sorted. stage : says which columns' turn it is. spare : a copy of these.
+    due : whether a world is being sorted. stage : says which columns' turn it is. gathered : a copy of these.
     """
 
     def __init__(self, pairs: PairChunks, lists: NeighbourLists) -> None:
@@ -67,16 +67,20 @@ class SpatialSort:
                 column = getattr(s, field.name)
                 parts = [column.get_scalar_field(k) for k in range(3)] if field.components == 3 else [column]
                 singles += [(part, part.dtype) for part in parts]
-        self.groups = tuple(tuple(singles[k : k + TOGETHER]) for k in range(0, len(singles), TOGETHER))
+        self.groups = tuple(
+            tuple(singles[k : k + COLUMNS_AT_ONCE]) for k in range(0, len(singles), COLUMNS_AT_ONCE)
+        )
         self.stages = len(self.groups)
         self.slotted: tuple[tuple[Any, int, int, Any], ...] = ()
         for column, slots, _ in s.slotted:
             self.slotted += ((column, slots, self.stages, column.dtype),)
-            self.stages += -(-slots // TOGETHER)
-        self.due, self.stage, self.spare = ti.field(ti.i32), ti.field(ti.i32), ti.field(ti.f64)
+            self.stages += -(-slots // COLUMNS_AT_ONCE)
+        self.due, self.stage, self.gathered = ti.field(ti.i32), ti.field(ti.i32), ti.field(ti.f64)
         builder = Builder()
         builder.dense(ti.i, s.worlds).place(self.due, self.stage)
-        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).dense(ti.k, TOGETHER).place(self.spare)
+        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).dense(ti.k, COLUMNS_AT_ONCE).place(
+            self.gathered
+        )
         self.tree = Tree(builder)
 
     def bytes(self) -> int:
@@ -88,7 +92,9 @@ class SpatialSort:
         grid, pairs = self.grid, self.pairs
         store = (StoreMemory(pairs),) if pairs.memories else ()
         cells = (NoteReach(grid, pairs.half_list), *measure_phases(grid), DropSkin(grid), *cell_phases(grid))
-        permute = EachColumns(self, (TakeColumns(grid, self), PutColumns(grid, self), EndColumns(grid, self)))
+        permute = PermuteColumns(
+            self, (GatherColumns(grid, self), WriteColumns(grid, self), EndColumns(grid, self))
+        )
         sort = (*store, BeginRebuild(pairs), *cells, permute, EndSort(grid, self))
         return BeginSort(grid, self), SortWorlds(self, sort)
 
@@ -105,7 +111,7 @@ class SortWorlds(Repeat):
         return self.sort.due[w]
 
 
-class EachColumns(Repeat):
+class PermuteColumns(Repeat):
     """This item permutes some columns after the others."""
 
     def __init__(self, sort: SpatialSort, items: tuple[Item, ...]) -> None:
@@ -138,7 +144,7 @@ class DropSkin(OfGrid):
         self.g.skin[w] = 0.0
 
 
-class TakeColumns(OfParticles):
+class GatherColumns(OfParticles):
     """This phase reads columns in the new order: along cells, and by index within a cell."""
 
     def __init__(self, grid: CellGrid, sort: SpatialSort) -> None:
@@ -151,15 +157,15 @@ class TakeColumns(OfParticles):
         for index, group in ti.static(enumerate(sort.groups)):
             if stage == index:
                 for k, part in ti.static(enumerate(group)):
-                    sort.spare[w, i, k] = ti.cast(part[0][w, source], ti.f64)
+                    sort.gathered[w, i, k] = ti.cast(part[0][w, source], ti.f64)
         for column in ti.static(sort.slotted):
-            first = (stage - column[2]) * TOGETHER
+            first = (stage - column[2]) * COLUMNS_AT_ONCE
             if first >= 0:
-                for k in range(first, ti.min(first + TOGETHER, column[1])):
-                    sort.spare[w, i, k - first] = ti.cast(column[0][w, source, k], ti.f64)
+                for k in range(first, ti.min(first + COLUMNS_AT_ONCE, column[1])):
+                    sort.gathered[w, i, k - first] = ti.cast(column[0][w, source, k], ti.f64)
 
 
-class PutColumns(TakeColumns):
+class WriteColumns(GatherColumns):
     """This phase writes the columns."""
 
     @ti.func
@@ -168,12 +174,12 @@ class PutColumns(TakeColumns):
         for index, group in ti.static(enumerate(sort.groups)):
             if stage == index:
                 for k, part in ti.static(enumerate(group)):
-                    part[0][w, i] = ti.cast(sort.spare[w, i, k], part[1])
+                    part[0][w, i] = ti.cast(sort.gathered[w, i, k], part[1])
         for column in ti.static(sort.slotted):
-            first = (stage - column[2]) * TOGETHER
+            first = (stage - column[2]) * COLUMNS_AT_ONCE
             if first >= 0:
-                for k in range(first, ti.min(first + TOGETHER, column[1])):
-                    column[0][w, i, k] = ti.cast(sort.spare[w, i, k - first], column[3])
+                for k in range(first, ti.min(first + COLUMNS_AT_ONCE, column[1])):
+                    column[0][w, i, k] = ti.cast(sort.gathered[w, i, k - first], column[3])
 
 
 class EndColumns(BeginSort):

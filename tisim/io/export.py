@@ -13,8 +13,9 @@ from tisim.components.domain import Domain
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, world_count
+from tisim.io.recording import Recording
 from tisim.io.run_folder import units
-from tisim.io.trajectory import Recording, Trajectory
+from tisim.io.trajectory import Trajectory
 from tisim.scene.initial_state import Arrays
 
 FORMATS = ("vtk", "xyz", "h5md")

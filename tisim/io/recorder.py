@@ -46,7 +46,7 @@ class Recorder(Observer):
         return self.due
 
     def observe(self, simulation: Simulation) -> None:
-        s, good = simulation.s, simulation.monitor.good
+        s, good = simulation.s, simulation.monitor.last_good
         running = s.read("status") == WorldStatus.RUNNING
         steps = s.read("steps")
         for w, interval in enumerate(self.interval):

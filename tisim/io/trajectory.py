@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import errno
 import io
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
@@ -27,7 +27,7 @@ import numpy as np
 from tisim import version
 from tisim.engine.assembly import needed_fields
 from tisim.engine.simulation import Simulation
-from tisim.errors import InputError, RunError, is_number, is_whole, must
+from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file, temporary_name
 from tisim.files.growing_hdf5 import GrowingFile
@@ -38,58 +38,12 @@ from tisim.io.recorder import Recorder
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import Field, resolve_fields
 
+if TYPE_CHECKING:
+    from tisim.io.recording import Recording
+
 LIBVER = ("v110", "v110")
 """These versions of HDF5 can read the file; earlier ones have no checksums of its structure."""
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-
-
-@dataclass(frozen=True)
-class Recording:
-    """This is a trajectory to record: ``frames`` evenly over the duration, or one frame ``every`` so much
-    time (s).
-
-    The start and the end are recorded always; with ``frames`` the start is one more.
-    """
-
-    path: Path | str
-    frames: int | None = None
-    every: float | None = None
-
-    def __post_init__(self) -> None:
-        received = "both" if self.every is not None else "neither"
-        must((self.frames is None) != (self.every is None), "recording", "given frames or every", received)
-        must(
-            self.frames is None or is_whole(self.frames, 1),
-            "frames",
-            "a whole number, at least 1",
-            self.frames,
-        )
-        sound = self.every is None or (is_number(self.every) and 0 < self.every < np.inf)
-        must(sound, "every", "above 0 s, and finite", self.every)
-
-    def interval(self, scene: Scene) -> float:
-        """Return the time between frames, s."""
-        return self.every if self.every is not None else scene.duration / (self.frames or 1)
-
-    def create(self, scenes: Sequence[Scene], real: str = "f64") -> Trajectory:
-        """Create the file for these scenes, in place of any before."""
-        return Trajectory(self, scenes, real)
-
-    @contextmanager
-    def observer(self, simulation: Simulation, resume: bool = False) -> Iterator[Recorder]:
-        """Yield the observer, to give to each ``run``, that writes all worlds of a loaded simulation.
-
-        The file is created, in place of any before. resume : True to append to the file that a stopped run
-        has left, for a simulation with one world.
-        """
-        scenes, real = simulation.scenes, simulation.runtime.precision
-        if resume:
-            time = float(simulation.monitor.good["time"][0])
-            trajectory_file = Trajectory.resume(self, scenes[0], time, real)
-        else:
-            trajectory_file = self.create(scenes, real)
-        with trajectory_file as trajectory:
-            yield trajectory.recorder(simulation, range(len(scenes)))
 
 
 class Trajectory:
@@ -228,18 +182,6 @@ class Trajectory:
         indices : of the scenes of the file, one for each world of the simulation.
         """
         return Recorder(self, simulation, indices)
-
-
-def recording_from_options(
-    path: Path, frames: int | None, every: float | None, resume: bool
-) -> Recording | None:
-    """Return the recording that the options of a command ask for; None when they ask for none."""
-    if frames is None and every is None:
-        resumable = resume and regular_file.exists(path)
-        rule = "given as before, to go on with trajectory.h5 (or give --fresh)"
-        must(not resumable, "--frames or --every", rule, "neither")
-        return None
-    return Recording(path, frames, every)
 
 
 def _replace(path: Path, image: bytes) -> None:

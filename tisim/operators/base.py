@@ -1,6 +1,6 @@
 """The contract of an operator: what changes the state between steps.
 
-An operator is an effect (see tisim/effects/base.py). ``particle`` is called for each particle on its own, and
+An operator is an effect (see tisim/effects/base). ``particle`` is called for each particle on its own, and
 may write only that particle; then ``world`` is called once per world, serially, and may add particles and
 remove them. One that defines no ``world`` leaves a stepper free to take each particle through many steps by
 itself.

@@ -32,5 +32,5 @@ class PeakDisplacement(Operator):
         farthest = ti.cast(shift.norm() / mass, ti.f64)
         # The maximum would drop NaN.
         if not finite(farthest):
-            s.fault_of_world(w, self.index)
+            s.fail_world_by_effect(w, self.index)
         s.peak_displacement[w] = ti.max(s.peak_displacement[w], farthest)

@@ -1,6 +1,6 @@
 """The contract of a source: an external field of place and time, which effects feel.
 
-A source is an effect (see tisim/effects/base.py) that writes nothing. Whoever feels it finds it with
+A source is an effect (see tisim/effects/base) that writes nothing. Whoever feels it finds it with
 ``sources`` among the bound effects of a scene, and adds up what they give.
 """
 

@@ -5,7 +5,7 @@
     def test_contracts():
         assert_contracts(scene)
 
-Each function raises AssertionError, and names what breaks the contract of tisim/effects/base.py or
+Each function raises AssertionError, and names what breaks the contract of tisim/effects/base or
 tisim/steppers/base.py. The scene should have particles that meet; a few particles and steps are enough.
 """
 

@@ -2,21 +2,31 @@
 
 from tisim.errors import must
 
-CLOCK = (
+WORLD_QUANTITIES = (
     *("time", "time_carry", "end", "dt", "approach_time", "fastest", "volume", "failure_time"),
     *("reached", "cut"),
 )
 """These quantities of a world (f64) tell its time and how its steps go."""
-BOOKS = (
+WORLD_INTEGERS = (
     *("count", "status", "failed", "failing_particle", "failing_effect"),
     *("changed", "events", "next_id", "underway"),
 )
 """These integers of a world (i32) tell how many particles it has and how it is doing."""
-MOTION = ("frame", "displacement", "displacement_since_list")
+WORLD_VECTORS = ("frame", "displacement", "displacement_since_list")
 """These vectors of a world (f64) tell how far its particles have moved."""
-TALLIES = ("steps", "particle_steps")
+WORLD_COUNTERS = ("steps", "particle_steps")
 """These counters (i64) are those that every world keeps."""
-OWN = ("seed", "skin", "step_ahead", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
+WORLD_SETTINGS = (
+    "seed",
+    "skin",
+    "step_ahead",
+    "most",
+    "pause_time",
+    "paused",
+    "goal",
+    "step_limit",
+    "listed_above",
+)
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "reported", "real", "records"),
@@ -27,6 +37,14 @@ ATTRIBUTES = (
 def check_names(state: type, names: tuple[str, ...]) -> None:
     """Raise InputError where a declared name is that of another one, or means something else on a state."""
     for k, name in enumerate(names):
-        taken = name in (*CLOCK, *BOOKS, *MOTION, *TALLIES, *OWN, *ATTRIBUTES, *names[:k])
+        taken = name in (
+            *WORLD_QUANTITIES,
+            *WORLD_INTEGERS,
+            *WORLD_VECTORS,
+            *WORLD_COUNTERS,
+            *WORLD_SETTINGS,
+            *ATTRIBUTES,
+            *names[:k],
+        )
         free = name.isidentifier() and not taken and not hasattr(state, name)
         must(free, "name of a field, counter, flag or quantity", "a name of no other use on a state", name)

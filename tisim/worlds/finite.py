@@ -16,9 +16,9 @@ class FiniteCheck:
     take much longer."""
 
     def __init__(self, s: State) -> None:
-        self.s, self.broken = s, ti.field(ti.i32)
+        self.s, self.not_finite = s, ti.field(ti.i32)
         builder = Builder()
-        builder.dense(ti.i, s.worlds).place(self.broken)
+        builder.dense(ti.i, s.worlds).place(self.not_finite)
         self.tree = Tree(builder)
         fields = [field for field in s.reported if not field.integer]
         self.scalars = tuple(getattr(s, f.name) for f in fields if f.components == 1 and not f.slots)
@@ -26,16 +26,16 @@ class FiniteCheck:
         self.slotted = tuple((getattr(s, f.name), f.slots) for f in fields if f.slots)
 
     @in_taichi_thread
-    def worlds(self) -> np.ndarray:
+    def finite_worlds(self) -> np.ndarray:
         """Return whether all is finite, by world."""
-        self._look()
-        finite: np.ndarray = self.broken.to_numpy() == 0
+        self._check_all()
+        finite: np.ndarray = self.not_finite.to_numpy() == 0
         return finite
 
     @ti.kernel
-    def _look(self):
+    def _check_all(self):
         for w in range(self.s.worlds):
-            self.broken[w] = 0
+            self.not_finite[w] = 0
         for w, i in ti.ndrange(self.s.worlds, self.s.capacity):
             if i < self.s.count[w]:
                 broken = 0
@@ -48,4 +48,4 @@ class FiniteCheck:
                     for k in range(column[1]):
                         broken += ti.cast(not finite(column[0][w, i, k]), ti.i32)
                 if broken > 0:
-                    self.broken[w] = 1
+                    self.not_finite[w] = 1

@@ -1,29 +1,13 @@
-"""The particle fields of a batch of worlds: a core, plus the union of what the scene's effects need.
+"""The state of a batch of worlds, with what kernels do to whole particles and worlds: add, remove, fail."""
 
-Every field has a leading world axis. Vectors are stored as separate components (structure of arrays),
-which the compiler can vectorise over particles; or all quantities of a particle together (array of
-structures), for scenes that do most of their work on pairs of particles picked from a list.
-"""
-
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
-
-import numpy as np
-
-from tisim.backend import runtime
-from tisim.backend.layout import Builder
-from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
-from tisim.backend.transfer import Exchange
-from tisim.errors import RunError
-from tisim.worlds.columns import BOOKS, CLOCK, MOTION, OWN, TALLIES, check_names
-from tisim.worlds.fields import Field
+from tisim.worlds.state_memory import StateMemory
 from tisim.worlds.status import ASKED, WorldStatus
 
 
 @ti.data_oriented
-class State:
-    """A state is the device memory of ``worlds`` worlds of at most ``capacity`` particles.
+class State(StateMemory):
+    """A state is all that a batch of worlds is at a time; kernels read and write it.
 
     Particle fields are ``s.NAME[w, i]``. World fields: ``count`` (live particles, slots 0..count-1),
     ``time``, ``dt``, ``end`` (s, f64), ``status``, ``seed`` of the scene, ``steps`` taken, and the counters
@@ -33,168 +17,7 @@ class State:
     not ended it yet: unless that is 0 the particles have no time in common, ``time`` is that of when the step
     began, and ``reached`` (s) one that all have got to. ``cut`` is how far into such a step all was well (s),
     when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
-
-    records : whether the real quantities of a particle lie together in memory.
-    domain : the space of the worlds, as kernels see it.
-    before_reading : called before particle fields are read, by what keeps some of their values elsewhere.
     """
-
-    def __init__(
-        self,
-        worlds: int,
-        capacity: int,
-        fields: tuple[Field, ...],
-        counters: tuple[str, ...],
-        world_quantities: tuple[str, ...] = (),
-        flags: tuple[str, ...] = (),
-        records: bool = False,
-    ) -> None:
-        # Before anything is placed: fields that are left half made are a fault of every later kernel.
-        check_names(type(self), (*(field.name for field in fields), *counters, *world_quantities, *flags))
-        self.worlds, self.capacity = worlds, capacity
-        self.fields, self.counters = fields, (*TALLIES, *counters)
-        self.world_quantities, self.flags = world_quantities, flags
-        self.reported = tuple(field for field in fields if not field.scratch)
-        self.real, self.records = runtime.current().real, records
-        builder = Builder()
-        self._record: list[Any] | None = [] if records else None
-        for field in fields:
-            setattr(self, field.name, self._place(builder, field))
-        if self._record:
-            builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
-        quantities, integers = (*CLOCK, *world_quantities), (*BOOKS, *flags)
-        for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (self.counters, ti.i64)):
-            for name in names:
-                column = ti.field(dtype)
-                builder.dense(ti.i, worlds).place(column)
-                setattr(self, name, column)
-        self.seed = ti.field(ti.i64)
-        builder.dense(ti.i, worlds).place(self.seed)
-        # The skin of its scene, m, 0 to have one chosen; and the first step, s, where that is known.
-        self.skin, self.step_ahead = ti.field(ti.f64), ti.field(ti.f64)
-        builder.dense(ti.i, worlds).place(self.skin, self.step_ahead)
-        # Particles that its scene may ever have; the capacity may be that of a larger one.
-        self.most = ti.field(ti.i32)
-        builder.dense(ti.i, worlds).place(self.most)
-        # No part of what a run is: a world waits at the first end of a step at or after ``pause_time`` (s),
-        # at ``goal`` steps, and for the next launches at ``step_limit`` steps. With more particles than
-        # ``listed_above`` it looks for pairs in cells.
-        self.pause_time, self.paused = ti.field(ti.f64), ti.field(ti.i32)
-        self.goal, self.step_limit = ti.field(ti.i64), ti.field(ti.i64)
-        self.listed_above = ti.field(ti.i32)
-        for column in (self.pause_time, self.paused, self.goal, self.step_limit, self.listed_above):
-            builder.dense(ti.i, worlds).place(column)
-        for name in MOTION:
-            # Scalars with an axis index: an atomic operation on a component of a vector field is lost.
-            column = ti.field(ti.f64)
-            builder.dense(ti.i, worlds).dense(ti.j, 3).place(column)
-            setattr(self, name, column)
-        self._tree = Tree(builder)
-        self._exchanges: dict[tuple[str, ...], Exchange] = {}
-        self.domain: Any = None
-        self.before_reading: list[Callable[[], None]] = []
-        self.columns = (*quantities, *integers, *MOTION, *self.counters, *OWN)
-        self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
-        self.slotted = tuple(
-            (
-                getattr(self, field.name),
-                field.slots,
-                int(field.default or 0) if field.integer else float(field.default or 0.0),
-            )
-            for field in fields
-            if field.slots
-        )
-        self.means = self._by_merge_rule("mean")
-        self.sums = self._by_merge_rule("sum")
-
-    def __getattr__(self, name: str) -> Any:
-        what = "the fields, counters or world_quantities of an effect that reads it"
-        raise AttributeError(f"{name!r} must be declared in {what}")
-
-    def _place(self, builder: Any, field: Field) -> Any:
-        dtype = ti.i32 if field.integer else ti.f64 if field.double else self.real
-        if field.slots:
-            column = ti.field(dtype)
-            builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).dense(ti.k, field.slots).place(column)
-            return column
-        column = ti.field(dtype) if field.components == 1 else ti.Vector.field(field.components, dtype)
-        parts = [column] if field.components == 1 else [column.get_scalar_field(k) for k in range(3)]
-        for part in parts:
-            if self._record is not None and dtype == self.real:
-                self._record.append(part)
-            else:
-                builder.dense(ti.i, self.worlds).dense(ti.j, self.capacity).place(part)
-        return column
-
-    def _by_merge_rule(self, rule: str) -> tuple[Any, ...]:
-        return tuple(getattr(self, field.name) for field in self.fields if field.merge == rule)
-
-    def bytes(self) -> dict[str, int]:
-        """Return the bytes of each particle field, all worlds together."""
-        real = 8 if self.real == ti.f64 else 4
-        return {f.name: f.bytes(real, self.worlds, self.capacity) for f in self.fields}
-
-    def _exchange(self, names: tuple[str, ...]) -> Exchange:
-        self.check()
-        if names not in self._exchanges:
-            self._exchanges[names] = Exchange({name: getattr(self, name) for name in names})
-        return self._exchanges[names]
-
-    def snapshot(self, names: Iterable[str]) -> dict[str, np.ndarray]:
-        """Return fields as arrays of their full shapes, by name.
-
-        A copy is compiled for each choice of particle fields, and one for all quantities of the worlds.
-        """
-        names = tuple(names)
-        particles = tuple(name for name in names if name not in self.columns)
-        for store in self.before_reading if particles else ():
-            store()
-        arrays = self._exchange(particles).read() if particles else {}
-        if len(particles) < len(names):
-            arrays |= self._exchange(self.columns).read()
-        return {name: arrays[name] for name in names}
-
-    def read(self, name: str) -> np.ndarray:
-        """Return a field as an array of its full shape."""
-        return self.snapshot((name,))[name]
-
-    def saved(self) -> tuple[str, ...]:
-        """Return the names of all that decides how a simulation goes on, pair lists apart: these may be made
-        anew."""
-        fields = (field.name for field in self.fields)
-        worlds = (*CLOCK, *BOOKS, *self.counters, *self.world_quantities, *self.flags)
-        return (*fields, *worlds, "frame", "seed", "goal")
-
-    def image(self) -> dict[str, np.ndarray]:
-        """Return a copy of all worlds as they are, by the names that are saved."""
-        return self.snapshot(self.saved())
-
-    def fill(self, values: Mapping[str, Any]) -> None:
-        """Set fields, each from an array of its full shape or to one number."""
-        worlds = {name: values[name] for name in self.columns if name in values}
-        if worlds:
-            exchange = self._exchange(self.columns)
-            exchange.write(worlds if len(worlds) == len(self.columns) else {**exchange.read(), **worlds})
-        particles = tuple(name for name in values if name not in worlds)
-        if particles:
-            self._exchange(particles).write(values)
-
-    def write(self, name: str, values: Any) -> None:
-        """Set a field from an array of its full shape, or to one number."""
-        self.fill({name: values})
-
-    @property
-    def alive(self) -> bool:
-        """Return whether the memory is there: neither given back, nor gone because Taichi has been started
-        anew."""
-        return self._tree.alive
-
-    def check(self) -> None:
-        """Raise RunError when the memory is gone."""
-        if self._tree.generation != runtime.generation():
-            raise RunError("a Simulation must be used with the settings it was made under; start it anew")
-        if not self.alive:
-            raise RunError("a Simulation must be used before it is closed; make another")
 
     @ti.func
     def axes(self, column: ti.template(), w):  # type: ignore[valid-type]
@@ -268,13 +91,13 @@ class State:
         self.failure_time[w] = t
 
     @ti.func
-    def fault(self, w, i, effect):
+    def fail_by_effect(self, w, i, effect):
         """Stop a world in which an effect, by its index in the scene, has made something not finite."""
         self.fail(w, WorldStatus.NOT_FINITE, i)
         ti.atomic_min(self.failing_effect[w], effect)
 
     @ti.func
-    def fault_of_world(self, w, effect):
+    def fail_world_by_effect(self, w, effect):
         """Stop a world in which an effect, by its index in the scene, has made a quantity of the world not
         finite."""
         ti.atomic_max(self.failed[w], WorldStatus.NOT_FINITE)

@@ -76,7 +76,7 @@ def test_steps_ahead_are_intervals():
     simulation = compiled(scene, 5, 10_000)
     simulation.load([scene])
     simulation.run(steps=100)
-    assert simulation.ahead() == pytest.approx(200, abs=1)
+    assert simulation.remaining_steps() == pytest.approx(200, abs=1)
 
 
 def test_diffusion_in_shear():

@@ -75,7 +75,7 @@ def test_steps_ahead_are_windows_whatever_a_launch_takes_particles_through():
     simulation.load([setup])
     for steps, ahead in ((2, 9998), (1000, 8998)):
         simulation.run(steps=steps)
-        assert simulation.ahead() == pytest.approx(ahead, abs=1)
+        assert simulation.remaining_steps() == pytest.approx(ahead, abs=1)
 
 
 @pytest.mark.slow

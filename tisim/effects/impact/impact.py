@@ -40,7 +40,7 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.effects.base import Force, PairEvent, PairForce, option, parameter
 from tisim.effects.impact.law import HOOKS, ImpactLaw
-from tisim.effects.impact.resting import press, rests, rounding
+from tisim.effects.impact.resting import rests, rounding, support
 from tisim.errors import must
 from tisim.worlds.bound import Peers
 
@@ -195,38 +195,11 @@ class Impact(PairEvent):
     def resolve(self, s, w, i, j, separation):
         if ti.static(self.forced):
             if rests(s, w, i, j, separation):
-                self.support(s, w, i, j, separation)
+                support(self, s, w, i, j, separation)
             else:
                 self.collide(s, w, i, j, separation)
         else:
             self.collide(s, w, i, j, separation)
-
-    @ti.func
-    def support(self, s, w, i, j, separation):
-        """Hold together what forces press together, which slides as friction lets it; what that takes of its
-        kinetic energy is heat, and nothing else happens."""
-        m_i, m_j = s.mass[w, i], s.mass[w, j]
-        reduced = m_i * m_j / (m_i + m_j)
-        n = separation.normalized()
-        slip = s.velocity[w, i] - s.velocity[w, j]
-        v_n = slip.dot(n)
-        slip -= v_n * n
-        v_t = slip.norm()
-        impulse, most = reduced * v_n * n, 0.0 * v_n
-        for law in ti.static(self.limit):
-            most += law.limit(w, reduced * v_n)
-        slid = v_t
-        if v_t > 0.0:
-            stopped = ti.min(v_t, most / reduced)
-            impulse += reduced * stopped / v_t * slip
-            slid -= stopped
-        press(s, w, i, -impulse)
-        press(s, w, j, impulse)
-        loss = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
-        for law in ti.static(self.temperature):
-            s.temperature[w, i] = law.temperature(s, w, i, loss * m_j / (m_i + m_j))
-            s.temperature[w, j] = law.temperature(s, w, j, loss * m_i / (m_i + m_j))
-        ti.atomic_add(s.contacts[w], 1)
 
     @ti.func
     def collide(self, s, w, i, j, separation):

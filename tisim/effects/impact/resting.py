@@ -51,3 +51,31 @@ def press(s, w, i, impulse):
     """Give grain i the impulse of a contact (N s), and count it among the forces of the step."""
     s.velocity[w, i] = s.velocity[w, i] + impulse / s.mass[w, i]
     s.force[w, i] = s.force[w, i] + impulse / ti.cast(s.dt[w], s.real)
+
+
+@ti.func
+def support(impact: ti.template(), s, w, i, j, separation):  # type: ignore[valid-type]
+    """Hold together what forces press together, which slides as friction lets it; what that takes of its
+    kinetic energy is heat, and nothing else happens."""
+    m_i, m_j = s.mass[w, i], s.mass[w, j]
+    reduced = m_i * m_j / (m_i + m_j)
+    n = separation.normalized()
+    slip = s.velocity[w, i] - s.velocity[w, j]
+    v_n = slip.dot(n)
+    slip -= v_n * n
+    v_t = slip.norm()
+    impulse, most = reduced * v_n * n, 0.0 * v_n
+    for law in ti.static(impact.limit):
+        most += law.limit(w, reduced * v_n)
+    slid = v_t
+    if v_t > 0.0:
+        stopped = ti.min(v_t, most / reduced)
+        impulse += reduced * stopped / v_t * slip
+        slid -= stopped
+    press(s, w, i, -impulse)
+    press(s, w, j, impulse)
+    loss = 0.5 * reduced * (v_n * v_n + v_t * v_t - slid * slid)
+    for law in ti.static(impact.temperature):
+        s.temperature[w, i] = law.temperature(s, w, i, loss * m_j / (m_i + m_j))
+        s.temperature[w, j] = law.temperature(s, w, j, loss * m_i / (m_i + m_j))
+    ti.atomic_add(s.contacts[w], 1)

@@ -1,0 +1,66 @@
+"""The parts of a scene by their dotted places, and copies of a scene with another part in one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.component import Component, unit_of
+from tisim.scene.scene import Scene
+
+
+def parts(scene: Scene) -> Iterator[tuple[str, Component]]:
+    """Yield every part of a scene with its dotted place, as in its TOML file."""
+    for effect in scene.effects:
+        yield from within(f"effects.{effect.label}", effect)
+    for name in ("particles", "domain", "stepper"):
+        yield from within(name, getattr(scene, name))
+
+
+def within(path: str, part: Component) -> Iterator[tuple[str, Component]]:
+    """Yield a part at a dotted place, and every part within it with its own."""
+    yield path, part
+    for name in type(part).model_fields:
+        if isinstance(inner := getattr(part, name), Component):
+            yield from within(f"{path}.{name}", inner)
+
+
+def exchanged(scene: Scene, path: str, part: Component) -> Scene:
+    """Return a copy of a scene with another part in the place with this dotted name."""
+    first, *rest = path.split(".")
+    if first == "effects":
+        own = next(effect for effect in scene.effects if effect.label == rest[0])
+        new = _put(own, rest[1:], part)
+        effects = tuple(new if effect is own else effect for effect in scene.effects)
+        return scene.model_copy(update={"effects": effects})
+    return scene.model_copy(update={first: _put(getattr(scene, first), rest, part)})
+
+
+def _put(part: Any, path: Sequence[str], new: Component) -> Any:
+    if not path:
+        return new
+    return part.model_copy(update={path[0]: _put(getattr(part, path[0]), path[1:], new)})
+
+
+def turned(scene: Scene, path: str, accuracy_parameter: AccuracyParameter, decades: float) -> Scene:
+    """Return a copy with an accuracy parameter of the part at ``path`` turned; InputError if it refuses."""
+    return exchanged(scene, path, accuracy_parameter.turned(dict(parts(scene))[path], decades))
+
+
+def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
+    """Return a copy whose steps are at most this long (s): settings of a control in s are such lengths."""
+    control = scene.stepper.control
+    lengths = [name for name, info in type(control).model_fields.items() if unit_of(info) == "s"]
+    shorter = {name: min(getattr(control, name), longest) for name in lengths}
+    return exchanged(scene, "stepper.control", control.model_copy(update=shorter))
+
+
+def finest(scene: Scene, decades: float) -> Scene:
+    """Return a copy with every accuracy parameter of its effects turned, so that they cannot hide the error
+    of the stepper."""
+    for path, part in list(parts(scene)):
+        for accuracy_parameter in part.accuracy_parameters:
+            if accuracy_parameter.converges and not path.startswith("stepper"):
+                scene = turned(scene, path, accuracy_parameter, decades)
+    return scene

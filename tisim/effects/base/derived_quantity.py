@@ -1,0 +1,69 @@
+"""Quantities of particles that follow from the rest of the state, and from each other."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.component import option, parameter
+from tisim.effects.base.effect import Effect
+from tisim.effects.base.pairwise import Pairwise
+
+
+class DerivedQuantity(Effect):
+    """A derived quantity of each particle follows from the rest of the state, such as a magnetic moment.
+
+    It is set before forces are summed, whenever they are; several of them in scene order.
+
+    quantity : the name of the field that it sets.
+    """
+
+    contract: ClassVar[bool] = True
+    quantity: ClassVar[str]
+
+    @ti.func
+    def response(self, s, w, i, total, t):
+        """Return the value of i, given the sum of what others do to it: 0 unless it is self-consistent."""
+        return total
+
+
+class SelfConsistentQuantity(DerivedQuantity, Pairwise):
+    """A self-consistent quantity of each particle depends on that of all others, such as an induced dipole.
+
+        q_i = response(sum_j influence(q_j))
+
+    It is found by sweeps over all particles at once (the method of Jacobi), each starting from the last
+    values, also those of the last step, until no particle changes by more than ``tolerance`` times the
+    largest value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so; with
+    ``sweeps`` of 0 there is one sweep per step and no such test.
+
+    Where the others act by a linear law, with real eigenvalues L, sweeps with a ``relaxation`` of a converge
+    if 1 - 2/a < L < 1 for all of them. There is no solution to find where L exceeds 1; a < 1 helps where one
+    is below -1, as in dense lattices.
+
+    ``sweep_factor`` of a world is what sweeps multiply the change by, from the last three; without end it
+    tends to the largest |1 - a + a L|.
+    """
+
+    contract: ClassVar[bool] = True
+    counters = ("mutual_sweeps",)
+    world_quantities = ("sweep_factor",)
+
+    tolerance: float = parameter(
+        "", "change in a sweep, over the largest value, at which the solution counts as converged", 1e-8, gt=0
+    )
+    sweeps: int = option("sweeps over all particles at most; 0 for one a step without a test", 100, ge=0)
+    relaxation: float = parameter(
+        "", "part a of its way that a sweep goes, q = (1 - a) q + a response", 1.0, gt=0, le=1
+    )
+
+    accuracy_parameters = (AccuracyParameter(tolerance=1),)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        return (self.model_copy(update={"sweeps": 0}),) if self.sweeps else ()
+
+    @ti.func
+    def influence(self, s, w, i, j, separation, distance, t):
+        """Return what j, with its present value, does at i."""
+        return 0.0 * separation

@@ -1,0 +1,76 @@
+"""What all effects have in common: the names by which a scene, a kernel and other effects know them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from tisim.components.component import Component, option
+from tisim.components.cost_hints import LawHints
+from tisim.worlds.bound import Peers
+from tisim.worlds.fields import Field
+
+
+class Effect(LawHints, Component):
+    """An effect is anything physical that a scene can call for: the contract of all of them.
+
+    Laws are made after one of its kinds: ``Force``, ``PairForce``, ``PairEvent``, ``DerivedQuantity``,
+    ``SelfConsistentQuantity``, ``Source`` or ``Operator``. A scene has each name once, so that it can hold
+    two of a kind where they make sense: each acts with its own parameters, and what both count is added up.
+
+    fields : the particle fields that it reads or writes, by name or as a ``Field``. depends_on_velocity :
+    whether it reads or changes velocities or spins. homogeneous : whether it would be the same for particles
+    that are all elsewhere, or all faster by one velocity, as those in each layer of a sheared box are.
+    counters : names of the integer counters that it keeps of a world. world_quantities : names of the
+    quantities that it keeps of a world. requires_source : the quantities of which a scene must have at least
+    one source. repeatable : whether a scene can hold two of its kind.
+    """
+
+    contract: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = False
+
+    name: str | None = option(
+        "name in the scene, files and messages; its kind unless given",
+        None,
+        pattern=r"^[A-Za-z][A-Za-z0-9_]*$",
+    )
+
+    fields: ClassVar[tuple[str | Field, ...]] = ()
+    depends_on_velocity: ClassVar[bool] = False
+    homogeneous: ClassVar[bool] = True
+    counters: ClassVar[tuple[str, ...]] = ()
+    world_quantities: ClassVar[tuple[str, ...]] = ()
+    requires_source: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def called(cls, data: Mapping[str, Any]) -> str:
+        """Return the name in the data of an effect; its kind unless one is given."""
+        return str(data.get("name") or cls.kind())
+
+    def required_fields(self) -> tuple[str | Field, ...]:
+        """Return the particle fields that it needs, given its options; by default all of ``fields``."""
+        return self.fields
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        """Return attributes to set on its bound object, chosen among the bound effects of the scene."""
+        return {}
+
+    def at_start(self, masses: np.ndarray) -> Self:
+        """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""
+        return self
+
+    def capacity(self, masses: np.ndarray) -> int:
+        """Return how many particles may ever live at once, given the masses of those of the start (kg); by
+        default there are never more than at the start."""
+        return len(masses)
+
+    @classmethod
+    def offers(cls, hook: str) -> bool:
+        """Return whether it defines a method that its contract leaves empty."""
+        return getattr(cls, hook) is not getattr(cls._promise(hook), hook)
+
+    @classmethod
+    def _promise(cls, hook: str) -> type:
+        return next(base for base in reversed(cls.__mro__) if hasattr(base, hook))

@@ -1,0 +1,28 @@
+"""What forces between particles and self-consistent quantities have in common: sums over pairs."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base.effect import Effect
+
+
+class Pairwise(Effect):
+    """This is the contract of what is summed over pairs.
+
+    short_ranged : whether it is zero where the gap between surfaces is wider than ``reach``; it is then
+    summed over the pair list, otherwise over all pairs.
+    """
+
+    contract: ClassVar[bool] = True
+    short_ranged: ClassVar[bool] = False
+
+    @ti.func
+    def reach(self, s, w, i):
+        """Return the widest gap (m) between surfaces at which it acts between i and a particle no larger.
+
+        Of a pair it is the reach of the larger particle that counts, whatever the smaller one would return.
+        ``assert_reach`` of tisim/testing tells whether it is long enough.
+        """
+        return 0.0
