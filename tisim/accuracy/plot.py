@@ -21,6 +21,8 @@ METHOD_COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66cce
 """The methods are drawn in P. Tol's bright set of colours, and one of his light one."""
 MARKERS = "osD^vP<>X"
 """The methods are drawn with these marks, one after the other."""
+STYLES = {USUAL_NUMBERS: "-", ("f64", "fast"): ":"}
+"""The lines of precisions and arithmetics; others are dashed."""
 LEGEND_WIDTH = 80
 """A line of the legend has so many characters at most, which a panel has room for."""
 
@@ -35,6 +37,8 @@ def save(study: Study, path: Path) -> Path:
 
 def picture(study: Study) -> Figure:
     """Draw a panel for each quantity: wall seconds across, error up, both logarithmic.
+
+    A method in another precision or arithmetic has its colour and a broken line.
 
     An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
     larger. Rings are the cheapest setting for each power of ten of the error, dotted ones others that timings
@@ -61,10 +65,12 @@ def picture(study: Study) -> Figure:
 
 
 def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
+    methods = list(dict.fromkeys(map(_usual_method, study.rows)))
     for at, method in enumerate(lines):
         rows = [row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same]
-        colour, marker = METHOD_COLOURS[at % len(METHOD_COLOURS)], MARKERS[at % len(MARKERS)]
-        style = "-" if all((row.precision, row.arithmetic) == USUAL_NUMBERS for row in rows) else "--"
+        one = study.line(method)[0]
+        colour = METHOD_COLOURS[methods.index(_usual_method(one)) % len(METHOD_COLOURS)]
+        marker, style = MARKERS[at % len(MARKERS)], STYLES.get((one.precision, one.arithmetic), "--")
         times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
         axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
         label = fill(_label(study, method), LEGEND_WIDTH)
@@ -99,6 +105,12 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel(f"wall time{' of all starts' if study.random else ''}")
     plain(axis)
+
+
+def _usual_method(row: Row) -> str:
+    """Return the name of the method of a row in the usual precision and arithmetic, whose colour it has."""
+    numbers = zip((row.precision, row.arithmetic), USUAL_NUMBERS, strict=True)
+    return row.method.removesuffix("".join(f", {kind}" for kind, usual in numbers if kind != usual))
 
 
 def _label(study: Study, method: str) -> str:

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.scenes import HEAT_CAPACITY, momentum, scene, simulate
+from tests.scenes import HEAT_CAPACITY, momentum, roundoff, scene, simulate
 from tisim import Box
-from tisim.backend import runtime
 from tisim.effects import Friction, Gravity, Heating, Impact, Reaction
 from tisim.operators import Fragmentation
 
@@ -33,7 +32,7 @@ def pairs(rng, boost=0.0, gravity=0.0, breaks=False, across=False):
         place = np.array([SIDE / 2 - 1e-5, 0, 0]) if across else rng.uniform(-SIDE / 4, SIDE / 4, 3)
         push = rng.normal(size=3)
         push *= np.sign(push @ normal) * 10.0 ** rng.uniform(0, 2)
-        touch = 1 - 1e4 * np.finfo(runtime.current().precision.replace("f", "float")).eps
+        touch = 1 - 1e4 * roundoff()
         centres = place + radius[:, None] * touch * np.array([-normal, normal])
         scenes.append(
             scene(
