@@ -16,7 +16,7 @@ MOTION = ("frame", "displacement", "displacement_since_list")
 """These vectors of a world (f64) tell how far its particles have moved."""
 TALLIES = ("steps", "particle_steps")
 """These counters (i64) are those that every world keeps."""
-OWN = ("seed", "skin", "step_ahead", "most", "pause_time", "paused", "goal", "step_limit", "listed_above")
+OWN = ("seed", "skin", "step_ahead", "most", "pause_time", "place", "goal", "step_limit", "listed_above")
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "reported", "real", "records"),
