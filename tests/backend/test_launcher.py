@@ -24,6 +24,11 @@ class Counter:
         self.count[None] += 1
         return self.count[None]
 
+    @ti.kernel
+    def add(self, number: ti.i32, factor: ti.i32) -> ti.i64:
+        self.count[None] += number * factor
+        return ti.cast(self.count[None], ti.i64) << 33
+
 
 @in_taichi_thread
 def counter():
@@ -39,6 +44,15 @@ def test_each_call_runs_the_kernel_of_its_own_object_and_returns_what_it_does():
         return [(up(), read(), other_read()) for _ in range(3)]
 
     assert run(counter(), counter()) == [(None, 2, 1), (None, 4, 2), (None, 6, 3)]
+
+
+def test_arguments_are_those_of_each_call():
+    @in_taichi_thread
+    def run(one):
+        add = Launcher(one.add)
+        return [add(number, factor) for number, factor in ((1, 2), (3, -4), (0, 7))]
+
+    assert run(counter()) == [2 << 33, -10 << 33, -10 << 33]
 
 
 @pytest.mark.skipif(BACKEND != "taichi", reason="Quadrants looks up the kernel itself")

@@ -4,32 +4,47 @@ from collections import Counter
 
 import pytest
 
+from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
-from tisim.worlds.launches import Launch
+from tisim.worlds.launches import Visit
 from tisim.worlds.state import State
 
 
 def assert_launches(simulation, steps, each):
-    """A step of all worlds is ``each`` launches, which tell who goes on, and those of lists that are due.
+    """A step of all worlds is ``each`` launches, and those of lists that are due; few find nobody whose turn
+    it is.
 
-    Nothing else is launched, and no field is read, between two looks. Lists are due in fewer than half of the
-    steps.
+    How far worlds have come is asked when they begin, and then of several steps at once, the more the longer
+    no list is due; no field is read. Lists are due in fewer than half of the steps.
     """
-    kernels, launched, copies = Counter(), Counter(), []
-    launch = ti.lang.kernel_impl.Kernel.__call__
+    program = simulation.program
+    launched, others, copies = Counter(), Counter(), []
+    launch, call = Launcher.__call__, ti.lang.kernel_impl.Kernel.__call__
 
-    def counted(kernel, *args, **options):
-        kernels[kernel.func.__name__] += 1
-        launched[args[0]] += 1
-        return launch(kernel, *args, **options)
+    def count_launch(launcher, *arguments):
+        launched[launcher] += 1
+        before = others.copy()
+        result = launch(launcher, *arguments)
+        # Quadrants calls the kernel for it.
+        others.clear()
+        others.update(before)
+        return result
+
+    def count_call(kernel, *arguments, **options):
+        others[kernel.func.__name__] += 1
+        return call(kernel, *arguments, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ti.lang.kernel_impl.Kernel, "__call__", counted)
+        patch.setattr(Launcher, "__call__", count_launch)
+        patch.setattr(ti.lang.kernel_impl.Kernel, "__call__", count_call)
         patch.setattr(State, "snapshot", lambda *_: copies.append(1))
-        simulation.program.advance(steps)
-    direct = [item for item in simulation.program.plan if isinstance(item, Launch)]
-    assert [launched[item] for item in direct] == [steps] * each
-    rebuilds = kernels["run"] - each * steps
-    assert 0 < rebuilds < steps / 2
-    assert kernels == {"_allow": 1, "_count": 1, "run": each * steps + rebuilds}
+        program.advance(steps)
+    direct = [item.launch.run for item in program.plan if isinstance(item, Visit)]
+    assert len(direct) == each
+    (rounds,) = {launched.pop(run) for run in direct}
+    assert steps <= rounds < 2 * steps
+    assert launched.pop(program.allow) == 1
+    assert launched.pop(program.look) < 0.7 * steps
+    assert 0 < sum(launched.values()) < steps / 2
+    assert not others
     assert not copies

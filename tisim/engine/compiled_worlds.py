@@ -17,7 +17,7 @@ from tisim.errors import InputError, RunError
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.finite import FiniteCheck
-from tisim.worlds.phases import Nest
+from tisim.worlds.phases import nested
 from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
 
@@ -60,8 +60,8 @@ class CompiledWorlds:
         """Compile the kernels of a step; no world may be running."""
         sort = self.assembly.sort
         self.program = Program(self.s, self.assembly.step, self.schedule, sort.every if sort else NEVER)
-        self.sort = Program(self.s, sort.items(), "particle") if sort else None
-        self.first = Program(self.s, self.assembly.first, self.schedule)
+        self.sort = Program(self.s, sort.items(), "particle", once=True) if sort else None
+        self.first = Program(self.s, self.assembly.first, self.schedule, once=True)
         with law_errors.in_a_line():
             self.program.compile()
             if self.first.items:
@@ -103,7 +103,7 @@ class CompiledWorlds:
         self._compile()
 
     def _choose(self, capacity: int) -> str:
-        if any(phase.long for phase, _ in Nest().phases(self.assembly.step)):
+        if any(phase.long for phase, _ in nested(self.assembly.step)):
             return "particle"
         # A world per thread needs as many worlds as threads; one small world is faster without launches.
         small = capacity * self.worlds <= 20_000

@@ -22,7 +22,7 @@ WORLD_SETTINGS = (
     "step_ahead",
     "most",
     "pause_time",
-    "paused",
+    "place",
     "goal",
     "step_limit",
     "listed_above",

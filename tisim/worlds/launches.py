@@ -1,11 +1,22 @@
-"""The launches of kernels that phases take where each is a loop over all worlds."""
+"""The launches of kernels that phases take where each is a loop over all worlds.
 
-from itertools import groupby
+Nobody asks after a launch what has become of it: a device would have to end all that it was given before it
+answers. Each world knows its ``place``, the launch of the step that it takes next, and has nothing to do in
+the others. So launches can be made in a row, many steps of them, and a world that comes to a repeat that they
+do not have in them waits there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tisim.backend import runtime
+from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
-from tisim.worlds.phases import Item, Nest, Phase, Repeat
+from tisim.worlds.phases import Phase, Repeat
+from tisim.worlds.routes import OVER, Items, Route, entry, first_group, launch_count
+from tisim.worlds.status import WorldStatus
 
 if TYPE_CHECKING:
     from tisim.worlds.program import Program
@@ -18,18 +29,24 @@ all threads."""
 TASKS_PER_THREAD = 4
 """A loop has so many tasks for each thread of a CPU, so that a thread that comes late has less to do."""
 
+QUIET = 16
+"""After so many looks that have found no world waiting for a repeat, fewer turns of it are made unasked."""
+
+MOST = 0.5
+"""A turn more of a repeat is always made where a larger part of the worlds waits for it."""
+
 
 @ti.data_oriented
 class Launch:
-    """A launch takes phases that follow each other: a loop over tasks of each, in every world that goes on.
+    """A launch takes phases that follow each other: a loop over tasks of each, in every world whose turn it
+    is; ``route`` says where these go on.
 
     A task is a range of items. On a CPU there are not more than keep all threads busy, nor are they so small
-    that waking a thread is not worth it. ``run`` returns how many worlds go on with what follows: a repeat in
-    the nest ``following``, or the next step.
+    that waking a thread is not worth it.
     """
 
-    def __init__(self, program: "Program", phases: tuple[Phase, ...], nest: Nest, following: Nest) -> None:
-        self.program, self.s, self.nest, self.following = program, program.s, nest, following
+    def __init__(self, program: "Program", phases: tuple[Phase, ...], route: Route) -> None:
+        self.program, self.s, self.route = program, program.s, route
         settings = runtime.current()
         self.iterations = TASK if settings.device == "cpu" else 1
         most = TASKS_PER_THREAD * settings.threads
@@ -39,67 +56,111 @@ class Launch:
             if settings.device == "cpu":
                 tasks = max(1, min(most, phase.extent // (TASK if phase.light else 1)))
             self.loops += ((phase, tasks, -(-phase.extent // tasks)),)
+        self.run = Launcher(self._run)
 
     @ti.kernel
-    def run(self) -> ti.i32:
+    def _run(self, place: ti.i32):
         for loop in ti.static(self.loops):
             if ti.static(self.program.serial and self.s.worlds * loop[1] == 1):
                 ti.loop_config(serialize=True)
             for w, q in ti.ndrange(self.s.worlds, loop[1] * self.iterations):
                 if q % self.iterations == 0:
-                    self.task(loop, w, q // self.iterations)
+                    self.task(loop, w, q // self.iterations, place)
             if ti.static(self.program.serial):
                 ti.loop_config(serialize=True)
             for w in range(self.s.worlds):
                 self.program._stop_failed(w)
-        n = 0
         if ti.static(self.program.serial):
             ti.loop_config(serialize=True)
         for w in range(self.s.worlds):
-            n += self.program._goes_on(self.following, w)
-        return n
+            if self._takes(w, place):
+                self.s.place[w] = self.program._follow(self.route, w, place)
 
     @ti.func
-    def task(self, loop: ti.template(), w, task):  # type: ignore[valid-type]
-        if self.program._active(self.nest, w) and loop[0].when(w) > 0:
+    def _takes(self, w, place):
+        """Return whether it is a world's turn; one that has come to its end keeps its place."""
+        return self.s.place[w] == place and self.s.status[w] == WorldStatus.RUNNING
+
+    @ti.func
+    def task(self, loop: ti.template(), w, task, place):  # type: ignore[valid-type]
+        if self._takes(w, place) and loop[0].when(w) > 0:
             begin = task * loop[2]
             for k in range(begin, ti.min(begin + loop[2], loop[0].size(w))):
                 loop[0].run(w, k)
 
 
-@ti.data_oriented
+@dataclass(frozen=True)
+class Visit:
+    """A visit is a launch in its place."""
+
+    launch: Launch
+    place: int
+
+
 class Loop:
-    """A loop makes the launches of a repeat, again and again while any world is pending."""
+    """A loop makes the launches of a repeat as many times as a step usually takes, which it learns.
 
-    def __init__(self, program: "Program", items: "tuple[Item, ...]", nest: Nest) -> None:
-        self.program, self.s, self.nest = program, program.s, nest
-        self.plan = plan(program, items, nest, nest)
+    place : that of its first launch, at which worlds wait that are not through. end : that after its last.
+    """
 
-    @ti.kernel
-    def count(self) -> ti.i32:
-        n = 0
-        if ti.static(self.program.serial):
-            ti.loop_config(serialize=True)
-        for w in range(self.s.worlds):
-            n += self.program._goes_on(self.nest, w)
-        return n
+    def __init__(self, plan: "Plan", place: int, end: int) -> None:
+        self.plan, self.place, self.end = plan, place, end
+        self.usual, self.more, self.quiet = 0, 0, 1
 
+    def turns(self) -> int:
+        """Return how many turns are to be made now, unasked."""
+        turns, self.more = self.usual + self.more, 0
+        return turns
 
-Plan = tuple[Launch | Loop, ...]
+    def learn(self, places: set[int], share: float) -> None:
+        """Hear at which places worlds wait, and which part of all does.
 
-
-def plan(program: "Program", items: "tuple[Item, ...]", nest: Nest, last: Nest) -> Plan:
-    """Return the launches that these items take; the last of them is followed by what ``last`` says."""
-    launches: list[Launch | Loop] = []
-    groups = [(repeated, tuple(group)) for repeated, group in groupby(items, lambda i: isinstance(i, Repeat))]
-    for k, (repeated, group) in enumerate(groups):
-        if repeated:
-            launches += [Loop(program, r.items, nest.within(r)) for r in group if isinstance(r, Repeat)]
+        Where some are in this repeat there is one turn more next time; always, where most have waited to
+        begin another at two looks in a row. Turns that nobody waits for become fewer.
+        """
+        self.more = int(not places.isdisjoint(range(self.place, self.end)))
+        if self.place in places:
+            self.usual += int(self.quiet == 0 and share > MOST)
+            self.quiet = 0
         else:
-            next_repeats = [
-                r for r in (groups[k + 1][1] if k + 1 < len(groups) else ()) if isinstance(r, Repeat)
-            ]
-            following = nest.within(next_repeats[0]) if next_repeats else last
-            phases = tuple(item for item in group if isinstance(item, Phase))
-            launches.append(Launch(program, phases, nest, following))
-    return tuple(launches)
+            self.quiet += 1
+            if self.quiet > QUIET:
+                self.usual, self.quiet = 3 * self.usual // 4, 1
+
+
+Plan = tuple[Visit | Loop, ...]
+
+
+class Planner:
+    """A planner makes the launches of a program, and its loops; launches that are the same only once."""
+
+    def __init__(self, program: "Program") -> None:
+        self.program = program
+        self.loops: list[Loop] = []
+        self._launches: dict[tuple[tuple[Phase, ...], Route], Launch] = {}
+
+    def step(self, items: Items) -> Plan:
+        """Return the launches of a step."""
+        return self._plan(items, 0, lambda _: OVER)
+
+    def _plan(self, items: Items, place: int, after: Callable[[int], Route]) -> Plan:
+        """Return the launches of items, the first of which has this place; ``after`` makes the route of a
+        world that is through with them, from where it is."""
+        plan: list[Visit | Loop] = []
+        while items:
+            first, rest = first_group(items)
+            if isinstance(first, Repeat):
+                again = partial(entry, items, place, after)
+                end = place + launch_count(first.items)
+                loop = Loop(self._plan(first.items, place, again), place, end)
+                self.loops.append(loop)
+                plan.append(loop)
+                place = end
+            else:
+                key = first, entry(rest, place + 1, after, place)
+                if key not in self._launches:
+                    self._launches[key] = Launch(self.program, *key)
+                plan.append(Visit(self._launches[key], place))
+                place += 1
+            items = rest
+        return tuple(plan)

@@ -57,8 +57,8 @@ class PerParticle(Phase):
 class Repeat:
     """A repeat takes items in order, again and again while ``pending(w)`` is above zero.
 
-    Items are phases, and further repeats. Only the last phase may change what ``pending`` says, and once it
-    says 0, the items of that phase that are left must have nothing to do: they may be skipped.
+    Items are phases, at least one, and further repeats. ``pending`` is asked before the first and after the
+    last of them.
     """
 
     def __init__(self, items: "tuple[Item, ...]") -> None:
@@ -72,22 +72,10 @@ class Repeat:
 Item = Phase | Repeat
 
 
-class Nest:
-    """A nest is repeats within each other, from the outermost; a loop in them runs while all are pending."""
-
-    def __init__(self, repeats: tuple[Repeat, ...] = ()) -> None:
-        self.repeats = repeats
-        self.inner: dict[Repeat, Nest] = {}
-
-    def within(self, repeat: Repeat) -> "Nest":
-        """Return this nest with a repeat in it; the same object whenever asked, as kernels are compiled for
-        each."""
-        return self.inner.setdefault(repeat, Nest((*self.repeats, repeat)))
-
-    def phases(self, items: tuple[Item, ...]) -> "Iterator[tuple[Phase, Nest]]":
-        """Yield every phase among the items, in order, with the nest that it is in."""
-        for item in items:
-            if isinstance(item, Repeat):
-                yield from self.within(item).phases(item.items)
-            else:
-                yield item, self
+def nested(items: tuple[Item, ...], depth: int = 0) -> Iterator[tuple[Phase, int]]:
+    """Yield every phase among the items, in order, with the number of repeats that it is in."""
+    for item in items:
+        if isinstance(item, Repeat):
+            yield from nested(item.items, depth + 1)
+        else:
+            yield item, depth

@@ -7,21 +7,32 @@ a ``Repeat``. The same phases run on two schedules, with the same bits:
 "world"    - a thread takes a world through many steps in one launch. No launches and no barriers between
              phases, and a world stays in cache: the way for batches and small systems on a CPU.
 "particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs and for one
-             large system on many cores. What may be repeated begins a launch of its own.
+             large system on many cores. What may be repeated begins a launch of its own. Many steps are
+             launched in a row before anybody asks how far worlds have come.
 
 That the bits agree needs no luck: phases only combine through sums in a fixed order, integer atomics and
 floating-point minima and maxima, none of which depend on the order of parallel work.
 """
 
-from collections.abc import Callable
-
 from tisim.backend import runtime
+from tisim.backend.launcher import Launcher
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.worlds.launches import TASK, Launch, Plan, plan
-from tisim.worlds.phases import Item, Nest, Repeat
+from tisim.worlds.launches import TASK, Plan, Planner, Visit
+from tisim.worlds.phases import Item, Phase, Repeat, nested
+from tisim.worlds.routes import NOWHERE, OVER, Fork, entry, launch_count
 from tisim.worlds.state import State
 from tisim.worlds.status import NEVER, WorldStatus
+
+PATIENCE = 8
+"""At most so many steps are launched before worlds are asked where they are."""
+LOOK_COST = 2.0
+"""Worlds are asked that often that the launches which find them waiting cost as much as asking does: twice
+what the launches of a step cost, in which a half of those that wait have waited."""
+PLACES = 31
+"""Places are told apart up to so many, by the bits of an integer; beyond that two share one."""
+SHARES = 256
+"""The share of worlds that wait for a repeat is told in this many parts."""
 
 
 @ti.data_oriented
@@ -29,14 +40,28 @@ class Program:
     """A program is one step of every running world, compiled for a state and a list of items.
 
     rest_every : worlds rest after a number of steps that is a multiple of this one, for what is done there.
+    once : whether worlds go through the items once, whatever steps they take.
     """
 
-    def __init__(self, s: State, items: tuple[Item, ...], schedule: str, rest_every: int = NEVER) -> None:
+    def __init__(
+        self,
+        s: State,
+        items: tuple[Item, ...],
+        schedule: str,
+        rest_every: int = NEVER,
+        once: bool = False,
+    ) -> None:
         self.s, self.items, self.schedule, self.rest_every = s, items, schedule, rest_every
-        self.outside = Nest()
+        self.once, self.patience = once, 1
         # One task has one thread, which is faster without waking it.
         self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
-        self.plan: Plan = plan(self, items, self.outside, self.outside) if schedule == "particle" else ()
+        # The first place is that of worlds which wait for nothing.
+        launched = (Phase(), *items) if isinstance(next(iter(items), None), Repeat) else items
+        self.begin = entry(launched, 0, lambda _: OVER, 0)
+        planner = Planner(self)
+        self.plan: Plan = planner.step(launched) if schedule == "particle" else ()
+        self.loops, self.places = tuple(planner.loops), launch_count(launched)
+        self.allow, self.look = Launcher(self._allow), Launcher(self._look)
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
@@ -46,26 +71,31 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(steps)
             return
-        self._allow(steps)
-        pending = self._count()
-        for _ in range(steps):
-            if not pending:
-                return
-            pending = self._launch(self.plan, self._count)
+        found = self.allow(steps)
+        while found:
+            for _ in range(min(self.patience, steps)):
+                self._launch(self.plan)
+            found = self.look()
+            self._learn(found)
 
-    def _launch(self, launches: Plan, count: Callable[[], int]) -> int:
-        """Make the launches, and return how many worlds go on with what follows them, which ``count``
-        tells."""
-        pending: int | None = None
-        for launch in launches:
-            if isinstance(launch, Launch):
-                pending = launch.run()
+    def _launch(self, plan: Plan) -> None:
+        """Make the launches, unasked."""
+        for item in plan:
+            if isinstance(item, Visit):
+                item.launch.run(item.place)
             else:
-                pending = launch.count() if pending is None else pending
-                while pending:
-                    pending = self._launch(launch.plan, launch.count)
-                pending = None
-        return count() if pending is None else pending
+                for _ in range(item.turns()):
+                    self._launch(item.plan)
+
+    def _learn(self, found: int) -> None:
+        """Learn from where worlds are after some steps, as ``_look`` tells it, how many steps and turns to
+        launch unasked."""
+        share = (found >> PLACES) / SHARES
+        places = {place for place in range(self.places) if found >> place % PLACES & 1}
+        for loop in self.loops:
+            loop.learn(places, share)
+        few = share * self.patience <= LOOK_COST
+        self.patience = min(self.patience + 1, PATIENCE) if few else self.patience // 2
 
     @in_taichi_thread
     def compile(self) -> None:
@@ -73,21 +103,21 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(0)
             return
-        self._count()
+        self.allow(0)
+        self.look()
         self._compile(self.plan)
 
-    def _compile(self, launches: Plan) -> None:
-        for launch in launches:
-            if isinstance(launch, Launch):
-                launch.run()
+    def _compile(self, plan: Plan) -> None:
+        for item in plan:
+            if isinstance(item, Visit):
+                item.launch.run(item.place)
             else:
-                launch.count()
-                self._compile(launch.plan)
+                self._compile(item.plan)
 
     def names(self) -> list[str]:
         """Return what runs in a step, in order; repeated phases have a star for each repeat that they are
         in."""
-        return [phase.name + "*" * len(nest.repeats) for phase, nest in self.outside.phases(self.items)]
+        return [phase.name + "*" * depth for phase, depth in nested(self.items)]
 
     @ti.kernel
     def _advance_worlds(self, steps: ti.i32):
@@ -125,16 +155,23 @@ class Program:
     def _stop_failed(self, w):
         """Stop a world in which a phase has failed, once all of its items have been heard."""
         if self.s.failed[w] > 0:
-            self.s.status[w] = self.s.failed[w]
+            self.s.status[w], self.s.place[w] = self.s.failed[w], NOWHERE
 
     @ti.func
     def _waits(self, w):
         return self.s.time[w] >= self.s.pause_time[w] or self.s.steps[w] >= self.s.step_limit[w]
 
     @ti.kernel
-    def _allow(self, steps: ti.i32):
+    def _allow(self, steps: ti.i32) -> ti.i64:
+        """Let worlds take steps, and return the places of those that do, a bit for each."""
+        places = ti.cast(0, ti.i64)
+        if ti.static(self.serial):
+            ti.loop_config(serialize=True)
         for w in range(self.s.worlds):
             self._allow_world(w, steps)
+            self.s.place[w] = ti.select(steps > 0, self._next_step(w), NOWHERE)
+            places |= self._bit(w)
+        return places
 
     @ti.func
     def _allow_world(self, w, steps):
@@ -144,25 +181,45 @@ class Program:
         self.s.step_limit[w] = limit
 
     @ti.func
-    def _active(self, nest: ti.template(), w):  # type: ignore[valid-type]
-        active = self.s.status[w] == WorldStatus.RUNNING and self.s.paused[w] == 0
-        for repeat in ti.static(nest.repeats):
-            active = active and repeat.pending(w) > 0
-        return active
+    def _follow(self, route: ti.template(), w, place):  # type: ignore[valid-type]
+        """Return where a world goes on, from this place."""
+        there = NOWHERE
+        if ti.static(isinstance(route, Fork)):
+            if route.repeat.pending(w) > 0:
+                there = self._follow(route.inside, w, place)
+            else:
+                there = self._follow(route.past, w, place)
+        elif ti.static(route != OVER):
+            there = place + route
+        elif ti.static(not self.once):
+            there = self._next_step(w)
+        return there
 
     @ti.func
-    def _goes_on(self, nest: ti.template(), w):  # type: ignore[valid-type]
-        """Return 1 for a world that goes on in a nest, else 0. Between two steps, note whether it waits."""
-        if ti.static(len(nest.repeats) == 0):
-            self.s.paused[w] = ti.cast(self._waits(w), ti.i32)
-        return ti.cast(self._active(nest, w), ti.i32)
+    def _next_step(self, w):
+        """Return where a world begins its next step; nowhere, where it waits."""
+        return ti.select(self._waits(w), NOWHERE, self._follow(self.begin, w, 0))
+
+    @ti.func
+    def _goes_on(self, w):
+        return self.s.place[w] != NOWHERE and self.s.status[w] == WorldStatus.RUNNING
+
+    @ti.func
+    def _bit(self, w):
+        """Return the bit of where a world is; 0 for one that does not go on."""
+        bit = ti.cast(1, ti.i64) << ti.max(self.s.place[w], 0) % PLACES
+        return ti.select(self._goes_on(w), bit, ti.cast(0, ti.i64))
 
     @ti.kernel
-    def _count(self) -> ti.i32:
-        """Return how many worlds take the next step."""
-        n = 0
+    def _look(self) -> ti.i64:
+        """Return the places at which there are worlds that go on, a bit for each, and which part of them is
+        not between two steps, in the bits above."""
+        places, going, waiting = ti.cast(0, ti.i64), 0, 0
         if ti.static(self.serial):
             ti.loop_config(serialize=True)
         for w in range(self.s.worlds):
-            n += self._goes_on(self.outside, w)
-        return n
+            places |= self._bit(w)
+            going += ti.cast(self._goes_on(w), ti.i32)
+            waiting += ti.cast(self._goes_on(w) and self.s.place[w] > 0, ti.i32)
+        share = SHARES * ti.cast(waiting, ti.i64) // ti.max(going, 1)
+        return places | share << PLACES

@@ -8,6 +8,7 @@ from tests.scenes import by_id, compiled
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import HertzMindlin
+from tisim.interactions.contact_memory import NO_PARTNER, PARTNERS
 
 E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
 G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))
@@ -106,6 +107,26 @@ def test_a_closed_path_yields_no_work():
     lost = 0.5 * (stiffness[0] - stiffness[1]) * SLID**2
     assert (middle * aside).sum() == pytest.approx(lost, rel=1e-9)
     np.testing.assert_allclose(elastic[-1], 0, atol=1e-9 * np.abs(elastic).max())
+
+
+def test_a_large_grain_that_many_small_ones_touch_remembers_nothing_and_each_of_them_one(rng):
+    """More of them than a grain has room for: the smaller of two remembers, and few larger ones touch it."""
+    small, size = 40, 0.05
+    turn, height = np.pi * (1 + 5**0.5) * np.arange(small), 1 - 2 * (np.arange(small) + 0.5) / small
+    aside = np.sqrt(1 - height**2)
+    around = np.stack([aside * np.cos(turn), aside * np.sin(turn), height], axis=1)
+    place = np.concatenate([[[0.0, 0.0, 0.0]], (1.0 + 0.98 * size) * around])
+    radius = np.concatenate([[1.0], np.full(small, size)])
+    made = grains(place, 0.01 * rng.normal(size=place.shape), rng.normal(size=place.shape),
+                  law={"young": 1e5}, radius=radius, mass=30 * radius**3, dt=1e-4, steps=20)  # fmt: skip
+    (result,) = run([made])
+    known, state = twin(made), by_id(result)
+    known.run(20, 1e-4)
+    for name, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
+        np.testing.assert_allclose(state[name], values, rtol=0, atol=1e-11 * np.abs(values).max())
+    partners = state["hertz_mindlin_partners"]
+    assert (partners[0] == NO_PARTNER).all()
+    assert ((partners[1:] == 0).sum(axis=1) == 1).sum() > PARTNERS
 
 
 @pytest.mark.long
