@@ -153,8 +153,8 @@ def test_convergence_figure_shows_the_logbook(outcome, tmp_path):
     assert curves["mean of the population"] == outcome.logbook.select("mean")
     assert list(bottom.get_lines()[0].get_ydata()) == [DERIVED["b_f/b_0"](x) for x in curves["best"]]
     marked = [line.get_xdata()[0] for line in top.get_lines() if line.get_linestyle() == ":"]
-    assert marked == [4, 8]
-    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pi", "b_f/b_0 of the best")
+    assert marked == [4]
+    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Π", "$b_{f}$/$b_{0}$ of the best")
     paths = report.write(outcome, tmp_path / "out")
     assert imread(paths["convergence.png"]).std() > 0.01
     assert paths["convergence.pdf"].read_bytes().startswith(b"%PDF")
