@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optimize.generation_log import best_of
 from optimize.outcome import Outcome
 from optimize.tables import logbook_columns
-from tisim.plotting.style import empty, legend_above, letters, superscripts
+from tisim.plotting.style import empty, legend_above, letters, symbols
 
 _BEST, _MEAN, _MARK, _SURE = "#0b5394", "#8a8a8a", "#c9c9c9", "#b45f06"
 
@@ -58,9 +58,9 @@ def convergence_figure(outcome: Outcome) -> Figure:
                 )  # fmt: skip
         _mark_moves(axes, log)
         legend_above(axes[0], 2)
-    axes[0].set_ylabel(superscripts(problem.objectives[0].label))
+    axes[0].set_ylabel(symbols(problem.objectives[0].label))
     if derived:
-        axes[1].set_ylabel(f"{derived} of the best")
+        axes[1].set_ylabel(f"{symbols(derived)} of the best")
     _finish(axes)
     return figure
 
@@ -71,7 +71,7 @@ def _of_several(outcome: Outcome) -> Figure:
     figure = empty(5.6, 2.2 * len(labels) + 0.5)
     axes = figure.subplots(len(labels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, label in zip(axes, labels, strict=True):
-        axis.set_ylabel(f"best {superscripts(label)}")
+        axis.set_ylabel(f"best {symbols(label)}")
         if log:
             axis.plot(log["gen"], _plottable(log[best_of(label)]), color=_BEST, marker="o", ms=3.5, lw=1.6)
     _finish(axes)
@@ -79,8 +79,10 @@ def _of_several(outcome: Outcome) -> Figure:
 
 
 def _mark_moves(axes: NDArray[Any], log: Mapping[str, Any]) -> None:
+    # After the last generation nothing is drawn from the box any more.
+    moved = np.array(log["gen"])[:-1][np.array(log["recentred"], dtype=bool)[:-1]]
     for axis in axes:
-        for count, at in enumerate(np.array(log["gen"])[np.array(log["recentred"], dtype=bool)]):
+        for count, at in enumerate(moved):
             label = "search box moved" if count == 0 else None
             axis.axvline(at, color=_MARK, ls=":", lw=1.2, zorder=0, label=label)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 
-from tisim.plotting.style import TIME, empty, letters, quantity, scale_of, si, superscripts
+from tisim.plotting.style import TIME, empty, letters, quantity, scale_of, si, superscripts, symbols
 
 
 def test_panels_have_letters_before_their_titles():
@@ -38,6 +38,12 @@ def test_values_have_prefixes():
 
 def test_powers_of_units_are_raised():
     assert superscripts("throughput (m^3/s), kg m^-2") == "throughput (m³/s), kg m⁻²"
+
+
+def test_symbols_are_printed_as_such():
+    assert symbols("b_f / b_0") == "$b_{f}$ / $b_{0}$"
+    assert symbols("Pi (m^3)") == "Π (m³)"
+    assert symbols("relative_velocity, Pink") == "relative_velocity, Pink"
 
 
 def test_axes_are_logarithmic_where_values_span_decades():

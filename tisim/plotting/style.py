@@ -83,6 +83,12 @@ def superscripts(text: str) -> str:
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), text)
 
 
+def symbols(text: str) -> str:
+    """Return a label with its symbols as they are printed: "b_f" has a subscript, and "Pi" is the letter."""
+    greek = re.sub(r"\bPi\b", "\N{GREEK CAPITAL LETTER PI}", superscripts(text))
+    return re.sub(r"\b([A-Za-z])_(\w+)\b", r"$\1_{\2}$", greek)
+
+
 def scale_of(values: np.ndarray) -> str:
     """Return the scale of an axis for values: "log" where they span decades and are positive, else
     "linear"."""

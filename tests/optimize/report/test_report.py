@@ -145,6 +145,17 @@ def test_symbols_of_the_table_are_explained_under_it(outcome):
     assert set(agglomeration("paper").meanings) <= set(headings)
 
 
+def moves(figure):
+    """The generations that a picture marks as those after which the search box was moved."""
+    return [line.get_xdata()[0] for line in figure.axes[0].get_lines() if line.get_linestyle() == ":"]
+
+
+def test_a_move_of_the_search_box_after_the_end_is_not_marked(tmp_path):
+    outcome = outcome_of(tmp_path, generations=4)
+    assert outcome.logbook.select("recentred")[-1]
+    assert moves(report.convergence_figure(outcome)) == []
+
+
 def test_convergence_figure_shows_the_logbook(outcome, tmp_path):
     figure = report.convergence_figure(outcome)
     top, bottom = figure.axes
@@ -152,9 +163,8 @@ def test_convergence_figure_shows_the_logbook(outcome, tmp_path):
     assert curves["best"] == outcome.logbook.select("best")
     assert curves["mean of the population"] == outcome.logbook.select("mean")
     assert list(bottom.get_lines()[0].get_ydata()) == [DERIVED["b_f/b_0"](x) for x in curves["best"]]
-    marked = [line.get_xdata()[0] for line in top.get_lines() if line.get_linestyle() == ":"]
-    assert marked == [4, 8]
-    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pi", "b_f/b_0 of the best")
+    assert moves(figure) == [4, 8]
+    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Π", "$b_{f}$/$b_{0}$ of the best")
     paths = report.write(outcome, tmp_path / "out")
     assert imread(paths["convergence.png"]).std() > 0.01
     assert paths["convergence.pdf"].read_bytes().startswith(b"%PDF")
