@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.device.launches import assert_launches
-from tests.device.scenes import SCENES
+from tests.device.scenes import SCENES, STEPS
 from tests.scenes import compiled
 
 pytestmark = [
@@ -67,4 +67,4 @@ def test_a_device_and_the_cpu_agree(name, on_cpu):
 
 
 def test_a_step_is_two_launches_and_few_ask_how_far_worlds_have_come():
-    assert_launches(simulation("grains"), 64, each=2)
+    assert_launches(simulation("grains"), STEPS, each=2)
