@@ -15,6 +15,7 @@ floating-point minima and maxima, none of which depend on the order of parallel 
 """
 
 from tisim.backend import runtime
+from tisim.backend.mappings import require_mappings
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.worlds.launches import TASK, Plan, Planner, Visit
@@ -28,6 +29,8 @@ PATIENCE = 8
 LOOK_COST = 2.0
 """Worlds are asked that often that the launches which find them waiting cost as much as asking does: twice
 what the launches of a step cost, in which a half of those that wait have waited."""
+LOOKS_PER_QUESTION = 16
+"""After so many looks a device that maps pages is asked whether it may go on: it takes a fraction of a ms."""
 PLACES = 31
 """Places are told apart up to so many, by the bits of an integer; beyond that two share one."""
 SHARES = 256
@@ -52,6 +55,7 @@ class Program:
     ) -> None:
         self.s, self.items, self.schedule, self.rest_every = s, items, schedule, rest_every
         self.once, self.patience = once, 1
+        self.maps_pages = runtime.current().device == "vulkan"
         # One task has one thread, which is faster without waking it.
         self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
         # The first place is that of worlds which wait for nothing.
@@ -69,8 +73,11 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(steps)
             return
-        found = self._allow(steps)
+        found, looks = self._allow(steps), 0
         while found:
+            if self.maps_pages and looks % LOOKS_PER_QUESTION == 0:
+                require_mappings()
+            looks += 1
             for _ in range(min(self.patience, steps)):
                 self._launch(self.plan)
             found = self._look()
