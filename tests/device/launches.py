@@ -10,11 +10,11 @@ from tisim.worlds.state import State
 
 
 def assert_launches(simulation, steps, each):
-    """A step of all worlds is ``each`` launches, and those of lists that are due; few find nobody whose turn
-    it is.
+    """A step of all worlds is ``each`` launches, and those of lists that are due, in fewer than half of the
+    steps; no field is read.
 
-    How far worlds have come is asked when they begin, and then of several steps at once, the more the longer
-    no list is due; no field is read. Lists are due in fewer than half of the steps.
+    A CPU tells after each launch how far worlds have come. A device is asked when they begin, and then of
+    several steps at once, the more the longer no list is due; few launches find nobody whose turn it is.
     """
     program = simulation.program
     kernels, launched, copies = Counter(), Counter(), []
@@ -32,10 +32,15 @@ def assert_launches(simulation, steps, each):
     direct = [item.launch for item in program.plan if isinstance(item, Visit)]
     assert len(direct) == each
     (rounds,) = {launched[item] for item in direct}
-    rebuilds = kernels["run"] - each * rounds
+    run = "run_and_look" if program.asks else "run"
+    rebuilds = kernels[run] - each * rounds
     assert 0 < rebuilds < steps / 2
-    assert steps <= rounds < 2 * steps
-    assert kernels.keys() == {"_allow", "_look", "run"}
     assert kernels["_allow"] == 1
-    assert kernels["_look"] < 0.7 * steps
+    if program.asks:
+        assert kernels.keys() == {"_allow", run}
+        assert rounds == steps
+    else:
+        assert kernels.keys() == {"_allow", "_look", run}
+        assert steps <= rounds < 2 * steps
+        assert kernels["_look"] < 0.7 * steps
     assert not copies

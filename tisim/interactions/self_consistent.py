@@ -92,6 +92,8 @@ class BeginSweepsAgain(BeginSweeps):
 class SweepUntilConverged(Repeat):
     """This item repeats sweeps of a world until it has converged."""
 
+    usual = 2
+
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         sweep = sum_phases(JacobiSweep(solver, trial), solver.left)
         super().__init__((*sweep, TakeSweep(solver, trial), JudgeSweep(solver)))
