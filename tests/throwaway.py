@@ -5,7 +5,7 @@ import numpy as np
 from tests.scenes import scene, simulate
 from tisim.backend.taichi import ti
 from tisim.effects import Force, PairForce, parameter
-from tisim.numerics import philox
+from tisim.numerics import elementary, philox
 from tisim.operators import Operator
 from tisim.worlds.fields import Field
 
@@ -35,7 +35,7 @@ class Trap(Force):
     @ti.func
     def force(self, s, w, i, t):
         spring = -self.stiffness(w) * (s.position[w, i] - self.centre(w))
-        return spring + s.mass[w, i] * self.shake(w) * ti.cast(ti.cos(self.omega(w) * t), s.real)
+        return spring + s.mass[w, i] * self.shake(w) * ti.cast(elementary.cos(self.omega(w) * t), s.real)
 
 
 class RandomKicks(Operator):

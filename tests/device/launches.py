@@ -11,11 +11,11 @@ from tisim.worlds.state import State
 
 
 def assert_launches(simulation, steps, each):
-    """A step of all worlds is ``each`` launches, and those of lists that are due; few find nobody whose turn
-    it is.
+    """A step of all worlds is ``each`` launches, and those of lists that are due, in fewer than half of the
+    steps; no field is read.
 
-    How far worlds have come is asked when they begin, and then of several steps at once, the more the longer
-    no list is due; no field is read. Lists are due in fewer than half of the steps.
+    A CPU tells after each launch how far worlds have come. A device is asked when they begin, and then of
+    several steps at once, the more the longer no list is due; few launches find nobody whose turn it is.
     """
     program = simulation.program
     launched, others, copies = Counter(), Counter(), []
@@ -39,12 +39,16 @@ def assert_launches(simulation, steps, each):
         patch.setattr(ti.lang.kernel_impl.Kernel, "__call__", count_call)
         patch.setattr(State, "snapshot", lambda *_: copies.append(1))
         program.advance(steps)
-    direct = [item.launch.run for item in program.plan if isinstance(item, Visit)]
-    assert len(direct) == each
-    (rounds,) = {launched.pop(run) for run in direct}
-    assert steps <= rounds < 2 * steps
+    visits = [item.launch for item in program.plan if isinstance(item, Visit)]
+    assert len(visits) == each
+    (rounds,) = {launched.pop(one.run_and_look if program.asks else one.run) for one in visits}
     assert launched.pop(program.allow) == 1
-    assert launched.pop(program.look) < 0.7 * steps
+    if program.asks:
+        assert rounds == steps
+    else:
+        assert steps <= rounds < 2 * steps
+        assert launched.pop(program.look) < 0.7 * steps
+    # Those of lists.
     assert 0 < sum(launched.values()) < steps / 2
     assert not others
     assert not copies

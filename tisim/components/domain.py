@@ -130,9 +130,10 @@ class Box(Domain):
     what is drawn as the box.
 
     With images, particles also see each other across joined faces: a periodic system, in which each sees the
-    nearest image of another, and no other. Two that could touch on both sides at once are refused. Of a force
-    that reaches farther than half a side only the part of the nearest image is summed, and it jumps where
-    another becomes the nearest: its reach must be chosen to fit, which nothing checks.
+    nearest image of another, and no other. Two that could touch on both sides at once are refused, and so are
+    short-ranged laws that reach farther than half a side from the centre of a particle when they begin. Of a
+    force between all pairs only the part of the nearest image is summed, and it jumps where another becomes
+    the nearest.
 
     Without images it is the control volume of Z04 section 7: a grain that leaves comes back on the other side
     with the same velocity, and meets there whatever is there. (The paper reverses the coordinate; the two

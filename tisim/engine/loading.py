@@ -10,10 +10,14 @@ import numpy as np
 from tisim.backend import runtime
 from tisim.effects.base import PairEvent, Pairwise
 from tisim.errors import InputError, must
+from tisim.interactions.pair_chunks import PairChunks
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import SHARED, Field
 from tisim.worlds.status import NO_ONE, WorldStatus
+
+ROUNDING = 1e-6
+"""By this part a law may reach farther than half a side, as single precision rounds."""
 
 
 def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
@@ -72,6 +76,26 @@ def check_sides(scene: Scene, start: Arrays) -> None:
     narrow = np.array(scene.domain.imaged()) & (high - low < reach)
     rule = f"at least {reach:g} m wide where it is periodic, twice what two of its particles that touch take"
     must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
+
+
+def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairChunks | None) -> None:
+    """Raise InputError where a law reaches farther than half a side of a box in which each particle sees the
+    nearest image of another alone: the force of the next one would be missing.
+
+    pairs : as they are listed at the start. The smallest particle of a world is not asked: of two the larger
+    says how far laws reach between them.
+    """
+    if pairs is None or not pairs.half_list.laws or not any(scenes[0].domain.imaged()):
+        return
+    laws = ", ".join(law.data.label for law in pairs.half_list.laws)
+    for scene, start, outlook in zip(scenes, starts, pairs.half_list.outlook(), strict=False):
+        (low, high), radius = scene.domain.bounds(), start["radius"]
+        if low is None or high is None or len(radius) < 2:
+            continue
+        reach = float(outlook[: len(radius)][radius >= np.partition(radius, 1)[1]].max())
+        narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDING) < reach)
+        rule = f"at least {2 * reach:g} m wide where it is periodic, twice as far as {laws} reaches"
+        must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 
 def check_field(f: Field, values: np.ndarray, n: int) -> None:

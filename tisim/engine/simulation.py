@@ -10,7 +10,7 @@ import numpy as np
 
 from tisim.engine.allocation import parts
 from tisim.engine.compiled_worlds import CompiledWorlds
-from tisim.engine.loading import check_start, laid_out, world_columns
+from tisim.engine.loading import check_reach, check_start, laid_out, world_columns
 from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
@@ -73,6 +73,7 @@ class Simulation(CompiledWorlds):
         self.edits = [[] for _ in scenes]
         self.s.fill({"pause_time": np.inf, "goal": NEVER, "listed_above": pair_list.SMALL_WORLD})
         self.begin()
+        check_reach(self.scenes, self.starts, self.assembly.pairs)
         self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.monitor.check_worlds()

@@ -21,6 +21,8 @@ def update_pairs(pairs: PairChunks) -> tuple[Item, ...]:
 class RebuildPairs(Repeat):
     """This item makes the pairs of a world anew, once, when its list is due."""
 
+    usual = 0
+
     def __init__(self, pairs: PairChunks, items: tuple[Phase, ...]) -> None:
         super().__init__(items)
         self.p = pairs

@@ -95,6 +95,8 @@ class BeginSweepsAfterEvents(BeginSweeps):
 class SweepUntilConverged(Repeat):
     """This item repeats sweeps of a world until it has converged."""
 
+    usual = 2
+
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         sweep = sum_phases(JacobiSweep(solver, trial), solver.exported)
         super().__init__((*sweep, ReplaceValues(solver, trial), CheckConvergence(solver)))

@@ -102,6 +102,8 @@ class SpatialSort:
 class SortWorlds(Repeat):
     """This item sorts the worlds whose turn it is, once."""
 
+    usual = 0
+
     def __init__(self, sort: SpatialSort, items: tuple[Item, ...]) -> None:
         super().__init__(items)
         self.sort = sort
@@ -116,7 +118,7 @@ class PermuteColumns(Repeat):
 
     def __init__(self, sort: SpatialSort, items: tuple[Item, ...]) -> None:
         super().__init__(items)
-        self.sort = sort
+        self.sort, self.usual = sort, sort.stages
 
     @ti.func
     def pending(self, w):

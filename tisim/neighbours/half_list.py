@@ -8,6 +8,8 @@ never on whether the list was due: results do not depend on when lists were made
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
@@ -80,6 +82,12 @@ class HalfList:
         longest, total = int(self.longest.to_numpy().max()), int(self.total.to_numpy().max())
         row, mean = -(-5 * longest // 4), -(-5 * total // (4 * self.s.capacity))
         return self.sizes.joined(ListSizes(row, mean))
+
+    @in_taichi_thread
+    def outlook(self) -> np.ndarray:
+        """Return how far (m) each particle looked from its centre when lists were last made."""
+        farthest: np.ndarray = self.grid.near.to_numpy()
+        return farthest
 
     def forget(self) -> None:
         """Have every list made anew before it is used again, as the first of a run: nothing is known of how

@@ -1,7 +1,8 @@
 """What IEEE 754 says of numbers that are not finite and of rounding, in both arithmetics.
 
 In fast arithmetic compilers take it that nothing is infinite, and regroup sums as if numbers were not
-rounded; NaN stays NaN. Where that must not be taken, a number passes through integers here.
+rounded; NaN stays NaN. Drivers of Vulkan regroup them in either: Mesa's takes (a + b) - a for b. Where that
+must not be taken, a number passes through integers here.
 """
 
 from tisim.backend import runtime
@@ -19,6 +20,11 @@ def far_away() -> float:
 def is_fast() -> bool:
     """Return whether the arithmetic that runs is the fast one."""
     return runtime.current().arithmetic == "fast"
+
+
+def regroups() -> bool:
+    """Return whether sums may be regrouped as if numbers were not rounded."""
+    return is_fast() or runtime.current().device == "vulkan"
 
 
 @ti.func
@@ -44,7 +50,7 @@ def rounded(x, count):
     """Return an f64 number as it is, rounded, so that no sum that it is part of is regrouped with those that
     it enters. count : an integer >= 0 that is read from a field."""
     number = x
-    if ti.static(is_fast()):
+    if ti.static(regroups()):
         number = ti.bit_cast(ti.bit_cast(x, ti.i64) ^ (ti.cast(count, ti.i64) >> 63), ti.f64)
     return number
 
@@ -63,12 +69,12 @@ def rounded_vector(x, unit):
     """Return three numbers of the precision that runs as they are, rounded; see ``rounded``. unit : a number
     of that precision between -1 and 1 that is read from a field."""
     numbers = x
-    if ti.static(is_fast() and runtime.current().precision == "f64"):
+    if ti.static(regroups() and runtime.current().precision == "f64"):
         # The highest bit of the exponent is that of numbers from 2 on.
         nothing = (ti.bit_cast(unit, ti.i64) >> 62) & ti.i64(1)
         for k in ti.static(range(3)):
             numbers[k] = ti.bit_cast(ti.bit_cast(x[k], ti.i64) ^ nothing, ti.f64)
-    elif ti.static(is_fast()):
+    elif ti.static(regroups()):
         nothing = (ti.bit_cast(unit, ti.i32) >> 30) & 1
         for k in ti.static(range(3)):
             numbers[k] = ti.bit_cast(ti.bit_cast(x[k], ti.i32) ^ nothing, ti.f32)

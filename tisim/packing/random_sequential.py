@@ -21,8 +21,8 @@ SATURATION_FRACTION = 0.3841
 """At this volume fraction no further sphere fits, in the bulk."""
 MAX_CONSECUTIVE_FAILURES = 5_000
 """After so many failures in a row places are no longer tried everywhere, only where there is room."""
-MAX_CELLS = 64
-"""The list of neighbours has so many cells along an axis at most."""
+MAX_CELLS = 128
+"""The list of neighbours has so many cells along an axis at most: 8 MB of them, for a million spheres."""
 
 
 @in_taichi_thread

@@ -1,9 +1,9 @@
 """The launches of kernels that phases take where each is a loop over all worlds.
 
-Nobody asks after a launch what has become of it: a device would have to end all that it was given before it
-answers. Each world knows its ``place``, the launch of the step that it takes next, and has nothing to do in
-the others. So launches can be made in a row, many steps of them, and a world that comes to a repeat that they
-do not have in them waits there.
+Each world knows its ``place``, the launch of the step that it takes next, and has nothing to do in the
+others. A device is not asked after a launch what has become of it, as it would have to end all that it was
+given before it answers: launches are made in a row, many steps of them, and a world that comes to a repeat
+that they do not have in them waits there.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,6 @@ all threads."""
 TASKS_PER_THREAD = 4
 """A loop has so many tasks for each thread of a CPU, so that a thread that comes late has less to do."""
 
-QUIET = 16
-"""After so many looks that have found no world waiting for a repeat, fewer turns of it are made unasked."""
-
-MOST = 0.5
-"""A turn more of a repeat is always made where a larger part of the worlds waits for it."""
-
 
 @ti.data_oriented
 class Launch:
@@ -56,10 +50,25 @@ class Launch:
             if settings.device == "cpu":
                 tasks = max(1, min(most, phase.extent // (TASK if phase.light else 1)))
             self.loops += ((phase, tasks, -(-phase.extent // tasks)),)
-        self.run = Launcher(self._run)
+        self.run, self.run_and_look = Launcher(self._run), Launcher(self._run_and_look)
 
     @ti.kernel
     def _run(self, place: ti.i32):
+        self._take(place)
+
+    @ti.kernel
+    def _run_and_look(self, place: ti.i32) -> ti.i64:
+        """Take the phases, and return where worlds are then, as ``Program._look`` does."""
+        self._take(place)
+        places = ti.cast(0, ti.i64)
+        if ti.static(self.program.serial):
+            ti.loop_config(serialize=True)
+        for w in range(self.s.worlds):
+            places |= self.program._bit(w)
+        return places
+
+    @ti.func
+    def _take(self, place):
         for loop in ti.static(self.loops):
             if ti.static(self.program.serial and self.s.worlds * loop[1] == 1):
                 ti.loop_config(serialize=True)
@@ -98,34 +107,23 @@ class Visit:
 
 
 class Loop:
-    """A loop makes the launches of a repeat as many times as a step usually takes, which it learns.
+    """A loop makes the launches of a repeat as often as a step usually takes them.
 
-    place : that of its first launch, at which worlds wait that are not through. end : that after its last.
+    bits : of the places of its launches, at the first of which worlds wait that are not through.
     """
 
-    def __init__(self, plan: "Plan", place: int, end: int) -> None:
-        self.plan, self.place, self.end = plan, place, end
-        self.usual, self.more, self.quiet = 0, 0, 1
+    def __init__(self, plan: "Plan", usual: int, places: range) -> None:
+        self.plan, self.usual, self.more = plan, usual, 0
+        self.bits = sum(1 << place for place in places)
 
     def turns(self) -> int:
         """Return how many turns are to be made now, unasked."""
         turns, self.more = self.usual + self.more, 0
         return turns
 
-    def learn(self, places: set[int], share: float) -> None:
-        """Hear at which places worlds wait, and which part of all does.
-
-        Where some are in this repeat there is one turn more next time; always, where most have waited to
-        begin another at two looks in a row. Turns that nobody waits for become fewer.
-        """
-        self.more = int(not places.isdisjoint(range(self.place, self.end)))
-        if self.place in places:
-            self.usual += int(self.quiet == 0 and share > MOST)
-            self.quiet = 0
-        else:
-            self.quiet += 1
-            if self.quiet > QUIET:
-                self.usual, self.quiet = 3 * self.usual // 4, 1
+    def learn(self, found: int) -> None:
+        """Hear where worlds wait; where some are in this repeat, it has one turn more next time."""
+        self.more = int(found & self.bits > 0)
 
 
 Plan = tuple[Visit | Loop, ...]
@@ -152,7 +150,7 @@ class Planner:
             if isinstance(first, Repeat):
                 again = partial(entry, items, place, after)
                 end = place + launch_count(first.items)
-                loop = Loop(self._plan(first.items, place, again), place, end)
+                loop = Loop(self._plan(first.items, place, again), first.usual, range(place, end))
                 self.loops.append(loop)
                 plan.append(loop)
                 place = end

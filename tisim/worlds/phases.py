@@ -58,8 +58,10 @@ class Repeat:
     """A repeat takes items in order, again and again while ``pending(w)`` is above zero.
 
     Items are phases, at least one, and further repeats. ``pending`` is asked before the first and after the
-    last of them.
+    last of them. So many turns as are ``usual`` in a step are launched before anybody asks.
     """
+
+    usual: int = 1
 
     def __init__(self, items: "tuple[Item, ...]") -> None:
         self.items = items

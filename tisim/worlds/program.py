@@ -7,8 +7,8 @@ a ``Repeat``. The same phases run on two schedules, with the same bits:
 "world"    - a thread takes a world through many steps in one launch. No launches and no barriers between
              phases, and a world stays in cache: the way for batches and small systems on a CPU.
 "particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs and for one
-             large system on many cores. What may be repeated begins a launch of its own. Many steps are
-             launched in a row before anybody asks how far worlds have come.
+             large system on many cores. What may be repeated begins a launch of its own. On a GPU many
+             steps are launched in a row before anybody asks how far worlds have come.
 
 That the bits agree needs no luck: phases only combine through sums in a fixed order, integer atomics and
 floating-point minima and maxima, none of which depend on the order of parallel work.
@@ -16,6 +16,7 @@ floating-point minima and maxima, none of which depend on the order of parallel 
 
 from tisim.backend import runtime
 from tisim.backend.launcher import Launcher
+from tisim.backend.mappings import require_mappings
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.worlds.launches import TASK, Plan, Planner, Visit
@@ -29,8 +30,10 @@ PATIENCE = 8
 LOOK_COST = 2.0
 """Worlds are asked that often that the launches which find them waiting cost as much as asking does: twice
 what the launches of a step cost, in which a half of those that wait have waited."""
-PLACES = 31
-"""Places are told apart up to so many, by the bits of an integer; beyond that two share one."""
+LOOKS_PER_QUESTION = 16
+"""After so many looks a device that maps pages is asked whether it may go on: it takes a fraction of a ms."""
+PLACES = 48
+"""A step has at most so many places: worlds tell theirs by the bits of an integer."""
 SHARES = 256
 """The share of worlds that wait for a repeat is told in this many parts."""
 
@@ -53,6 +56,8 @@ class Program:
     ) -> None:
         self.s, self.items, self.schedule, self.rest_every = s, items, schedule, rest_every
         self.once, self.patience = once, 1
+        # A CPU has ended a launch when it returns, so what it says of it costs nothing.
+        self.asks, self.maps_pages = (runtime.current().device == name for name in ("cpu", "vulkan"))
         # One task has one thread, which is faster without waking it.
         self.serial = runtime.current().device == "cpu" and s.worlds <= TASK
         # The first place is that of worlds which wait for nothing.
@@ -60,8 +65,10 @@ class Program:
         self.begin = entry(launched, 0, lambda _: OVER, 0)
         planner = Planner(self)
         self.plan: Plan = planner.step(launched) if schedule == "particle" else ()
-        self.loops, self.places = tuple(planner.loops), launch_count(launched)
+        self.loops = tuple(planner.loops)
         self.allow, self.look = Launcher(self._allow), Launcher(self._look)
+        if launch_count(launched) > PLACES:
+            raise TypeError(f"a step must have at most {PLACES} launches")
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
@@ -71,8 +78,14 @@ class Program:
         if self.schedule == "world":
             self._advance_worlds(steps)
             return
-        found = self.allow(steps)
+        found, looks = self.allow(steps), 0
         while found:
+            if self.asks:
+                found = self._launch_asking(self.plan, found)
+                continue
+            if self.maps_pages and looks % LOOKS_PER_QUESTION == 0:
+                require_mappings()
+            looks += 1
             for _ in range(min(self.patience, steps)):
                 self._launch(self.plan)
             found = self.look()
@@ -87,14 +100,23 @@ class Program:
                 for _ in range(item.turns()):
                     self._launch(item.plan)
 
+    def _launch_asking(self, plan: Plan, found: int) -> int:
+        """Make the launches, each repeat while there are worlds in it, and return where worlds are, as
+        ``_look`` does; ``found`` says where they were."""
+        for item in plan:
+            if isinstance(item, Visit):
+                found = item.launch.run_and_look(item.place)
+            else:
+                while found & item.bits:
+                    found = self._launch_asking(item.plan, found)
+        return found
+
     def _learn(self, found: int) -> None:
         """Learn from where worlds are after some steps, as ``_look`` tells it, how many steps and turns to
         launch unasked."""
-        share = (found >> PLACES) / SHARES
-        places = {place for place in range(self.places) if found >> place % PLACES & 1}
         for loop in self.loops:
-            loop.learn(places, share)
-        few = share * self.patience <= LOOK_COST
+            loop.learn(found)
+        few = (found >> PLACES) * self.patience <= LOOK_COST * SHARES
         self.patience = min(self.patience + 1, PATIENCE) if few else self.patience // 2
 
     @in_taichi_thread
@@ -110,7 +132,8 @@ class Program:
     def _compile(self, plan: Plan) -> None:
         for item in plan:
             if isinstance(item, Visit):
-                item.launch.run(item.place)
+                launch = item.launch.run_and_look if self.asks else item.launch.run
+                launch(item.place)
             else:
                 self._compile(item.plan)
 
@@ -185,10 +208,13 @@ class Program:
         """Return where a world goes on, from this place."""
         there = NOWHERE
         if ti.static(isinstance(route, Fork)):
+            # Names, one by one: Quadrants would look for attributes of attributes without end.
+            inside = ti.static(route.inside)
+            past = ti.static(route.past)
             if route.repeat.pending(w) > 0:
-                there = self._follow(route.inside, w, place)
+                there = self._follow(inside, w, place)
             else:
-                there = self._follow(route.past, w, place)
+                there = self._follow(past, w, place)
         elif ti.static(route != OVER):
             there = place + route
         elif ti.static(not self.once):
@@ -207,7 +233,7 @@ class Program:
     @ti.func
     def _bit(self, w):
         """Return the bit of where a world is; 0 for one that does not go on."""
-        bit = ti.cast(1, ti.i64) << ti.max(self.s.place[w], 0) % PLACES
+        bit = ti.cast(1, ti.i64) << ti.max(self.s.place[w], 0)
         return ti.select(self._goes_on(w), bit, ti.cast(0, ti.i64))
 
     @ti.kernel

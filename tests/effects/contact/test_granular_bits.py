@@ -105,7 +105,7 @@ def skin_of(simulation, w):
     return simulation.assembly.pairs.half_list.grid.skin[w]
 
 
-def test_a_step_is_few_launches_and_few_ask_how_far_worlds_have_come(simulation):
+def test_a_step_is_few_launches_which_tell_how_far_worlds_have_come(simulation):
     """One more than a step has without what takes grains away, after which forces may be summed again."""
     simulation.load([bed(k) for k in range(3)])
     assert_launches(simulation, 64, each=3)

@@ -73,7 +73,7 @@ class StageSweep(Repeat):
 
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
-        self.s = context.s
+        self.s, self.usual = context.s, context.stepper.data.stages - 1
 
     @ti.func
     def pending(self, w):

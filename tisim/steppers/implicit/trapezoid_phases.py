@@ -12,6 +12,8 @@ from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 class Iteration(Repeat):
     """This repeat makes iterations of an attempt, until there is a verdict."""
 
+    usual = 2
+
     def __init__(self, context: StepContext, items: tuple[Item, ...]) -> None:
         super().__init__(items)
         self.s = context.s
