@@ -70,17 +70,18 @@ class Magnets(Source):
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        # What vectors are right for, then the other points one by one.
+        # What vectors are right for, then the other points one by one; a tile of one point has no vectors.
         size = ti.static(r[0].n)
-        left = ti.Vector([0] * size, ti.i32)
         for k in range(self.each.size(w)):
-            wrong = 0
-            for lane in range(size):
-                place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
-                b, slope, right = self.each.flux_mostly(w, k, place)
-                left[lane] = ti.select(right, 0, 1)
-                wrong += left[lane]
-                add_point(value, gradient, lane, ti.select(right, b, 0.0), ti.select(right, slope, 0.0))
+            left, wrong = ti.Vector([1] * size, ti.i32), size
+            if ti.static(size > 1):
+                wrong = 0
+                for lane in range(size):
+                    place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
+                    b, slope, right = self.each.flux_mostly(w, k, place)
+                    left[lane] = ti.select(right, 0, 1)
+                    wrong += left[lane]
+                    add_point(value, gradient, lane, ti.select(right, b, 0.0), ti.select(right, slope, 0.0))
             if wrong > 0:
                 for lane in range(size):
                     if left[lane] > 0:
