@@ -22,6 +22,7 @@ from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.sources import Cylinder, MagneticCylinders
+from tisim.sources.sampling import TILE_POINTS
 from tisim.worlds.bound import connected
 from tisim.worlds.parameter_table import ParameterTable
 
@@ -30,23 +31,22 @@ RADIUS, LENGTH, M = 300e-6, 1000e-6, (985e3 * 0.6, 0.0, 985e3 * 0.8)
 
 @in_taichi_thread
 @ti.kernel
-def field(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
-    for i in range(r.shape[0]):
-        b = source.value(0, ti.cast(ti.Vector([r[i, 0], r[i, 1], r[i, 2]]), float), 0.0)
-        for a in ti.static(range(3)):
-            out[i, 0, a] = b[a]
-
-
-@in_taichi_thread
-@ti.kernel
-def both(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
-    for i in range(r.shape[0]):
-        place = ti.cast(ti.Vector([r[i, 0], r[i, 1], r[i, 2]]), float)
-        b, slope = source.value_and_gradient(0, place, 0.0)
-        for a in ti.static(range(3)):
-            out[i, 0, a] = b[a]
-            for c in ti.static(range(3)):
-                out[i, 1 + c, a] = slope[a, c]
+def sample(source: ti.template(), slopes: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarray()):
+    """As tisim.sources.sample does, but that gradients may be left out."""
+    points = r.shape[0]
+    for first in range((points + TILE_POINTS - 1) // TILE_POINTS):
+        place = [ti.Vector([0.0] * TILE_POINTS) for _ in ti.static(range(3))]
+        value = [ti.Vector([0.0] * TILE_POINTS) for _ in ti.static(range(3))]
+        gradient = [ti.Vector([0.0] * TILE_POINTS) for _ in ti.static(range(9 * slopes))]
+        for lane in range(TILE_POINTS):
+            for a in ti.static(range(3)):
+                place[a][lane] = r[ti.min(first * TILE_POINTS + lane, points - 1), a]
+        source.add_tile(0, place, 0.0, value, gradient)
+        for lane in range(ti.min(TILE_POINTS, points - first * TILE_POINTS)):
+            for a in ti.static(range(3)):
+                out[first * TILE_POINTS + lane, 0, a] = value[a][lane]
+                for c in ti.static(range(3 * slopes)):
+                    out[first * TILE_POINTS + lane, 1 + c, a] = gradient[3 * a + c][lane]
 
 
 def bound(digits):
@@ -82,10 +82,10 @@ def compare(points, repeats):
     out = {}
     for name, digits in (("exact", None), ("4 digits", 4), ("3 digits", 3)):
         table, source = bound(digits)
-        for label, kernel in (("field", field), ("field and gradient", both)):
+        for label, slopes in (("field", 0), ("field and gradient", 1)):
             out[f"{name}, {label}"] = np.zeros((len(r), 4, 3))
-            runs[f"{name}, {label}"] = lambda k=kernel, s=source, o=out[f"{name}, {label}"], _=table: k(
-                s, r, o
+            runs[f"{name}, {label}"] = lambda k=slopes, s=source, o=out[f"{name}, {label}"], _=table: sample(
+                s, k, r, o
             )
     for run in runs.values():
         run()

@@ -4,8 +4,6 @@ A source is an effect (see tisim/effects/base) that writes nothing. Whoever feel
 ``sources`` among the bound effects of a scene, and adds up what they give.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
@@ -40,6 +38,25 @@ class Source(Effect):
     def value_and_gradient(self, w, r, t):
         """Return the field and its gradient; a source that makes both of the same numbers does so here."""
         return self.value(w, r, t), self.gradient(w, r, t)
+
+    @ti.func
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore[valid-type]
+        """Add the field and its gradient at a tile of points: r and ``value`` are three vectors and
+        ``gradient`` nine, of a component for each point, or none where it is not asked for. A source that
+        takes them at once does so here."""
+        for lane in range(ti.static(r[0].n)):
+            place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
+            one, slope = self.value_and_gradient(w, place, t)
+            add_point(value, gradient, lane, one, slope)
+
+
+@ti.func
+def add_point(value: ti.template(), gradient: ti.template(), lane, one, slope):  # type: ignore[valid-type]
+    """Add the field and its gradient at one point of a tile."""
+    for a in ti.static(range(3)):
+        value[a][lane] = value[a][lane] + one[a]
+        for c in ti.static(range(len(gradient) // 3)):
+            gradient[3 * a + c][lane] = gradient[3 * a + c][lane] + slope[a, c]
 
 
 def sources(peers: Peers, quantity: str) -> tuple[Bound[Source], ...]:

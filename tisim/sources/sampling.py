@@ -16,6 +16,14 @@ from tisim.sources.base import Source
 from tisim.worlds.bound import Peers, connected
 from tisim.worlds.parameter_table import ParameterTable
 
+TILE_POINTS = 16
+"""So many points are taken at once on a CPU."""
+
+
+def tile_size() -> int:
+    """Return how many points are taken at once."""
+    return TILE_POINTS if runtime.current().device == "cpu" else 1
+
 
 @ti.data_oriented
 class _Sum:
@@ -26,17 +34,22 @@ class _Sum:
 
     @ti.kernel
     def at(self, t: ti.f64, r: ti.types.ndarray(), out: ti.types.ndarray()):  # type: ignore[valid-type]
-        for i in range(r.shape[0]):
-            place = ti.Vector([r[i, 0], r[i, 1], r[i, 2]])
-            value, gradient = 0.0 * place, 0.0 * place.outer_product(place)
+        points = r.shape[0]
+        tile = ti.static(tile_size())
+        for first in range((points + tile - 1) // tile):
+            place = [ti.Vector([0.0] * tile) for _ in ti.static(range(3))]
+            value = [ti.Vector([0.0] * tile) for _ in ti.static(range(3))]
+            gradient = [ti.Vector([0.0] * tile) for _ in ti.static(range(9))]
+            for lane in range(tile):
+                for a in ti.static(range(3)):
+                    place[a][lane] = r[ti.min(first * tile + lane, points - 1), a]
             for field in ti.static(self.fields):
-                b, slope = field.value_and_gradient(0, place, t)
-                value += b
-                gradient += slope
-            for a in ti.static(range(3)):
-                out[i, 0, a] = value[a]
-                for c in ti.static(range(3)):
-                    out[i, 1 + c, a] = gradient[a, c]
+                field.add_tile(0, place, t, value, gradient)
+            for lane in range(ti.min(tile, points - first * tile)):
+                for a in ti.static(range(3)):
+                    out[first * tile + lane, 0, a] = value[a][lane]
+                    for c in ti.static(range(3)):
+                        out[first * tile + lane, 1 + c, a] = gradient[3 * a + c][lane]
 
 
 def sample(

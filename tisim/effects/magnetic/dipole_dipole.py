@@ -39,11 +39,10 @@ class DipoleDipole(PairForce):
 
     @ti.func
     def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
-        square, a, b = inverse * inverse, s.moment[w, i], s.moment[w, j]
+        square, a, b = inverse * inverse, s.moment[w, i], (3.0 * mu_0 / (4.0 * ti.math.pi)) * s.moment[w, j]
         along_a, along_b = a.dot(separation), b.dot(separation)
-        size = (3.0 * mu_0 / (4.0 * ti.math.pi)) * inverse * (square * square)
         along = (5.0 * square) * (along_a * along_b) - a.dot(b)
-        return size * (along * separation - along_a * b - along_b * a)
+        return inverse * (square * square) * (along * separation - along_a * b - along_b * a)
 
     @ti.func
     def between(self, s, w, i, j, separation, distance):

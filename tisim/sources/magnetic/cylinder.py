@@ -91,7 +91,19 @@ class Cylinder(Body):
     @ti.func
     def flux(self, w, k, r):
         rho, outward, z, end = self.place(w, k, r)
-        six = self.shape(w, k, rho, z, end)
+        return self.flux_of(w, k, self.shape(w, k, rho, z, end), rho, outward, end)
+
+    @ti.func
+    def flux_mostly(self, w, k, r):
+        rho, outward, z, end = self.place(w, k, r)
+        half = 0.5 * self.length(w, k)
+        six, right = cylinder_field.mostly(rho, z, end, self.radius(w, k), half, self.ends)
+        b, slope = self.flux_of(w, k, six, rho, outward, end)
+        return b, slope, right
+
+    @ti.func
+    def flux_of(self, w, k, six, rho, outward, end):
+        """Return B (T) and its gradient (T/m) by the six functions."""
         slope = cylinder_field.gradient(
             six, rho, outward, self.unit(w, k), self.across(w, k), self.along(w, k)
         )
@@ -102,8 +114,7 @@ class Cylinder(Body):
         """Return the flux density B = mu_0 (H + M) (T), M inside only."""
         across, along = cylinder_field.field(six, rho, outward, self.across(w, k), self.along(w, k))
         b = across + along * self.unit(w, k)
-        if rho < self.radius(w, k) and end < 0.0:
-            b += self.magnetisation(w, k)
+        b += ti.select(rho < self.radius(w, k) and end < 0.0, self.magnetisation(w, k), 0.0)
         return mu_0 * b
 
 

@@ -11,8 +11,6 @@ subscripts derivatives:
 All others follow from the equation of Laplace. They go smoothly to 0 far away and have no digits to cancel.
 """
 
-from __future__ import annotations
-
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.numerics.elliptic import elliptic, limits
@@ -38,7 +36,7 @@ def two_ends(rho, u, radius):
     slim = rho * rho < SLIM * far
     both = ti.Matrix([[0.0 * rho, 0.0 * rho] for _ in range(6)])
     if not (slim[0] and slim[1]):
-        both = off_axis(rho, u, radius)
+        both = off_axis(rho, u, radius, False)[0]
     # One question for most points, which are far from the axis of both.
     for k in range(ti.select(slim[0] or slim[1], 2, 0)):
         first = k == 0
@@ -72,6 +70,14 @@ class ClosedEnds:
     @ti.func
     def both(self, rho, u, radius):
         return two_ends(rho, u, radius)
+
+    @ti.func
+    def mostly(self, rho, u, radius):
+        """Return the six numbers of two ends without a loop or a branch, and whether they are right: as they
+        are at most points."""
+        both, met = off_axis(rho, u, radius, True)
+        slim = rho * rho < SLIM * (u * u + radius * radius)
+        return both, met and not (slim[0] or slim[1])
 
 
 @ti.func
@@ -123,9 +129,9 @@ def near_axis(rho, u, radius, far):
 
 
 @ti.func
-def off_axis(rho, u, radius):
+def off_axis(rho, u, radius, mostly: ti.template()):  # type: ignore[valid-type]
     """Return the six numbers of two ends, (6, 2), by closed forms in complete elliptic integrals, put into
-    the sums of ``elliptic``.
+    the sums of ``elliptic``, and whether these have met their limit; mostly : as there.
 
     The second derivatives are B16 Eqs (5.3)-(5.6), (5.20)-(5.22), the third those of a current loop (W. R.
     Smythe, Static and Dynamic Electricity, 1950, section 7.10).
@@ -144,9 +150,8 @@ def off_axis(rho, u, radius):
     gamma = ti.select(inside, -size, size)
     over_gamma = 1.0 / gamma
     kc = ti.max(ti.sqrt(u * u + gap * gap) * over_s, least)
-    k, sigma, third, other = elliptic(
-        kc, reach * over_product, size, ti.abs(over_gamma), n * (size * size + beta * beta)
-    )
+    rest = n * (size * size + beta * beta)
+    k, sigma, third, other, met = elliptic(kc, reach * over_product, size, ti.abs(over_gamma), rest, mostly)
     # The same difference twice: each loses digits where the other does not.
     lift = ti.select(
         gamma < 0.5,
@@ -164,7 +169,7 @@ def off_axis(rho, u, radius):
     e = 1.0 - 0.5 * m - 0.5 * m * m * sigma
     rim = (square * reach - (gap * total + u * u) * e) / radius
     away = 2.0 * radius + 2.0 * m * rho * sigma - total * m * (1.0 + m * sigma)
-    return ti.Matrix.rows(
+    both = ti.Matrix.rows(
         [
             uu - ti.select(inside, 0.5, 0.0),
             over + 0.25 * ti.select(inside, 1.0, ratio),
@@ -174,3 +179,4 @@ def off_axis(rho, u, radius):
             2.0 * radius * u * volume * over_reach * over_square * (1.0 - sigma * (2.0 - m)),
         ]
     )
+    return both, met

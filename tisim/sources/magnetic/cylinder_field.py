@@ -19,15 +19,24 @@ def shape(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid
     if rho * rho + z * z > ends.far * (radius * radius + half * half):
         six = far_field(rho, z, radius, half, ends.small)
     else:
-        six = close_by(rho, z, end, radius, half, ends)
+        pair = ends.both(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
+        six = close_by(rho, z, end, radius, pair)
     return six
 
 
 @ti.func
-def close_by(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+def mostly(rho, z, end, radius, half, ends: ti.template()):  # type: ignore[valid-type]
+    """Return the six functions without a loop or a branch, and whether they are right: as they are at most
+    points, neither far away nor about the axis."""
+    pair, right = ends.mostly(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
+    far = rho * rho + z * z > ends.far * (radius * radius + half * half)
+    return close_by(rho, z, end, radius, pair), right and not far
+
+
+@ti.func
+def close_by(rho, z, end, radius, pair):
     """Return the difference between the ends, and between them an infinite cylinder (B16 Eq. 5.24)."""
     side, between = ti.select(z < 0.0, -1.0, 1.0), end < 0.0
-    pair = ends.both(rho, ti.Vector([ti.abs(z) + half, ti.abs(end)]), radius)
     odd = ti.select(between, 1.0, -1.0)
     six = ti.Vector(
         [

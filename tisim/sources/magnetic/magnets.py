@@ -1,12 +1,10 @@
 """What uniformly magnetised bodies have in common, whatever their shape."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector
-from tisim.sources.base import Source, parameter
+from tisim.sources.base import Source, add_point, parameter
 from tisim.worlds.bound import Peers
 
 
@@ -34,6 +32,12 @@ class Body(Component):
         """Return B (T) and its gradient dB_i/dr_j (T/m), which is right where r is not on the surface."""
         return 0.0 * r, 0.0 * r.outer_product(r)
 
+    @ti.func
+    def flux_mostly(self, w, k, r):
+        """Return B and its gradient without a loop or a branch, so that compilers take many points at once,
+        and whether they are right. Where they are not, and for a body that has no such way, ``flux`` is."""
+        return 0.0 * r, 0.0 * r.outer_product(r), False
+
 
 class Magnets(Source):
     """This is the contract of the sum of the fields of a list of bodies, each magnetised as it says, not by
@@ -41,6 +45,8 @@ class Magnets(Source):
 
     contract: ClassVar[bool] = True
     quantity: ClassVar[str] = "magnetic_flux_density"
+    each: ClassVar[Any]
+    """The bodies, where this is bound."""
 
     @ti.func
     def value(self, w, r, t):
@@ -61,6 +67,27 @@ class Magnets(Source):
             b += one
             gradient += slope
         return b, gradient
+
+    @ti.func
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        # What vectors are right for, then the other points one by one; a tile of one point has no vectors.
+        size = ti.static(r[0].n)
+        for k in range(self.each.size(w)):
+            left, wrong = ti.Vector([1] * size, ti.i32), size
+            if ti.static(size > 1):
+                wrong = 0
+                for lane in range(size):
+                    place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
+                    b, slope, right = self.each.flux_mostly(w, k, place)
+                    left[lane] = ti.select(right, 0, 1)
+                    wrong += left[lane]
+                    add_point(value, gradient, lane, ti.select(right, b, 0.0), ti.select(right, slope, 0.0))
+            if wrong > 0:
+                for lane in range(size):
+                    if left[lane] > 0:
+                        place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
+                        b, slope = self.each.flux(w, k, place)
+                        add_point(value, gradient, lane, b, slope)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         ((bodies, _),) = self.lists()

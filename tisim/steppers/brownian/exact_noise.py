@@ -90,7 +90,7 @@ class Push(PairSum):
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        return effect.times(effect.pair(w, i, j, distance), separation, self.s.force[w, j])
+        return effect.times(effect.pair(w, i, j, distance, 1.0 / distance), separation, self.s.force[w, j])
 
     @ti.func
     def finish(self, w, i, total, t):
@@ -113,7 +113,9 @@ class Fill(PerParticle):
             r = m.domain.separation(w, s.position[w, j], s.position[w, i], s.time[w])
             parts = ti.Vector([ti.cast(1.0, s.real), ti.cast(0.0, s.real)])
             if i != j:
-                parts = ti.sqrt(s.radius[w, i] * s.radius[w, j]) * m.mobility.pair(w, i, j, r.norm())
+                distance = r.norm()
+                parts = m.mobility.pair(w, i, j, distance, 1.0 / distance)
+                parts *= ti.sqrt(s.radius[w, i] * s.radius[w, j])
             for a, b in ti.static(ti.ndrange(3, 3)):
                 m.matrix[w, 3 * j + b, 3 * i + a] = (parts[0] if a == b else 0.0) + parts[1] * r[a] * r[b]
 

@@ -59,6 +59,8 @@ class Couple(PairSum):
     """This phase makes all sums over the other particles: of what forces do, of noise, of squares, of traces;
     and stops a world at pairs that cannot be, where the tensor does not exclude them."""
 
+    by_inverse = True
+
     def __init__(self, fast) -> None:
         super().__init__(fast.s, fast.domain, (fast.mobility,), None)
         self.fluid, self.sound = fast.fluid, fast.mobility.sound
@@ -66,17 +68,22 @@ class Couple(PairSum):
 
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
-        r, size = separation, self.s.radius[w, j]
-        parts = effect.pair(w, i, j, distance)
+        return self.term_by_inverse(effect, w, i, j, separation, 1.0 / distance, t)
+
+    @ti.func
+    def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]
+        r, size, square = separation, self.s.radius[w, j], separation.norm_sqr()
+        parts = effect.pair(w, i, j, square * inverse, inverse)
         push_velocity = effect.times(parts, r, self.s.force[w, j])
         noise = effect.times(parts, r, ti.sqrt(size) * self.s.gauss[w, j])
-        a, b, square = parts[0], parts[1], distance * distance
+        a, b = parts[0], parts[1]
         along = a + b * square
+        # The diagonal of (a I + b r r^T)^2, of which the second is yet to be multiplied with squares of r.
+        alike, apart = size * a * a, size * b * (a + along)
         total = ti.Vector.zero(self.s.real, self.components)
         for k in ti.static(range(3)):
             total[k], total[3 + k] = push_velocity[k], noise[k]
-            # The diagonal of (a I + b r r^T)^2.
-            total[6 + k] = size * (a * a + (a + along) * b * r[k] * r[k])
+            total[6 + k] = alike + apart * (r[k] * r[k])
         total[9] = ti.sqrt(size) * (2.0 * a + along)
         for k in ti.static(range(10, self.components)):
             total[k] = ti.select(along * along * size * self.s.radius[w, i] < 1.0, 0.0, 1.0)

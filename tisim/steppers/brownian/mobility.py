@@ -6,9 +6,6 @@ They are of an infinite fluid.
 
 from tisim.backend.taichi import ti
 
-NEAR = 1e-9
-"""Spheres nearer than this part of the sum of their radii are in one place: no direction is between them."""
-
 
 @ti.data_oriented
 class Oseen:
@@ -18,10 +15,10 @@ class Oseen:
     sound = False
 
     @ti.func
-    def of(self, one, other, r):
-        """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m)."""
-        a = 0.75 / r
-        return ti.Vector([a, a / (r * r)])
+    def of(self, one, other, r, inverse):
+        """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m); inverse : 1/r."""
+        a = 0.75 * inverse
+        return ti.Vector([a, a * (inverse * inverse)])
 
 
 @ti.data_oriented
@@ -43,27 +40,20 @@ class RotnePrager:
     sound = True
 
     @ti.func
-    def of(self, one, other, r):
-        """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m)."""
-        # In units of s, which keeps powers within what f32 can hold; few divisions, as these take longest.
-        unit = 1.0 / (one + other)
-        x, d, p = ti.max(r * unit, NEAR), ti.abs(one - other) * unit, one * other * unit * unit
-        v, half = 1.0 / x, 0.5 / p
-        square, inverse, sizes = x * x, v * v, 1.0 - 2.0 * p
-        around, within = d * d + 3.0 * square, d * d - square
-        apart, inside = x > 1.0, x <= ti.max(d, NEAR)
-        a = ti.select(
-            apart,
-            0.75 * v * (1.0 + sizes * inverse / 3.0),
-            half * (1.0 - around * around * inverse * v / 16.0),
-        )
-        b = ti.select(
-            apart, 0.75 * v * (1.0 - sizes * inverse), half * within * within * inverse * v * 3.0 / 16.0
-        )
-        # The larger radius is (1 + d)/2 in these units.
-        a = ti.select(inside, 2.0 / (1.0 + d), a)
-        b = ti.select(inside, 0.0, b)
-        return ti.Vector([a * unit, b * inverse * unit * (unit * unit)])
+    def of(self, one, other, r, inverse):
+        """Return a (1/m) and b (1/m^3) for two radii (m) at a distance r (m); inverse : 1/r."""
+        # In units of r. The radii are divided by themselves, so that this waits for no distance.
+        x, y, per_product = one * inverse, other * inverse, 1.0 / (one * other)
+        squares, gap = 0.25 * (x * x + y * y), (x - y) * (x - y)
+        around, within, apart = gap + 3.0, gap - 1.0, x + y < 1.0
+        near = (16.0 * (x + y) - around * around) * (r * (per_product / 32.0))
+        a = ti.select(apart, inverse * (0.75 + squares), near)
+        near = within * within * (per_product * (3.0 / 32.0))
+        b = ti.select(apart, inverse * inverse * (0.75 - 3.0 * squares), near)
+        # Also true of spheres in one place, where the gap is not a number.
+        inside = not (gap < 1.0)
+        a = ti.select(inside, ti.select(one < other, one, other) * per_product, a)
+        return ti.Vector([a, ti.select(inside, 0.0, b * inverse)])
 
 
 @ti.data_oriented
@@ -77,10 +67,10 @@ class Mobility:
         self.s, self.fluid, self.sound, self.tensor = fluid.s, fluid, tensor.sound, tensor
 
     @ti.func
-    def pair(self, w, i, j, distance):
-        """Return a (1/m) and b (1/m^3) of the block of particles i and j."""
+    def pair(self, w, i, j, distance, inverse):
+        """Return a (1/m) and b (1/m^3) of the block of particles i and j; inverse : 1 / distance."""
         s = self.s
-        parts = self.tensor.of(s.radius[w, i], s.radius[w, j], distance)
+        parts = self.tensor.of(s.radius[w, i], s.radius[w, j], distance, inverse)
         if ti.static(self.fluid.holds):
             parts *= ti.cast(self.fluid.mobile(w, i) * self.fluid.mobile(w, j), s.real)
         return parts
