@@ -40,16 +40,16 @@ def listed(simulation):
     fetch_begin, fetch_count = p.fetch_begin.to_numpy(), p.fetch_count.to_numpy()
     pairs = []
     for w, n in enumerate(counts):
-        chunks, found, left = -(-n // SLOTS), [], {i: [] for i in range(n)}
+        chunks, found, left = -(-n // p.chunk), [], {i: [] for i in range(n)}
         for c in range(chunks):
             assert begin[w, c] == (end[w, c - 1] if c else 0), "chunks follow each other"
             for m in range(begin[w, c], end[w, c]):
                 i, j = int(first[w, m]), int(second[w, m])
-                homes = {i // SLOTS, j // SLOTS}
+                homes = {i // p.chunk, j // p.chunk}
                 assert c in homes
                 assert (len(homes) == 1) == (m < outer[w, c])
                 if m >= outer[w, c]:
-                    left[j if i // SLOTS == c else i].append(m)
+                    left[j if i // p.chunk == c else i].append(m)
                 found.append((i, j))
         for i in range(n):
             told = fetched[w, fetch_begin[w, i] : fetch_begin[w, i] + fetch_count[w, i]]
