@@ -10,7 +10,7 @@ from pathlib import Path
 from tisim.errors import RunError
 
 MAPPINGS, LIMIT = Path("/proc/self/maps"), Path("/proc/sys/vm/max_map_count")
-SPARE = 0.2
+FREE_MAPPINGS = 0.2
 """This part of what is allowed is left for what is launched before anybody asks again."""
 
 
@@ -19,7 +19,7 @@ def require_mappings() -> None:
     if not LIMIT.exists():
         return
     limit, used = int(LIMIT.read_text()), MAPPINGS.read_bytes().count(b"\n")
-    if used > (1.0 - SPARE) * limit:
+    if used > (1.0 - FREE_MAPPINGS) * limit:
         raise RunError(
             f"mappings of memory must stay below {limit}; received {used}: this driver takes one for each "
             f"loop that is launched (sysctl vm.max_map_count allows for more)"

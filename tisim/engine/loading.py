@@ -16,7 +16,7 @@ from tisim.scene.scene import Scene
 from tisim.worlds.fields import SHARED, Field
 from tisim.worlds.status import NO_ONE, WorldStatus
 
-ROUNDING = 1e-6
+ROUNDED_SIDE = 1e-6
 """By this part a law may reach farther than half a side, as single precision rounds."""
 
 
@@ -93,7 +93,7 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
         if low is None or high is None or len(radius) < 2:
             continue
         reach = float(outlook[: len(radius)][radius >= np.partition(radius, 1)[1]].max())
-        narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDING) < reach)
+        narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDED_SIDE) < reach)
         rule = f"at least {2 * reach:g} m wide where it is periodic, twice as far as {laws} reaches"
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
