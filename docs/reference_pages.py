@@ -108,10 +108,14 @@ def as_rst(_app: Any, _what: str, _name: str, value: Any, _options: Any, lines: 
         lines += _settings(reference.settings(value))
 
 
-def signature(_app: Any, _what: str, _name: str, value: Any, *_: Any) -> tuple[str, None] | None:
-    """For autodoc: how plain data that is checked is made."""
-    checked = isinstance(value, type) and issubclass(value, Checked)
-    return (_call(reference.settings(value)), None) if checked else None
+def signature(
+    _app: Any, _what: str, _name: str, value: Any, _options: Any, given: str | None, returned: str | None
+) -> tuple[str, str | None] | None:
+    """For autodoc: how plain data that is checked is made; and arguments of kernels by their names alone."""
+    if isinstance(value, type) and issubclass(value, Checked):
+        return _call(reference.settings(value)), None
+    template = r": <[\w.]+ object at \w+>"
+    return (re.sub(template, "", given), returned) if given and re.search(template, given) else None
 
 
 def _call(settings: tuple[Declaration, ...]) -> str:
