@@ -51,10 +51,10 @@ class Monitor:
         self._good = self.s.snapshot(names) if image is None else {name: image[name].copy() for name in names}
         self._behind = np.zeros(self.s.worlds, bool)
         self.faults: dict[int, tuple[float, str]] = {}
-        # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
-        shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
         large = self.s.worlds * self.s.capacity >= LARGE
-        self.check = simulation.finite_check if large and shared_clock else None
+        self.check = simulation.finite_check if large else None
+        # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
+        self.shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
 
     @property
     def good(self) -> Image:
@@ -68,16 +68,19 @@ class Monitor:
 
     def check_worlds(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
-        now = self._snapshot() if self.check is None else self.s.snapshot(self.s.columns)
+        lazy = self.check is not None and self.shared_clock
+        now = self.s.snapshot(self.s.columns) if lazy else self._snapshot()
         finite = self._finite(now) if self.check is None else (now["failed"] == 0) & self.check.worlds()
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
         wrong = ~finite | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
         known = ~wrong & (now["underway"] == 0)
-        if self.check is None:
+        if lazy:
+            self._behind |= known
+        elif known.all():
+            self._good = {name: now[name] for name in self._good}
+        else:
             for name, good_values in self._good.items():
                 good_values[known] = now[name][known]
-        else:
-            self._behind |= known
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))
