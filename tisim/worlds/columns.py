@@ -12,7 +12,7 @@ BOOKS = (
     *("changed", "events", "next_id", "underway"),
 )
 """These integers of a world (i32) tell how many particles it has and how it is doing."""
-MOTION = ("frame", "displacement", "displacement_since_list")
+MOTION = ("frame", "displacement")
 """These vectors of a world (f64) tell how far its particles have moved."""
 TALLIES = ("steps", "particle_steps")
 """These counters (i64) are those that every world keeps."""
@@ -20,6 +20,7 @@ OWN = ("seed", "skin", "step_ahead", "most", "pause_time", "paused", "goal", "st
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "reported", "real", "records"),
+    "shared",
     *("domain", "before_reading", "columns", "singles", "slotted", "means", "sums"),
 )
 

@@ -34,6 +34,7 @@ class State:
     began, and ``reached`` (s) one that all have got to. ``cut`` is how far into such a step all was well (s),
     when it has failed; a step that begins with ``cut`` above 0 ends there, and its world does.
 
+    shared : whether several threads may work on a world at once, as kernels are compiled.
     records : whether the real quantities of a particle lie together in memory.
     domain : the space of the worlds, as kernels see it.
     before_reading : called before particle fields are read, by what keeps some of their values elsewhere.
@@ -55,7 +56,7 @@ class State:
         self.fields, self.counters = fields, (*TALLIES, *counters)
         self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
-        self.real, self.records = runtime.current().real, records
+        self.real, self.records, self.shared = runtime.current().real, records, True
         builder = Builder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:
