@@ -6,6 +6,7 @@ import pytest
 from tests.scenes import compiled, fixed, scene
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Impact, parameter
+from tisim.engine import monitor
 from tisim.io.checkpoint import restore, save
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 
@@ -68,12 +69,15 @@ def crowded():
         pytest.param(crowded, marks=pytest.mark.slow),
     ],
 )
-def test_the_state_is_that_of_the_last_step_before_the_failure(make):
+def test_the_state_is_that_of_the_last_step_before_the_failure(make, monkeypatch):
+    """Also of many particles, which are looked at on the device."""
     start, step, fault = make()
     simulation = compiled(start, worlds=4)
     failures = []
-    for stretches in (1, 7):
+    for stretches, large in ((1, monitor.LARGE), (7, 1)):
+        monkeypatch.setattr(monitor, "LARGE", large)
         simulation.load([start, start.replace({"duration": WHEN / 2})])
+        assert (simulation.monitor.check is not None) == (large == 1)
         for _ in range(stretches):
             simulation.run(steps=None if stretches == 1 else 2000)
         bad, good = simulation.results()

@@ -53,10 +53,10 @@ class Monitor:
         )
         self._outdated = np.zeros(self.s.worlds, bool)
         self.faults: dict[int, tuple[float, str]] = {}
-        # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
-        shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
         large = self.s.worlds * self.s.capacity >= LARGE
-        self.finite_check = simulation.finite_check if large and shared_clock else None
+        self.finite_check = simulation.finite_check if large else None
+        # Particles with clocks of their own are known at some looks only, so what is good is kept at each.
+        self.shared_clock = not any(field.name == "own_interval" for field in self.s.fields)
 
     @property
     def last_good(self) -> Image:
@@ -70,7 +70,8 @@ class Monitor:
 
     def check_worlds(self) -> None:
         """Stop worlds in which something is wrong, at their last good step; keep others' as good."""
-        now = self._snapshot() if self.finite_check is None else self.s.snapshot(self.s.columns)
+        lazy = self.finite_check is not None and self.shared_clock
+        now = self.s.snapshot(self.s.columns) if lazy else self._snapshot()
         finite = (
             self._finite(now)
             if self.finite_check is None
@@ -79,11 +80,13 @@ class Monitor:
         # A world that a checkpoint has kept is good as it is, and its status says that it has failed.
         wrong = ~finite | ~np.isin(now["status"], (WorldStatus.RUNNING, WorldStatus.ENDED))
         known = ~wrong & (now["underway"] == 0)
-        if self.finite_check is None:
+        if lazy:
+            self._outdated |= known
+        elif known.all():
+            self._last_good = {name: now[name] for name in self._last_good}
+        else:
             for name, good_values in self._last_good.items():
                 good_values[known] = now[name][known]
-        else:
-            self._outdated |= known
         wrong[list(self.faults)] = False
         if wrong.any():
             self._stop(np.flatnonzero(wrong))
