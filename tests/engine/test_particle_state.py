@@ -88,6 +88,19 @@ def test_forces_are_those_of_what_was_written():
     assert np.abs(simulation.state["force"] - force).max() > 0.1
 
 
+def test_lists_that_are_too_short_for_what_was_written_grow():
+    """The next step begins with the forces of what was written, as from a start, not with those of before."""
+    close = crystal(lattice=np.arange(4) * 0.55)
+    simulation = compiled(crystal(), 2)
+    simulation.load(crystal())
+    sizes = simulation.assembly.sizes
+    simulation.state["position"] = close.particles.arrays(close.domain, 0)["position"]
+    assert simulation.assembly.sizes != sizes
+    force = simulation.state["force"]
+    simulation.load(close)
+    np.testing.assert_array_equal(force, simulation.state["force"])
+
+
 def test_to_write_what_is_there_changes_nothing(simulation):
     """Nor in what comes: events, steps and bits, in both worlds."""
     simulation.run()

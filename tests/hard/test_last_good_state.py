@@ -77,7 +77,7 @@ def test_the_state_is_that_of_the_last_step_before_the_failure(make, monkeypatch
     for stretches, large in ((1, monitor.LARGE), (7, 1)):
         monkeypatch.setattr(monitor, "LARGE", large)
         simulation.load([start, start.replace({"duration": WHEN / 2})])
-        assert (simulation.monitor.check is not None) == (large == 1)
+        assert (simulation.monitor.finite_check is not None) == (large == 1)
         for _ in range(stretches):
             simulation.run(steps=None if stretches == 1 else 2000)
         bad, good = simulation.results()

@@ -131,7 +131,7 @@ class Box(Domain):
 
     With images, particles also see each other across joined faces: a periodic system, in which each sees the
     nearest image of another, and no other. Two that could touch on both sides at once are refused, and so are
-    short-ranged laws that reach farther than half a side from the centre of a particle when they begin. Of a
+    short-ranged laws that, when they begin, reach from centre to centre farther than half a side. Of a
     force between all pairs only the part of the nearest image is summed, and it jumps where another becomes
     the nearest.
 

@@ -82,8 +82,8 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
     """Raise InputError where a law reaches farther than half a side of a box in which each particle sees the
     nearest image of another alone: the force of the next one would be missing.
 
-    pairs : as they are listed at the start. The smallest particle of a world is not asked: of two the larger
-    says how far laws reach between them.
+    pairs : as they are listed at the start. Of two the larger says how far beyond the surface of the other
+    laws reach.
     """
     if pairs is None or not pairs.half_list.laws or not any(scenes[0].domain.imaged()):
         return
@@ -92,7 +92,8 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
         (low, high), radius = scene.domain.bounds(), start["radius"]
         if low is None or high is None or len(radius) < 2:
             continue
-        reach = float(outlook[: len(radius)][radius >= np.partition(radius, 1)[1]].max())
+        order = np.argsort(radius, kind="stable")
+        reach = float((outlook[order[1:]] + radius[order[:-1]]).max())
         narrow = np.array(scene.domain.imaged()) & (0.5 * (high - low) * (1 + ROUNDED_SIDE) < reach)
         rule = f"at least {2 * reach:g} m wide where it is periodic, twice as far as {laws} reaches"
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())

@@ -104,10 +104,10 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
     for quantity, start in (("approach_time", np.inf), ("fastest", 0.0), ("events", 0)):
         now[quantity][w] = start
     now["status"][:], now["status"][w], now["goal"][:] = WorldStatus.ENDED, WorldStatus.RUNNING, NEVER
-    simulation.put(now)
-    s.write("pause_time", np.inf)
-    if simulation.first.items:
-        simulation.first.advance(1)
+    _begin_again(simulation, now)
+    while (simulation.s.read("failed") == WorldStatus.LIST_OVERFLOW).any():
+        simulation.grow_lists(simulation.list_sizes())
+        _begin_again(simulation, now)
     after = s.image()
     status[w] = after["status"][w]
     simulation.put({**after, "status": status, "goal": goal, "pause_time": pauses})
@@ -116,3 +116,11 @@ def _edit(simulation: Simulation, w: int, name: str, values: np.ndarray) -> None
     simulation.edits[w].append(f"{name} at t = {float(after['time'][w]):.6g} s")
     simulation.monitor = Monitor(simulation, before)
     simulation.monitor.check_worlds()
+
+
+def _begin_again(simulation: Simulation, now: Mapping[str, np.ndarray]) -> None:
+    """Put the worlds where they are, with all that the next step of those that run takes."""
+    simulation.put(now)
+    simulation.s.write("pause_time", np.inf)
+    if simulation.first.items:
+        simulation.first.advance(1)

@@ -15,7 +15,7 @@ from tisim.engine.monitor import Monitor
 from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
-from tisim.errors import is_number, is_whole, must
+from tisim.errors import InputError, is_number, is_whole, must
 from tisim.neighbours import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -73,7 +73,12 @@ class Simulation(CompiledWorlds):
         self.edits = [[] for _ in scenes]
         self.s.fill({"pause_time": np.inf, "goal": NEVER, "listed_above": near_list.SMALL_WORLD})
         self.begin()
-        check_reach(self.scenes, self.starts, self.assembly.pairs)
+        try:
+            check_reach(self.scenes, self.starts, self.assembly.pairs)
+        except InputError:
+            # Nothing is loaded then.
+            self.scenes = []
+            raise
         self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.monitor.check_worlds()

@@ -30,7 +30,7 @@ PATIENCE = 8
 LOOK_COST = 2.0
 """Worlds are asked that often that the launches which find them waiting cost as much as asking does: twice
 what the launches of a step cost, in which a half of those that wait have waited."""
-LOOKS_PER_QUESTION = 16
+LOOKS_PER_QUESTION = 4
 """After so many looks a device that maps pages is asked whether it may go on: it takes a fraction of a ms."""
 PLACES = 48
 """A step has at most so many places: worlds tell theirs by the bits of an integer."""
@@ -67,7 +67,7 @@ class Program:
         self.plan: Plan = planner.step(launched) if schedule == "particle" else ()
         self.loops = tuple(planner.loops)
         self.allow, self.look = Launcher(self._allow), Launcher(self._look)
-        if launch_count(launched) > PLACES:
+        if self.plan and launch_count(launched) > PLACES:
             raise TypeError(f"a step must have at most {PLACES} launches")
 
     @in_taichi_thread
@@ -126,7 +126,8 @@ class Program:
             self._advance_worlds(0)
             return
         self.allow(0)
-        self.look()
+        if not self.asks:
+            self.look()
         self._compile(self.plan)
 
     def _compile(self, plan: Plan) -> None:

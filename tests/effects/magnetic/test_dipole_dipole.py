@@ -90,7 +90,7 @@ def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
 
 def test_near_pairs_only(rng):
     """Up to so many radii; also over the pair list, where sizes are unlike."""
-    few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 8)))) for _ in range(WORLDS - 1)]
+    few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 7)))) for _ in range(WORLDS - 1)]
     scenes = [*few, magnets(rng, TruncatedDipoleDipole(cutoff=4.0), n=400, sizes=(0.02, 0.1))]
     for one, state in zip(scenes, loads(scenes, capacity=400), strict=True):
         forces, radius = pair_forces(state), state["radius"]
@@ -101,7 +101,7 @@ def test_near_pairs_only(rng):
 
 def test_a_box_in_which_a_law_reaches_beyond_half_a_side_is_refused(rng):
     """There the second image of a particle would act as well."""
-    wide, narrow = (magnets(rng, TruncatedDipoleDipole(cutoff=c), sizes=(0.2, 0.2)) for c in (8.4, 8.6))
+    wide, narrow = (magnets(rng, TruncatedDipoleDipole(cutoff=c), sizes=(0.2, 0.2)) for c in (7.4, 7.6))
     loads([wide], capacity=400)
     told = "box must be at least 3.04 m wide where it is periodic, twice as far as truncated_dipole_dipole"
     with pytest.raises(InputError, match=told):

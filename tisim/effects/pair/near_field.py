@@ -114,8 +114,8 @@ class TruncatedNearField(NearField):
 
     @ti.func
     def reach(self, s, w, i):
-        # Pairs are listed by the gap between their surfaces, which is less than the distance of the centres.
-        return self.cutoff(w)
+        # Between surfaces, of two of which the other is a point.
+        return self.cutoff(w) - s.radius[w, i]
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
