@@ -7,7 +7,7 @@ from tests.scenes import HEAT_CAPACITY, by_id, check_sums, scene, simulate
 from tisim import Box, InputError
 from tisim.effects import Heating, Impact
 from tisim.engine.loading import check_sides
-from tisim.steppers import ApproachTime, Verlet
+from tisim.steppers import FixedStep, Verlet
 
 
 def run(scenes):
@@ -109,7 +109,7 @@ def test_two_leave_the_box_in_one_step_and_meet_inside_it():
         speed,
         (Impact(hardness=1e12), Heating(heat_capacity=HEAT_CAPACITY)),
         domain=box,
-        stepper=Verlet(control=ApproachTime(shortest=1.0, longest=1.0)),
+        stepper=Verlet(control=FixedStep(dt=1.0)),
         duration=1.0,
         quantities={"temperature": 300.0},
     )

@@ -44,7 +44,7 @@ def test_the_package_is_lammps_where_levers_do_not_matter():
 def test_in_a_sheared_box_the_package_is_numpy_and_numpy_is_lammps():
     """The latter with the levers of LAMMPS, and with images that lag a step behind, as there."""
     made, steps = sheared_lammps.scene(), 300
-    ours, twin = (by(made, steps) for by in (sheared_lammps.by_package, sheared_lammps.by_numpy))
+    ours, twin = (by(made, steps) for by in (bench.end_of, sheared_lammps.by_numpy))
     assert max(sheared_lammps.apart(ours, twin).values()) < ROUNDING
     theirs = sheared_lammps.by_numpy(made, steps, "radius", sheared_lammps.STEP)
     assert max(sheared_lammps.apart(theirs, sheared_lammps.by_lammps(made, steps)).values()) < ROUNDING
