@@ -54,7 +54,7 @@ class HalfList:
         self, s: State, domain: Bound[Domain], laws: tuple[Bound[Pairwise], ...], sizes: ListSizes
     ) -> None:
         self.s, self.domain = s, domain
-        self.laws = tuple(law for law in laws if law.data.offers("reach"))
+        self.laws = tuple(law for law in laws if law.data.reaches())
         self.grid, self.spent = CellGrid(s, domain), 1.0 - REACH_PART if self.laws else 1.0
         self.sizes, self.row = sizes, sizes.row
         self.index, self.size, self.stale = (ti.field(ti.i32) for _ in range(3))
