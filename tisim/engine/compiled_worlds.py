@@ -47,6 +47,7 @@ class CompiledWorlds:
                 raise InputError(f"{what} must be {rule}; received {no.received}") from None
         self.s, self.table = self.allocation.s, self.allocation.table
         self.schedule = schedule or self._choose(capacity)
+        self.s.shared = self.schedule == "particle"
         self.s.write("status", WorldStatus.ENDED)
         self._compile()
         return trees
@@ -76,8 +77,8 @@ class CompiledWorlds:
 
     def list_sizes(self) -> ListSizes:
         """Return sizes in which the lists of pairs last made would have room."""
-        pairs = self.assembly.pairs
-        return pairs.half_list.wanted() if pairs else ListSizes()
+        lists = self.assembly.lists
+        return lists.wanted(self.assembly.sizes) if lists else ListSizes()
 
     @in_taichi_thread
     def grow_lists(self, sizes: ListSizes) -> None:
@@ -88,10 +89,16 @@ class CompiledWorlds:
         image, before = self.s.image(), self.assembly.sizes
         self.s.write("status", WorldStatus.ENDED)
         try:
-            self._assemble(sizes)
+            try:
+                self._assemble(sizes)
+            except NoRoom:
+                # Once more, without what is only kept for later.
+                memory.reclaim()
+                self._assemble(sizes)
         except RunError as full:
             self._assemble(before)
             rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean"
+            rows += f", and of {sizes.near} for events and step control"
             raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
         finally:
             self.put(image)
