@@ -17,9 +17,11 @@ from tisim.errors import InputError, RunError
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.finite import FiniteCheck
+from tisim.worlds.launched_program import LaunchedProgram
 from tisim.worlds.phases import nested
 from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
+from tisim.worlds.world_program import world_programs
 
 
 class CompiledWorlds:
@@ -59,16 +61,20 @@ class CompiledWorlds:
 
     def _compile(self) -> None:
         """Compile the kernels of a step; no world may be running."""
-        sort = self.assembly.sort
-        self.program = Program(self.s, self.assembly.step, self.schedule, sort.every if sort else NEVER)
-        self.sort = Program(self.s, sort.items(), "particle", once=True) if sort else None
-        self.first = Program(self.s, self.assembly.first, self.schedule, once=True)
+        sort, first, step = self.assembly.sort, self.assembly.first, self.assembly.step
+        rest_every = sort.every if sort else NEVER
+        self.first: Program
+        self.program: Program
+        if self.schedule == "world":
+            self.first, self.program = world_programs(self.s, (first, step), rest_every)
+        else:
+            self.first = LaunchedProgram(self.s, first, once=True)
+            self.program = LaunchedProgram(self.s, step, rest_every)
+        self.sort = LaunchedProgram(self.s, sort.items(), once=True) if sort else None
         with law_errors.in_a_line():
-            self.program.compile()
-            if self.first.items:
-                self.first.compile()
-            if self.sort:
-                self.sort.compile()
+            for program in (self.program, self.first, self.sort):
+                if program and program.items:
+                    program.compile()
 
     @property
     def assembly(self) -> Assembly:
