@@ -5,6 +5,7 @@ from tisim.backend.launcher import Launcher
 from tisim.backend.mappings import require_mappings
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.errors import must
 from tisim.worlds.launches import TASK, Plan, Planner, Visit
 from tisim.worlds.phases import Item, Phase, Repeat
 from tisim.worlds.program import Program, StepRules
@@ -48,8 +49,8 @@ class LaunchedProgram(StepRules, Program):
         self.plan: Plan = planner.step(launched)
         self.loops = tuple(planner.loops)
         self.allow, self.look = Launcher(self._allow), Launcher(self._look)
-        if launch_count(launched) > PLACES:
-            raise TypeError(f"a step must have at most {PLACES} launches")
+        count = launch_count(launched)
+        must(count <= PLACES, "launches of a step", f"at most {PLACES}", count)
 
     @in_taichi_thread
     def advance(self, steps: int) -> None:
