@@ -16,7 +16,9 @@ from tisim.components import serialization
 from tisim.components.component import Checked, Component
 from tisim.components.domain import Domain
 from tisim.components.invalid import text_of, unit_of
+from tisim.components.materials import ContactProperties
 from tisim.effects.base import Effect
+from tisim.effects.contact.granular.parts import ContactPart
 from tisim.engine import docstrings, template
 from tisim.errors import InputError, abbreviated, did_you_mean
 from tisim.geometry.shape import Shape
@@ -58,6 +60,8 @@ FAMILIES = {
     "sources": Family("Sources", Source, "effects.NAME"),
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
+    "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
+    "materials": Family("Materials", ContactProperties, ""),
     "operators": Family("Operators", Operator, "effects.NAME"),
     "steppers": Family("Steppers", Stepper, "stepper"),
     "step_controls": Family("Step controls", StepControl, "stepper.control"),
