@@ -9,6 +9,8 @@ from tests.scenes import by_id, compiled, scene
 from tisim.effects import CapillaryBridge, Lorentz, ParallelBond
 from tisim.sources import ElectricField
 
+pytestmark = pytest.mark.long
+
 WORLDS, CAPACITY = 16, 16
 LIQUID = {"surface_tension": 0.07, "contact_angle": 0.4, "volume": 1e-9}
 CEMENT = {"young": 1e8, "stiffness_ratio": 2.0, "radius_ratio": 0.8, "tensile_strength": 1e6,

@@ -8,6 +8,8 @@ from tests.effects.contact.grains import run, twin
 from tests.effects.contact.test_granular_impacts import couple_energies
 from tests.scenes import by_id
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("name", LAWS)
 def test_one_step_and_some_hundred_are_those_of_the_twin(name, rng):

@@ -10,6 +10,8 @@ from tests.effects.contact.compositions import NEUTRAL, along, grains, loaded
 from tests.effects.contact.grains import run
 from tests.scenes import by_id
 
+pytestmark = pytest.mark.long
+
 K, YOUNG, POISSON = NEUTRAL["hooke"]["stiffness"], NEUTRAL["jkr"]["young"], NEUTRAL["jkr"]["poisson"]
 E_STAR, G_STAR = YOUNG / (2 * (1 - POISSON**2)), YOUNG / (4 * (2 - POISSON) * (1 + POISSON))
 PRESSED = 0.02

@@ -55,7 +55,7 @@ class RollingEPSD(RollingResistance):
 
     def mix(self, pair: Touching) -> dict[str, float]:
         friction = pair.mixed("rolling_friction")
-        return {"slope": friction, "share": 2.25 * friction**2}
+        return {"slope": friction, "share": 2.25 * friction * friction}
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
