@@ -124,10 +124,12 @@ def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int)
     from tisim.components import serialization
     from tisim.effects import Granular, Walls
     from tisim.geometry import Plane
+    from tisim.scene import plugins
     from tisim.steppers import FixedStep, Verlet
 
     parts = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
     given = {part: getattr(law, part) for part in parts if getattr(law, part)}
+    plugins.load_parts()
     composed = serialization.from_dict(Granular, {"kind": "granular", **given}, "law")
     bounds = tuple(Plane(point=point, normal=normal) for point, normal in planes(walls))
     quantities = {"spin": at["spin"]}
