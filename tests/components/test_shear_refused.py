@@ -9,6 +9,7 @@ from tests.throwaway import Trap
 from tisim import InputError, ShearedBox
 from tisim.accuracy.sweep import methods
 from tisim.effects import Gravity, HertzMindlin, Impact, StokesDrag, Walls
+from tisim.geometry import Plane
 from tisim.operators import PeakDisplacement
 from tisim.sources import ElectricField, UniformFlow
 from tisim.steppers import ApproachTime, ErrorControl, Trapezoid, Verlet
@@ -40,7 +41,7 @@ WRONG = {
     ),
     "walls": (
         {},
-        {"effects": (HertzMindlin(**LAW), Walls())},
+        {"effects": (HertzMindlin(**LAW), Walls(planes=[Plane()]))},
         r"effects.walls must be one that acts on all layers alike \(homogeneous\), as gravity does, in a she",
     ),
     "drag": (

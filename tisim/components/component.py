@@ -157,6 +157,16 @@ class Component(AccuracyHints, Checked):
             spread.extend(value if size == 3 else (value,))
         return spread
 
+    def members(self) -> dict[str, Component]:
+        """Return, by name, the parts that it is made of and that kernels read as parts of it, ``self.NAME``;
+        by default none."""
+        return {}
+
+    def derived_rows(self) -> dict[str, list[float]]:
+        """Return, by name, rows of numbers that a kernel reads as ``self.NAME(w, k)``, made of what differs
+        per world; by default none. How long they are is compiled in."""
+        return {}
+
     @classmethod
     def room(cls, rows: int) -> int:
         """Return how many rows of this kind a list has room for, so that scenes with lists of like lengths
@@ -167,7 +177,8 @@ class Component(AccuracyHints, Checked):
         """Return what is compiled in: class, every option that is not a per-world parameter, room for
         lists."""
         varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
-        fixed = tuple((n, getattr(self, n)) for n in type(self).model_fields if n not in varying)
+        options, members = (n for n in type(self).model_fields if n not in varying), self.members()
+        fixed = tuple((n, members[n].structure() if n in members else getattr(self, n)) for n in options)
         return (
             type(self),
             *fixed,

@@ -67,11 +67,11 @@ def _width(kind: type[Component]) -> int:
 
 
 def _slots(part: Component) -> int:
-    """Return the number of slots of a part in the table of a world: its own, and for each list its length and
-    room for its rows."""
-    return _width(type(part)) + sum(
-        1 + _width(kind) * kind.room(len(getattr(part, n))) for n, kind in part.lists()
-    )
+    """Return the number of slots of a part in the table of a world: its own, for each list its length and
+    room for its rows, what is derived for each row, and those of its members."""
+    lists = sum(1 + _width(kind) * kind.room(len(getattr(part, n))) for n, kind in part.lists())
+    derived = sum(len(values) for values in part.derived_rows().values())
+    return _width(type(part)) + lists + derived + sum(_slots(one) for one in part.members().values())
 
 
 def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
@@ -85,6 +85,10 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
             yield from _entries(row, f"{where}.{name}.{k}")
         spare = _width(kind) * (kind.room(len(rows)) - len(rows))
         yield from [(f"{where}.{name}", 0.0)] * spare
+    for name, values in part.derived_rows().items():
+        yield from ((f"{where}.{name}", value) for value in values)
+    for name, member in part.members().items():
+        yield from _entries(member, f"{where}.{name}")
 
 
 class ParameterTable:
@@ -107,7 +111,12 @@ class ParameterTable:
         for name, kind in part.lists():
             setattr(bound, name, self._bind_rows(kind, slot))
             slot += 1 + _width(kind) * kind.room(len(getattr(part, name)))
+        for name, derived in part.derived_rows().items():
+            setattr(bound, name, _row_reader(self.field, slot, 1, 1))
+            slot += len(derived)
         self._next = slot
+        for name, member in part.members().items():
+            setattr(bound, name, self.bind(member))
         for name, values in part.lookups().items():
             setattr(bound, name, self._place(values))
         return bound

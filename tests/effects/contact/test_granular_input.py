@@ -27,13 +27,15 @@ WRONG = {
     "hertz_mindlin.restitution must be at most 1.0; received 1.5": lambda: law(restitution=1.5),
     "hertz_mindlin.friction must be at least 0.0; received -0.1": lambda: law(friction=-0.1),
     "hertz_mindlin.friction must be a finite number; received nan": lambda: law(friction=float("nan")),
-    "walls.planes must be a list of 1; received ()": lambda: Walls(planes=()),
+    "walls must be given a plane or a surface; received 'none'": lambda: Walls(planes=()),
     "plane.normal must be a direction, not of length 0; received (0.0, 0.0, 0.0)": lambda: Plane(
         normal=(0, 0, 0)
     ),
-    "effects.walls must be used together with effects.hertz_mindlin; received 'walls'": lambda: one(Walls()),
+    "effects.walls must be used together with effects.hertz_mindlin; received 'walls'": lambda: one(
+        Walls(planes=[Plane()])
+    ),
     "effects.walls must be used together with effects.hertz_mindlin; received 'hertz, walls'": lambda: one(
-        Hertz(young=1, poisson=0), Walls()
+        Hertz(young=1, poisson=0), Walls(planes=[Plane()])
     ),
     "stepper.control must be one that suits hertz_mindlin, such as fixed_step or that of an implicit "
     "stepper; received 'approach_time'": lambda: one(law(), stepper=Verlet()),

@@ -13,7 +13,7 @@ class GranularContact(PairForce):
 
     The law sees the contact only: which way it faces, how deep it is, how its surfaces move past each other,
     and what it remembers. The contact lies in the middle of the overlap, R_i - delta / 2 from the centre of
-    i, and the force acts there. A wall is a grain of infinite radius and mass, at rest.
+    i, and the force acts there. A wall is a grain of infinite radius and mass.
 
     memory : values that a contact remembers while it lasts, zero when it begins.
     """
@@ -55,10 +55,10 @@ class GranularContact(PairForce):
         return force, arm * couple, (distance - arm) * couple, ti.select(overlap >= 0.0, known, 0.0)
 
     @ti.func
-    def at_wall(self, s, w, i, normal, overlap, past, dt):
+    def at_wall(self, s, w, i, normal, overlap, velocity, past, dt):
         """Return force and torque of a wall on i, and what the contact remembers; ``normal`` points into the
-        wall."""
+        wall, whose surface has a ``velocity`` (m/s) there."""
         arm = s.radius[w, i] - 0.5 * overlap
-        slip = -s.velocity[w, i] - (arm * s.spin[w, i]).cross(normal)
+        slip = velocity - s.velocity[w, i] - (arm * s.spin[w, i]).cross(normal)
         force, known = self.contact(w, normal, overlap, s.radius[w, i], s.mass[w, i], slip, past, dt)
         return force, arm * normal.cross(force), known
