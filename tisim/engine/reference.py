@@ -17,6 +17,7 @@ from tisim.components.component import Checked, Component
 from tisim.components.domain import Domain
 from tisim.components.invalid import text_of, unit_of
 from tisim.effects.base import Effect
+from tisim.effects.motion.base import Motion
 from tisim.engine import docstrings, template
 from tisim.errors import InputError, abbreviated, did_you_mean
 from tisim.geometry.shape import Shape
@@ -58,6 +59,7 @@ FAMILIES = {
     "sources": Family("Sources", Source, "effects.NAME"),
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
+    "motions": Family("Motions of walls", Motion, "effects.walls.motion"),
     "operators": Family("Operators", Operator, "effects.NAME"),
     "steppers": Family("Steppers", Stepper, "stepper"),
     "step_controls": Family("Step controls", StepControl, "stepper.control"),
