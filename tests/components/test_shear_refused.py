@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.effects.contact.sheared import DT, LAW, crowd
+from tests.effects.contact.grains import HERTZ_MINDLIN
+from tests.effects.contact.sheared import DT, MATERIALS, crowd
 from tests.scenes import scene
 from tests.throwaway import Trap
 from tisim import InputError, ShearedBox
 from tisim.accuracy.sweep import methods
-from tisim.effects import Gravity, HertzMindlin, Impact, StokesDrag, Walls
+from tisim.effects import Gravity, Impact, StokesDrag, Walls
 from tisim.geometry import Plane
 from tisim.operators import PeakDisplacement
 from tisim.sources import ElectricField, UniformFlow
@@ -41,7 +42,7 @@ WRONG = {
     ),
     "walls": (
         {},
-        {"effects": (HertzMindlin(**LAW), Walls(planes=[Plane()]))},
+        {"effects": (HERTZ_MINDLIN, Walls(planes=[Plane()]))},
         r"effects.walls must be one that acts on all layers alike \(homogeneous\), as gravity does, in a she",
     ),
     "drag": (
@@ -69,7 +70,12 @@ WRONG = {
 
 @pytest.mark.parametrize(("box", "more", "message"), WRONG.values(), ids=WRONG)
 def test_what_does_not_go_with_shear_is_refused(box, more, message):
-    settings = {"effects": (HertzMindlin(**LAW),), "quantities": {"spin": np.zeros((1, 3))}, **more}
+    settings = {
+        "effects": (HERTZ_MINDLIN,),
+        "materials": MATERIALS,
+        "quantities": {"spin": np.zeros((1, 3))},
+        **more,
+    }
     with pytest.raises(InputError, match=message):
         scene([[0, 0, 0]], [[0, 0, 0]], domain=ShearedBox(**{**BOX, **box}), **settings)
 

@@ -5,11 +5,12 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.effects.contact.grains import HERTZ_MINDLIN
 from tests.effects.contact.sheared import (
     ACROSS,
     ALONG,
     DT,
-    LAW,
+    MATERIALS,
     RATE,
     SIDES,
     STEPS,
@@ -22,7 +23,6 @@ from tisim import Recording, ShearedBox
 from tisim.accuracy.quantity import usual, velocity
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects import HertzMindlin
 from tisim.io.export import export
 from tisim.steppers import Boris, FixedStep, Verlet
 from tisim.testing import assert_lists
@@ -124,7 +124,9 @@ def pair(shift, stepper=None):
     settings = {"radius": 0.25, "mass": 1.0, "dt": DT, "steps": STEPS, "domain": box}
     spin = {"spin": np.array([[1.0, 2.0, 30.0], [0.0, -5.0, 10.0]])}
     stepper = stepper or Verlet(control=FixedStep(dt=DT))
-    return scene(place, velocity, (HertzMindlin(**LAW),), quantities=spin, stepper=stepper, **settings)
+    return scene(
+        place, velocity, (HERTZ_MINDLIN,), materials=MATERIALS, quantities=spin, stepper=stepper, **settings
+    )
 
 
 @pytest.mark.parametrize(
@@ -163,7 +165,9 @@ def layers(rate=RATE, steps=3000):
     box = ShearedBox(low=(0, 0, 0), high=(2.8, 2.0, 2.8), rate=rate)
     velocity = np.outer(rate * (place[:, ACROSS] - 1.0), [1, 0, 0])
     settings = {"radius": 0.29, "mass": 1.0, "dt": DT, "steps": steps, "domain": box}
-    return scene(place, velocity, (HertzMindlin(**LAW),), quantities={"spin": 0 * place}, **settings)
+    return scene(
+        place, velocity, (HERTZ_MINDLIN,), materials=MATERIALS, quantities={"spin": 0 * place}, **settings
+    )
 
 
 @pytest.mark.parametrize("made", ["crowd", "sparse", "layers", "reverse"])

@@ -230,7 +230,7 @@ def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_report
     off, sliding, reason, time = in_fast_arithmetic("engine.test_fast", "piled")
     assert off < CLOSE
     assert sliding > 1000
-    for word in ("not finite", "effects.hertz_mindlin", "particle 0"):
+    for word in ("not finite", "effects.granular", "particle 0"):
         assert word in reason
     assert time == 0.0
 

@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
+from tests.effects.contact.grains import HERTZ_MINDLIN
 from tests.scenes import by_id, fixed, scene
 from tests.throwaway import Bridge
-from tisim import Simulation
-from tisim.effects import HertzMindlin
+from tisim import Material, Simulation
 from tisim.interactions import listed_pairs
 from tisim.steppers import Trapezoid
 from tisim.steppers.implicit.step_control import ErrorControl
 
 RADIUS, NARROW = 0.1, 1e-6
 """m. With a skin so narrow lists are made anew whenever something moves."""
-LAWS = HertzMindlin(young=1e5, poisson=0.25, restitution=0.6, friction=0.4), Bridge(pull=3.0, rupture=0.02)
+MATERIALS = {"grain": Material(young=1e5, poisson=0.25, restitution=0.6, friction=0.4)}
+LAWS = HERTZ_MINDLIN, Bridge(pull=3.0, rupture=0.02)
 
 
 def falling(stepper, skin=None):
@@ -28,6 +29,7 @@ def falling(stepper, skin=None):
         mass=1.0,
         stepper=stepper,
         duration=0.1,
+        materials=MATERIALS,
         quantities={"spin": 5 * rng.normal(size=lattice.shape)},
         **({} if skin is None else {"skin": skin}),
     )

@@ -101,9 +101,9 @@ def test_they_are_those_of_an_unsorted_run_but_for_rounding(simulation, usual):
     assert unsorted.sort is None
     (expected,) = ends(unsorted, [bed(1)])
     unsorted.close()
-    for name in ("position", "velocity", "spin", "force", "hertz_mindlin_past"):
+    for name in ("position", "velocity", "spin", "force", "granular_past"):
         scale, found = np.abs(expected.state[name]).max(), [usual[0].state[name], expected.state[name]]
-        if name == "hertz_mindlin_past":
+        if name == "granular_past":
             # A grain remembers its partners in any order.
             found = [np.sort(values.reshape(GRAINS, -1)) for values in found]
         np.testing.assert_allclose(*found, rtol=0, atol=1e-9 * scale, err_msg=name)

@@ -119,7 +119,7 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
         elif any(scene.domain.joined()):
             name, value = "velocity", velocity
         return (Quantity(name, value, returns=True),)
-    starts = [scene.particles.arrays(scene.domain, scene.seed + k) for k in (0, 1)]
+    starts = [scene.start(scene.seed + k) for k in (0, 1)]
     differ = any(not np.array_equal(starts[0][name], starts[1][name]) for name in ("position", "velocity"))
     rule = "given for a scene with impacts or operators whose start is not random"
     must(differ, "quantities", rule, "none")

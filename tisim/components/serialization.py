@@ -32,8 +32,9 @@ def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
 
 
 def from_dict(base: type[Part], data: Any, where: str) -> Part:
-    """Return the part that ``data["kind"]`` names; its other keys are its parameters."""
-    values = table(data, where)
+    """Return the part that ``data["kind"]`` names; its other keys are its parameters. Text is a kind by
+    itself."""
+    values: dict[str, Any] = {"kind": data} if isinstance(data, str) else table(data, where)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
     listed = dict(kind.lists())

@@ -31,9 +31,66 @@ from .base import (
 from .contact.bond import ContactBond as ContactBond
 from .contact.dissipation import ContactDissipation as ContactDissipation
 from .contact.friction import ContactFriction as ContactFriction
-from .contact.granular import GranularContact as GranularContact
+from .contact.granular.cohesion import DMT as DMT
+from .contact.granular.cohesion import SJKR as SJKR
+from .contact.granular.constant import ConstantDamping as ConstantDamping
+from .contact.granular.contact import GranularContact as GranularContact
+from .contact.granular.granular import Granular as Granular
+from .contact.granular.hertz import HertzMaterial as HertzMaterial
+from .contact.granular.hooke import Hooke as Hooke
+from .contact.granular.jkr import JKR as JKR
+from .contact.granular.mindlin import (
+    DisplacementSpring as DisplacementSpring,
+)
+from .contact.granular.mindlin import (
+    LinearSpring as LinearSpring,
+)
+from .contact.granular.mindlin import (
+    MindlinDisplacement as MindlinDisplacement,
+)
+from .contact.granular.mindlin import (
+    MindlinForce as MindlinForce,
+)
+from .contact.granular.mindlin import (
+    TangentialSpring as TangentialSpring,
+)
+from .contact.granular.parts import (
+    Cohesion as Cohesion,
+)
+from .contact.granular.parts import (
+    Damping as Damping,
+)
+from .contact.granular.parts import (
+    NormalForce as NormalForce,
+)
+from .contact.granular.parts import (
+    RollingResistance as RollingResistance,
+)
+from .contact.granular.parts import (
+    TangentialForce as TangentialForce,
+)
+from .contact.granular.parts import (
+    TwistingResistance as TwistingResistance,
+)
+from .contact.granular.restitution import RestitutionDamping as RestitutionDamping
+from .contact.granular.rolling import (
+    RollingCDT as RollingCDT,
+)
+from .contact.granular.rolling import (
+    RollingEPSD as RollingEPSD,
+)
+from .contact.granular.rolling import (
+    RollingSDS as RollingSDS,
+)
+from .contact.granular.twisting import (
+    TwistingMarshall as TwistingMarshall,
+)
+from .contact.granular.twisting import (
+    TwistingSDS as TwistingSDS,
+)
+from .contact.granular.viscoelastic import ViscoelasticDamping as ViscoelasticDamping
+from .contact.granular.viscous import ViscousFriction as ViscousFriction
 from .contact.hertz import Hertz as Hertz
-from .contact.hertz_mindlin import HertzMindlin as HertzMindlin
 from .contact.normal import NormalContact as NormalContact
 from .contact.power_law import Contact as Contact
 from .contact.power_law import ContactLaw as ContactLaw

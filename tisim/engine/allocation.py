@@ -32,7 +32,7 @@ class Allocation:
     """
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
-        asked = (scene.effects, scene.stepper)
+        asked = (scene.acting(), scene.stepper)
         counters, quantities, flags, totals = (
             declared(*asked, what) for what in ("counters", "world_quantities", "flags", "totals")
         )

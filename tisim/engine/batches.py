@@ -70,7 +70,7 @@ class Batches:
         groups: dict[Any, list[int]] = {}
         for index, scene in enumerate(scenes):
             try:
-                starts[index] = scene.particles.arrays(scene.domain, scene.seed)
+                starts[index] = scene.start()
             except InputError as error:
                 if strict:
                     raise

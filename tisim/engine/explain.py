@@ -115,7 +115,7 @@ def known_effects() -> list[type[Effect]]:
 def _memory(simulation: Simulation, scene: Scene) -> Iterator[Memory]:
     users = {
         need if isinstance(need, str) else need.name: why
-        for need, why in needed_fields(scene.effects, scene.stepper).items()
+        for need, why in needed_fields(scene.acting(), scene.stepper).items()
     }
     core = {field.name for field in CORE}
     for name, size in simulation.s.bytes().items():

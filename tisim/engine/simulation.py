@@ -65,7 +65,7 @@ class Simulation(CompiledWorlds):
                 f"at most {self.s.capacity}",
                 room,
             )
-        starts = list(starts or (scene.particles.arrays(scene.domain, scene.seed) for scene in scenes))
+        starts = list(starts or (scene.start() for scene in scenes))
         for scene, start in zip(scenes, starts, strict=True):
             check_start(self.s.fields, scene, start)
         self.table.write([parts(scene) for scene in scenes])

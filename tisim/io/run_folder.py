@@ -164,7 +164,7 @@ def read_result(path: Path) -> Result:
 
 def units(scene: Scene) -> dict[str, str]:
     """Return the unit of each quantity that particles of a scene have, by name."""
-    fields = resolve_fields((*SHARED, *needed_fields(scene.effects, scene.stepper)))
+    fields = resolve_fields((*SHARED, *needed_fields(scene.acting(), scene.stepper)))
     return {field.name: field.unit for field in fields}
 
 

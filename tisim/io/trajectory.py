@@ -197,5 +197,5 @@ def _replace(path: Path, image: bytes) -> None:
 
 def recorded_fields(scene: Scene) -> tuple[Field, ...]:
     """Return the quantities in a trajectory of a scene: all but what particles remember of each other."""
-    fields = resolve_fields(needed_fields(scene.effects, scene.stepper))
+    fields = resolve_fields(needed_fields(scene.acting(), scene.stepper))
     return tuple(field for field in fields if not (field.slots or field.scratch))

@@ -60,7 +60,7 @@ class HalfList(NeighbourRows):
         self, s: State, domain: Bound[Domain], laws: tuple[Bound[Pairwise], ...], sizes: ListSizes
     ) -> None:
         super().__init__(s, domain, sizes.row)
-        self.laws, self.sizes = tuple(law for law in laws if law.data.offers("reach")), sizes
+        self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
         builder = Builder()

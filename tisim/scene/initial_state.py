@@ -11,6 +11,7 @@ from pydantic import ConfigDict, field_serializer, field_validator, model_valida
 from tisim.components.arrays import Numbers, Rows, equal, frozen
 from tisim.components.component import Component, Text, Vector, option, parameter
 from tisim.components.domain import Domain
+from tisim.components.materials import Materials
 from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
 from tisim.errors import InputError, abbreviated, must
 from tisim.packing.placement import Placement, RandomInDomain
@@ -33,6 +34,11 @@ class Start(Component):
         """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
 
+    def material_indices(self, materials: Materials) -> np.ndarray | None:
+        """Return the index of the material of each particle, shape (n,), given those of the scene; None where
+        all are of the first."""
+        return None
+
 
 class Particles(Start):
     """Particles are given one by one, as lists or arrays.
@@ -49,6 +55,11 @@ class Particles(Start):
     mass: Numbers | None = parameter("kg", "masses, greater than 0", None)
     density: float | None = parameter(
         "kg/m^3", "density of all particles, instead of masses", None, gt=0, examples=[2000.0]
+    )
+    material: Any = option(
+        "material of each particle, by its name or its number, from 0, in the scene; one for all, the "
+        "first unless given",
+        None,
     )
     quantities: Mapping[Text, Any] = option(
         "further fields by name, in SI, such as temperature", default_factory=dict
@@ -91,6 +102,31 @@ class Particles(Start):
     @field_serializer("quantities", when_used="json")
     def _plain(self, values: Mapping[str, Any]) -> dict[str, Any]:
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
+
+    @field_validator("material")
+    @classmethod
+    def _one_or_each(cls, value: Any) -> Any:
+        if value is None or isinstance(value, str):
+            return value
+        column = np.atleast_1d(np.asarray(value))
+        must(column.ndim == 1 and column.dtype.kind in "iU", "particles.material", "names or numbers", value)
+        return frozen(column) if column.dtype.kind == "i" else tuple(map(str, column))
+
+    @field_serializer("material", when_used="json")
+    def _listed(self, value: Any) -> Any:
+        return value.tolist() if isinstance(value, np.ndarray) else value
+
+    def material_indices(self, materials: Materials) -> np.ndarray | None:
+        if self.material is None:
+            return None
+        given, where = self.material, "particles.material"
+        names = (given,) if isinstance(given, str) else given
+        n, indices = (
+            len(self.position),
+            {name: materials.index(name, where) for name in np.unique(names).tolist()},
+        )
+        must(len(names) in (1, n), where, f"one, or {n} of them", len(names))
+        return np.resize([indices[name] for name in np.asarray(names).tolist()], n)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -170,6 +206,7 @@ class Cloud(Start):
     )
     pulse: Pulse | None = option("velocities that are added at the start, such as a blast's", None)
     temperature: float = parameter("K", "temperature", 300.0, gt=0)
+    material: Text | None = option("material of the spheres; the first of the scene unless given", None)
     specific_charge: float | None = parameter(
         "C/kg", "charge over mass of each sphere; unless given, there is none", None
     )
@@ -198,6 +235,10 @@ class Cloud(Start):
     def _mass(self) -> float:
         """Return the mass of each sphere, kg."""
         return self.density * 4 / 3 * np.pi * self.radius**3
+
+    def material_indices(self, materials: Materials) -> np.ndarray | None:
+        index = 0 if self.material is None else materials.index(self.material, "cloud.material")
+        return np.full(self.count(), index) if index else None
 
     def masses(self) -> np.ndarray:
         # All in one place of memory, as the number may be large and a scene is checked before it is run.

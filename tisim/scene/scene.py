@@ -14,12 +14,14 @@ from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.json_text import json_pieces
+from tisim.components.material_law import MaterialLaw
+from tisim.components.materials import Material, MaterialPair, Materials
 from tisim.components.sheared_box import ShearedBox
 from tisim.effects.base import Effect
 from tisim.errors import InputError, abbreviated, did_you_mean, must, printable
 from tisim.files import python_file
 from tisim.scene import plugins
-from tisim.scene.initial_state import Start
+from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
 from tisim.steppers.verlet import Verlet
@@ -39,6 +41,13 @@ class Scene(Component):
 
     name: Text = option("name of the scene, for people", "scene")
     particles: Start = option("what it starts with, Particles or Cloud")
+    materials: Mapping[Text, Material] = option(
+        "materials by name, which laws of contact go by", default_factory=dict
+    )
+    material_pairs: Mapping[Text, MaterialPair] = option(
+        "what two materials have where no rule gives it, by both names, such as steel-rubber",
+        default_factory=dict,
+    )
     effects: tuple[Effect, ...] = option("effects, sources and operators, which act in this order", ())
     domain: Domain = option("space that it lives in, such as Open or Box", Open())
     stepper: Stepper = option("how time advances; tolerances and limits are stated here", Verlet())
@@ -89,20 +98,35 @@ class Scene(Component):
                 f"used together with a source of {' or '.join(kind.requires_source)}",
                 ", ".join(labels),
             )
+        self._check_materials()
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
         self.capacity()
         return self
 
+    def _check_materials(self) -> None:
+        """Raise InputError unless the materials have what effects need of them, and all names are known."""
+        materials = Materials(self.materials, self.material_pairs)
+        self.particles.material_indices(materials)
+        for part in (part for effect in self.effects for part in effect.parts()):
+            if isinstance(part, MaterialLaw):
+                part.check_materials(materials)
+
     def structure(self) -> tuple[Any, ...]:
         """Return what is compiled in; scenes that agree in it can run as one batch."""
         parts = (*self.effects, self.domain, self.stepper)
-        return tuple(part.structure() for part in parts)
+        return *(part.structure() for part in parts), tuple(self.materials)
 
     def acting(self) -> tuple[Effect, ...]:
-        """Return the effects, with what they take from the start filled in."""
-        masses = self.particles.masses()
-        return tuple(effect.at_start(masses) for effect in self.effects)
+        """Return the effects, with what they take from the start and from the materials filled in."""
+        masses, materials = self.particles.masses(), Materials(self.materials, self.material_pairs)
+        return tuple(_of(effect, materials).at_start(masses) for effect in self.effects)
+
+    def start(self, seed: int | None = None) -> Arrays:
+        """Return the quantities of particles at the start, by name; of another seed where one is given."""
+        arrays = self.particles.arrays(self.domain, self.seed if seed is None else seed)
+        indices = self.particles.material_indices(Materials(self.materials, self.material_pairs))
+        return arrays if indices is None else {**arrays, "material": indices}
 
     def capacity(self) -> int:
         """Return how many particles may ever live at once."""
@@ -133,6 +157,8 @@ class Scene(Component):
             **({} if self.skin is None else {"skin": self.skin}),
             "seed": self.seed,
             "particles": particles,
+            **_tables("materials", self.materials),
+            **_tables("material_pairs", self.material_pairs),
             "domain": serialization.to_dict(self.domain),
             "stepper": serialization.to_dict(self.stepper),
             "effects": {effect.label: _table(effect) for effect in self.effects},
@@ -208,6 +234,17 @@ class Scene(Component):
             must(name in data["effects"], "effect to leave out", f"one of {present}", name)
         others = {kind: values for kind, values in data["effects"].items() if kind not in names}
         return type(self).from_dict({**data, "effects": others})
+
+
+def _of(effect: Effect, materials: Materials) -> Effect:
+    """Return an effect that knows the materials, if it is one that goes by them."""
+    return effect.with_materials(materials) if isinstance(effect, MaterialLaw) else effect
+
+
+def _tables(key: str, parts: Mapping[str, Component]) -> dict[str, Any]:
+    """Return a key with a table of each part by name; nothing where there is none."""
+    tables = {name: serialization.to_dict(part, named=False) for name, part in parts.items()}
+    return {key: tables} if tables else {}
 
 
 def _table(effect: Effect) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def allocated(scene: Scene) -> Iterator[Allocation]:
 @contextmanager
 def started(scene: Scene) -> Iterator[tuple[Allocation, Arrays]]:
     """Yield the fields of one world at its start, with the parameters of the scene, and this start."""
-    start = scene.particles.arrays(scene.domain, scene.seed)
+    start = scene.start()
     with allocated(scene) as made:
         s = made.s
         check_start(s.fields, scene, start)

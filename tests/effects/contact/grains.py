@@ -2,14 +2,16 @@
 
 import numpy as np
 
-from tests.effects.contact.granular_twin import Grains, Material
+from tests.effects.contact.granular_twin import Grains, TwinLaw
 from tests.scenes import scene, simulate
-from tisim.effects import Gravity, HertzMindlin, Walls
+from tisim import Material
+from tisim.effects import Granular, Gravity, HertzMaterial, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
 
 WORLDS, CAPACITY = 32, 64
 USUAL = {"young": 1e7, "poisson": 0.3, "restitution": 0.8, "friction": 0.4}
-"""The law unless a test asks for another; young in Pa."""
+"""The material unless a test asks for another; young in Pa."""
+HERTZ_MINDLIN = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
 FAR = 1e6
 """m; where a wall is out of the way."""
 FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -22,18 +24,19 @@ def cell(side):
     return low + [((side,) * 3, tuple(-axis)) for axis in np.eye(3)]
 
 
-def effects(planes=(AWAY,), gravity=(0.0, 0.0, 0.0), **law):
+def effects(planes=(AWAY,), gravity=(0.0, 0.0, 0.0)):
     """Hertz and Mindlin, walls, and gravity."""
     walls = tuple(Plane(point=point, normal=normal) for point, normal in planes)
-    return HertzMindlin(**{**USUAL, **law}), Walls(planes=walls), Gravity(acceleration=gravity)
+    return HERTZ_MINDLIN, Walls(planes=walls), Gravity(acceleration=gravity)
 
 
 def grains(position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.0, 0.0), law=None, **more):
     """Grains given one by one, 1 kg each and 1 m in radius unless said."""
     spin = np.zeros_like(np.asarray(velocity, float)) if spin is None else spin
     given = {"radius": 1.0, "mass": 1.0, **more}
-    acting = effects(planes, gravity, **(law or {}))
-    return scene(position, velocity, acting, quantities={"spin": spin}, **given)
+    materials = {"grain": Material(**{**USUAL, **(law or {})})}
+    acting = effects(planes, gravity)
+    return scene(position, velocity, acting, quantities={"spin": spin}, materials=materials, **given)
 
 
 def run(scenes, **more):
@@ -65,9 +68,9 @@ def heap(rng, n=40, side=1.6, dt=2e-4, steps=300, **law):
 def twin(made):
     """The same in NumPy, at its start."""
     start = made.particles.arrays(made.domain, made.seed)
-    law, walls, gravity = made.effects[:3]
+    law, (_, walls, gravity) = made.materials["grain"], made.effects[:3]
     return Grains(
-        Material(law.young, law.poisson, law.restitution, law.friction),
+        TwinLaw(law.young, law.poisson, law.restitution, law.friction),
         *(start[name] for name in ("position", "velocity", "spin", "radius", "mass")),
         planes=[(plane.point, plane.normal) for plane in walls.planes],
         acceleration=gravity.acceleration,

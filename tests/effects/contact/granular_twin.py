@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass
-class Material:
+class TwinLaw:
     """A material, young in Pa.
 
     levers : "contact" has spins move surfaces that are R - delta / 2 from the centres, where forces act;

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.effects.contact.granular_twin import Grains, Material
+from tests.effects.contact.grains import HERTZ_MINDLIN
+from tests.effects.contact.granular_twin import Grains, TwinLaw
 from tests.scenes import scene
-from tisim import ShearedBox
-from tisim.effects import HertzMindlin
+from tisim import Material, ShearedBox
 
 SIDES, RATE, DT, STEPS = np.array([1.6, 2.0, 1.8]), 3.0, 2e-4, 300
-LAW = {"young": 1e5, "poisson": 0.25, "restitution": 0.6, "friction": 0.4}
+MATERIALS = {"grain": Material(young=1e5, poisson=0.25, restitution=0.6, friction=0.4)}
 ALONG, ACROSS = 0, 1
 
 
@@ -23,9 +23,8 @@ def crowd(rng, n=60, rate=RATE, sides=SIDES, steps=STEPS, low=0.0, **more):
     settings = {"radius": radius, "mass": 30 * radius**3, "dt": DT, "steps": steps}
     box = ShearedBox(low=(low,) * 3, high=tuple(sides + low), rate=rate)
     spin = {"spin": 5 * rng.normal(size=(n, 3))}
-    return scene(
-        place, velocity, (HertzMindlin(**LAW),), quantities=spin, **{**settings, "domain": box, **more}
-    )
+    settings |= {"domain": box, "materials": MATERIALS, **more}
+    return scene(place, velocity, (HERTZ_MINDLIN,), quantities=spin, **settings)
 
 
 def inside(box, place, velocity, time):
@@ -48,9 +47,9 @@ class ShearedGrains(Grains):
         start = made.particles.arrays(made.domain, made.seed)
         low, high = made.domain.bounds()
         self.sides, self.rate, self.time, self.lag = high - low, made.domain.rate, 0.0, lag
-        (law,) = made.effects
+        law = made.materials["grain"]
         super().__init__(
-            Material(law.young, law.poisson, law.restitution, law.friction, levers),
+            TwinLaw(law.young, law.poisson, law.restitution, law.friction, levers),
             *(start[name] for name in ("position", "velocity", "spin", "radius", "mass")),
         )
 

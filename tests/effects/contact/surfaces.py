@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from tests.effects.contact.grains import HERTZ_MINDLIN
 from tests.scenes import scene, simulate
-from tisim.effects import Gravity, HertzMindlin, Walls
+from tisim import Material
+from tisim.effects import Gravity, Walls
 from tisim.geometry import (
     BoxSurface,
     ConicalSurface,
@@ -54,12 +56,13 @@ def beside(position, velocity, shapes, gravity=(0.0, 0.0, 0.0), law=None, spin=N
     """A grain at some shapes, by the names of their lists."""
     law = {"young": YOUNG, "poisson": POISSON, "restitution": 1.0, "friction": 0.0, **(law or {})}
     acting = (
-        HertzMindlin(**law),
+        HERTZ_MINDLIN,
         Walls(surface=TRIANGLES, **{**FAR, **shapes}),
         Gravity(acceleration=gravity),
     )
     quantities = {"spin": [spin or (0.0, 0.0, 0.0)]}
     given = {"radius": RADIUS, "mass": 1.0, "dt": 2e-5, "quantities": quantities, **more}
+    given["materials"] = {"grain": Material(**law)}
     return scene([position], [velocity], acting, **given)
 
 

@@ -3,43 +3,68 @@
 import numpy as np
 import pytest
 
-from tests.effects.contact.grains import CAPACITY, FLOOR, USUAL, WORLDS, effects, grains
+from tests.effects.contact.grains import CAPACITY, FLOOR, HERTZ_MINDLIN, USUAL, WORLDS, grains
 from tests.scenes import scene, simulate
-from tisim import InputError
-from tisim.effects import Hertz, HertzMindlin, Walls
+from tisim import InputError, Material, MaterialPair
+from tisim.effects import DMT, JKR, Granular, Hertz, TwistingMarshall, Walls
 from tisim.geometry import Plane
 from tisim.steppers import Verlet
 
 
-def law(**changes):
-    return HertzMindlin(**{**USUAL, **changes})
+def material(**changes):
+    return Material(**{**USUAL, **changes})
 
 
 def one(*acting, **more):
-    return scene([[0, 0, 0]], [[0, 0, 0]], acting, **more)
+    return scene([[0, 0, 0]], [[0, 0, 0]], acting, **{"materials": {"grain": material()}, **more})
 
 
+LACKING = {"grain": Material(young=1e7, poisson=0.3, restitution=0.5), "glass": material()}
 WRONG = {
-    "hertz_mindlin.young must be greater than 0.0; received 0": lambda: law(young=0),
-    "hertz_mindlin.poisson must be greater than -1.0; received -1": lambda: law(poisson=-1),
-    "hertz_mindlin.poisson must be at most 0.5; received 0.6": lambda: law(poisson=0.6),
-    "hertz_mindlin.restitution must be greater than 0.0; received 0": lambda: law(restitution=0),
-    "hertz_mindlin.restitution must be at most 1.0; received 1.5": lambda: law(restitution=1.5),
-    "hertz_mindlin.friction must be at least 0.0; received -0.1": lambda: law(friction=-0.1),
-    "hertz_mindlin.friction must be a finite number; received nan": lambda: law(friction=float("nan")),
+    "material.young must be greater than 0.0; received 0": lambda: material(young=0),
+    "material.poisson must be greater than -1.0; received -1": lambda: material(poisson=-1),
+    "material.poisson must be at most 0.5; received 0.6": lambda: material(poisson=0.6),
+    "material.restitution must be greater than 0.0; received 0": lambda: material(restitution=0),
+    "material.restitution must be at most 1.0; received 1.5": lambda: material(restitution=1.5),
+    "material.friction must be at least 0.0; received -0.1": lambda: material(friction=-0.1),
+    "material.friction must be a finite number; received nan": lambda: material(friction=float("nan")),
     "walls must be given a plane or a surface; received 'none'": lambda: Walls(planes=()),
     "plane.normal must be a direction, not of length 0; received (0.0, 0.0, 0.0)": lambda: Plane(
         normal=(0, 0, 0)
     ),
-    "effects.walls must be used together with effects.hertz_mindlin; received 'walls'": lambda: one(
+    "effects.walls must be used together with effects.granular; received 'walls'": lambda: one(
         Walls(planes=[Plane()])
     ),
-    "effects.walls must be used together with effects.hertz_mindlin; received 'hertz, walls'": lambda: one(
+    "effects.walls must be used together with effects.granular; received 'hertz, walls'": lambda: one(
         Hertz(young=1, poisson=0), Walls(planes=[Plane()])
     ),
-    "stepper.control must be one that suits hertz_mindlin, such as fixed_step or that of an implicit "
-    "stepper; received 'approach_time'": lambda: one(law(), stepper=Verlet()),
-    "effects.hertz_mindlin must be given once; received 2": lambda: one(law(), law()),
+    "stepper.control must be one that suits granular, such as fixed_step or that of an implicit "
+    "stepper; received 'approach_time'": lambda: one(HERTZ_MINDLIN, stepper=Verlet()),
+    "effects.granular must be given once; received 2": lambda: one(HERTZ_MINDLIN, HERTZ_MINDLIN),
+    "materials must be given, as hertz_material needs them; received 'none'": lambda: one(
+        HERTZ_MINDLIN, materials={}
+    ),
+    "materials.grain.friction must be given (coefficient mu of friction), as mindlin_force needs it; "
+    "received 'nothing'": lambda: one(HERTZ_MINDLIN, materials=LACKING),
+    "material_pairs.grain-clay must be named after two of its materials (grain), as in steel-rubber; "
+    "received 'grain-clay'": lambda: one(
+        HERTZ_MINDLIN, material_pairs={"grain-clay": MaterialPair(friction=1)}
+    ),
+    "material_pairs.grain-glass must be given once; received 'glass-grain'": lambda: one(
+        HERTZ_MINDLIN,
+        materials={"grain": material(), "glass": material()},
+        material_pairs={"glass-grain": MaterialPair(), "grain-glass": MaterialPair()},
+    ),
+    "a name of materials must be letters, digits and _, a letter first; received 'a b'": lambda: one(
+        materials={"a b": material()}
+    ),
+    "walls.material must be one of the materials of the scene (grain); received 'grian'; did you "
+    "mean 'grain'?": lambda: one(HERTZ_MINDLIN, Walls(planes=[Plane()], material="grian")),
+    "granular.tangential must be given, as the resistance to twisting goes by it; "
+    "received 'nothing'": lambda: Granular(twisting=TwistingMarshall()),
+    "granular.cohesion must be left out, as jkr is adhesive itself; received 'dmt'": lambda: Granular(
+        normal=JKR(), cohesion=DMT()
+    ),
 }
 
 
@@ -61,16 +86,16 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
     stiff = {"law": {"young": 1e15}, **far}
     couple = [[0, 0, 9], [2.1, 0, 9]]
     made = {
-        "one place": (grains([[0, 0, 5]] * 2, [[0, 0, 0]] * 2, **far), "hertz_mindlin"),
+        "one place": (grains([[0, 0, 5]] * 2, [[0, 0, 0]] * 2, **far), "granular"),
         "no number": (
             grains([[0, 0, 5], [1, 0, 5]], [[0, 0, 0]] * 2, law={"young": 1e300}, **far),
-            "hertz_mindlin",
+            "granular",
         ),
-        "pair": (grains(couple, [[0, 0, 0], [-9, 0, 0]], **stiff), "hertz_mindlin"),
+        "pair": (grains(couple, [[0, 0, 0], [-9, 0, 0]], **stiff), "granular"),
         "wall": (grains([[0, 0, 1.1]], [[0, 0, -9]], planes=[FLOOR], **stiff), "walls"),
         "deep at the start": (
             grains([[0, 0, 9], [1.9, 0, 9]], [[0, 0, 0]] * 2, law={"young": 1e10}, **far),
-            "hertz_mindlin",
+            "granular",
         ),
         "in a wall at the start": (
             grains([[0, 0, 0.9]], [[0, 0, 0]], planes=[FLOOR], law={"young": 1e10}, **far),
@@ -90,7 +115,7 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
 def test_what_is_pressed_far_into_each_other_gives_back_what_it_holds():
     """A grain far beyond a wall, one within a larger one, and centres 1e-6 radii apart: Hertz's 8/15 E*
     sqrt(R*) delta^2.5, by steps that resolve it."""
-    e_star = effects()[0].effective_young
+    e_star = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
     more = {"law": {"restitution": 1.0}, "dt": 1e-5, "steps": 4000}
     still = [[0, 0, 0]] * 2
     made = [

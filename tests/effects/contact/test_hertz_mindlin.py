@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.effects.contact.grains import CAPACITY, USUAL, WORLDS, effects, grains, heap, run, twin
+from tests.effects.contact.grains import CAPACITY, USUAL, WORLDS, grains, heap, run, twin
 from tests.scenes import by_id, compiled
+from tisim import Material
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.effects import HertzMindlin
+from tisim.components.materials import Materials, Touching
+from tisim.effects import Granular, RestitutionDamping
 from tisim.interactions.contact_memory import NO_PARTNER, PARTNERS
 
 E_STAR = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
@@ -28,7 +30,7 @@ def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarra
         for k in range(path.shape[0]):
             n = ti.Vector([normal[k, 0], normal[k, 1], normal[k, 2]])
             slip = ti.Vector([path[k, 1], path[k, 2], path[k, 3]])
-            force, known = law.contact(0, n, path[k, 0], 1.0, 1.0, slip, past, DT)
+            force, _couple, known = law.contact(0, 0, n, path[k, 0], 1.0, 1.0, slip, 0.0 * slip, past, DT)
             past = known
             for c in ti.static(range(3)):
                 out[k, c], out[k, 3 + c] = force[c], known[c]
@@ -40,7 +42,7 @@ def along(normal, overlap, moved, **law):
     one = grains([[0, 0, 0]], [[0, 0, 0]], law=law)
     simulation = compiled(one, WORLDS, CAPACITY)
     simulation.load([one])
-    (bound,) = simulation.assembly.effects.of(HertzMindlin)
+    (bound,) = simulation.assembly.effects.of(Granular)
     path, out = np.column_stack([overlap, moved / DT]), np.zeros((len(moved), 6))
     _along(bound, np.ascontiguousarray(np.broadcast_to(normal, moved.shape), float), path, out)
     return out[:, :3], out[:, 3:]
@@ -124,7 +126,7 @@ def test_a_large_grain_that_many_small_ones_touch_remembers_nothing_and_each_of_
     known.run(20, 1e-4)
     for name, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
         np.testing.assert_allclose(state[name], values, rtol=0, atol=1e-11 * np.abs(values).max())
-    partners = state["hertz_mindlin_partners"]
+    partners = state["granular_partners"]
     assert (partners[0] == NO_PARTNER).all()
     assert ((partners[1:] == 0).sum(axis=1) == 1).sum() > PARTNERS
 
@@ -150,7 +152,7 @@ def test_momentum_and_angular_momentum_stay(rng):
 
 def test_a_law_of_one_material():
     """E* and G* of two grains alike, and the c of their damping."""
-    law = effects()[0]
-    assert law.effective_young == pytest.approx(E_STAR, rel=1e-15)
-    assert law.effective_shear == pytest.approx(G_STAR, rel=1e-15)
-    assert HertzMindlin(**{**USUAL, "restitution": 1}).damping == 0
+    (alike,) = Materials({"grain": Material(**USUAL)}, {}).touching()
+    assert alike.effective_young == pytest.approx(E_STAR, rel=1e-15)
+    assert alike.effective_shear == pytest.approx(G_STAR, rel=1e-15)
+    assert RestitutionDamping().mix(Touching(("a", "b"), *[Material(restitution=1)] * 2, None)) == {"loss": 0}

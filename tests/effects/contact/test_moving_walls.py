@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.effects.contact.grains import HERTZ_MINDLIN
 from tests.effects.contact.surfaces import AWAY, POISSON, RADIUS, YOUNG, moving
 from tests.scenes import by_id, compiled, scene, simulate
-from tisim import InputError, Simulation
+from tisim import InputError, Material, Simulation
 from tisim.effects import (
     Gravity,
-    HertzMindlin,
     Oscillation,
     Rotation,
     Servo,
@@ -39,7 +39,7 @@ def among(position, velocity, floor=NOWHERE, drum=None, lid=None, shaker=None, b
     plate, shaking = shaker or (NOWHERE, Oscillation(amplitude=(0, 0, 0), frequency=1))
     band, going = belt or (NOWHERE, Translation(velocity=(0, 0, 0)))
     acting = (
-        HertzMindlin(**law),
+        HERTZ_MINDLIN,
         Walls(name="floor", planes=[floor]),
         Walls(name="drum", cylinders=[tube], motion=turning),
         Walls(name="lid", planes=[cover], motion=pressing),
@@ -49,6 +49,7 @@ def among(position, velocity, floor=NOWHERE, drum=None, lid=None, shaker=None, b
     )
     spin = more.pop("spin", np.zeros_like(np.asarray(position, float)))
     given = {"radius": RADIUS, "mass": 1.0, "dt": 2e-5, "quantities": {"spin": spin}, **more}
+    given["materials"] = {"grain": Material(**law)}
     return scene(position, velocity, acting, **given)
 
 

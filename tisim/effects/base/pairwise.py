@@ -18,6 +18,10 @@ class Pairwise(Effect):
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = False
 
+    def reaches(self) -> bool:
+        """Return whether it acts beyond contact at all, given its options."""
+        return self.offers("reach")
+
     @ti.func
     def reach(self, s, w, i):
         """Return the widest gap (m) between surfaces at which it acts between i and a particle no larger.

@@ -22,6 +22,7 @@ class WallContacts(WallSearch):
     if TYPE_CHECKING:
         laws: Any
         stride: Any
+        wall_material: Any
         motion: Any
         kept: Any
         has_planes: Any
@@ -42,7 +43,7 @@ class WallContacts(WallSearch):
             r = self.motion.to_body(self.kept, w, s.position[w, i], t)
             if ti.static(self.has_planes):
                 for k in range(self.flat.size(w)):
-                    touching += ti.select(self.flat.distance(w, k, r) <= s.radius[w, i], 1, 0)
+                    touching += ti.select(self.flat.distance(w, k, r) <= self.reach(s, w, i), 1, 0)
                 if touching + before > 0:
                     for k in range(self.flat.size(w)):
                         push, turn = self.touch_plane(s, w, i, k, r, t, dt, commit)
@@ -50,7 +51,7 @@ class WallContacts(WallSearch):
             if ti.static(self.touches_surfaces or self.motion.moves):
                 clear = self.from_planes(w, r)
                 if ti.static(self.touches_surfaces):
-                    number, found, beside = self.contacts(s, w, i, r)
+                    number, found, beside = self.contacts(s, w, i, r, self.reach(s, w, i))
                     push, turn = self.touch_surfaces(s, w, i, number + before, number, found, t, dt, commit)
                     force, torque, touching = force + push, torque + turn, touching + number
                     clear = ti.min(clear, beside)
@@ -71,13 +72,21 @@ class WallContacts(WallSearch):
             self.resistance[w] = 0
 
     @ti.func
+    def reach(self, s, w, i):
+        """Return how far (m) a wall may be from the centre of grain i for a law to act: mostly its radius."""
+        gap = ti.cast(0.0, s.real)
+        for law in ti.static(self.laws):
+            gap = ti.max(gap, law[0].wall_reach(s, w, i))
+        return s.radius[w, i] + gap
+
+    @ti.func
     def may_touch(self, s, w, i, t):
         """Return whether grain i may touch the wall, given when it was last seen where, how far from it."""
         near = True
         if ti.static(self.touches_surfaces or self.motion.moves):
             seen = ti.Vector([self.clear[w, i, axis] for axis in ti.static(range(3))])
             moved = (s.position[w, i] - seen).norm() + self.clear[w, i, 4] * ti.cast(t, s.real)
-            near = moved + s.radius[w, i] >= self.clear[w, i, 3]
+            near = moved + self.reach(s, w, i) >= self.clear[w, i, 3]
         return near
 
     @ti.func
@@ -99,7 +108,7 @@ class WallContacts(WallSearch):
         overlap = s.radius[w, i] - distance
         place = s.position[w, i] + (s.radius[w, i] - 0.5 * overlap) * normal
         velocity = self.motion.velocity_at(self.kept, w, place, t)
-        return law.at_wall(s, w, i, normal, overlap, velocity, past, dt)
+        return law.at_wall(s, w, i, normal, overlap, velocity, self.wall_material, past, dt)
 
     @ti.func
     def touch_plane(self, s, w, i, k, r, t, dt, commit):
@@ -112,7 +121,7 @@ class WallContacts(WallSearch):
             for c in ti.static(range(size)):
                 past[c] = self.past[w, i, begin + c]
             known = 0.0 * past
-            if distance <= s.radius[w, i]:
+            if distance <= self.reach(s, w, i):
                 outward = self.flat.direction(w, k)
                 push, turn, known = self.touch(s, w, i, law, outward, distance, past, t, dt)
                 force, torque = force + push, torque + turn

@@ -75,12 +75,13 @@ class WallSearch:
         return best
 
     @ti.func
-    def contacts(self, s, w, i, r):
+    def contacts(self, s, w, i, r, touching):
         """Return the contacts of grain i, which is at r (m) beside the shapes, with surfaces: how many, and
-        their directions and distances; and how far it is from surfaces at least, where there is none."""
+        their directions and distances, of ``touching`` (m) at most; and how far it is from surfaces at least,
+        where there is none."""
         found, number, searching = ti.Matrix.zero(s.real, CONTACTS, 4), 0, 1
-        clear, radius = ti.cast(ti.math.inf, s.real), s.radius[w, i]
-        limit, reach = clear, REACH * radius
+        clear = ti.cast(ti.math.inf, s.real)
+        limit, reach = clear, REACH * touching
         if ti.static(self.has_mesh):
             gap = self.mesh.clearance(r)
             clear, reach = ti.max(gap, reach), ti.select(gap < reach, reach, 0.0)
@@ -88,7 +89,7 @@ class WallSearch:
             best = self.deepest(w, r, limit, reach, found, number)
             if number == 0:
                 clear = ti.min(clear, best[0])
-            if best[0] >= radius:
+            if best[0] >= touching:
                 searching = 0
             elif number == CONTACTS:
                 s.fail(w, WorldStatus.CONTACT_OVERFLOW, i)
@@ -97,7 +98,7 @@ class WallSearch:
                 for axis in ti.static(range(3)):
                     found[number, axis] = (r[axis] - best[1 + axis]) / best[0]
                 found[number, 3] = best[0]
-                number, limit = number + 1, radius
+                number, limit = number + 1, touching
         return number, found, clear
 
     @ti.func

@@ -9,9 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import model_validator
 
-from tisim.components.component import Component
+from tisim.components.component import Component, Text
+from tisim.components.material_law import MaterialLaw
+from tisim.components.materials import Materials
 from tisim.effects.base import Effect, Field, Force, option
-from tisim.effects.contact.granular import GranularContact
+from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.wall_contacts import WallContacts
 from tisim.effects.contact.wall_search import CONTACTS
 from tisim.effects.motion.base import AtRest, Motion, MotionState
@@ -31,7 +33,7 @@ FIELDS = ("past", "surface_past", "loads", "touched", "clear")
 load, how many contacts there are, and where it was how far from the wall."""
 
 
-class Walls(WallContacts, Force):
+class Walls(WallContacts, MaterialLaw, Force):
     """Walls hold grains back by the contact laws of the scene; together they are one rigid body, at rest or
     in motion.
 
@@ -58,6 +60,7 @@ class Walls(WallContacts, Force):
     boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", ())
     surface: TriangulatedSurface | None = option("a surface of triangles, such as that of an STL file", None)
     motion: Motion = option("how the body moves", AtRest())
+    material: Text | None = option("material of the walls; the first of the scene unless given", None)
 
     @model_validator(mode="after")
     def _there(self) -> Walls:
@@ -68,6 +71,13 @@ class Walls(WallContacts, Force):
     def members(self) -> dict[str, Component]:
         surface = {"surface": self.surface} if self.surface else {}
         return {"motion": self.motion, **surface}
+
+    def check_materials(self, materials: Materials) -> None:
+        self.material_index(materials)
+
+    def material_index(self, materials: Materials) -> int:
+        """Return the index of the material of the walls among those of a scene."""
+        return 0 if self.material is None else materials.index(self.material, f"{self.label}.material")
 
     def kinds_of_surface(self) -> Iterator[str]:
         """Yield the names of the lists of surfaces of which there are any."""
@@ -102,6 +112,7 @@ class Walls(WallContacts, Force):
         return {
             "laws": tuple(laws),
             "stride": begin,
+            "wall_material": self.material_index(self._materials),
             "flat": bound.planes,
             "has_planes": bool(self.planes),
             "surfaces": tuple(getattr(bound, name) for name in self.kinds_of_surface()),

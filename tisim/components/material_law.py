@@ -1,0 +1,71 @@
+"""What laws have in common whose numbers depend on the materials that touch."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import PrivateAttr
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Component
+from tisim.components.invalid import text_of, unit_of
+from tisim.components.materials import Material, Materials, Touching
+from tisim.errors import must
+
+
+class MaterialLaw(Component):
+    """This is the contract of a part of a law whose numbers depend on the materials that touch.
+
+    uses : names of the properties of materials that it needs. ``mix`` makes its numbers of those of two
+    materials; kernels read them as ``self.NAME(w, pair)``, with ``pair`` of ``material_pair``.
+    """
+
+    contract: ClassVar[bool] = True
+    uses: ClassVar[tuple[str, ...]] = ()
+    _materials: Materials = PrivateAttr(default=Materials({}, {}))
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        """Return its numbers for two materials, by name, the same names for all."""
+        return {}
+
+    def with_materials(self, materials: Materials) -> Self:
+        """Return it with the materials of a scene, and so the laws that it is made of."""
+        laws = {name: getattr(self, name) for name in type(self).model_fields}
+        update = {n: law.with_materials(materials) for n, law in laws.items() if isinstance(law, MaterialLaw)}
+        made = self.model_copy(update=update)
+        made._materials = materials
+        return made
+
+    def check_materials(self, materials: Materials) -> None:
+        """Raise InputError unless the materials of a scene have what it needs."""
+        must(
+            bool(materials.named) or not self.uses, "materials", f"given, as {self.label} needs them", "none"
+        )
+        for name in self.uses:
+            info = Material.model_fields[name]
+            what = ", ".join(filter(None, (text_of(info).partition(";")[0], unit_of(info))))
+            for pair in materials.touching():
+                for label in pair.lacking(name):
+                    rule = f"given ({what}), as {self.label} needs it"
+                    must(False, f"materials.{label}.{name}", rule, "nothing")
+
+    @property
+    def several(self) -> bool:
+        """Return whether there is more than one material."""
+        return len(self._materials.named) > 1
+
+    @property
+    def number_of_materials(self) -> int:
+        return max(1, len(self._materials.named))
+
+    def derived_rows(self) -> dict[str, list[float]]:
+        rows = [self.mix(pair) for pair in self._materials.touching()]
+        return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
+
+    @ti.func
+    def material_pair(self, s, w, i, j):
+        """Return the number of the pair of materials of i and j."""
+        pair = 0
+        if ti.static(self.several):
+            pair = s.material[w, i] * self.number_of_materials + s.material[w, j]
+        return pair

@@ -1,0 +1,56 @@
+"""Cohesion while surfaces touch."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.materials import Touching
+from tisim.effects.contact.granular.parts import Cohesion
+
+
+class SJKR(Cohesion):
+    """Grains pull each other by a cohesion for each area of contact, after a simplified JKR model.
+
+        F = k_c A,    A = 2 pi R* delta
+
+    A is the area of the lens that two spheres share, to first order in delta / R*. Coulomb's limit is that of
+    the normal force without cohesion.
+
+    Source: L21 section 2.2.1; C. Kloss, C. Goniva, A. Hager, S. Amberger and S. Pirker, Prog. Comput. Fluid
+    Dyn. 12 (2012) 140, for its use.
+    """
+
+    uses: ClassVar = ("cohesion_energy_density",)
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        return {"density": pair.mixed("cohesion_energy_density")}
+
+    @ti.func
+    def pull(self, w, pair, radius, overlap):
+        return 2.0 * ti.math.pi * self.density(w, pair) * radius * overlap
+
+
+class DMT(Cohesion):
+    """Hard grains pull each other by a constant force while they touch, as Derjaguin, Muller and Toporov
+    found.
+
+        F = 4 pi gamma R*
+
+    gamma is the surface energy, half the work of adhesion. Coulomb's limit is taken of |F_n + 2 F|, with F_n
+    the elastic and cohesive force, so that it is mu F where the contact is about to part.
+
+    Source: B. V. Derjaguin, V. M. Muller and Y. P. Toporov, J. Colloid Interface Sci. 53 (1975) 314; L21 Eq.
+    (4.5); J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.
+    """
+
+    adhesive: ClassVar[bool] = True
+    uses: ClassVar = ("surface_energy",)
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        return {"line": 4 * math.pi * pair.mixed("surface_energy")}
+
+    @ti.func
+    def pull(self, w, pair, radius, overlap):
+        return self.line(w, pair) * radius

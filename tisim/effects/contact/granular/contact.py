@@ -1,0 +1,94 @@
+"""The contract of contact laws that hold between spheres, and between a sphere and a wall."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.material_law import MaterialLaw
+from tisim.effects.base import Field, PairForce
+
+
+class GranularContact(MaterialLaw, PairForce):
+    """A granular contact gives the force at the point where a grain touches another or a wall.
+
+    The law sees the contact only: which way it faces, how deep it is, of which materials, how its surfaces
+    move past each other, and what it remembers. The contact lies in the middle of the overlap, R_i - delta/2
+    from the centre of i, and the force acts there. A wall is a grain of infinite radius and mass.
+
+    memory : values that a contact remembers while it lasts, zero when it begins.
+    """
+
+    contract: ClassVar[bool] = True
+    short_ranged: ClassVar[bool] = True
+    fields = ("radius", "velocity", "spin")
+    depends_on_velocity: ClassVar[bool] = True
+    # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
+    incompatible_controls = ("approach_time",)
+
+    def required_fields(self) -> tuple[str | Field, ...]:
+        return (*self.fields, "material") if self.several else self.fields
+
+    @ti.func
+    def lasts(self, w, pair, overlap, radius, past):
+        """Return whether there is a contact; a law that holds on to what parts asks what it remembers."""
+        return overlap >= 0.0
+
+    @ti.func
+    def contact(self, w, pair, normal, overlap, radius, mass, slip, spinning, past, dt):
+        """Return the force (N) and the couple (N m) on i, and what the contact remembers after a further dt
+        (s), given ``past``.
+
+        pair : which materials touch (see tisim/components/material_law.py). normal : unit vector from i to
+        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. slip :
+        velocity (m/s) of the surface of the other past that of i. spinning : spin (rad/s) of the other
+        relative to i. Where there is no contact what it returns is not used, and may be no number.
+        """
+        return 0.0 * normal, 0.0 * normal, past
+
+    @ti.func
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        a, b = s.radius[w, i], s.radius[w, j]
+        overlap = a + b - distance
+        arm = a - 0.5 * overlap
+        normal = (1.0 / distance) * separation
+        turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
+        slip = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
+        m, n = s.mass[w, i], s.mass[w, j]
+        # R* and m*, by one division.
+        sizes, masses = a + b, m + n
+        inverse = 1.0 / (sizes * masses)
+        radius, mass = a * b * (masses * inverse), m * n * (sizes * inverse)
+        pair, spinning = self.material_pair(s, w, i, j), s.spin[w, j] - s.spin[w, i]
+        # Chosen afterwards, not by a branch: several pairs are computed at once.
+        force, couple, known = self.contact(w, pair, normal, overlap, radius, mass, slip, spinning, past, dt)
+        lasts = self.lasts(w, pair, overlap, radius, past)
+        force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
+        # n x F is the same seen from either: both turn round at once.
+        moment = normal.cross(force)
+        back = (distance - arm) * moment - couple
+        return force, arm * moment + couple, back, ti.select(lasts, known, 0.0)
+
+    @ti.func
+    def wall_reach(self, s, w, i):
+        """Return the widest gap (m) at which it acts between i and a wall."""
+        return 0.0 * s.radius[w, i]
+
+    @ti.func
+    def at_wall(self, s, w, i, normal, overlap, velocity, material, past, dt):
+        """Return force and torque of a wall on i, and what the contact remembers.
+
+        normal : unit vector into the wall. velocity : that of its surface at the contact (m/s). material :
+        index of its material.
+        """
+        arm, radius = s.radius[w, i] - 0.5 * overlap, s.radius[w, i]
+        pair, spin = 0, s.spin[w, i]
+        if ti.static(self.several):
+            pair = s.material[w, i] * self.number_of_materials + material
+        slip = velocity - s.velocity[w, i] - (arm * spin).cross(normal)
+        force, couple, known = self.contact(
+            w, pair, normal, overlap, radius, s.mass[w, i], slip, -spin, past, dt
+        )
+        lasts = self.lasts(w, pair, overlap, radius, past)
+        force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
+        return force, arm * normal.cross(force) + couple, ti.select(lasts, known, 0.0)

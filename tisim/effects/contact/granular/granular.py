@@ -1,0 +1,183 @@
+"""The contact law that is composed of parts."""
+
+from typing import Self
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Component
+from tisim.components.material_law import MaterialLaw
+from tisim.effects.base import option
+from tisim.effects.contact.granular.contact import GranularContact
+from tisim.effects.contact.granular.hertz import HertzMaterial
+from tisim.effects.contact.granular.parts import (
+    Cohesion,
+    Damping,
+    NormalForce,
+    RollingResistance,
+    TangentialForce,
+    TwistingResistance,
+)
+from tisim.errors import must
+from tisim.numerics.vectors import piece
+
+
+@ti.func
+def remembered(past, begin: ti.template(), size: ti.template()):  # type: ignore[valid-type]
+    """Return what is remembered for a part; for one that remembers nothing, a number that it hands back."""
+    return piece(past, begin, max(1, size))
+
+
+class Granular(GranularContact):
+    """Grains that touch push each other apart, lose energy, stick, slide and roll as the parts of it say.
+
+        F_n = elastic force - gamma_n v_n - cohesion
+        F_t, couples : of the tangential, rolling and twisting part, each up to its friction times N
+
+    v_n is the speed at which the surfaces separate. N is |F_n| without cohesion; beside ``jkr`` and ``dmt``
+    it is |F_n + 2 F_c|, with F_c the force that parts the two and without damping. The contact lies in the
+    middle of the overlap. What the parts need to know of the materials that touch is in the materials of the
+    scene.
+
+    With ``hertz_material``, ``restitution_damping`` and ``mindlin_force`` it is the law of Hertz and Mindlin:
+    an impact at a speed v lasts 2.94 (15 m* / (16 E* sqrt(R* v)))^(2/5), and a fiftieth of that as a step
+    gives its restitution to 0.004. In a step beyond 2 sqrt(m* / S_n) the overlap would alternate and grow:
+    the force is then not a number, and the world stops.
+
+    Source: that of its parts; composed as by A. P. Santos, D. S. Bolintineanu, G. S. Grest, J. B. Lechman, S.
+    J. Plimpton, I. Srivastava and L. E. Silbert, Phys. Rev. E 102 (2020) 032903.
+    """
+
+    normal: NormalForce = option("elastic force along the line of centres", HertzMaterial())
+    damping: Damping | None = option("damping, of the normal and the tangential force", None)
+    tangential: TangentialForce | None = option("friction of surfaces that slide", None)
+    rolling: RollingResistance | None = option("resistance to rolling", None)
+    twisting: TwistingResistance | None = option("resistance to twisting about the line of centres", None)
+    cohesion: Cohesion | None = option("cohesion of surfaces that touch", None)
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        label = self.label
+        wants = self.twisting is not None and self.twisting.needs_tangential
+        rule = "given, as the resistance to twisting goes by it"
+        must(self.tangential is not None or not wants, f"{label}.tangential", rule, "nothing")
+        double = self.normal.adhesive and self.cohesion is not None
+        rule = f"left out, as {self.normal.kind()} is adhesive itself"
+        must(not double, f"{label}.cohesion", rule, self.cohesion and self.cohesion.kind())
+        return self
+
+    def members(self) -> dict[str, Component]:
+        names = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
+        return {name: part for name in names if isinstance(part := getattr(self, name), MaterialLaw)}
+
+    def has(self, name: str) -> bool:
+        """Return whether it has a part."""
+        return name in self.members()
+
+    def slots(self) -> dict[str, tuple[int, int]]:
+        """Return where what each part remembers begins in what a contact does, and how many values it is."""
+        slots, begin = {}, 0
+        for name, part in self.members().items():
+            size = getattr(part, "memory", 0)
+            slots[name] = (begin if size else 0, size)
+            begin += size
+        return slots
+
+    @property
+    def memory(self) -> int:  # type: ignore[override]
+        return sum(size for _, size in self.slots().values())
+
+    @property
+    def adhesive(self) -> bool:
+        """Return whether Coulomb's limit knows of the force that parts two grains."""
+        return self.normal.adhesive or (self.cohesion is not None and self.cohesion.adhesive)
+
+    def reaches(self) -> bool:
+        return self.normal.beyond_contact
+
+    @ti.func
+    def reach(self, s, w, i):
+        # R* is at most half the radius of the larger grain.
+        return self.normal.reach(w, 0.5 * s.radius[w, i])
+
+    @ti.func
+    def wall_reach(self, s, w, i):
+        gap = ti.cast(0.0, s.real)
+        if ti.static(self.normal.beyond_contact):
+            gap = self.normal.reach(w, s.radius[w, i])
+        return gap
+
+    @ti.func
+    def lasts(self, w, pair, overlap, radius, past):
+        touches = overlap >= 0.0
+        if ti.static(self.normal.beyond_contact):
+            held = (past[0] > 0.0) & (overlap >= -self.normal.separation_gap(w, pair, radius))
+            touches = touches | held
+        return touches
+
+    @ti.func
+    def contact(self, w, pair, normal, overlap, radius, mass, slip, spinning, past, dt):
+        known, couple, opening = 0.0 * past, 0.0 * normal, slip.dot(normal)
+        deep = overlap
+        if ti.static(not self.normal.beyond_contact):
+            deep = ti.max(overlap, 0.0)
+        circle = self.normal.circle(w, pair, radius, deep)
+        stiffness = self.normal.stiffness(w, pair, circle)
+        elastic = self.normal.elastic(w, pair, radius, deep, circle)
+        damping = 0.0 * stiffness
+        if ti.static(self.has("damping")):
+            damping = self.damping.coefficient(w, pair, stiffness, mass, self.normal.restitution_factor)
+        press = elastic - damping * opening
+        # Beyond this step the overlap would alternate and grow.
+        press = ti.select(stiffness * dt * dt < 4.0 * mass, press, ti.math.nan)
+        limit = ti.abs(press)
+        if ti.static(self.adhesive):
+            limit = ti.abs(elastic + self.adhesion(w, pair, radius, deep))
+        if ti.static(self.has("cohesion")):
+            press -= self.cohesion.pull(w, pair, radius, deep)
+        force = -press * normal
+        if ti.static(self.normal.memory > 0):
+            known[0] = 1.0
+
+        spring, dashpot, friction = 0.0 * stiffness, 0.0 * stiffness, 0.0 * stiffness
+        if ti.static(self.has("tangential")):
+            begin, size = ti.static(self.slots()["tangential"])
+            sliding = slip - opening * normal
+            grip, kept = self.tangential.force(
+                w, pair, normal, stiffness, damping, limit, sliding, remembered(past, begin, size), dt
+            )
+            force += grip
+            for k in ti.static(range(size)):
+                known[begin + k] = kept[k]
+            if ti.static(self.has("twisting")):
+                spring = self.tangential.spring(w, pair, stiffness)
+                dashpot = self.tangential.dashpot(w, pair, damping)
+                friction = self.tangential.coulomb(w, pair)
+        if ti.static(self.has("rolling")):
+            first, length = ti.static(self.slots()["rolling"])
+            rolling = radius * spinning.cross(normal)
+            roll, left = self.rolling.force(
+                w, pair, normal, stiffness, mass, limit, rolling, remembered(past, first, length), dt
+            )
+            couple += radius * normal.cross(roll)
+            for k in ti.static(range(length)):
+                known[first + k] = left[k]
+        if ti.static(self.has("twisting")):
+            start, extent = ti.static(self.slots()["twisting"])
+            twist, turned = self.twisting.couple(
+                w, pair, circle, spring, dashpot, friction, limit, spinning.dot(normal),
+                remembered(past, start, extent), dt,
+            )  # fmt: skip
+            couple += twist * normal
+            for k in ti.static(range(extent)):
+                known[start + k] = turned[k]
+        return force, couple, known
+
+    @ti.func
+    def adhesion(self, w, pair, radius, overlap):
+        """Return what Coulomb's limit adds to the elastic force (N): twice the force that parts the two, less
+        what pulls already."""
+        force = 2.0 * self.normal.pull_off(w, pair, radius)
+        if ti.static(self.has("cohesion")):
+            force = self.cohesion.pull(w, pair, radius, overlap)
+        return force

@@ -1,0 +1,33 @@
+"""The normal force of Hertz."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.materials import Touching
+from tisim.effects.contact.granular.parts import NormalForce
+
+
+class HertzMaterial(NormalForce):
+    """Elastic spheres push each other apart as Hertz found, by the elastic constants of their materials.
+
+        F_n = 4/3 E* a delta,    S_n = 2 E* a,    a^2 = R* delta
+
+    Source: H. Hertz (1882).
+    """
+
+    uses: ClassVar = ("young", "poisson")
+    restitution_factor: ClassVar[float] = math.sqrt(5 / 6)
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        return {"modulus": 2 * pair.effective_young}
+
+    @ti.func
+    def stiffness(self, w, pair, circle):
+        return self.modulus(w, pair) * circle
+
+    @ti.func
+    def elastic(self, w, pair, radius, overlap, circle):
+        return 2.0 / 3.0 * self.modulus(w, pair) * circle * overlap

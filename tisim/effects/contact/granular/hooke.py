@@ -1,0 +1,33 @@
+"""The normal force of a linear spring."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.materials import Touching
+from tisim.effects.contact.granular.parts import NormalForce
+
+
+class Hooke(NormalForce):
+    """Grains push each other apart like a linear spring.
+
+        F_n = k delta,    S_n = k
+
+    An impact lasts pi sqrt(m* / k) where damping is light, at any speed.
+
+    Source: P. A. Cundall and O. D. L. Strack, Geotechnique 29 (1979) 47.
+    """
+
+    uses: ClassVar = ("stiffness",)
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        return {"constant": pair.mixed("stiffness")}
+
+    @ti.func
+    def stiffness(self, w, pair, circle):
+        return self.constant(w, pair) + 0.0 * circle
+
+    @ti.func
+    def elastic(self, w, pair, radius, overlap, circle):
+        return self.constant(w, pair) * overlap

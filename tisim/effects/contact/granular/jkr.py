@@ -1,0 +1,87 @@
+"""The normal force of soft adhesive spheres."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.materials import Touching
+from tisim.effects.contact.granular.parts import NormalForce
+from tisim.numerics import elementary
+
+
+class JKR(NormalForce):
+    """Soft adhesive spheres press and pull each other as Johnson, Kendall and Roberts found.
+
+        delta = a^2/R* - 2 sqrt(pi gamma a / E*)
+        F_n = 4 E* a^3 / (3 R*) - 4 sqrt(pi gamma E* a^3),    S_n = 2 E* a
+
+    gamma is the surface energy, half the work of adhesion. Contact begins at delta = 0, with F_n = -8/9 F_c;
+    the largest pull is F_c = 3 pi gamma R*. It lasts to delta = -3/2 (pi gamma / E*)^(2/3) (R*/2)^(1/3),
+    where the equation ends, at F_n = -5/9 F_c. LAMMPS ends it where the pull is largest. Coulomb's limit is
+    taken of |F_n + 2 F_c|.
+
+    Source: K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; C. Thornton and
+    Z. Ning, Powder Technol. 99 (1998) 154; J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.
+    """
+
+    uses: ClassVar = ("young", "poisson", "surface_energy")
+    restitution_factor: ClassVar[float] = math.sqrt(5 / 6)
+    adhesive: ClassVar[bool] = True
+    beyond_contact: ClassVar[bool] = True
+    memory: ClassVar[int] = 1
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        young, energy = pair.effective_young, pair.mixed("surface_energy")
+        ratio = math.pi * energy / young
+        return {
+            "modulus": 2 * young,
+            "bond": 2 * math.sqrt(ratio),
+            "most": 3 * math.pi * energy,
+            "stretch": 1.5 * (ratio * ratio / 2) ** (1 / 3),
+        }
+
+    @ti.func
+    def circle(self, w, pair, radius, overlap):
+        """Return a = x^2, with x the largest root of x^4 = c x + d, c = R* bond and d = R* delta: by the
+        resolvent cubic of Ferrari, in a unit of length in which neither c nor d is above 1."""
+        d, line = radius * overlap, elementary.pow(radius * self.bond(w, pair), 1.0 / 3.0)
+        unit = ti.max(line + ti.sqrt(ti.sqrt(ti.abs(d))), SMALLEST)
+        share = line / unit
+        c, third = share * share * share, d / (unit * unit * unit * unit) / 3.0
+        q = c * c / 16.0
+        first = elementary.pow(q + ti.sqrt(ti.max(q * q + third * third * third, 0.0)), 1.0 / 3.0)
+        second = third / first
+        square = first * first + third + second * second
+        width = ti.sqrt(square)
+        x = 0.25 * c / width + 0.5 * ti.sqrt(ti.max(4.0 * width - 0.25 * c * c / square, 0.0))
+        return (unit * x) * (unit * x)
+
+    @ti.func
+    def stiffness(self, w, pair, circle):
+        return self.modulus(w, pair) * circle
+
+    @ti.func
+    def elastic(self, w, pair, radius, overlap, circle):
+        pressed = 2.0 / 3.0 * circle * circle * circle / radius
+        return self.modulus(w, pair) * (pressed - self.bond(w, pair) * circle * ti.sqrt(circle))
+
+    @ti.func
+    def pull_off(self, w, pair, radius):
+        return self.most(w, pair) * radius
+
+    @ti.func
+    def separation_gap(self, w, pair, radius):
+        return self.stretch(w, pair) * elementary.pow(radius, 1.0 / 3.0)
+
+    @ti.func
+    def reach(self, w, radius):
+        stretch = self.stretch(w, 0)
+        for pair in ti.static(range(1, self.number_of_materials**2)):
+            stretch = ti.max(stretch, self.stretch(w, pair))
+        return stretch * elementary.pow(radius, 1.0 / 3.0)
+
+
+SMALLEST = 1e-30
+"""Roots of lengths are not below this, m^(1/2)."""

@@ -1,0 +1,150 @@
+"""The contracts of the parts of a granular contact law: what each sees of a contact, and what it gives.
+
+In all of them ``pair`` says which materials touch (see tisim/components/material_law.py), ``radius`` is R*
+and ``mass`` m*; 1/R* = 1/R_i + 1/R_j and 1/m* = 1/m_i + 1/m_j. ``limit`` is the normal force (N) that
+Coulomb's limit is taken of. A part that remembers something says how many values, in ``memory``; they are 0
+when a contact begins.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.material_law import MaterialLaw
+
+
+class NormalForce(MaterialLaw):
+    """A normal force pushes grains apart along the line of centres, as far as it is elastic.
+
+    restitution_factor : by this a damping c sqrt(S m*) differs from that of a linear spring, S = k, where
+    both are to give an impact the same restitution. adhesive : whether it pulls too. beyond_contact : whether
+    it holds on to what parts; it then remembers that there is a contact, ``memory``.
+    """
+
+    contract: ClassVar[bool] = True
+    restitution_factor: ClassVar[float] = 1.0
+    adhesive: ClassVar[bool] = False
+    beyond_contact: ClassVar[bool] = False
+    memory: ClassVar[int] = 0
+
+    @ti.func
+    def circle(self, w, pair, radius, overlap):
+        """Return the radius a (m) of the circle of contact."""
+        return ti.sqrt(radius * overlap)
+
+    @ti.func
+    def stiffness(self, w, pair, circle):
+        """Return the stiffness S_n (N/m), how the force grows with the overlap."""
+        return 0.0 * circle
+
+    @ti.func
+    def elastic(self, w, pair, radius, overlap, circle):
+        """Return the elastic force (N), positive where it pushes."""
+        return 0.0 * circle
+
+    @ti.func
+    def pull_off(self, w, pair, radius):
+        """Return the force (N) that it takes to part the two, where the law is adhesive."""
+        return 0.0 * radius
+
+    @ti.func
+    def separation_gap(self, w, pair, radius):
+        """Return the gap (m) up to which a contact that has begun lasts."""
+        return 0.0 * radius
+
+    @ti.func
+    def reach(self, w, radius):
+        """Return the widest of these gaps (m), of whatever materials, at this R*."""
+        return 0.0 * radius
+
+
+class Damping(MaterialLaw):
+    """Damping takes energy from the relative motion of two that touch."""
+
+    contract: ClassVar[bool] = True
+
+    @ti.func
+    def coefficient(self, w, pair, stiffness, mass, factor):
+        """Return the coefficient (N s/m) of a dashpot beside a spring of some stiffness (N/m), ``factor``
+        being the ``restitution_factor`` of the normal force."""
+        return 0.0 * stiffness
+
+
+class TangentialForce(MaterialLaw):
+    """A tangential force holds back surfaces that slide past each other, up to Coulomb's limit."""
+
+    contract: ClassVar[bool] = True
+    memory: ClassVar[int] = 0
+
+    @ti.func
+    def force(self, w, pair, normal, stiffness, damping, limit, sliding, past, dt):
+        """Return the force (N) on i, in the plane of contact, and what is remembered.
+
+        stiffness, damping : S_n (N/m) and gamma_n (N s/m) of the normal force. sliding : velocity (m/s) of
+        the surface of j past that of i.
+        """
+        return 0.0 * normal, past
+
+    @ti.func
+    def spring(self, w, pair, stiffness):
+        """Return the tangential stiffness S_t (N/m)."""
+        return 0.0 * stiffness
+
+    @ti.func
+    def dashpot(self, w, pair, damping):
+        """Return the tangential damping (N s/m)."""
+        return 0.0 * damping
+
+    @ti.func
+    def coulomb(self, w, pair):
+        """Return the coefficient of friction."""
+        return 0.0
+
+
+class RollingResistance(MaterialLaw):
+    """Rolling resistance holds back two that roll on each other, by a couple about an axis in the plane of
+    contact."""
+
+    contract: ClassVar[bool] = True
+    memory: ClassVar[int] = 0
+
+    @ti.func
+    def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
+        """Return the force (N) whose moment about an arm of R* n is the couple on i, and what is remembered.
+
+        stiffness : S_n (N/m). rolling : R* Omega x n (m/s), Omega the spin of j relative to i.
+        """
+        return 0.0 * normal, past
+
+
+class TwistingResistance(MaterialLaw):
+    """Twisting resistance holds back two that twist on each other, by a couple about their normal."""
+
+    contract: ClassVar[bool] = True
+    memory: ClassVar[int] = 0
+    needs_tangential: ClassVar[bool] = False
+
+    @ti.func
+    def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
+        """Return the couple (N m) on i about the normal, and what is remembered.
+
+        circle : radius a (m) of the contact. spring, dashpot, friction : S_t (N/m), damping (N s/m) and mu of
+        the tangential force. twisting : spin (rad/s) of j relative to i about the normal.
+        """
+        return 0.0 * twisting, past
+
+
+class Cohesion(MaterialLaw):
+    """Cohesion pulls two that touch towards each other.
+
+    adhesive : whether Coulomb's limit knows of it, as of the force that parts the two.
+    """
+
+    contract: ClassVar[bool] = True
+    adhesive: ClassVar[bool] = False
+
+    @ti.func
+    def pull(self, w, pair, radius, overlap):
+        """Return the force (N, >= 0) by which the two are pulled together."""
+        return 0.0 * overlap

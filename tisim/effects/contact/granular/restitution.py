@@ -1,0 +1,33 @@
+"""Damping by a coefficient of restitution."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.materials import Touching
+from tisim.effects.contact.granular.parts import Damping
+
+
+class RestitutionDamping(Damping):
+    """Damping that gives an impact along the line of centres its coefficient of restitution, at any speed.
+
+        gamma = c sqrt(S m*),    c = -2 f ln e / sqrt(ln^2 e + pi^2)
+
+    f is 1 beside Hooke's spring and sqrt(5/6) beside Hertz's. The normal force pulls a little before surfaces
+    part.
+
+    Source: Y. Tsuji, T. Tanaka and T. Ishida, Powder Technol. 71 (1992) 239, who fit c; D. Antypov and J. A.
+    Elliott, EPL 94 (2011) 50004, who found it.
+    """
+
+    uses: ClassVar = ("restitution",)
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        logarithm = math.log(pair.mixed("restitution"))
+        return {"loss": -2 * logarithm / math.hypot(logarithm, math.pi)}
+
+    @ti.func
+    def coefficient(self, w, pair, stiffness, mass, factor):
+        return factor * self.loss(w, pair) * ti.sqrt(stiffness * mass)

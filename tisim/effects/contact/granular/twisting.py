@@ -1,0 +1,70 @@
+"""Resistance to twisting about the line of centres, by springs with memory."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.materials import Touching
+from tisim.effects.contact.granular.parts import TwistingResistance
+from tisim.effects.contact.granular.spring import eased
+
+
+@ti.func
+def _slipping(elastic, drag, limit):
+    """Return the sum of an elastic couple and a drag, cut to a limit, and what elastic couple that leaves."""
+    couple = ti.max(-limit, ti.min(limit, elastic + drag))
+    return couple, ti.select(couple == elastic + drag, elastic, couple - drag)
+
+
+class TwistingMarshall(TwistingResistance):
+    """Two that twist on each other are held back by the springs and the friction of their circle of contact.
+
+        M = T + gamma_t a^2/2 Omega,    dT/dt = S_t a^2/2 Omega,    |M| <= 2/3 a mu N
+
+    S_t, gamma_t and mu are those of the tangential force, a is the radius of the circle, and Omega the
+    relative spin about the normal. T falls as its stiffness does while it is eased; ``twisting marshall`` of
+    LAMMPS remembers the angle.
+
+    Source: J. S. Marshall, J. Comput. Phys. 228 (2009) 1541.
+    """
+
+    memory: ClassVar[int] = 2
+    needs_tangential: ClassVar[bool] = True
+
+    @ti.func
+    def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
+        area = 0.5 * circle * circle
+        stiffness = spring * area
+        elastic = eased(stiffness, past[1]) * past[0] + stiffness * dt * twisting
+        most = 2.0 / 3.0 * circle * friction * limit
+        couple, known = _slipping(elastic, dashpot * area * twisting, most)
+        return couple, ti.Vector([known, stiffness])
+
+
+class TwistingSDS(TwistingResistance):
+    """A spring, a dashpot and a slider hold back two that twist on each other, with constants of their own.
+
+        M = k_t xi + gamma_t Omega,    dxi/dt = Omega,    |M| <= mu_t N
+
+    Omega is the relative spin about the normal; mu_t is a length. It is ``twisting sds`` of LAMMPS.
+
+    Source: S. Luding, Granul. Matter 10 (2008) 235.
+    """
+
+    memory: ClassVar[int] = 1
+    uses: ClassVar = ("twisting_friction", "twisting_stiffness", "twisting_damping")
+
+    def mix(self, pair: Touching) -> dict[str, float]:
+        return {
+            "arm": pair.mixed("twisting_friction"),
+            "constant": pair.mixed("twisting_stiffness"),
+            "drag": pair.mixed("twisting_damping"),
+        }
+
+    @ti.func
+    def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
+        stiffness = self.constant(w, pair)
+        elastic = stiffness * (past[0] + dt * twisting)
+        couple, known = _slipping(elastic, self.drag(w, pair) * twisting, self.arm(w, pair) * limit)
+        return couple, ti.Vector([known / stiffness])
