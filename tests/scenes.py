@@ -53,7 +53,7 @@ def scene(
     position, velocity, effects=(), radius=RADIUS, density=DENSITY, mass=None, dt=1e-9, steps=1, **more
 ):
     """Grains given one by one, for a number of equal steps."""
-    quantities = more.pop("quantities", {})
+    quantities, material = more.pop("quantities", {}), more.pop("material", None)
     return Scene(
         particles=Particles(
             position=np.asarray(position, float),
@@ -61,6 +61,7 @@ def scene(
             radius=radius,
             density=None if mass is not None else density,
             mass=mass,
+            material=material,
             quantities=quantities,
         ),
         effects=effects,

@@ -29,6 +29,7 @@ from .base import (
     parameter as parameter,
 )
 from .contact.bond import ContactBond as ContactBond
+from .contact.capillary_bridge import CapillaryBridge as CapillaryBridge
 from .contact.dissipation import ContactDissipation as ContactDissipation
 from .contact.friction import ContactFriction as ContactFriction
 from .contact.granular.cohesion import DMT as DMT
@@ -92,6 +93,7 @@ from .contact.granular.viscoelastic import ViscoelasticDamping as ViscoelasticDa
 from .contact.granular.viscous import ViscousFriction as ViscousFriction
 from .contact.hertz import Hertz as Hertz
 from .contact.normal import NormalContact as NormalContact
+from .contact.parallel_bond import ParallelBond as ParallelBond
 from .contact.power_law import Contact as Contact
 from .contact.power_law import ContactLaw as ContactLaw
 from .contact.softening import ContactSoftening as ContactSoftening

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.effects.contact.granular_twin import Grains, TwinLaw
+from tests.effects.contact.granular_twin import Grains, law_of
 from tests.scenes import scene, simulate
 from tisim import Material
 from tisim.effects import Granular, Gravity, HertzMaterial, MindlinForce, RestitutionDamping, Walls
@@ -24,10 +24,10 @@ def cell(side):
     return low + [((side,) * 3, tuple(-axis)) for axis in np.eye(3)]
 
 
-def effects(planes=(AWAY,), gravity=(0.0, 0.0, 0.0)):
-    """Hertz and Mindlin, walls, and gravity."""
+def effects(planes=(AWAY,), gravity=(0.0, 0.0, 0.0), law=HERTZ_MINDLIN):
+    """A law, that of Hertz and Mindlin unless another is given, walls, and gravity."""
     walls = tuple(Plane(point=point, normal=normal) for point, normal in planes)
-    return HERTZ_MINDLIN, Walls(planes=walls), Gravity(acceleration=gravity)
+    return law, Walls(planes=walls), Gravity(acceleration=gravity)
 
 
 def grains(position, velocity, spin=None, planes=(AWAY,), gravity=(0.0, 0.0, 0.0), law=None, **more):
@@ -67,11 +67,13 @@ def heap(rng, n=40, side=1.6, dt=2e-4, steps=300, **law):
 
 def twin(made):
     """The same in NumPy, at its start."""
-    start = made.particles.arrays(made.domain, made.seed)
-    law, (_, walls, gravity) = made.materials["grain"], made.effects[:3]
+    start = made.start()
+    planes = [plane for one in made.effects if isinstance(one, Walls) for plane in one.planes]
+    (acceleration,) = [one.acceleration for one in made.effects if isinstance(one, Gravity)]
     return Grains(
-        TwinLaw(law.young, law.poisson, law.restitution, law.friction),
+        law_of(made),
         *(start[name] for name in ("position", "velocity", "spin", "radius", "mass")),
-        planes=[(plane.point, plane.normal) for plane in walls.planes],
-        acceleration=gravity.acceleration,
+        planes=[(plane.point, plane.normal) for plane in planes],
+        acceleration=acceleration,
+        material=start.get("material"),
     )

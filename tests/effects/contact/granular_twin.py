@@ -1,75 +1,269 @@
-"""Grains under Hertz and Mindlin in NumPy: every contact at once, velocity Verlet with half kicks."""
+"""Grains under a composed contact law in NumPy: every contact at once, velocity Verlet with half kicks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+
+from tisim.effects import Granular
+
+ATTACHED, SLIP, ROLL, TWIST, SLOTS = 0, slice(1, 5), slice(5, 9), slice(9, 11), 11
+"""What the twin has a contact remember: whether it has begun, and of each part a value and its stiffness."""
+SERIES = ("stiffness", "rolling_stiffness", "twisting_stiffness")
 
 
 @dataclass
 class TwinLaw:
-    """A material, young in Pa.
+    """A composition by the names of its parts, its materials, and what is given of pairs of these.
 
     levers : "contact" has spins move surfaces that are R - delta / 2 from the centres, where forces act;
     "radius" does as LAMMPS: spins move surfaces at R, where walls act too, and a contact that begins has no
     tangential force if its damping alone is beyond Coulomb's limit.
     """
 
-    young: float
-    poisson: float
-    restitution: float
-    friction: float
+    materials: tuple[dict[str, float], ...]
+    pairs: dict[tuple[int, int], dict[str, float]] = field(default_factory=dict)
+    normal: str = "hertz_material"
+    damping: str | None = "restitution_damping"
+    tangential: str | None = "mindlin_force"
+    rolling: str | None = None
+    twisting: str | None = None
+    cohesion: str | None = None
+    options: dict[str, float] = field(default_factory=dict)
     levers: str = "contact"
 
-    def contact(self, normal, overlap, radius, mass, slip, past, dt):
-        """Force on each of some contacts, and the elastic part of its tangential one; ``past`` is that of
-        before, (n, 3), with sqrt(R* delta) of then, (n, 1)."""
-        e, nu, log = self.young, self.poisson, np.log(self.restitution)
-        e_star, g_star = e / (2 * (1 - nu**2)), e / (4 * (2 - nu) * (1 + nu))
-        loss = -2 * np.sqrt(5 / 6) * log / np.sqrt(log**2 + np.pi**2)
-        elastic, was = past[:, :3], past[:, 3]
-        circle = np.sqrt(radius * overlap)
-        stiff, shear = 2 * e_star * circle, 8 * g_star * circle
-        opening = (slip * normal).sum(axis=1)
-        across = slip - opening[:, None] * normal
-        press = 4 / 3 * e_star * circle * overlap - loss * np.sqrt(stiff * mass) * opening
-        drag = (loss * np.sqrt(shear * mass))[:, None] * across
+    def of(self, name, which):
+        """A property of each of some pairs of materials, (n, 2)."""
+        values = []
+        for i, j in which:
+            a, b = self.materials[i].get(name), self.materials[j].get(name)
+            given = self.pairs.get((i, j), self.pairs.get((j, i), {})).get(name)
+            mixed = (
+                None if a is None or b is None else 2 / (1 / a + 1 / b) if name in SERIES else (a * b) ** 0.5
+            )
+            values.append(mixed if given is None else given)
+        return np.array(values, float)
 
-        eased = circle < was
-        elastic = np.where(eased[:, None], elastic * (circle / np.where(eased, was, 1))[:, None], elastic)
-        flat = elastic - (elastic * normal).sum(axis=1, keepdims=True) * normal
-        size, left = np.linalg.norm(elastic, axis=1), np.linalg.norm(flat, axis=1)
-        elastic = flat * np.where(left > 0, size / np.where(left > 0, left, 1), 0)[:, None]
-        elastic = elastic + shear[:, None] * dt * across
-        grip, limit = elastic + drag, self.friction * np.abs(press)
-        size = np.linalg.norm(grip, axis=1)
-        self.slides = size > limit
-        if self.levers == "radius":
-            bare = (elastic == 0).all(axis=1)
-            limit = np.where(bare, 0, limit)
-        held = np.where(self.slides, limit / np.where(size > 0, size, 1), 1)[:, None] * grip
-        kept = ~self.slides | bare if self.levers == "radius" else ~self.slides
-        elastic = np.where(kept[:, None], elastic, held - drag)
-        self.stored = 8 / 15 * e_star * circle * overlap**2 + (elastic**2).sum(axis=1) / (2 * shear + 1e-300)
-        return held - press[:, None] * normal, np.column_stack([elastic, circle])
+    def moduli(self, which):
+        """E* and G*."""
+        e, nu = (np.array([[m[k] for m in self.materials]])[0][which] for k in ("young", "poisson"))
+        return 1 / ((1 - nu**2) / e).sum(axis=1), 1 / (2 * (2 - nu) * (1 + nu) / e).sum(axis=1)
+
+    def gap(self, which, radius):
+        """How far surfaces may part before a contact that has begun ends, m."""
+        if self.normal != "jkr":
+            return np.zeros(len(radius))
+        ratio = np.pi * self.of("surface_energy", which) / self.moduli(which)[0]
+        return 1.5 * ratio ** (2 / 3) * (radius / 2) ** (1 / 3)
+
+    def press(self, which, overlap, radius):
+        """Radius of the circle, S_n, elastic force, F_c, and the energy that is stored."""
+        circle = np.sqrt(radius * np.maximum(overlap, 0))
+        if self.normal == "hooke":
+            k = self.of("stiffness", which)
+            return circle, k, k * overlap, 0 * k, k * overlap**2 / 2
+        e_star, _ = self.moduli(which)
+        if self.normal == "hertz_material":
+            stored = 8 / 15 * e_star * circle * overlap**2
+            return circle, 2 * e_star * circle, 4 / 3 * e_star * circle * overlap, 0 * circle, stored
+        energy = self.of("surface_energy", which)
+        line, circle = 2 * radius * np.sqrt(np.pi * energy / e_star), np.zeros(len(radius))
+        for k in range(len(radius)):
+            roots = np.roots([1, 0, 0, -line[k], -radius[k] * overlap[k]])
+            circle[k] = roots.real[np.abs(roots.imag) < 1e-6 * np.abs(roots)].max() ** 2
+        force = 4 * e_star * circle**3 / (3 * radius) - 4 * np.sqrt(np.pi * energy * e_star * circle**3)
+        return circle, 2 * e_star * circle, force, 3 * np.pi * energy * radius, np.nan * force
+
+    def loss(self, which, stiffness, mass):
+        """gamma_n."""
+        if self.damping is None:
+            return 0 * mass
+        if self.damping == "constant_damping":
+            return self.of("damping", which)
+        if self.damping == "viscoelastic_damping":
+            return self.of("viscous_time", which) * stiffness
+        log = np.log(self.of("restitution", which))
+        shape = 1.0 if self.normal == "hooke" else np.sqrt(5 / 6)
+        return -2 * shape * log / np.sqrt(np.pi**2 + log**2) * np.sqrt(stiffness * mass)
+
+    def pull(self, which, radius, overlap):
+        """Cohesion."""
+        if self.cohesion == "sjkr":
+            return self.of("cohesion_energy_density", which) * 2 * np.pi * radius * overlap
+        return 4 * np.pi * self.of("surface_energy", which) * radius if self.cohesion == "dmt" else 0 * radius
+
+    def contact(self, which, normal, overlap, radius, mass, slip, spinning, past, dt):
+        """Force and couple on each of some contacts, and what they remember then; ``which`` materials touch,
+        (n, 2)."""
+        known = np.zeros_like(past)
+        known[:, ATTACHED] = 1
+        circle, stiffness, elastic, parting, self.stored = self.press(which, overlap, radius)
+        damping = self.loss(which, stiffness, mass)
+        opening = (slip * normal).sum(axis=1)
+        pull = self.pull(which, radius, overlap)
+        press = elastic - damping * opening
+        limit = np.abs(press)
+        if self.normal == "jkr":
+            limit = np.abs(elastic + 2 * parting)
+        if self.cohesion == "dmt":
+            limit = np.abs(elastic - pull + 2 * pull)
+        force, couple = -(press - pull)[:, None] * normal, np.zeros_like(normal)
+        spring, drag, friction = self.tangential_constants(which, stiffness, damping)
+        if self.tangential:
+            across, form = slip - opening[:, None] * normal, "force"
+            if self.tangential in ("mindlin_displacement", "linear_spring"):
+                form = "displacement"
+            grip, known[:, SLIP], self.slides = spring_and_slider(
+                past[:, SLIP], normal, across, spring, drag, friction * limit, dt, form, self.levers
+            )
+            force = force + grip
+            if self.tangential == "viscous_friction":
+                known[:, SLIP] = 0
+            with np.errstate(divide="ignore", invalid="ignore"):
+                size = (known[:, 1:4] ** 2).sum(axis=1)
+                own = size / (2 * spring) if form == "force" else spring * size / 2
+            self.stored = self.stored + np.where(spring > 0, own, 0)
+        if self.rolling:
+            rolling = radius[:, None] * np.cross(spinning, normal)
+            roll, known[:, ROLL] = self.rolled(
+                which, normal, stiffness, mass, limit, rolling, past[:, ROLL], dt
+            )
+            couple = couple + radius[:, None] * np.cross(normal, roll)
+        if self.twisting:
+            twist = self.twisted(
+                which,
+                circle,
+                spring,
+                drag,
+                friction,
+                limit,
+                (spinning * normal).sum(axis=1),
+                past[:, TWIST],
+                dt,
+            )
+            couple, known[:, TWIST] = couple + twist[0][:, None] * normal, twist[1]
+        return force, couple, known
+
+    def tangential_constants(self, which, stiffness, damping):
+        """S_t, gamma_t and mu."""
+        zero = 0 * stiffness
+        if self.tangential is None:
+            return zero, zero, zero
+        friction = self.of("friction", which)
+        if self.tangential == "viscous_friction":
+            return zero, self.options.get("damping_ratio", 1.0) * damping, friction
+        if self.tangential == "linear_spring":
+            ratio = self.options.get("stiffness_ratio", 2 / 7)
+        else:
+            e_star, g_star = self.moduli(which)
+            ratio = 4 * g_star / e_star
+        return ratio * stiffness, np.sqrt(ratio) * damping, friction
+
+    def rolled(self, which, normal, stiffness, mass, limit, rolling, past, dt):
+        """The force of which R* n x it is the couple of rolling, and what is remembered."""
+        most = self.of("rolling_friction", which) * limit
+        if self.rolling == "rolling_cdt":
+            speed = np.linalg.norm(rolling, axis=1)
+            return (most / np.where(speed > 0, speed, np.inf))[:, None] * rolling, 0 * past
+        if self.rolling == "rolling_sds":
+            spring, form = self.of("rolling_stiffness", which), "displacement"
+            drag = self.of("rolling_damping", which)
+        else:
+            spring, form = 2.25 * self.of("rolling_friction", which) ** 2 * stiffness, "force"
+            drag = 2 * self.options.get("rolling_damping_ratio", 0.3) * np.sqrt(spring * mass)
+        return spring_and_slider(past, normal, rolling, spring, drag, most, dt, form)[:2]
+
+    def twisted(self, which, circle, spring, drag, friction, limit, twisting, past, dt):
+        """The couple of twisting, and what is remembered."""
+        if self.twisting == "twisting_sds":
+            stiffness, arm = self.of("twisting_stiffness", which), self.of("twisting_friction", which)
+            damping, elastic = self.of("twisting_damping", which), past[:, 0]
+        else:
+            stiffness, damping, arm = spring * circle**2 / 2, drag * circle**2 / 2, 2 / 3 * circle * friction
+            was = past[:, 1]
+            share = np.where(stiffness < was, stiffness / np.where(was > 0, was, 1), 1)
+            elastic = np.where(was > 0, share, 1) * past[:, 0]
+        elastic = elastic + stiffness * dt * twisting
+        total, most = elastic + damping * twisting, arm * limit
+        held = np.clip(total, -most, most)
+        elastic = np.where(held == total, elastic, held - damping * twisting)
+        return held, np.column_stack([elastic, stiffness])
+
+
+def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, levers="contact"):
+    """Force of a spring, a dashpot and a slider; what they remember: force or displacement, and stiffness."""
+    held, was = past[:, :3], past[:, 3]
+    if form == "force":
+        eased = (spring < was) & (was > 0)
+        held = held * np.where(eased, spring / np.where(was > 0, was, 1), 1)[:, None]
+    flat = held - (held * normal).sum(axis=1, keepdims=True) * normal
+    size, left = np.linalg.norm(held, axis=1), np.linalg.norm(flat, axis=1)
+    held = flat * np.where(left > 0, size / np.where(left > 0, left, 1), 0)[:, None]
+    held = held + (dt * velocity if form == "displacement" else (spring * dt)[:, None] * velocity)
+    elastic = held if form == "force" else spring[:, None] * held
+    damped = drag[:, None] * velocity
+    total = elastic + damped
+    size = np.linalg.norm(total, axis=1)
+    slides = size > most
+    bare = (elastic == 0).all(axis=1) & (levers == "radius")
+    limit = np.where(bare, 0, most)
+    total = np.where(slides, limit / np.where(size > 0, size, 1), 1)[:, None] * total
+    left = total - damped
+    if form == "displacement":
+        left = left / np.where(spring > 0, spring, np.inf)[:, None]
+    held = np.where((slides & ~bare)[:, None], left, held)
+    return total, np.column_stack([held, spring]), slides
+
+
+def law_of(scene, levers="contact"):
+    """The law of a scene."""
+    (law,) = (effect for effect in scene.effects if isinstance(effect, Granular))
+    names, parts = list(scene.materials), law.members()
+    given = {
+        tuple(names.index(one) for one in name.split("-")): pair.model_dump(exclude_none=True)
+        for name, pair in scene.material_pairs.items()
+    }
+    options = {
+        "stiffness_ratio": getattr(law.tangential, "stiffness_ratio", None),
+        "damping_ratio": getattr(law.tangential, "damping_ratio", None),
+        "rolling_damping_ratio": getattr(law.rolling, "damping_ratio", None),
+    }
+    kinds = {
+        name: parts[name].kind() if name in parts else None
+        for name in ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
+    }
+    materials = tuple(material.model_dump(exclude_none=True) for material in scene.materials.values())
+    return TwinLaw(materials, given, **kinds, options=options, levers=levers)
+
+
+def hertz_mindlin(young, poisson, restitution, friction, levers="contact"):
+    """The law of Hertz and Mindlin between grains of one material; young in Pa."""
+    material = {"young": young, "poisson": poisson, "restitution": restitution, "friction": friction}
+    return TwinLaw((material,), levers=levers)
 
 
 class Grains:
-    """Spheres and planes (point, normal), under one material and a constant acceleration.
+    """Spheres and planes (point, normal), under one law and a constant acceleration.
 
-    Between loads ``past`` and ``held`` keep what contacts remember, of pairs i < j and of grains at planes.
-    ``sliding`` and ``sticking`` count contacts of all loads so far. ``virial`` is the sum of r F over
-    pairs, J, (3, 3), which presses outwards where it is positive.
+    material : index of that of each; planes are of the first. Between loads ``past`` and ``held`` keep what
+    contacts remember, of pairs i < j and of grains at planes. ``sliding`` and ``sticking`` count contacts of
+    all loads so far. ``virial`` is the sum of r F over pairs, J, (3, 3), which presses outwards where it is
+    positive.
     """
 
-    def __init__(self, material, position, velocity, spin, radius, mass, planes=(), acceleration=(0, 0, 0)):
-        self.material, self.radius, self.mass = material, np.asarray(radius), np.asarray(mass)
+    law: Any
+
+    def __init__(
+        self, law, position, velocity, spin, radius, mass, planes=(), acceleration=(0, 0, 0), material=None
+    ):
+        self.law, self.radius, self.mass = law, np.asarray(radius), np.asarray(mass)
         self.x, self.v, self.w = (np.array(values, float) for values in (position, velocity, spin))
         self.planes = [(np.asarray(p, float), np.asarray(n) / np.linalg.norm(n)) for p, n in planes]
-        self.acceleration = np.asarray(acceleration, float)
-        n = len(self.x)
-        self.past, self.held = np.zeros((n, n, 4)), np.zeros((n, len(self.planes), 4))
+        self.acceleration, n = np.asarray(acceleration, float), len(self.x)
+        self.material = np.zeros(n, int) if material is None else np.asarray(material)
+        self.past, self.held = np.zeros((n, n, SLOTS)), np.zeros((n, len(self.planes), SLOTS))
         self.sliding = self.sticking = 0
         self.load(0.0)
 
@@ -82,52 +276,69 @@ class Grains:
             self._plane(k, *plane, dt)
 
     def _contact(self, *contact):
-        force, known = self.material.contact(*contact)
-        self.sliding += self.material.slides.sum()
-        self.sticking += (~self.material.slides).sum()
-        self.stored += self.material.stored.sum()
-        return force, known
+        force, couple, known = self.law.contact(*contact)
+        if self.law.tangential:
+            self.sliding += self.law.slides.sum()
+            self.sticking += (~self.law.slides).sum()
+        self.stored += self.law.stored.sum()
+        return force, couple, known
 
     def apart(self):
         """From i to j: how far each other is, m, and its velocity, m/s, both (n, n, 3)."""
         return self.x[None] - self.x[:, None], self.v[None] - self.v[:, None]
 
+    def lasting(self, which, overlap, radius, attached):
+        """Which contacts there are."""
+        return (overlap >= 0) | ((attached > 0) & (overlap >= -self.law.gap(which, radius)))
+
     def _pairs(self, dt):
         gap, passing = self.apart()
         distance = np.linalg.norm(gap, axis=2)
-        overlap = self.radius[:, None] + self.radius - distance
-        i, j = np.nonzero(np.triu(overlap >= 0, 1))
-        delta, a, b = overlap[i, j], self.radius[i], self.radius[j]
+        i, j = np.triu_indices(len(self.x), 1)
+        overlap, reduced = (self.radius[:, None] + self.radius - distance)[i, j], self.radius[:, None]
+        reduced = (reduced * self.radius / (reduced + self.radius))[i, j]
+        near = np.nonzero((overlap >= 0) | (self.past[i, j, ATTACHED] > 0))[0]
+        i, j, overlap, reduced = i[near], j[near], overlap[near], reduced[near]
+        lasts = self.lasting(
+            self.material[np.column_stack([i, j])], overlap, reduced, self.past[i, j, ATTACHED]
+        )
+        i, j, delta, reduced = i[lasts], j[lasts], overlap[lasts], reduced[lasts]
+        a, b, which = self.radius[i], self.radius[j], self.material[np.column_stack([i, j])]
         n = gap[i, j] / distance[i, j][:, None]
         arm, other = (a - delta / 2)[:, None], (b - delta / 2)[:, None]
-        if self.material.levers == "contact":
+        if self.law.levers == "contact":
             turn = np.cross(arm * self.w[i] + other * self.w[j], n)
         else:
             turn = np.cross(a[:, None] * self.w[i] + b[:, None] * self.w[j], n)
-        slip = passing[i, j] - turn
+        slip, spinning = passing[i, j] - turn, self.w[j] - self.w[i]
         mass = self.mass[i] * self.mass[j] / (self.mass[i] + self.mass[j])
-        force, known = self._contact(n, delta, a * b / (a + b), mass, slip, self.past[i, j], dt)
+        force, couple, known = self._contact(
+            which, n, delta, reduced, mass, slip, spinning, self.past[i, j], dt
+        )
         self.past[:] = 0
         self.past[i, j] = known
-        couple = np.cross(n, force)
+        moment = np.cross(n, force)
         self.virial = -gap[i, j].T @ force
         np.add.at(self.force, i, force)
         np.add.at(self.force, j, -force)
-        np.add.at(self.torque, i, arm * couple)
-        np.add.at(self.torque, j, other * couple)
+        np.add.at(self.torque, i, arm * moment + couple)
+        np.add.at(self.torque, j, other * moment - couple)
 
     def _plane(self, k, point, normal, dt):
         overlap = self.radius - (self.x - point) @ normal
-        (i,) = np.nonzero(overlap >= 0)
+        which = np.column_stack([self.material, 0 * self.material])
+        (i,) = np.nonzero(self.lasting(which, overlap, self.radius, self.held[:, k, ATTACHED]))
         n, arm = np.broadcast_to(-normal, (len(i), 3)), (self.radius[i] - overlap[i] / 2)[:, None]
-        if self.material.levers == "radius":
+        if self.law.levers == "radius":
             arm = self.radius[i][:, None]
         slip = -self.v[i] - np.cross(arm * self.w[i], n)
-        force, known = self._contact(n, overlap[i], self.radius[i], self.mass[i], slip, self.held[i, k], dt)
+        force, couple, known = self._contact(
+            which[i], n, overlap[i], self.radius[i], self.mass[i], slip, -self.w[i], self.held[i, k], dt
+        )
         self.held[:, k] = 0
         self.held[i, k] = known
         self.force[i] += force
-        self.torque[i] += arm * np.cross(n, force)
+        self.torque[i] += arm * np.cross(n, force) + couple
 
     def run(self, steps, dt):
         """Take some steps of dt (s)."""
@@ -142,7 +353,7 @@ class Grains:
 
     def remove(self, i):
         """Take grain i away; the others go on as they are."""
-        for name in ("x", "v", "w", "radius", "mass", "held"):
+        for name in ("x", "v", "w", "radius", "mass", "held", "material"):
             setattr(self, name, np.delete(getattr(self, name), i, axis=0))
         self.past = np.delete(np.delete(self.past, i, axis=0), i, axis=1)
         # Forces are summed again as velocities now are; no time has gone by that contacts remember.

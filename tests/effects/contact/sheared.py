@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.effects.contact.grains import HERTZ_MINDLIN
-from tests.effects.contact.granular_twin import Grains, TwinLaw
+from tests.effects.contact.granular_twin import Grains, law_of
 from tests.scenes import scene
 from tisim import Material, ShearedBox
 
@@ -47,9 +47,8 @@ class ShearedGrains(Grains):
         start = made.particles.arrays(made.domain, made.seed)
         low, high = made.domain.bounds()
         self.sides, self.rate, self.time, self.lag = high - low, made.domain.rate, 0.0, lag
-        law = made.materials["grain"]
         super().__init__(
-            TwinLaw(law.young, law.poisson, law.restitution, law.friction, levers),
+            law_of(made, levers),
             *(start[name] for name in ("position", "velocity", "spin", "radius", "mass")),
         )
 

@@ -8,7 +8,10 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.components.materials import Touching
 from tisim.effects.contact.granular.parts import NormalForce
-from tisim.numerics import elementary
+from tisim.numerics.roots import cube_root
+
+SMALLEST = 1e-9
+"""Roots of lengths are not below this, m^(1/2): its fourth power is a number of f32."""
 
 
 class JKR(NormalForce):
@@ -46,12 +49,13 @@ class JKR(NormalForce):
     def circle(self, w, pair, radius, overlap):
         """Return a = x^2, with x the largest root of x^4 = c x + d, c = R* bond and d = R* delta: by the
         resolvent cubic of Ferrari, in a unit of length in which neither c nor d is above 1."""
-        d, line = radius * overlap, elementary.pow(radius * self.bond(w, pair), 1.0 / 3.0)
+        d, line = radius * overlap, cube_root(radius * self.bond(w, pair))
         unit = ti.max(line + ti.sqrt(ti.sqrt(ti.abs(d))), SMALLEST)
         share = line / unit
         c, third = share * share * share, d / (unit * unit * unit * unit) / 3.0
         q = c * c / 16.0
-        first = elementary.pow(q + ti.sqrt(ti.max(q * q + third * third * third, 0.0)), 1.0 / 3.0)
+        # Both are 0 where nothing adheres and surfaces just touch.
+        first = ti.max(cube_root(q + ti.sqrt(ti.max(q * q + third * third * third, 0.0))), SMALLEST)
         second = third / first
         square = first * first + third + second * second
         width = ti.sqrt(square)
@@ -73,15 +77,11 @@ class JKR(NormalForce):
 
     @ti.func
     def separation_gap(self, w, pair, radius):
-        return self.stretch(w, pair) * elementary.pow(radius, 1.0 / 3.0)
+        return self.stretch(w, pair) * cube_root(radius)
 
     @ti.func
     def reach(self, w, radius):
         stretch = self.stretch(w, 0)
         for pair in ti.static(range(1, self.number_of_materials**2)):
             stretch = ti.max(stretch, self.stretch(w, pair))
-        return stretch * elementary.pow(radius, 1.0 / 3.0)
-
-
-SMALLEST = 1e-30
-"""Roots of lengths are not below this, m^(1/2)."""
+        return stretch * cube_root(radius)

@@ -14,8 +14,8 @@ class ViscoelasticDamping(Damping):
 
         gamma = A S
 
-    Beside Hertz's force it is that of Kuwabara and Kono, F = 2 A E* a v_n, with 3 A / 2 for the A of
-    Brilliantov and Poeschel; 1 - e grows as the fifth root of the speed. Beside Hooke's it is a dashpot.
+    Beside Hertz's force it is that of Kuwabara and Kono, 2 A E* a v_n, with the A of Brilliantov and
+    Poeschel: 1 - e grows as the fifth root of the speed. Beside Hooke's it is a dashpot.
 
     Source: G. Kuwabara and K. Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; N. V. Brilliantov, F. Spahn, J.-M.
     Hertzsch and T. Poeschel, Phys. Rev. E 53 (1996) 5382.

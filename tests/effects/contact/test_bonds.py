@@ -1,0 +1,185 @@
+"""Liquid bridges and cemented bonds, each against its closed form; one structure of scenes."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from tests.effects.contact.loads import close
+from tests.scenes import by_id, compiled, scene
+from tisim.effects import CapillaryBridge, Lorentz, ParallelBond
+from tisim.sources import ElectricField
+
+WORLDS, CAPACITY = 16, 16
+LIQUID = {"surface_tension": 0.07, "contact_angle": 0.4, "volume": 1e-9}
+CEMENT = {"young": 1e8, "stiffness_ratio": 2.0, "radius_ratio": 0.8, "tensile_strength": 1e6,
+          "shear_strength": 8e5}  # fmt: skip
+R = 0.01
+"""m."""
+HEAVY = 1e9
+"""kg; what is so heavy goes on as it began."""
+RUPTURE = 1.2 * 1e-3
+"""m; (1 + theta / 2) V^(1/3)."""
+X, Y, Z = np.eye(3)
+
+
+def grains(
+    position, velocity, spin=None, charge=0.0, liquid=None, cement=None, field=(0.0, 0.0, 0.0), **more
+):
+    """Grains with a liquid or a cement; without, neither does anything."""
+    n = len(position)
+    effects = (
+        CapillaryBridge(**{**LIQUID, **({"surface_tension": 0.0} if liquid is None else liquid)}),
+        ParallelBond(**{**CEMENT, **({"gap": -R} if cement is None else cement)}),
+        ElectricField(constant=field),
+        Lorentz(),
+    )
+    quantities = {"spin": np.zeros((n, 3)) if spin is None else spin, "charge": np.broadcast_to(charge, n)}
+    return scene(position, velocity, effects, quantities=quantities, **{"radius": R, "mass": 1.0, **more})
+
+
+def simulated(scenes, until=None):
+    simulation = compiled(scenes[0], WORLDS, CAPACITY)
+    simulation.load(scenes)
+    simulation.run(until=until)
+    results = simulation.results()
+    for result in results:
+        assert result.status.ok or result.status.reason == "running", result.status.reason
+    return [by_id(result) for result in results]
+
+
+def bridge(gap, radius=(R, R), **liquid):
+    """Its force, N."""
+    law = {**LIQUID, **liquid}
+    mean = 2 * radius[0] * radius[1] / sum(radius)
+    s = max(gap, 0) * np.sqrt(mean / law["volume"])
+    line = 2 * np.pi * mean * law["surface_tension"] * np.cos(law["contact_angle"])
+    return line / (1 + 1.05 * s + 2.5 * s**2)
+
+
+def test_a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures():
+    """Of heavy grains that part slowly: at each gap the force; none before they have touched."""
+    sizes, gaps, dt = ((R, R), (R, 0.3 * R)), np.array([0.1, 0.5, 0.98, 1.02]) * RUPTURE, 1e-3
+    made = []
+    for a, b in sizes:
+        for start, v in ((-1e-6, 1e-2), (0.5 * RUPTURE, 1e-2)):
+            place = [[0, 0, 0], [a + b + start, 0, 0]]
+            made.append(grains(place, [[0, 0, 0], v * X], liquid={}, radius=(a, b), mass=HEAVY,
+                               dt=dt, duration=1.0))  # fmt: skip
+    for gap in gaps:
+        states = simulated(made, until=gap / 1e-2)
+        for k, radius in enumerate(sizes):
+            wet, dry = states[2 * k], states[2 * k + 1]
+            now = np.diff(wet["position"][:, 0])[0] - sum(radius)
+            expected = bridge(now, radius) if now <= RUPTURE else 0.0
+            np.testing.assert_allclose(wet["force"][0], expected * X, rtol=1e-9)
+            np.testing.assert_array_equal(dry["force"], 0)
+
+
+def test_a_bridge_takes_its_work_from_grains_that_part():
+    """The integral of the force up to the rupture, to first order in the step."""
+    work, mass = quad(bridge, 0, RUPTURE)[0], 1e-3
+    v = 1.5 * (4 * work / mass) ** 0.5
+    made = grains([[0, 0, 0], [2 * R - 1e-12, 0, 0]], [-v / 2 * X, v / 2 * X], liquid={}, mass=mass,
+                  dt=1e-6, duration=4 * RUPTURE / v)  # fmt: skip
+    (state,) = simulated([made])
+    after = np.diff(state["velocity"][:, 0])[0]
+    assert after**2 == pytest.approx(v**2 - 4 * work / mass, rel=1e-3)
+
+
+SIDE = 2 * R
+"""m, of centres that touch."""
+CEMENT_RADIUS = 0.8 * R
+AREA, SECOND = np.pi * CEMENT_RADIUS**2, np.pi * CEMENT_RADIUS**4 / 4
+STIFF, SOFT = 1e8 / SIDE, 1e8 / SIDE / 2
+TIME, STEPS = 1e-3, 100
+
+
+def led(velocity=(0.0, 0.0, 0.0), spins=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), steps=STEPS, **cement):
+    """A scene of two heavy grains that are bonded and led."""
+    return grains([[0, 0, 0], [SIDE, 0, 0]], [[0, 0, 0], velocity], spins, cement={"gap": 1e-6, **cement},
+                  mass=HEAVY, dt=TIME / STEPS, duration=TIME / STEPS * steps)  # fmt: skip
+
+
+def test_a_bond_is_a_disc_of_cement():
+    """Stretched, sheared, bent and twisted a little: k_n A, k_s A, k_n I and k_s J; moments about each centre
+    have the arm of the force."""
+    w = 1e-2
+    made = [led(1e-3 * X), led(1e-3 * Y), led(spins=(-w * Z, w * Z)), led(spins=(-w * X, w * X)),
+            led(spins=(w * Z, w * Z))]  # fmt: skip
+    stretched, sheared, bent, twisted, rolled = simulated(made)
+    close(stretched["force"][0], STIFF * AREA * 1e-3 * TIME * X, 1e-9)
+    close(sheared["force"][0], SOFT * AREA * 1e-3 * TIME * Y, 1e-4)
+    close(sheared["torque"], SIDE / 2 * np.array([Z, Z]) * sheared["force"][0, 1], 1e-4)
+    close(bent["torque"], STIFF * SECOND * 2 * w * TIME * np.array([Z, -Z]), 1e-9)
+    close(twisted["torque"], SOFT * 2 * SECOND * 2 * w * TIME * np.array([X, -X]), 1e-9)
+    close(rolled["force"][0], -SOFT * AREA * SIDE * w * TIME * Y, 1e-9)
+
+
+def test_a_bond_breaks_at_its_strength_and_stays_broken():
+    """In each way by its own stress: it holds at 0.98 of what it can carry, and not at 1.02, nor again."""
+    limits = {
+        "stretch": (lambda v: {"velocity": v * X}, 1e6 / (STIFF * TIME)),
+        "shear": (lambda v: {"velocity": v * Y}, 8e5 / (SOFT * TIME)),
+        "bend": (lambda v: {"spins": (-v * Z, v * Z)}, 1e6 / (2 * STIFF * CEMENT_RADIUS * TIME)),
+        "twist": (lambda v: {"spins": (-v * X, v * X)}, 8e5 / (2 * SOFT * CEMENT_RADIUS * TIME)),
+    }
+    for part, holds in ((0.98, True), (1.02, False)):
+        made = [led(**way(part * most)) for way, most in limits.values()]
+        for name, state in zip(limits, simulated(made), strict=True):
+            load = np.abs(state["force"]).max() + np.abs(state["torque"]).max()
+            assert (load > 0) == holds, name
+            assert (state["parallel_bond_past"] != 0).any() == holds, name
+
+
+def beam(n, load, heavy=True, **cement):
+    """A row of n grains that are bonded to a heavy one, the last of which is pulled aside (N)."""
+    place = SIDE * np.arange(n + 1)[:, None] * X
+    mass = np.full(n + 1, 1e-2)
+    mass[0] = HEAVY
+    charge = np.zeros(n + 1)
+    charge[-1] = 1.0
+    return grains(place, 0 * place, charge=charge, field=(0.0, load, 0.0), mass=mass, dt=1e-6, duration=0.4,
+                  cement={"gap": 1e-6, "damping_ratio": 5.0, **cement})  # fmt: skip
+
+
+def test_a_row_of_bonded_grains_bends_like_a_beam():
+    """P L^3 / (3 E I) of Euler and Bernoulli, less 1 / (4 n^2) of it as it bends between grains
+    alone, and the shear of each bond."""
+    for n, load in ((3, 0.5), (6, 0.25)):
+        (state,) = simulated([beam(n, load)])
+        assert np.abs(state["velocity"]).max() < 1e-4 * np.abs(state["position"][:, 1]).max()
+        bent = load * (n * SIDE) ** 3 / (3 * 1e8 * SECOND)
+        discrete = bent * (1 - 1 / (4 * n**2)) + n * load / (SOFT * AREA)
+        assert state["position"][-1, 1] == pytest.approx(discrete, rel=2e-3)
+        assert discrete == pytest.approx(bent, rel=0.08 if n == 6 else 0.25)
+
+
+def test_a_beam_breaks_at_its_root_by_the_load_of_its_strength():
+    """sigma_c = P l r / I with the arm l from the middle of the first bond; it creeps there, much damped."""
+    n = 4
+    arm = (n - 0.5) * SIDE
+    most = 1e6 * SECOND / (CEMENT_RADIUS * arm)
+    held, broken = ((state["parallel_bond_past"] != 0).any(axis=1).sum()
+                    for state in simulated([beam(n, 0.97 * most), beam(n, 1.03 * most)]))  # fmt: skip
+    assert (held, broken) == (n, n - 1)
+
+
+def test_bonded_grains_turn_as_one():
+    """A dumbbell that spins about an axis of its own, bent and sheared: momentum and angular momentum stay, and
+    energy stays within the error of the step."""
+    place = [[0, 0, 0], [SIDE, 0, 0], [SIDE, SIDE, 0]]
+    velocity = [[0, 0.2, 0.1], [0, -0.2, 0.0], [0.1, 0, 0]]
+    spin = [[30.0, 0, 0], [30.0, 5, 0], [0, 0, -9.0]]
+    made = grains(place, velocity, spin, mass=[1e-2, 1e-2, 2e-2], dt=1e-6, duration=5e-3,
+                  cement={"gap": 1e-6, "tensile_strength": 1e12, "shear_strength": 1e12})  # fmt: skip
+    (state,) = simulated([made])
+    start = made.start()
+
+    def sums(state):
+        momentum = state["mass"][:, None] * state["velocity"]
+        inertia = 0.4 * (state["mass"] * state["radius"] ** 2)[:, None]
+        turning = np.cross(state["position"], momentum) + inertia * state["spin"]
+        return np.concatenate([momentum.sum(axis=0), turning.sum(axis=0)])
+
+    np.testing.assert_allclose(sums(state), sums(start), rtol=0, atol=1e-13)
+    assert np.linalg.norm(np.diff(state["position"], axis=0), axis=1) == pytest.approx(SIDE, rel=1e-2)

@@ -1,0 +1,78 @@
+"""Composed contact laws against the twin in NumPy, of two materials, between grains and at walls."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.compositions import LAWS, TWO, grains, heap
+from tests.effects.contact.grains import run, twin
+from tests.effects.contact.test_granular_impacts import couple_energies
+from tests.scenes import by_id
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_one_step_and_some_hundred_are_those_of_the_twin(name, rng):
+    """Every part of a law acts, remembers, sticks and slides; pairs of materials by their rules, and by a
+    table."""
+    made = [heap(name, rng), heap(name, rng, pairs=True)]
+    for steps in (1, 200):
+        for one, result in zip(made, run(made, steps=steps), strict=True):
+            known, state = twin(one), by_id(result)
+            known.run(steps, 1e-4)
+            for field, values in (("position", known.x), ("velocity", known.v), ("spin", known.w)):
+                np.testing.assert_allclose(
+                    state[field], values, rtol=0, atol=1e-11 * np.abs(values).max(), err_msg=field
+                )
+            assert steps == 1 or min(known.sliding, known.sticking) > 300
+
+
+def couples(name, rng, each=16, **more):
+    """Couples that fly at each other, far apart, a third of them grazing, and spin."""
+    radius, mass = rng.uniform(0.3, 1, (each, 2)), rng.uniform(0.5, 2, (each, 2))
+    grazing = 1 - 10 ** rng.uniform(-6, -2, each)
+    aside = np.where(rng.uniform(size=each) < 0.3, grazing, rng.uniform(0, 1, each))
+    first = 10.0 * np.arange(each)[:, None] * [1.0, 0.0, 0.0]
+    normal = np.stack([0 * aside, aside, np.sqrt(1 - aside**2)], axis=1)
+    second = first + radius.sum(axis=1)[:, None] * normal
+    v, speed = np.zeros((each, 2, 3)), 10 ** rng.uniform(0, 1, each)
+    v[:, 0, 2] = speed
+    place = np.stack([first, second], axis=1).reshape(-1, 3)
+    spin = (rng.normal(size=(each, 2, 3)) * speed[:, None, None]).reshape(-1, 3)
+    soft, hard = TWO[name]
+    return grains(
+        name,
+        place,
+        v.reshape(-1, 3),
+        spin,
+        radius=radius.ravel(),
+        mass=mass.ravel(),
+        first=soft,
+        second=hard,
+        material=np.arange(2 * each) % 2,
+        dt=5e-5,
+        steps=8000,
+        **more,
+    )
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_energy_never_grows_in_impacts_and_momentum_stays(name, rng):
+    """Of grains of two materials that have met and parted; those that adhere have given up more."""
+    met = 0
+    for result in run([couples(name, rng) for _ in range(8)]):
+        start, end = result.start, by_id(result)
+        before, after = couple_energies(start), couple_energies(end)
+        apart = np.linalg.norm(np.diff(end["position"].reshape(-1, 2, 3), axis=1)[:, 0], axis=1)
+        parted = apart > 0.05 + end["radius"].reshape(-1, 2).sum(axis=1)
+        met += ((after != before) & parted).sum()
+        assert (after[parted] <= before[parted] * (1 + 1e-5)).all()
+        for sums in momenta(start), momenta(end):
+            np.testing.assert_allclose(sums, momenta(start), rtol=0, atol=1e-11 * np.abs(sums).max())
+    assert met > 30
+
+
+def momenta(state):
+    """Momentum of each couple, and its angular momentum about the origin."""
+    momentum = state["mass"][:, None] * state["velocity"]
+    inertia = 0.4 * (state["mass"] * state["radius"] ** 2)[:, None]
+    turning = np.cross(state["position"], momentum) + inertia * state["spin"]
+    return np.concatenate([momentum, turning], axis=1).reshape(-1, 2, 6).sum(axis=1)

@@ -1,0 +1,249 @@
+"""What the parts of a contact law say of one contact led along a path, and of one impact, each against
+its closed form."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import gamma
+
+from tests.effects.contact.compositions import NEUTRAL, along, grains, loaded
+from tests.effects.contact.grains import run
+from tests.scenes import by_id
+
+K, YOUNG, POISSON = NEUTRAL["hooke"]["stiffness"], NEUTRAL["jkr"]["young"], NEUTRAL["jkr"]["poisson"]
+E_STAR, G_STAR = YOUNG / (2 * (1 - POISSON**2)), YOUNG / (4 * (2 - POISSON) * (1 + POISSON))
+PRESSED = 0.02
+"""m."""
+X, Y, Z = np.eye(3)
+
+
+def held(n, value=PRESSED):
+    """A path at one overlap."""
+    return np.full(n, value)
+
+
+def at(n, *steps):
+    """A path that does something in its first steps, and nothing then."""
+    path = np.zeros((n, 3))
+    path[: len(steps)] = steps
+    return path
+
+
+def test_hooke_pushes_like_a_spring_and_damping_goes_by_speed():
+    """k delta; of constant damping gamma v, beside Hertz's force."""
+    force, _, _ = along("hooke", np.linspace(0, 0.1, 5))
+    np.testing.assert_allclose(force[:, 0], -K * np.linspace(0, 0.1, 5), rtol=1e-14)
+    force, _, _ = along("dmt", held(1), at(1, 1e-5 * X), damping=30.0)
+    assert force[0, 0] == pytest.approx(-4 / 3 * E_STAR * PRESSED**1.5 + 30.0, rel=1e-14)
+
+
+def impacts(name, speeds, duration, steps, **first):
+    """The restitution of two that meet head-on, at each speed; steps in so many parts of a duration (s)."""
+    made = [
+        grains(
+            name,
+            [[0, 0, 0], [2, 0, 0]],
+            [[v / 2, 0, 0], [-v / 2, 0, 0]],
+            first={key: values[k] for key, values in first.items()},
+            dt=duration(v) / steps,
+            steps=3 * steps,
+        )
+        for k, v in enumerate(speeds)
+    ]
+    found = [by_id(result)["velocity"][:, 0] for result in run(made)]
+    return np.array([after[1] - after[0] for after in found]) / speeds
+
+
+def test_beside_hookes_spring_an_impact_has_the_restitution_too():
+    """From e = 0.01 to 1, to first order in the step."""
+    e = np.array([0.01, 0.1, 0.5, 0.9, 1.0])
+    for steps in (100, 400):
+        found = impacts("hooke", np.ones(5), lambda v: np.pi * (0.5 / K) ** 0.5, steps, restitution=e)
+        np.testing.assert_allclose(found, e, rtol=0, atol=3 / steps)
+
+
+def test_viscoelastic_restitution_falls_as_the_fifth_root_of_the_speed():
+    """1 - C (3/2 A k^(2/5) v^(1/5)) + 3/5 (...)^2, k = 4/3 E* sqrt(R*) / m* (Ramirez and others 1999)."""
+    speeds, lag = np.array([0.01, 0.1, 1.0]), 2e-4
+    stiff = 4 / 3 * E_STAR * 0.5**0.5 / 0.5
+    c = gamma(0.6) * np.pi**0.5 / (2**0.2 * 5**0.4 * gamma(2.1))
+    small = 1.5 * c * lag * stiff**0.4 * speeds**0.2
+    found = impacts("jkr", speeds, lambda v: 3.2 * stiff**-0.4 * v**-0.2, 1000, viscous_time=np.full(3, lag))
+    assert c == pytest.approx(1.15344, abs=1e-5)
+    np.testing.assert_allclose(1 - found, small - 0.6 * small**2, rtol=0.02)
+
+
+def test_a_linear_spring_is_remembered_and_slides():
+    """0.4 k xi, up to mu N, and back from there at once."""
+    moved = np.concatenate([np.tile(1e-3 * Y, (10, 1)), np.tile(-1e-4 * Y, (5, 1))])
+    force, _, _ = along("hooke", held(15), moved, friction=0.2)
+    limit = 0.2 * K * PRESSED
+    drawn = 0.4 * K * 1e-3 * np.arange(1, 11)
+    np.testing.assert_allclose(force[:10, 1], np.minimum(drawn, limit), rtol=1e-13)
+    np.testing.assert_allclose(force[10:, 1], limit - 0.4 * K * 1e-4 * np.arange(1, 6), rtol=1e-12)
+
+
+def test_the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure():
+    """8 G* a xi; pressed at a displacement it holds more."""
+    overlap = np.array([0.01, 0.01, 0.04, 0.0025])
+    force, _, _ = along("jkr", overlap, at(4, 0 * Y, 1e-6 * Y), friction=1e6)
+    np.testing.assert_allclose(force[1:, 1], 8 * G_STAR * np.sqrt(overlap[1:]) * 1e-6, rtol=1e-9)
+
+
+def test_viscous_friction_forgets():
+    """x gamma u up to mu N, and nothing at rest."""
+    moved = np.array([[0, 1e-7, 0], [0, 1, 0], [0, 0, 0]])
+    force, _, _ = along("dmt", held(3), moved, friction=0.3, damping=30.0)
+    expected = [0.7 * 30.0 * 1e-2, 0.3 * 4 / 3 * E_STAR * PRESSED**1.5, 0]
+    np.testing.assert_allclose(force[:, 1], expected, rtol=1e-13)
+
+
+ROLLS = {
+    "hooke": ({"rolling_friction": 0.1, "rolling_stiffness": 5e3}, 5e3, K * PRESSED),
+    "jkr": (
+        {"rolling_friction": 0.1},
+        2.25 * 0.01 * 2 * E_STAR * PRESSED**0.5,
+        4 / 3 * E_STAR * PRESSED**1.5,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ROLLS)
+def test_a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once(name):
+    """k_r R* theta, up to mu_r R* N, at right angles to the normal; about that it does nothing."""
+    first, spring, push = ROLLS[name]
+    limit = 0.1 * push
+    reached = limit / spring
+    turned = np.concatenate(
+        [np.tile(0.1 * reached * Z + 7 * X, (20, 1)), np.tile(-0.01 * reached * Z, (9, 1))]
+    )
+    # Of no damping.
+    mass_drag = 0.0 if name == "hooke" else 2 * 0.2 * spring**0.5 / 1e-5
+    _, couple, _ = along(name, held(29), 0.0, turned, **first)
+    np.testing.assert_array_equal(couple[:, :2], 0)
+    rising = spring * 0.1 * reached * np.arange(1, 21) + mass_drag * 0.1 * reached
+    np.testing.assert_allclose(couple[:20, 2], np.minimum(rising, limit), rtol=1e-9)
+    if name == "hooke":
+        np.testing.assert_allclose(couple[20:, 2], limit * (1 - 0.01 * np.arange(1, 10)), rtol=1e-11)
+
+
+def test_a_constant_torque_holds_back_rolling_at_any_speed():
+    turned = np.array([[0, 0, 1e-9], [0, 0, -1.0], [0, 0, 0], [5, 0, 0], [0, 0.3, 0.4]])
+    _, couple, _ = along("dmt", held(5), 0.0, turned, rolling_friction=0.1)
+    limit = 0.1 * 4 / 3 * E_STAR * PRESSED**1.5
+    expected = limit * np.array([[0, 0, 1], [0, 0, -1], [0, 0, 0], [0, 0, 0], [0, 0.6, 0.8]])
+    np.testing.assert_allclose(couple, expected, rtol=1e-12, atol=1e-12)
+
+
+TWISTS = {
+    "hooke": ({"twisting_friction": 0.05, "twisting_stiffness": 70.0}, 70.0, 0.05 * K * PRESSED),
+    "jkr": (
+        {"friction": 0.3},
+        8 * G_STAR * PRESSED**1.5 / 2,
+        2 / 3 * PRESSED**0.5 * 0.3 * 4 / 3 * E_STAR * PRESSED**1.5,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TWISTS)
+def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(name):
+    first, spring, limit = TWISTS[name]
+    turned = np.concatenate(
+        [np.tile(-0.1 * limit / spring * X, (20, 1)), np.tile(0.01 * limit / spring * X, (9, 1))]
+    )
+    _, couple, _ = along(name, held(29), 0.0, turned, **first)
+    expected = -limit * np.concatenate([np.minimum(0.1 * np.arange(1, 21), 1), 1 - 0.01 * np.arange(1, 10)])
+    np.testing.assert_allclose(couple, expected[:, None] * X, rtol=1e-9, atol=1e-9 * limit)
+
+
+def test_a_contact_that_is_pressed_turned_eased_and_turned_back_yields_no_work():
+    """Rolled and twisted: half of what the spring has lost times the square of the angle is lost."""
+    n, angle = 500, 1e-4
+    still, down = np.zeros(n), np.linspace(PRESSED, 0.005, n)
+    overlap = np.concatenate([still + PRESSED, down, still + 0.005, down[::-1]])
+    ways = np.concatenate([still + angle / n, still, still - angle / n, still])
+    circle = np.sqrt([PRESSED, 0.005])
+    springs = {0: 8 * G_STAR * circle**3 / 2}
+    for axis, stiffness in springs.items():
+        _, couple, _ = along("jkr", overlap, 0.0, ways[:, None] * np.eye(3)[axis], friction=1e6)
+        middle = couple[:, axis] - 0.5 * np.diff(couple[:, axis], prepend=0)
+        lost = 0.5 * (stiffness[0] - stiffness[1]) * angle**2
+        assert (middle * ways).sum() == pytest.approx(lost, rel=1e-3)
+
+
+def test_cohesion_pulls_while_surfaces_touch():
+    """SJKR k_c 2 pi R* delta; DMT 4 pi gamma R*, of which friction at no load holds mu times."""
+    overlap = np.array([-1e-9, 0.0, PRESSED])
+    force, _, lasts = along("hooke", overlap, cohesion_energy_density=4e3)
+    np.testing.assert_allclose(force[:, 0], (8e3 * np.pi - K) * np.maximum(overlap, 0), rtol=1e-14)
+    force, _, lasts = along("dmt", overlap, surface_energy=5.0)
+    np.testing.assert_array_equal(lasts, [0, 1, 1])
+    hertz = 4 / 3 * E_STAR * PRESSED**1.5
+    np.testing.assert_allclose(force[:, 0], [0, 20 * np.pi, 20 * np.pi - hertz], rtol=1e-13)
+    force, _, _ = along("dmt", held(1, 0.0), at(1, 0.1 * Y), surface_energy=5.0, friction=0.3, damping=1e3)
+    assert force[0, 1] == pytest.approx(0.3 * 20 * np.pi, rel=1e-13)
+
+
+GAMMA = 20.0
+"""J/m^2; of soft grains that adhere much."""
+PARTS = 3 * np.pi * GAMMA
+"""N; the force that parts them, of R* = 1 m."""
+STRETCH = 1.5 * (np.pi * GAMMA / E_STAR) ** (2 / 3) * 0.5 ** (1 / 3)
+"""m; how far they stretch."""
+
+
+def jkr_force(overlap):
+    """The stable force (N) of R* = 1 m, by bisection of a in delta(a)."""
+    low, high = (np.pi * GAMMA / (4 * E_STAR)) ** (1 / 3), 10.0
+    for _ in range(200):
+        a = 0.5 * (low + high)
+        high, low = (a, low) if a**2 - 2 * np.sqrt(np.pi * GAMMA * a / E_STAR) > overlap else (high, a)
+    return 4 * E_STAR * a**3 / 3 - 4 * np.sqrt(np.pi * GAMMA * E_STAR * a**3)
+
+
+def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most():
+    """-8/9 of that at the first touch and -5/9 where it ends; dry before."""
+    ways = np.concatenate([[-0.1 * STRETCH, 0.0, 0.03], np.linspace(0.03, -0.999999 * STRETCH, 300)])
+    force, _, lasts = along("jkr", [*ways, -1.000001 * STRETCH, -0.5 * STRETCH], surface_energy=GAMMA)
+    np.testing.assert_array_equal(lasts, [0, *[1] * 302, 0, 0])
+    np.testing.assert_array_equal(force[lasts == 0], 0)
+    assert force[1, 0] == pytest.approx(8 / 9 * PARTS, rel=1e-13)
+    assert force[:, 0].max() == pytest.approx(PARTS, rel=1e-4)
+    assert force[302, 0] == pytest.approx(5 / 9 * PARTS, rel=2e-3)
+    np.testing.assert_allclose(
+        force[2:303, 0], [-jkr_force(d) for d in ways[2:]], rtol=1e-6, atol=1e-9 * PARTS
+    )
+
+
+def test_friction_of_adhesive_grains_goes_by_the_force_that_parts_them():
+    """mu |F_n + 2 F_c|: 10/9 mu F_c at the first touch."""
+    force, _, _ = along("jkr", held(1, 0.0), at(1, 0.1 * Y), surface_energy=GAMMA, friction=0.3)
+    assert force[0, 1] == pytest.approx(0.3 * 10 / 9 * PARTS, rel=1e-12)
+
+
+def test_parting_takes_the_work_of_adhesion():
+    """7.09 (W^5 R*^4 / E*^2)^(1/3), W = 2 gamma, of two that meet at a speed that is enough; others stay."""
+    work = quad(lambda d: -jkr_force(d), -STRETCH, 0, limit=200)[0]
+    assert work == pytest.approx(7.09 * ((2 * GAMMA) ** 5 / E_STAR**2) ** (1 / 3), rel=1e-3)
+    least = (2 * work) ** 0.5
+    speeds = least * np.array([0.9, 1.1, 2.0])
+    made = [
+        grains(
+            "jkr",
+            [[0, 0, 0], [4, 0, 0]],
+            [[v / 2, 0, 0], [-v / 2, 0, 0]],
+            radius=2.0,
+            mass=2.0,
+            first={"surface_energy": GAMMA},
+            dt=2e-5,
+            steps=30000,
+        )
+        for v in speeds
+    ]
+    simulation = loaded(made)
+    simulation.run()
+    stays, *leave = (by_id(result) for result in simulation.results())
+    assert np.ptp(stays["position"][:, 0]) < 4 + STRETCH
+    for v, state in zip(speeds[1:], leave, strict=True):
+        after = np.diff(state["velocity"][:, 0])[0]
+        assert after**2 == pytest.approx(v**2 - 2 * work, rel=2e-3)

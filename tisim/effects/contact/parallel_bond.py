@@ -1,0 +1,106 @@
+"""Cemented grains: bonds that carry forces and moments, and break."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import PairForce, parameter
+from tisim.effects.contact.granular.spring import turned
+from tisim.numerics.vectors import piece
+
+
+@ti.func
+def carried(remembered, normal, angle):
+    """Return a vector across the line of centres as it turns with the pair, and by an angle (rad) about its
+    normal."""
+    known = turned(remembered, normal)
+    return (known + angle * normal.cross(known)) / ti.sqrt(1.0 + angle * angle)
+
+
+class ParallelBond(PairForce):
+    """Grains that are near each other at the start are cemented: a bond carries forces and moments, and
+    breaks.
+
+        F_n = k_n A (d - d_0),    dF_s/dt = k_s A u_s,    dM_n/dt = k_s J Omega_n,    dM_s/dt = k_n I Omega_s
+        k_n = E / (R_i + R_j),    k_s = k_n / kappa,    A = pi r^2,    I = pi r^4 / 4,    J = 2 I
+        breaks at   F_n / A + |M_s| r / I > sigma_c   or   |F_s| / A + |M_n| r / J > tau_c
+
+    It is a disc of cement of the radius r = lambda min(R_i, R_j), and a chain of them an elastic beam. d_0 is
+    the distance of the centres at the start, u_s the velocity of the surfaces past each other midway between
+    them and Omega the relative spin, n along the line of centres and s across. What is remembered turns with
+    the pair. Beside it may act what pushes grains apart that touch, such as ``granular``.
+
+    Source: D. O. Potyondy and P. A. Cundall, Int. J. Rock Mech. Min. Sci. 41 (2004) 1329, Eqs (9)-(15).
+    """
+
+    short_ranged: ClassVar[bool] = True
+    fields = ("radius", "velocity", "spin")
+    depends_on_velocity: ClassVar[bool] = True
+    # Its steps know nothing of how stiff bonds are.
+    incompatible_controls = ("approach_time",)
+    memory: ClassVar[int] = 8
+
+    gap: float = parameter("m", "widest gap between surfaces over which bonds form at the start", 0.0)
+    young: float = parameter("Pa", "Young's modulus E of the cement", examples=[1e9], gt=0)
+    stiffness_ratio: float = parameter("", "normal over shear stiffness, kappa", 2.5, gt=0)
+    radius_ratio: float = parameter(
+        "", "radius of the cement over that of the smaller grain, lambda", 1.0, gt=0
+    )
+    tensile_strength: float = parameter("Pa", "strength sigma_c", examples=[1e7], gt=0)
+    shear_strength: float = parameter("Pa", "strength tau_c", examples=[1e7], gt=0)
+    damping_ratio: float = parameter("", "damping of each spring over the critical one", 0.0, ge=0)
+
+    @ti.func
+    def reach(self, s, w, i):
+        # What is stretched so far has broken.
+        strain = self.tensile_strength(w) / self.young(w)
+        return ti.max(self.gap(w), 0.0) + 2.0 * strain * s.radius[w, i]
+
+    @ti.func
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        a, b = s.radius[w, i], s.radius[w, j]
+        normal = (1.0 / distance) * separation
+        arm = 0.5 * (a - b + distance)
+        begins = (t <= 0.0) & (distance <= a + b + self.gap(w))
+        rest = ti.select(past[0] > 0.0, past[0], distance)
+
+        turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
+        passing = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
+        opening, rolling = passing.dot(normal), s.spin[w, j] - s.spin[w, i]
+        sliding, twisting = passing - opening * normal, rolling.dot(normal)
+        bending = rolling - twisting * normal
+
+        r = self.radius_ratio(w) * ti.min(a, b)
+        area, second = ti.math.pi * r * r, 0.25 * ti.math.pi * r * r * r * r
+        stiff = self.young(w) / (a + b)
+        soft = stiff / self.stiffness_ratio(w)
+        spin = 0.5 * dt * (s.spin[w, i] + s.spin[w, j]).dot(normal)
+        shear = carried(piece(past, 1, 3), normal, spin) + soft * area * dt * sliding
+        moment = carried(piece(past, 4, 3), normal, spin) + stiff * second * dt * bending
+        twist = past[7] + 2.0 * soft * second * dt * twisting
+        pull = stiff * area * (distance - rest)
+
+        tension = pull / area + moment.norm() * r / second
+        shearing = shear.norm() / area + ti.abs(twist) * r / (2.0 * second)
+        whole = (tension <= self.tensile_strength(w)) & (shearing <= self.shear_strength(w))
+        holds = ((past[0] > 0.0) | begins) & whole
+
+        m, n = s.mass[w, i], s.mass[w, j]
+        inertia, other = 0.4 * m * a * a, 0.4 * n * b * b
+        mass, turning = m * n / (m + n), inertia * other / (inertia + other)
+        twice = 2.0 * self.damping_ratio(w)
+        force = (pull + twice * ti.sqrt(stiff * area * mass) * opening) * normal
+        force += shear + twice * ti.sqrt(soft * area * mass) * sliding
+        couple = moment + twice * ti.sqrt(stiff * second * turning) * bending
+        couple += (twist + twice * ti.sqrt(2.0 * soft * second * turning) * twisting) * normal
+
+        force, couple = ti.select(holds, force, 0.0), ti.select(holds, couple, 0.0)
+        lever = normal.cross(force)
+        known = ti.Vector([rest, shear[0], shear[1], shear[2], moment[0], moment[1], moment[2], twist])
+        return (
+            force,
+            arm * lever + couple,
+            (distance - arm) * lever - couple,
+            ti.select(holds, known, 0.0),
+        )
