@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.arrays import Rows
+from tisim.components.arrays import Rows, equal
 from tisim.components.component import option
 from tisim.errors import InputError, must
 from tisim.geometry.shape import Shape
@@ -57,6 +57,14 @@ class TriangulatedSurface(Shape):
         must(bool(whole.all()), f"{label}.faces", rule, self.faces[~whole][:1].tolist())
         must(len(self.corners()) > 0, f"{label}.faces", "triangles with an area", "none")
         return self
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return equal(self.vertices, other.vertices) and equal(self.faces, other.faces)
+
+    def __hash__(self) -> int:
+        return hash(self.structure())
 
     def corners(self) -> np.ndarray:
         """Return the corners of the triangles that have an area, m, shape (triangles, 3, 3)."""

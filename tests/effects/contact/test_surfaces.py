@@ -7,13 +7,23 @@ from tests.effects.contact.surfaces import (
     POISSON,
     RADIUS,
     SHEET,
+    TRIANGLES,
     WORLDS,
     YOUNG,
     beside,
     moving,
     run,
 )
-from tisim.geometry import BoxSurface, ConicalSurface, CylindricalSurface, Disc, Plane, SphericalSurface
+from tisim import Scene
+from tisim.geometry import (
+    BoxSurface,
+    ConicalSurface,
+    CylindricalSurface,
+    Disc,
+    Plane,
+    SphericalSurface,
+    TriangulatedSurface,
+)
 
 E_STAR = YOUNG / (2 * (1 - POISSON**2))
 SOFT = {"restitution": 0.5, "friction": 0.5}
@@ -51,6 +61,19 @@ BLOCKS = {
     "brick": {"boxes": (BoxSurface(low=(-0.4, -0.3, -0.5), high=(0.4, 0.3, 0.5)),)},
     "coin": {"discs": (Disc(radius=0.5),)},
 }
+
+
+def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
+    """Triangles too, which are arrays; other triangles are another scene."""
+    made = beside((0, 0, 0), (0, 0, 0), {})
+    again = Scene.from_dict(made.to_dict())
+    assert again.effects == made.effects
+    assert again.digest() == made.digest()
+    assert again.structure() == made.structure()
+    other = TriangulatedSurface(vertices=2 * TRIANGLES.vertices, faces=TRIANGLES.faces)
+    walls = made.effects[1].model_copy(update={"surface": other})
+    effects = (made.effects[0], walls, made.effects[2])
+    assert made.model_copy(update={"effects": effects}).structure() != made.structure()
 
 
 def test_a_ball_within_bounces_for_ever():
