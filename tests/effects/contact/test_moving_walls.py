@@ -21,6 +21,7 @@ WORLDS, CAPACITY = 8, 4
 E_STAR = YOUNG / (2 * (1 - POISSON**2))
 UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 NOWHERE = Plane(point=(0, 0, -AWAY))
+STILL = Oscillation(amplitude=(0, 0, 0), frequency=1)
 G = 10.0
 
 
@@ -29,28 +30,33 @@ def sunk(push):
     return (3 * push / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
 
 
-def among(position, velocity, floor=NOWHERE, drum=None, lid=None, shaker=None, belt=None, law=None, **more):
+def among(position, velocity, floor=NOWHERE, drum=None, lid=None, law=None, more_walls=(), **more):
     """Grains of 1 kg among walls at rest and in motion; those not given are far away. Each is (shape,
-    motion)."""
+    motion). Others, ``more_walls``, are another structure, which takes long to compile."""
     law = {"young": YOUNG, "poisson": POISSON, "restitution": 0.5, "friction": 0.5, **(law or {})}
     tube = CylindricalSurface(start=(AWAY, -1, 0), end=(AWAY, 1, 0), radius=1)
     tube, turning = drum or (tube, Rotation(rate=(0, 1, 0)))
     cover, pressing = lid or (Plane(point=(0, 0, AWAY), normal=DOWN), Servo(force=1, limit=1))
-    plate, shaking = shaker or (NOWHERE, Oscillation(amplitude=(0, 0, 0), frequency=1))
-    band, going = belt or (NOWHERE, Translation(velocity=(0, 0, 0)))
     acting = (
         HERTZ_MINDLIN,
         Walls(name="floor", planes=[floor]),
         Walls(name="drum", cylinders=[tube], motion=turning),
         Walls(name="lid", planes=[cover], motion=pressing),
-        Walls(name="shaker", planes=[plate], motion=shaking),
-        Walls(name="belt", planes=[band], motion=going),
+        *more_walls,
         Gravity(acceleration=more.pop("gravity", (0.0, 0.0, -G))),
     )
     spin = more.pop("spin", np.zeros_like(np.asarray(position, float)))
     given = {"radius": RADIUS, "mass": 1.0, "dt": 2e-5, "quantities": {"spin": spin}, **more}
     given["materials"] = {"grain": Material(**law)}
     return scene(position, velocity, acting, **given)
+
+
+def shaken(plate=NOWHERE, shaking=STILL, band=NOWHERE, going=(0.0, 0.0, 0.0)):
+    """A plate that shakes, and a wall that goes."""
+    return (
+        Walls(name="shaker", planes=[plate], motion=shaking),
+        Walls(name="belt", planes=[band], motion=Translation(velocity=going)),
+    )
 
 
 def run(scenes, **more):
@@ -60,12 +66,14 @@ def run(scenes, **more):
     return results
 
 
+@pytest.mark.slow
 def test_a_moving_wall_is_one_at_rest_for_those_who_go_along():
     """A grain that hits a wall which moves and slides, spinning: as in the frame of the wall."""
     goes, velocity, spin = np.array([0.7, -0.4, 1.1]), np.array([0.3, 0.2, -1.0]), [[3.0, -5.0, 20.0]]
     place, more = [[0, 0, RADIUS + 0.05]], {"spin": spin, "steps": 20_000}
-    moves = among(place, [velocity + goes], belt=(Plane(), Translation(velocity=tuple(goes))), **more)
-    (rest, moved) = run([among(place, [velocity], floor=Plane(), **more), moves])
+    walls = shaken(), shaken(band=Plane(), going=tuple(goes))
+    rests = among(place, [velocity], floor=Plane(), more_walls=walls[0], **more)
+    rest, moved = run([rests, among(place, [velocity + goes], more_walls=walls[1], **more)])
     shift = goes * rest.time
     np.testing.assert_allclose(moved.state["position"] - shift, rest.state["position"], rtol=0, atol=1e-9)
     np.testing.assert_allclose(moved.state["velocity"] - goes, rest.state["velocity"], rtol=0, atol=1e-8)
@@ -73,6 +81,7 @@ def test_a_moving_wall_is_one_at_rest_for_those_who_go_along():
     assert np.linalg.norm(rest.state["velocity"] - velocity) > 0.5
 
 
+@pytest.mark.long
 def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
     """While it slides: v = mu g t along the wall, and mu m g R on the drum."""
     friction, size, t = 0.3, 2.0, 0.05
@@ -97,6 +106,7 @@ def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
     assert np.linalg.norm(slip) < 0.02 < np.linalg.norm(v)
 
 
+@pytest.mark.long
 def test_the_floor_bears_the_weight_of_a_column():
     """Of three grains, at rest."""
     place = [[0, 0, (2 * k + 0.99) * RADIUS] for k in range(3)]
@@ -116,6 +126,7 @@ def pressed():
     return made, gap, speed
 
 
+@pytest.mark.long
 def test_a_servo_presses_with_the_wanted_force(pressed):
     made, gap, speed = pressed
     simulation = compiled(made, WORLDS, CAPACITY)
@@ -132,6 +143,7 @@ def test_a_servo_presses_with_the_wanted_force(pressed):
     assert result.measures["lid_travel"] == pytest.approx(gap + deeper, rel=1e-5)
 
 
+@pytest.mark.long
 def test_a_servo_goes_on_from_a_checkpoint_to_the_same_bits(pressed, tmp_path):
     """And beside other worlds."""
     made, *_ = pressed
@@ -167,6 +179,7 @@ def test_the_same_bits_on_both_schedules(pressed):
         np.testing.assert_array_equal(particle.state[name], values, err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_grain_goes_along_with_a_plate_that_shakes_gently():
     """With half of g: the plate bears m (g + a), and the grain has its velocity, but for the overlap, which
     changes with the force."""
@@ -175,7 +188,9 @@ def test_a_grain_goes_along_with_a_plate_that_shakes_gently():
     size = 0.5 * G / omega**2
     shaking = Oscillation(amplitude=(0, 0, size), frequency=frequency, phase=-np.pi / 2)
     place = [[0, 0, RADIUS - sunk(1.5 * G) - size]]
-    ends = [among(place, [[0, 0, 0]], shaker=(Plane(), shaking), duration=t) for t in (0.35, 0.4, 0.45)]
+    ends = [
+        among(place, [[0, 0, 0]], more_walls=shaken(Plane(), shaking), duration=t) for t in (0.35, 0.4, 0.45)
+    ]
     for result in run(ends):
         angle = omega * result.time - np.pi / 2
         rise = -(omega**2) * size * np.sin(angle)
@@ -185,6 +200,7 @@ def test_a_grain_goes_along_with_a_plate_that_shakes_gently():
         assert result.state["velocity"][0, 2] == pytest.approx(speed, abs=2e-3 * omega * size)
 
 
+@pytest.mark.slow
 def test_a_wall_as_fast_as_sound_throws_grains_ahead():
     """As fast as sound in a chain pressed by a thousandth of a radius: four grains at rest fly off in order,
     none slower than the wall, and none faster than twice that but for what the chain focuses."""
@@ -195,7 +211,7 @@ def test_a_wall_as_fast_as_sound_throws_grains_ahead():
     made = among(
         place,
         np.zeros((4, 3)),
-        belt=(wall, Translation(velocity=(fast, 0, 0))),
+        more_walls=shaken(band=wall, going=(fast, 0, 0)),
         law={"restitution": 1.0, "friction": 0.0},
         gravity=(0, 0, 0),
         dt=2e-6,

@@ -76,6 +76,7 @@ def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
     assert made.model_copy(update={"effects": effects}).structure() != made.structure()
 
 
+@pytest.mark.slow
 def test_a_ball_within_bounces_for_ever():
     """Along planes, curved faces, and in their corners; there it may touch three at once."""
     rng = np.random.default_rng(1)
@@ -91,6 +92,7 @@ def test_a_ball_within_bounces_for_ever():
         assert moving(result.state) < 8.0 * (1 + 2e-4), name
 
 
+@pytest.mark.slow
 def test_a_ball_that_grazes_edges_gains_nothing():
     """A third of the shots hit an edge, a rim, or a tip; elastic ones keep their energy, others lose some."""
     rng = np.random.default_rng(3)
@@ -114,6 +116,7 @@ def test_a_ball_that_grazes_edges_gains_nothing():
     assert hits > len(shots) / 3
 
 
+@pytest.mark.slow
 def test_a_sphere_rolls_over_seams_as_on_a_plane():
     """Over seams and vertices of a sheet of triangles: with its speed, and the same as on a plane."""
     sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
@@ -136,6 +139,7 @@ def test_a_sphere_rolls_over_seams_as_on_a_plane():
         assert result.measures["walls_force_z"] == pytest.approx(-10.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_grain_on_a_seam_is_held_once():
     """Exactly over a vertex, where up to six triangles meet, and over an edge."""
     sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
@@ -146,6 +150,7 @@ def test_a_grain_on_a_seam_is_held_once():
         np.testing.assert_allclose(result.state["position"][0], place, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_faces_of_a_box_are_planes():
     """In a corner with all three of them, sliding and spinning: as of planes, with what they remember."""
     planes = tuple(Plane(point=(0, 0, 0), normal=tuple(axis)) for axis in np.eye(3))
@@ -160,6 +165,7 @@ def test_faces_of_a_box_are_planes():
     assert box.state["walls_touched"][0] == 3
 
 
+@pytest.mark.slow
 def test_a_grain_lies_in_a_groove():
     """Each side of a groove of 90 degrees holds 1 / sqrt 2 of the weight; a sharp ridge holds all of it."""
     half, whole = ((3 * push / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3) for push in (10 / 2**0.5, 10))
