@@ -14,7 +14,7 @@ from functools import cache
 from random import Random
 from typing import Any
 
-from tests.hostile import with_needed
+from tests.hostile import materials, with_needed
 from tisim import Scene, steppers
 from tisim.components import serialization
 from tisim.effects import (
@@ -54,6 +54,16 @@ COMMON: dict[str, dict[str, Any]] = {
     "softening": {"activation_energy": 300.0},
     "cooling": {"convection": 10.0},
     "contact": {"stiffness": 1e9},
+    "granular": {
+        "normal": "hertz_material",
+        "damping": "restitution_damping",
+        "tangential": "mindlin_force",
+        "rolling": "rolling_epsd",
+        "twisting": "twisting_marshall",
+        "cohesion": "dmt",
+    },
+    "capillary_bridge": {"volume": 1e-12},
+    "parallel_bond": {"gap": 1e-4, "young": 1e6, "tensile_strength": 1e6, "shear_strength": 1e6},
     "contact_bond": {"stiffness": 1e9, "grip_stiffness": 1e6, "threshold": 1e-3},
     "contact_dissipation": {"damping": 1e3},
     "contact_friction": {"stiffness": 1e6},
@@ -166,6 +176,8 @@ def _scene(effects: dict[str, Any], stepper: dict[str, Any] | None = None) -> di
         "stepper": stepper or {"kind": "verlet", "control": {"kind": "fixed_step", "dt": DT}},
         "effects": effects,
     }
+    if "granular" in effects:
+        data["materials"] = materials()
     scene = Scene.from_dict(data)
     names = {
         need if isinstance(need, str) else need.name for need in needed_fields(scene.effects, scene.stepper)
@@ -196,6 +208,7 @@ def own(name: str) -> list[Place]:
         for place in places(scenes()[name])
         if place[0] == "duration"
         or (place[0] == "particles" and place[3 if place[1] == "quantities" else 2] == 0)
+        or place[0] == "materials"
         or (place[0] == family and (family == "stepper" or place[1] == kind))
     ]
 

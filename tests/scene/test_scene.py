@@ -147,8 +147,8 @@ class TestReplace:
             (
                 "nonsense",
                 1,
-                "scene.nonsense must be a known key: name, particles, effects, domain, stepper, "
-                "duration, skin or seed; received 1",
+                "scene.nonsense must be a known key: name, particles, materials, material_pairs, effects, "
+                "domain, stepper, duration, skin or seed; received 1",
             ),
         ],
     )

@@ -59,6 +59,9 @@ from .contact.granular.parts import (
     Cohesion as Cohesion,
 )
 from .contact.granular.parts import (
+    ContactPart as ContactPart,
+)
+from .contact.granular.parts import (
     Damping as Damping,
 )
 from .contact.granular.parts import (

@@ -16,7 +16,9 @@ from tisim.components import serialization
 from tisim.components.component import Checked, Component
 from tisim.components.domain import Domain
 from tisim.components.invalid import text_of, unit_of
+from tisim.components.materials import ContactProperties
 from tisim.effects.base import Effect
+from tisim.effects.contact.granular.parts import ContactPart
 from tisim.effects.motion.base import Motion
 from tisim.engine import docstrings, template
 from tisim.errors import InputError, abbreviated, did_you_mean
@@ -60,6 +62,8 @@ FAMILIES = {
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
     "motions": Family("Motions of walls", Motion, "effects.walls.motion"),
+    "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
+    "materials": Family("Materials", ContactProperties, ""),
     "operators": Family("Operators", Operator, "effects.NAME"),
     "steppers": Family("Steppers", Stepper, "stepper"),
     "step_controls": Family("Step controls", StepControl, "stepper.control"),

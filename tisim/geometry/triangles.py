@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.arrays import Rows, equal
-from tisim.components.component import option
+from tisim.components.component import parameter
 from tisim.errors import InputError, must
 from tisim.geometry.shape import Shape
 from tisim.geometry.triangle_grid import TriangleGrid
@@ -22,8 +22,10 @@ class TriangulatedSurface(Shape):
     triangles without area are left out. Particles find those near them in a grid of cells.
     """
 
-    vertices: Rows = option("places of the vertices, m", examples=[((0, 0, 0), (1, 0, 0), (0, 1, 0))])
-    faces: Rows = option("indices of the three vertices of each triangle, from 0", examples=[((0, 1, 2),)])
+    vertices: Rows = parameter("m", "places of the vertices", examples=[((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    faces: Rows = parameter(
+        "", "indices of the three vertices of each triangle, from 0", examples=[((0, 1, 2),)]
+    )
 
     if TYPE_CHECKING:
         begin: ClassVar[Any]

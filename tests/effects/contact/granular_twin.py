@@ -19,8 +19,9 @@ class TwinLaw:
     """A composition by the names of its parts, its materials, and what is given of pairs of these.
 
     levers : "contact" has spins move surfaces that are R - delta / 2 from the centres, where forces act;
-    "radius" does as LAMMPS: spins move surfaces at R, where walls act too, and a contact that begins has no
-    tangential force if its damping alone is beyond Coulomb's limit.
+    "radius" does as LAMMPS: spins move surfaces at R, where walls act too; a contact that begins has no
+    tangential or rolling force if its damping alone is beyond the limit; a couple of twisting that is beyond
+    its limit acts against the twist of now; and JKR ends where its pull is largest.
     """
 
     materials: tuple[dict[str, float], ...]
@@ -56,7 +57,8 @@ class TwinLaw:
         if self.normal != "jkr":
             return np.zeros(len(radius))
         ratio = np.pi * self.of("surface_energy", which) / self.moduli(which)[0]
-        return 1.5 * ratio ** (2 / 3) * (radius / 2) ** (1 / 3)
+        most = 1.5 * ratio ** (2 / 3) * (radius / 2) ** (1 / 3)
+        return most / 9 ** (1 / 3) if self.levers == "radius" else most
 
     def press(self, which, overlap, radius):
         """Radius of the circle, S_n, elastic force, F_c, and the energy that is stored."""
@@ -173,7 +175,7 @@ class TwinLaw:
         else:
             spring, form = 2.25 * self.of("rolling_friction", which) ** 2 * stiffness, "force"
             drag = 2 * self.options.get("rolling_damping_ratio", 0.3) * np.sqrt(spring * mass)
-        return spring_and_slider(past, normal, rolling, spring, drag, most, dt, form)[:2]
+        return spring_and_slider(past, normal, rolling, spring, drag, most, dt, form, self.levers)[:2]
 
     def twisted(self, which, circle, spring, drag, friction, limit, twisting, past, dt):
         """The couple of twisting, and what is remembered."""
@@ -188,6 +190,8 @@ class TwinLaw:
         elastic = elastic + stiffness * dt * twisting
         total, most = elastic + damping * twisting, arm * limit
         held = np.clip(total, -most, most)
+        if self.levers == "radius":
+            held = np.where(np.abs(total) > most, np.sign(twisting) * most, total)
         elastic = np.where(held == total, elastic, held - damping * twisting)
         return held, np.column_stack([elastic, stiffness])
 
@@ -207,7 +211,7 @@ def spring_and_slider(past, normal, velocity, spring, drag, most, dt, form, leve
     total = elastic + damped
     size = np.linalg.norm(total, axis=1)
     slides = size > most
-    bare = (elastic == 0).all(axis=1) & (levers == "radius")
+    bare = (elastic == 0).all(axis=1) & (spring > 0) & (levers == "radius")
     limit = np.where(bare, 0, most)
     total = np.where(slides, limit / np.where(size > 0, size, 1), 1)[:, None] * total
     left = total - damped

@@ -52,12 +52,14 @@ class Walls(WallContacts, MaterialLaw, Force):
     depends_on_velocity: ClassVar[bool] = True
     requires: ClassVar = (GranularContact,)
 
-    planes: tuple[Plane, ...] = option("planes; their number may differ per world, as that of others", ())
-    discs: tuple[Disc, ...] = option("flat discs", ())
-    spheres: tuple[SphericalSurface, ...] = option("spheres, from within or around", ())
-    cylinders: tuple[CylindricalSurface, ...] = option("cylinders, from within or around", ())
-    cones: tuple[ConicalSurface, ...] = option("cones, from within or around", ())
-    boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", ())
+    planes: tuple[Plane, ...] = option(
+        "planes; their number may differ per world, as that of others", (), examples=[()]
+    )
+    discs: tuple[Disc, ...] = option("flat discs", (), examples=[()])
+    spheres: tuple[SphericalSurface, ...] = option("spheres, from within or around", (), examples=[()])
+    cylinders: tuple[CylindricalSurface, ...] = option("cylinders, from within or around", (), examples=[()])
+    cones: tuple[ConicalSurface, ...] = option("cones, from within or around", (), examples=[()])
+    boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", (), examples=[()])
     surface: TriangulatedSurface | None = option("a surface of triangles, such as that of an STL file", None)
     motion: Motion = option("how the body moves", AtRest())
     material: Text | None = option("material of the walls; the first of the scene unless given", None)

@@ -10,7 +10,7 @@ from tisim.components.materials import Touching
 from tisim.effects.contact.granular.parts import NormalForce
 from tisim.numerics.roots import cube_root
 
-SMALLEST = 1e-9
+LEAST_ROOT = 1e-9
 """Roots of lengths are not below this, m^(1/2): its fourth power is a number of f32."""
 
 
@@ -50,12 +50,12 @@ class JKR(NormalForce):
         """Return a = x^2, with x the largest root of x^4 = c x + d, c = R* bond and d = R* delta: by the
         resolvent cubic of Ferrari, in a unit of length in which neither c nor d is above 1."""
         d, line = radius * overlap, cube_root(radius * self.bond(w, pair))
-        unit = ti.max(line + ti.sqrt(ti.sqrt(ti.abs(d))), SMALLEST)
+        unit = ti.max(line + ti.sqrt(ti.sqrt(ti.abs(d))), LEAST_ROOT)
         share = line / unit
         c, third = share * share * share, d / (unit * unit * unit * unit) / 3.0
         q = c * c / 16.0
         # Both are 0 where nothing adheres and surfaces just touch.
-        first = ti.max(cube_root(q + ti.sqrt(ti.max(q * q + third * third * third, 0.0))), SMALLEST)
+        first = ti.max(cube_root(q + ti.sqrt(ti.max(q * q + third * third * third, 0.0))), LEAST_ROOT)
         second = third / first
         square = first * first + third + second * second
         width = ti.sqrt(square)

@@ -14,7 +14,13 @@ from tisim.backend.taichi import ti
 from tisim.components.material_law import MaterialLaw
 
 
-class NormalForce(MaterialLaw):
+class ContactPart(MaterialLaw):
+    """A contact part is a part of a granular contact law."""
+
+    contract: ClassVar[bool] = True
+
+
+class NormalForce(ContactPart):
     """A normal force pushes grains apart along the line of centres, as far as it is elastic.
 
     restitution_factor : by this a damping c sqrt(S m*) differs from that of a linear spring, S = k, where
@@ -59,7 +65,7 @@ class NormalForce(MaterialLaw):
         return 0.0 * radius
 
 
-class Damping(MaterialLaw):
+class Damping(ContactPart):
     """Damping takes energy from the relative motion of two that touch."""
 
     contract: ClassVar[bool] = True
@@ -71,7 +77,7 @@ class Damping(MaterialLaw):
         return 0.0 * stiffness
 
 
-class TangentialForce(MaterialLaw):
+class TangentialForce(ContactPart):
     """A tangential force holds back surfaces that slide past each other, up to Coulomb's limit."""
 
     contract: ClassVar[bool] = True
@@ -102,7 +108,7 @@ class TangentialForce(MaterialLaw):
         return 0.0
 
 
-class RollingResistance(MaterialLaw):
+class RollingResistance(ContactPart):
     """Rolling resistance holds back two that roll on each other, by a couple about an axis in the plane of
     contact."""
 
@@ -118,7 +124,7 @@ class RollingResistance(MaterialLaw):
         return 0.0 * normal, past
 
 
-class TwistingResistance(MaterialLaw):
+class TwistingResistance(ContactPart):
     """Twisting resistance holds back two that twist on each other, by a couple about their normal."""
 
     contract: ClassVar[bool] = True
@@ -135,7 +141,7 @@ class TwistingResistance(MaterialLaw):
         return 0.0 * twisting, past
 
 
-class Cohesion(MaterialLaw):
+class Cohesion(ContactPart):
     """Cohesion pulls two that touch towards each other.
 
     adhesive : whether Coulomb's limit knows of it, as of the force that parts the two.
