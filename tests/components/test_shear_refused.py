@@ -10,6 +10,7 @@ from tests.throwaway import Trap
 from tisim import InputError, ShearedBox
 from tisim.accuracy.sweep import methods
 from tisim.effects import Gravity, Impact, StokesDrag, Walls
+from tisim.geometry import Plane
 from tisim.operators import PeakDisplacement
 from tisim.sources import ElectricField, UniformFlow
 from tisim.steppers import ApproachTime, ErrorControl, Trapezoid, Verlet
@@ -41,7 +42,7 @@ WRONG = {
     ),
     "walls": (
         {},
-        {"effects": (HERTZ_MINDLIN, Walls())},
+        {"effects": (HERTZ_MINDLIN, Walls(planes=[Plane()]))},
         r"effects.walls must be one that acts on all layers alike \(homogeneous\), as gravity does, in a she",
     ),
     "drag": (

@@ -150,6 +150,12 @@ from .magnetic.mutual_moment import (
 from .magnetic.mutual_moment import (
     MutualMoment as MutualMoment,
 )
+from .motion.base import AtRest as AtRest
+from .motion.base import Motion as Motion
+from .motion.oscillation import Oscillation as Oscillation
+from .motion.rotation import Rotation as Rotation
+from .motion.servo import Servo as Servo
+from .motion.translation import Translation as Translation
 from .pair.mie import Mie as Mie
 from .pair.near_field import NearField as NearField
 from .pair.near_field import TruncatedNearField as TruncatedNearField

@@ -32,7 +32,7 @@ from tisim.neighbours.lists import NeighbourLists
 from tisim.neighbours.near_list import NearList, update_near_list
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper
-from tisim.steppers.common import FinishStep, FirstStep
+from tisim.steppers.common import EndStep, FinishStep, FirstStep
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.step_control import FixedStep, StepControl
 from tisim.worlds.bound import Bound, Peers
@@ -63,10 +63,12 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
 
 
 def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[str, ...]:
-    """Return the names of the ``counters``, ``world_quantities`` or ``flags`` that the parts of a scene
-    declare, each once."""
-    parts: tuple[Any, ...] = (*effects, stepper, stepper.control)
-    return tuple(dict.fromkeys(name for part in parts for name in getattr(part, what, ())))
+    """Return the names of the ``counters``, ``world_quantities``, ``flags`` or ``totals`` that the parts of a
+    scene declare, each once."""
+    kept = [name for effect in effects for name in effect.keeps(what)]
+    for part in (stepper, stepper.control):
+        kept += getattr(part, what, ())
+    return tuple(dict.fromkeys(kept))
 
 
 def picks_pairs(effects: Sequence[Effect], stepper: Stepper) -> bool:
@@ -130,7 +132,9 @@ class Assembly:
         self.failure_attribution = FailureAttribution(context.force_sum)
         own: Step = stepper.data.step(context)
         known = (FirstStep(s, control),) if isinstance(control.data, FixedStep) and context.forced else ()
-        step, first = fuse(own.items), [*known, *lists, *self._summed(SumForcesAtStart)]
+        keepers = tuple(e for e in effects if e.data.offers("end_step") and e.data.keeps("world_quantities"))
+        ends = (EndStep(s, keepers),) if keepers else ()
+        step, first = [*fuse(own.items), *ends], [*known, *lists, *self._summed(SumForcesAtStart), *ends]
         if near and contacts:
             survey = FindContacts(near, contacts, control)
             step += [ClearContacts(contacts), survey]

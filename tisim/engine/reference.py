@@ -19,6 +19,7 @@ from tisim.components.invalid import text_of, unit_of
 from tisim.components.materials import ContactProperties
 from tisim.effects.base import Effect
 from tisim.effects.contact.granular.parts import ContactPart
+from tisim.effects.motion.base import Motion
 from tisim.engine import docstrings, template
 from tisim.errors import InputError, abbreviated, did_you_mean
 from tisim.geometry.shape import Shape
@@ -60,6 +61,7 @@ FAMILIES = {
     "sources": Family("Sources", Source, "effects.NAME"),
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
+    "motions": Family("Motions of walls", Motion, "effects.walls.motion"),
     "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
     "materials": Family("Materials", ContactProperties, ""),
     "operators": Family("Operators", Operator, "effects.NAME"),

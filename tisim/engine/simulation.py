@@ -206,22 +206,27 @@ class Simulation(CompiledWorlds):
         self._check_loaded()
         now, good = self.s.snapshot(self.s.columns), self.monitor.last_good
         counts = {name: now[name] for name in self.s.counters}
-        measures = {name: now[name] for e in self.scenes[0].effects for name in e.world_quantities}
+        effects = self.scenes[0].effects
+        quantities = {name: now[name] for e in effects for name in e.keeps("world_quantities")}
         status = now["status"]
         results = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
             order = self.in_order(w, good)
+            state = {f.name: good[f.name][w, order] for f in self.s.reported}
+            measures = {name: float(values[w]) for name, values in quantities.items()}
+            for effect in self.scenes[w].effects:
+                measures |= effect.measures(state)
             results.append(
                 Result(
                     scene=self.scenes[w],
-                    state={f.name: good[f.name][w, order] for f in self.s.reported},
+                    state=state,
                     start=self.starts[w],
                     time=float(good["time"][w]),
                     work={name: int(count[w]) for name, count in counts.items()},
                     status=self.monitor.status(w, int(status[w])),
                     wall_s=self.wall_s / len(self.scenes),
                     settings={**self.runtime.described, **self._edited(w)},
-                    measures={name: float(values[w]) for name, values in measures.items()},
+                    measures=measures,
                 )
             )
         return results

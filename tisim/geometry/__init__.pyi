@@ -1,2 +1,15 @@
+from .box import BoxSurface as BoxSurface
+from .cone import ConicalSurface as ConicalSurface
+from .cylinder import CylindricalSurface as CylindricalSurface
+from .disc import Disc as Disc
 from .plane import Plane as Plane
+from .revolved import (
+    Barrel as Barrel,
+)
+from .revolved import (
+    RevolvedSurface as RevolvedSurface,
+)
 from .shape import Shape as Shape
+from .sphere import SphericalSurface as SphericalSurface
+from .surface import Surface as Surface
+from .triangles import TriangulatedSurface as TriangulatedSurface

@@ -9,11 +9,16 @@ from tisim.components.component import Component
 
 
 class Shape(Component):
-    """A shape tells how far a place is from its surface; it is a row of a list, such as that of walls."""
+    """A shape tells how far a place is from its surface. Most are rows of lists, as those of walls."""
 
     contract: ClassVar[bool] = True
 
+    @classmethod
+    def room(cls, rows: int) -> int:
+        # A kind of which there is none costs nothing.
+        return super().room(rows) if rows else 0
+
     @ti.func
     def distance(self, w, k, r):
-        """Return the signed distance (m) of r from shape k of world w, positive where particles are."""
+        """Return the distance (m) of r from shape k of world w, positive where particles are."""
         return 0.0 * r[0]

@@ -29,10 +29,19 @@ class SumForcesAtStart(SumForces):
 
     @ti.func
     def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
-        force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.commits)
+        s = self.s
+        force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         if ti.static(effect.data.offers("load")):
-            ahead = ti.cast(self.s.step_ahead[w], self.s.real)
-            force = self.unless_not_finite(force, effect.load(self.s, w, i, t, ahead, False)[0])
+            # In a loop, as it takes long to compile: what acts now, then over the step ahead.
+            for turn in range(2):
+                dt = ti.select(turn == 0, self.elapsed_time(w), ti.cast(s.step_ahead[w], s.real))
+                push, moment = effect.load(s, w, i, t, dt, turn == 0)
+                if turn == 0:
+                    force, torque = push, moment
+                else:
+                    force = self.unless_not_finite(force, push)
+        else:
+            force, torque = effect.load(s, w, i, t, self.elapsed_time(w), self.commits)
         return self.wrench(force, torque)
 
     @ti.func

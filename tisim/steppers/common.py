@@ -131,6 +131,18 @@ class AdvanceClock(Phase):
         advance_clock(self.s, w)
 
 
+class EndStep(Phase):
+    """This phase lets effects set what they keep of the world, given the forces at the end of the step."""
+
+    def __init__(self, s, effects) -> None:
+        self.s, self.effects = s, effects
+
+    @ti.func
+    def run(self, w, _k):
+        for effect in ti.static(self.effects):
+            effect.end_step(self.s, w)
+
+
 class FinishStep(Phase):
     """This phase stops a world that has reached its end."""
 

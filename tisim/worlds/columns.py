@@ -29,9 +29,9 @@ WORLD_SETTINGS = (
 )
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
-    *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "reported", "real", "records"),
-    "shared",
-    *("domain", "before_reading", "columns", "singles", "slotted", "means", "sums"),
+    *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "totals", "reported"),
+    *("real", "records", "shared", "domain", "before_reading", "columns", "singles", "slotted", "means"),
+    "sums",
 )
 
 

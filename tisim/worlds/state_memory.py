@@ -47,12 +47,14 @@ class StateMemory:
         world_quantities: tuple[str, ...] = (),
         flags: tuple[str, ...] = (),
         records: bool = False,
+        totals: tuple[str, ...] = (),
     ) -> None:
         # Before anything is placed: fields that are left half made are a fault of every later kernel.
-        check_names(type(self), (*(field.name for field in fields), *counters, *world_quantities, *flags))
+        names = (*(field.name for field in fields), *counters, *world_quantities, *flags, *totals)
+        check_names(type(self), names)
         self.worlds, self.capacity = worlds, capacity
         self.fields, self.counters = fields, (*WORLD_COUNTERS, *counters)
-        self.world_quantities, self.flags = world_quantities, flags
+        self.world_quantities, self.flags, self.totals = world_quantities, flags, totals
         self.reported = tuple(field for field in fields if not field.scratch)
         self.real, self.records, self.shared = runtime.current().real, records, True
         builder = Builder()
@@ -62,7 +64,8 @@ class StateMemory:
         if self._record:
             builder.dense(ti.i, worlds).dense(ti.j, capacity).place(*self._record)
         quantities, integers = (*WORLD_QUANTITIES, *world_quantities), (*WORLD_INTEGERS, *flags)
-        for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (self.counters, ti.i64)):
+        whole = (*self.counters, *totals)
+        for names, dtype in ((quantities, ti.f64), (integers, ti.i32), (whole, ti.i64)):
             for name in names:
                 column = ti.field(dtype)
                 builder.dense(ti.i, worlds).place(column)
@@ -92,7 +95,7 @@ class StateMemory:
         self._exchanges: dict[tuple[str, ...], Exchange] = {}
         self.domain: Any = None
         self.before_reading: list[Callable[[], None]] = []
-        self.columns = (*quantities, *integers, *WORLD_VECTORS, *self.counters, *WORLD_SETTINGS)
+        self.columns = (*quantities, *integers, *WORLD_VECTORS, *whole, *WORLD_SETTINGS)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
             (
@@ -162,7 +165,7 @@ class StateMemory:
         anew."""
         fields = (field.name for field in self.fields)
         worlds = (*WORLD_QUANTITIES, *WORLD_INTEGERS, *self.counters, *self.world_quantities, *self.flags)
-        return (*fields, *worlds, "frame", "seed", "goal")
+        return (*fields, *worlds, *self.totals, "frame", "seed", "goal")
 
     def image(self) -> dict[str, np.ndarray]:
         """Return a copy of all worlds as they are, by the names that are saved."""

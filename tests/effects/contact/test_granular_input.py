@@ -28,13 +28,15 @@ WRONG = {
     "material.restitution must be at most 1.0; received 1.5": lambda: material(restitution=1.5),
     "material.friction must be at least 0.0; received -0.1": lambda: material(friction=-0.1),
     "material.friction must be a finite number; received nan": lambda: material(friction=float("nan")),
-    "walls.planes must be a list of 1; received ()": lambda: Walls(planes=()),
+    "walls must be given a plane or a surface; received 'none'": lambda: Walls(planes=()),
     "plane.normal must be a direction, not of length 0; received (0.0, 0.0, 0.0)": lambda: Plane(
         normal=(0, 0, 0)
     ),
-    "effects.walls must be used together with effects.granular; received 'walls'": lambda: one(Walls()),
+    "effects.walls must be used together with effects.granular; received 'walls'": lambda: one(
+        Walls(planes=[Plane()])
+    ),
     "effects.walls must be used together with effects.granular; received 'hertz, walls'": lambda: one(
-        Hertz(young=1, poisson=0), Walls()
+        Hertz(young=1, poisson=0), Walls(planes=[Plane()])
     ),
     "stepper.control must be one that suits granular, such as fixed_step or that of an implicit "
     "stepper; received 'approach_time'": lambda: one(HERTZ_MINDLIN, stepper=Verlet()),
@@ -57,7 +59,7 @@ WRONG = {
         materials={"a b": material()}
     ),
     "walls.material must be one of the materials of the scene (grain); received 'grian'; did you "
-    "mean 'grain'?": lambda: one(HERTZ_MINDLIN, Walls(material="grian")),
+    "mean 'grain'?": lambda: one(HERTZ_MINDLIN, Walls(planes=[Plane()], material="grian")),
     "granular.tangential must be given, as the resistance to twisting goes by it; "
     "received 'nothing'": lambda: Granular(twisting=TwistingMarshall()),
     "granular.cohesion must be left out, as jkr is adhesive itself; received 'dmt'": lambda: Granular(

@@ -18,13 +18,16 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    sources and operators do only where they say so.
 4. ``counters`` names the integer counters of events it keeps per world: ``ti.atomic_add(s.NAME[w], 1)``;
    ``world_quantities`` names quantities of a world, ``s.NAME[w]``, f64, 0 at the start; a Result gives them
-   back. Of several effects of one kind they are summed, as all write the same.
+   back. Of several effects of one kind they are summed, as all write the same. What is summed over particles
+   in a step, in any order, is a whole number, of ``totals``. Where the options decide, ``keeps`` returns the
+   names. ``end_step`` sets quantities of a world by what the forces of a step come to; ``measures`` makes
+   more of the particles of a Result.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
    are summed in scene order. The velocity of j relative to i is ``s.relative_velocity(w, i, j, separation)``:
    that of an image that moves past the box is not the difference of the two. What near pairs remember of
    each other (``memory``) is handed to ``interaction``, which returns it brought up to date, together with
    the force; what a particle remembers of a force, such as that of walls, is brought up to date in ``load``,
-   where that is told to.
+   where that is told to, and there it may add to ``totals``.
 6. Who feels an external field finds it with ``sources`` (see tisim/sources/base.py), and names in
    ``requires_source`` the quantities of which a scene must have at least one source.
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from tisim.backend.taichi import ti
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import LawHints
 from tisim.worlds.bound import Peers
@@ -24,8 +25,10 @@ class Effect(LawHints, Component):
     whether it reads or changes velocities or spins. homogeneous : whether it would be the same for particles
     that are all elsewhere, or all faster by one velocity, as those in each layer of a sheared box are.
     counters : names of the integer counters that it keeps of a world. world_quantities : names of the
-    quantities that it keeps of a world. requires_source : the quantities of which a scene must have at least
-    one source. repeatable : whether a scene can hold two of its kind.
+    quantities that it keeps of a world. totals : names of whole numbers of a world that sum up what all
+    particles add in a step, in any order (``ti.atomic_add``), and that no Result has. requires_source : the
+    quantities of which a scene must have at least one source. repeatable : whether a scene can hold two of
+    its kind.
     """
 
     contract: ClassVar[bool] = True
@@ -42,6 +45,7 @@ class Effect(LawHints, Component):
     homogeneous: ClassVar[bool] = True
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
+    totals: ClassVar[tuple[str, ...]] = ()
     requires_source: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -52,6 +56,11 @@ class Effect(LawHints, Component):
     def required_fields(self) -> tuple[str | Field, ...]:
         """Return the particle fields that it needs, given its options; by default all of ``fields``."""
         return self.fields
+
+    def keeps(self, what: str) -> tuple[str, ...]:
+        """Return the names of the ``counters``, ``world_quantities`` or ``totals`` that it keeps of a world,
+        given its options; by default those of its class."""
+        return getattr(self, what, ())
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         """Return attributes to set on its bound object, chosen among the bound effects of the scene."""
@@ -65,6 +74,16 @@ class Effect(LawHints, Component):
         """Return how many particles may ever live at once, given the masses of those of the start (kg); by
         default there are never more than at the start."""
         return len(masses)
+
+    def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
+        """Return what a Result tells of it, by name, given the particles; ``world_quantities`` are told
+        anyway."""
+        return {}
+
+    @ti.func
+    def end_step(self, s, w):
+        """Set its quantities of a world at the end of a step, and once before the first; serially, before
+        events and operators. It is asked of an effect that keeps quantities of a world."""
 
     @classmethod
     def offers(cls, hook: str) -> bool:

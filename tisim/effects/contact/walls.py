@@ -1,24 +1,51 @@
-"""Walls at rest, which grains touch as they touch each other."""
+"""Walls, which grains touch as they touch each other."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from __future__ import annotations
 
-from tisim.backend.taichi import ti
-from tisim.components.component import Text
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.components.component import Component, Text
 from tisim.components.material_law import MaterialLaw
 from tisim.components.materials import Materials
-from tisim.effects.base import Effect, Force, option
+from tisim.effects.base import Effect, Field, Force, option
 from tisim.effects.contact.granular.contact import GranularContact
+from tisim.effects.contact.wall_contacts import WallContacts
+from tisim.effects.contact.wall_search import CONTACTS
+from tisim.effects.motion.base import AtRest, Motion, MotionState
+from tisim.errors import must
+from tisim.geometry.box import BoxSurface
+from tisim.geometry.cone import ConicalSurface
+from tisim.geometry.cylinder import CylindricalSurface
+from tisim.geometry.disc import Disc
 from tisim.geometry.plane import Plane
+from tisim.geometry.sphere import SphericalSurface
+from tisim.geometry.surface import Surface
+from tisim.geometry.triangles import TriangulatedSurface
 from tisim.worlds.bound import Peers
-from tisim.worlds.fields import Field
+
+FIELDS = ("past", "surface_past", "loads", "touched", "clear")
+"""A grain remembers of a wall, where there is need: what its contacts with planes do, and with surfaces, the
+load, how many contacts there are, and where it was how far from the wall."""
 
 
-class Walls(MaterialLaw, Force):
-    """Plane walls at rest hold grains back by the contact laws of the scene.
+class Walls(WallContacts, MaterialLaw, Force):
+    """Walls hold grains back by the contact laws of the scene; together they are one rigid body, at rest or
+    in motion.
 
-    A wall is a grain of infinite radius and mass. What a contact remembers lies with the grain, for each wall
-    by itself.
+    A wall is a grain of infinite radius and mass. Planes bound the space in which grains are: each is felt by
+    itself. Other surfaces have two sides, and rims; where they meet, at an edge or a seam, a grain feels the
+    nearer one, and at a concave edge both. What a contact remembers lies with the grain, and goes along with
+    it from one triangle to the next.
+
+    Bodies that move by themselves, or whose forces are told by themselves, are walls of their own names. The
+    result tells the force (N) and the torque (N m) of the grains on the body, about the origin or the centre
+    of its rotation, as ``measures["NAME_force_x"]`` and so on, and ``state["NAME_loads"]`` those of the body
+    on each grain.
     """
 
     fields = ("radius", "velocity", "spin")
@@ -26,9 +53,26 @@ class Walls(MaterialLaw, Force):
     requires: ClassVar = (GranularContact,)
 
     planes: tuple[Plane, ...] = option(
-        "the walls; their number may differ per world", (Plane(),), min_length=1
+        "planes; their number may differ per world, as that of others", (), examples=[()]
     )
+    discs: tuple[Disc, ...] = option("flat discs", (), examples=[()])
+    spheres: tuple[SphericalSurface, ...] = option("spheres, from within or around", (), examples=[()])
+    cylinders: tuple[CylindricalSurface, ...] = option("cylinders, from within or around", (), examples=[()])
+    cones: tuple[ConicalSurface, ...] = option("cones, from within or around", (), examples=[()])
+    boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", (), examples=[()])
+    surface: TriangulatedSurface | None = option("a surface of triangles, such as that of an STL file", None)
+    motion: Motion = option("how the body moves", AtRest())
     material: Text | None = option("material of the walls; the first of the scene unless given", None)
+
+    @model_validator(mode="after")
+    def _there(self) -> Walls:
+        there = any(getattr(self, name) for name, _ in self.lists()) or self.surface is not None
+        must(there, self.label, "given a plane or a surface", "none")
+        return self
+
+    def members(self) -> dict[str, Component]:
+        surface = {"surface": self.surface} if self.surface else {}
+        return {"motion": self.motion, **surface}
 
     def check_materials(self, materials: Materials) -> None:
         self.material_index(materials)
@@ -37,72 +81,64 @@ class Walls(MaterialLaw, Force):
         """Return the index of the material of the walls among those of a scene."""
         return 0 if self.material is None else materials.index(self.material, f"{self.label}.material")
 
+    def kinds_of_surface(self) -> Iterator[str]:
+        """Yield the names of the lists of surfaces of which there are any."""
+        return (name for name, kind in self.lists() if issubclass(kind, Surface) and getattr(self, name))
+
+    @property
+    def touches_surfaces(self) -> bool:
+        """Return whether there are surfaces other than planes."""
+        return self.surface is not None or any(self.kinds_of_surface())
+
+    def keeps(self, what: str) -> tuple[str, ...]:
+        kept = self.motion.quantities
+        names = {"world_quantities": kept, "totals": ("resistance",) if kept else ()}
+        return tuple(f"{self.label}_{name}" for name in names.get(what, ()))
+
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
-        past = Field(f"{self.label}_past", "", 1, "keep", slots=max(1, Plane.room(len(self.planes)) * values))
-        return past, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
+        room = {"past": Plane.room(len(self.planes)) * values, "loads": 6}
+        if self.touches_surfaces:
+            room["surface_past"] = CONTACTS * (3 + values)
+        if self.touches_surfaces or self.motion.moves:
+            room["clear"] = 5
+        slots = (Field(f"{self.label}_{n}", "", 1, "keep", slots=size) for n, size in room.items() if size)
+        return *slots, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         laws, begin = [], 0
         for law in peers.of(GranularContact):
             laws.append((law, begin, law.data.memory))
             begin += law.data.memory
-        own = {"each": peers.bound(self).planes, "wall": self.material_index(self._materials)}
-        return {"laws": tuple(laws), "stride": begin, **own}
+        bound = peers.bound(self)
+        return {
+            "laws": tuple(laws),
+            "stride": begin,
+            "wall_material": self.material_index(self._materials),
+            "flat": bound.planes,
+            "has_planes": bool(self.planes),
+            "surfaces": tuple(getattr(bound, name) for name in self.kinds_of_surface()),
+            "has_mesh": self.surface is not None,
+            "mesh": bound.surface,
+        }
 
     def remembers(self, s: Any) -> dict[str, Any]:
-        return {name: getattr(s, f"{self.label}_{name}") for name in ("past", "touched")}
+        def columns(names: Iterable[str]) -> dict[str, Any]:
+            return {name: getattr(s, f"{self.label}_{name}") for name in names}
 
-    if TYPE_CHECKING:
-        past: Any
-        each: Any
-        stride: int
-        wall: int
+        present = {field.name for field in s.fields}
+        fields = [name for name in FIELDS if f"{self.label}_{name}" in present]
+        return {
+            "kept": MotionState(columns(self.motion.quantities)),
+            **columns(fields),
+            **(columns(["resistance"]) if self.motion.quantities else {}),
+        }
 
-    @ti.func
-    def overlap(self, s, w, i, k):
-        """Return how deep (m) grain i lies in wall k; it is negative when they do not touch."""
-        return s.radius[w, i] - self.each.distance(w, k, s.position[w, i])
-
-    @ti.func
-    def reach(self, s, w, i):
-        """Return the widest gap (m) at which a law acts between grain i and a wall."""
-        gap = ti.cast(0.0, s.real)
-        for law in ti.static(self.laws):
-            gap = ti.max(gap, law[0].wall_reach(s, w, i))
-        return gap
-
-    @ti.func
-    def load(self, s, w, i, t, dt, commit):
-        force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
-        touching = 0
-        for k in range(self.each.size(w)):
-            touching += ti.select(self.overlap(s, w, i, k) >= -self.reach(s, w, i), 1, 0)
-        # Most grains touch no wall, and have touched none in the step before.
-        if touching + self.touched[w, i] > 0:
-            for k in range(self.each.size(w)):
-                for law in ti.static(self.laws):
-                    push, turn = self.touch(s, w, i, k, law, dt, commit)
-                    force, torque = force + push, torque + turn
-            if commit:
-                self.touched[w, i] = touching
-        return force, torque
-
-    @ti.func
-    def touch(self, s, w, i, k, law: ti.template(), dt, commit):  # type: ignore[valid-type]
-        """Return force (N) and torque (N m) of one law at wall k; what the contact remembers goes on where
-        ``commit``."""
-        force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
-        begin, overlap = k * self.stride + law[1], self.overlap(s, w, i, k)
-        past = ti.Vector.zero(s.real, max(1, law[2]))
-        for c in ti.static(range(law[2])):
-            past[c] = self.past[w, i, begin + c]
-        known = 0.0 * past
-        if overlap >= -self.reach(s, w, i):
-            normal = -self.each.direction(w, k)
-            rest = ti.Vector.zero(s.real, 3)
-            force, torque, known = law[0].at_wall(s, w, i, normal, overlap, rest, self.wall, past, dt)
-        if commit:
-            for c in ti.static(range(law[2])):
-                self.past[w, i, begin + c] = known[c]
-        return force, torque
+    def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
+        loads = state[f"{self.label}_loads"]
+        arms = state["position"] - np.array(self.motion.centre_of_torque())
+        moments = np.cross(arms, loads[:, :3]) + loads[:, 3:]
+        # Exactly rounded sums, so the same in any order.
+        sums = (-math.fsum(column) for column in np.concatenate([loads[:, :3], moments], axis=1).T)
+        names = (f"{self.label}_{what}_{axis}" for what in ("force", "torque") for axis in "xyz")
+        return dict(zip(names, sums, strict=True))

@@ -1,0 +1,73 @@
+"""The contract of motions of walls, and walls at rest."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Component, Vector
+
+
+@ti.data_oriented
+class MotionState:
+    """A motion state holds the quantities of the world that a motion keeps, by name."""
+
+    def __init__(self, columns: Mapping[str, Any]) -> None:
+        vars(self).update(columns)
+
+
+class Motion(Component):
+    """A motion says where a rigid body, such as a wall, is at a time, and how fast it moves.
+
+    At the time 0 the body is where its shapes say, unless the motion says otherwise. Most motions are
+    functions of the time alone. One that follows from the forces on the body keeps what it needs in
+    quantities of the world: it names them in ``quantities``, ``kept`` has them in kernels, by name, and
+    ``end_step`` sets them, with ``force_on_body``.
+
+    moves : whether the body is ever elsewhere than its shapes say, or moves at all.
+    """
+
+    contract: ClassVar[bool] = True
+    moves: ClassVar[bool] = True
+    quantities: ClassVar[tuple[str, ...]] = ()
+
+    def centre_of_torque(self) -> Vector:
+        """Return the place (m) about which the torque on the body is told; by default the origin."""
+        return 0.0, 0.0, 0.0
+
+    @ti.func
+    def to_body(self, kept, w, r, t):
+        """Return where a place r (m) in space is among the shapes of the body at time t (s, f64)."""
+        return r
+
+    @ti.func
+    def to_space(self, kept, w, direction, t):
+        """Return a direction of the body as it is in space at time t."""
+        return direction
+
+    @ti.func
+    def velocity_at(self, kept, w, r, t):
+        """Return the velocity (m/s) of the body at a place r in space at time t."""
+        return 0.0 * r
+
+    @ti.func
+    def fastest(self, w, r, around):
+        """Return a speed (m/s) above that of the body at all places within ``around`` (m) of r in space, at
+        any time."""
+        return 0.0 * around
+
+    @ti.func
+    def resistance(self, w, force):
+        """Return what the motion has to know of a force (N) of the body on a particle: a part, summed over
+        all particles as a whole number, which is the same in any order."""
+        return ti.cast(0, ti.i64)
+
+    @ti.func
+    def end_step(self, kept, w, total, t):
+        """Set the quantities of the world at the end of a step, at time t, given the sum of
+        ``resistance``; once also before the first step."""
+
+
+class AtRest(Motion):
+    """The body rests where its shapes say."""
+
+    moves: ClassVar[bool] = False

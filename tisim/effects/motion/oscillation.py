@@ -1,0 +1,37 @@
+"""Oscillation along a line, such as that of a shaken plate."""
+
+import math
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Vector, parameter
+from tisim.effects.motion.base import Motion
+from tisim.numerics import elementary
+
+
+class Oscillation(Motion):
+    """The body oscillates about where its shapes say.
+
+    x = A sin(2 pi f t + phase)
+    """
+
+    amplitude: Vector = parameter("m", "amplitude A", examples=[(0.0, 0.0, 1e-3)])
+    frequency: float = parameter("Hz", "frequency f", examples=[50.0], gt=0)
+    phase: float = parameter("rad", "phase at t = 0", 0.0)
+
+    @ti.func
+    def angle(self, w, t):
+        # In f64, whatever the precision: it grows without bound.
+        return 2.0 * math.pi * ti.cast(self.frequency(w), ti.f64) * t + self.phase(w)
+
+    @ti.func
+    def to_body(self, kept, w, r, t):
+        return r - ti.cast(elementary.sin(self.angle(w, t)), float) * self.amplitude(w)
+
+    @ti.func
+    def velocity_at(self, kept, w, r, t):
+        rate = 2.0 * math.pi * self.frequency(w)
+        return rate * ti.cast(elementary.cos(self.angle(w, t)), float) * self.amplitude(w)
+
+    @ti.func
+    def fastest(self, w, r, around):
+        return 2.0 * math.pi * self.frequency(w) * self.amplitude(w).norm()

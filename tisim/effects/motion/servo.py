@@ -1,0 +1,75 @@
+"""A servo, which moves a wall until particles resist it with a wanted force."""
+
+import math
+from collections.abc import Iterator
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.ranges import check_direction
+from tisim.effects.base import Vector, parameter
+from tisim.effects.motion.base import Motion
+
+QUANTA = 2.0**32
+"""A resistance is counted in so many parts of the wanted one."""
+MOST_RESISTANCE = 2.0**20
+"""The resistance of one particle is counted up to so many times the wanted one."""
+
+
+class Servo(Motion):
+    """The body moves along a direction until particles resist it with a wanted force.
+
+        v = v_max (1 - P / F), within -v_max and v_max
+
+    P is the force of the particles on it, against the direction. The velocity of a step is that of the force
+    at its beginning. It settles where F / (v_max dt) is above half of the stiffness with which particles
+    resist it. For a pressure give F as pressure times area. The result tells its ``travel`` (m) along the
+    direction, and its ``speed`` (m/s).
+    """
+
+    quantities: ClassVar = ("travel", "speed", "moved_at")
+
+    force: float = parameter("N", "wanted force F", examples=[10.0], gt=0)
+    direction: Vector = parameter("", "direction in which it pushes", (0.0, 0.0, -1.0))
+    limit: float = parameter("m/s", "speed v_max against no resistance", examples=[0.1], gt=0)
+
+    @model_validator(mode="after")
+    def _directed(self) -> Self:
+        check_direction(f"{self.label}.direction", self.direction)
+        return self
+
+    @classmethod
+    def columns(cls) -> Iterator[tuple[str, int]]:
+        yield from super().columns()
+        yield "axis", 3
+
+    def values(self) -> list[float]:
+        length = math.hypot(*self.direction)
+        return [*super().values(), *(component / length for component in self.direction)]
+
+    @ti.func
+    def to_body(self, kept, w, r, t):
+        travel = kept.travel[w] + kept.speed[w] * (t - kept.moved_at[w])
+        return r - ti.cast(travel, float) * self.axis(w)
+
+    @ti.func
+    def velocity_at(self, kept, w, r, t):
+        return ti.cast(kept.speed[w], float) * self.axis(w)
+
+    @ti.func
+    def fastest(self, w, r, around):
+        return self.limit(w)
+
+    @ti.func
+    def resistance(self, w, force):
+        part = ti.cast(force.dot(self.axis(w)), ti.f64) / self.force(w)
+        part = ti.min(ti.max(part, -MOST_RESISTANCE), MOST_RESISTANCE)
+        return ti.cast(ti.round(part * QUANTA), ti.i64)
+
+    @ti.func
+    def end_step(self, kept, w, total, t):
+        kept.travel[w] = kept.travel[w] + kept.speed[w] * (t - kept.moved_at[w])
+        kept.moved_at[w] = t
+        excess = ti.min(ti.max(ti.cast(total, ti.f64) / QUANTA - 1.0, -1.0), 1.0)
+        kept.speed[w] = -ti.cast(self.limit(w), ti.f64) * excess

@@ -1,0 +1,90 @@
+"""Surfaces of revolution of straight lines: cylinders, cones and discs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector, option, parameter
+from tisim.components.ranges import check_direction
+from tisim.geometry.surface import Surface
+
+
+class RevolvedSurface(Surface):
+    """This is the contract of a surface that a line from (rho_1, 0) to (rho_2, L) describes as it turns about
+    an axis, with discs at both ends where it is closed.
+
+    rho is the distance from the axis, z the place along it. Of r = (rho, z) the nearest place is in the plane
+    through r and the axis: (rho_1, 0) + u (rho_2 - rho_1, L), with u that of the foot on the line, within 0
+    and 1.
+    """
+
+    contract: ClassVar[bool] = True
+
+    def generator(self) -> tuple[Vector, Vector, float, float, float]:
+        """Return where the axis begins (m), its direction, L, rho_1 and rho_2 (m)."""
+        raise NotImplementedError
+
+    @classmethod
+    def columns(cls) -> Iterator[tuple[str, int]]:
+        yield from super().columns()
+        yield from (("origin", 3), ("axis", 3), ("side", 3), ("length", 1), ("low_radius", 1))
+        yield "high_radius", 1
+
+    def values(self) -> list[float]:
+        origin, direction, *sizes = self.generator()
+        axis = np.array(direction) / math.hypot(*direction)
+        side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        return [*super().values(), *origin, *axis.tolist(), *(side / np.linalg.norm(side)).tolist(), *sizes]
+
+    @ti.func
+    def nearest(self, w, k, c, r):
+        out, axis, length = r - self.origin(w, k), self.axis(w, k), self.length(w, k)
+        z = out.dot(axis)
+        across = out - z * axis
+        rho = across.norm()
+        # From the axis it is as far in any direction.
+        away = ti.select(rho > 0.0, across / ti.select(rho > 0.0, rho, 1.0), self.side(w, k))
+        # The lateral face, else the disc at the end, from the axis out.
+        low, high = self.low_radius(w, k), self.high_radius(w, k)
+        begin, end = ti.select(c == 2, length, 0.0), ti.select(c == 1, 0.0, length)
+        near, far = ti.select(c == 0, low, 0.0), ti.select(c == 1, low, high)
+        wide, tall = far - near, end - begin
+        u = ((rho - near) * wide + (z - begin) * tall) / (wide * wide + tall * tall)
+        u = ti.min(ti.max(u, 0.0), 1.0)
+        return self.origin(w, k) + (begin + u * tall) * axis + (near + u * wide) * away
+
+
+class Barrel(RevolvedSurface):
+    """This is the contract of a surface around a part of an axis, which may be closed at both ends."""
+
+    contract: ClassVar[bool] = True
+
+    start: Vector = parameter("m", "where the axis begins", (0.0, 0.0, 0.0))
+    end: Vector = parameter("m", "where the axis ends", examples=[(0.0, 0.0, 1.0)])
+    closed: bool = option("whether there are discs at both ends", False)
+
+    @model_validator(mode="after")
+    def _long(self) -> Barrel:
+        check_direction(f"{self.label}.end - {self.label}.start", self._along())
+        return self
+
+    def _along(self) -> Vector:
+        x, y, z = (b - a for a, b in zip(self.start, self.end, strict=True))
+        return x, y, z
+
+    @property
+    def face_count(self) -> int:
+        return 3 if self.closed else 1
+
+    def radii(self) -> tuple[float, float]:
+        """Return the radii at the start and at the end, m."""
+        raise NotImplementedError
+
+    def generator(self) -> tuple[Vector, Vector, float, float, float]:
+        return self.start, self._along(), math.hypot(*self._along()), *self.radii()

@@ -1,0 +1,187 @@
+"""A surface made of triangles, such as that of an STL file."""
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.arrays import Rows, equal
+from tisim.components.component import parameter
+from tisim.errors import InputError, must
+from tisim.geometry.shape import Shape
+from tisim.geometry.triangle_grid import TriangleGrid
+
+
+class TriangulatedSurface(Shape):
+    """A surface of triangles, with particles on either side of it, such as that of an STL file.
+
+    The same in all worlds of a batch. ``TriangulatedSurface.read("drum.stl", scale=1e-3)`` reads a file;
+    triangles without area are left out. Particles find those near them in a grid of cells.
+    """
+
+    vertices: Rows = parameter("m", "places of the vertices", examples=[((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    faces: Rows = parameter(
+        "", "indices of the three vertices of each triangle, from 0", examples=[((0, 1, 2),)]
+    )
+
+    if TYPE_CHECKING:
+        begin: ClassVar[Any]
+        listed: ClassVar[Any]
+
+    @classmethod
+    def read(cls, path: str | Path, scale: float = 1.0) -> Self:
+        """Return the surface in a file of a format that meshio reads, such as STL, PLY or OBJ; ``scale`` is
+        the length of its unit in m."""
+        try:
+            import meshio
+        except ImportError:
+            rule = 'there to read a surface (python -m pip install "tisim[mesh]")'
+            raise InputError(f"meshio must be {rule}; received none") from None
+        try:
+            # For an ASCII file of STL it multiplies what four letters would be as a number.
+            with np.errstate(over="ignore"):
+                mesh = meshio.read(path)
+        except (OSError, ValueError, meshio.ReadError, SystemExit) as fault:
+            rule = "a file that meshio reads"
+            raise InputError(f"surface must be {rule}; received {path!s} ({fault})") from None
+        must("triangle" in mesh.cells_dict, "surface", "of triangles", str(path))
+        vertices, index = np.unique(mesh.points.astype(float), axis=0, return_inverse=True)
+        return cls(vertices=scale * vertices, faces=index.reshape(-1)[mesh.cells_dict["triangle"]])
+
+    @model_validator(mode="after")
+    def _indexed(self) -> Self:
+        count, label = len(self.vertices), self.label
+        whole = (self.faces == np.rint(self.faces)) & (self.faces >= 0) & (self.faces < count)
+        rule = f"whole numbers below the number of vertices, {count}"
+        must(bool(whole.all()), f"{label}.faces", rule, self.faces[~whole][:1].tolist())
+        must(len(self.corners()) > 0, f"{label}.faces", "triangles with an area", "none")
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return equal(self.vertices, other.vertices) and equal(self.faces, other.faces)
+
+    def __hash__(self) -> int:
+        return hash(self.structure())
+
+    def corners(self) -> np.ndarray:
+        """Return the corners of the triangles that have an area, m, shape (triangles, 3, 3)."""
+        corners: np.ndarray = self.vertices[self.faces.astype(int)]
+        sides = corners[:, 1:] - corners[:, :1]
+        return corners[np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > 0]
+
+    def structure(self) -> tuple[Any, ...]:
+        return type(self), hashlib.sha256(self.corners().tobytes()).hexdigest()
+
+    def lookups(self) -> dict[str, np.ndarray]:
+        corners = self.corners()
+        grid = TriangleGrid.of(corners)
+        return {
+            "triangles": corners.reshape(-1, 9),
+            "grid": np.array([[*grid.low, grid.width, *grid.dims]]),
+            "first": grid.first,
+            "begin": grid.begin[:, None],
+            "listed": grid.members[:, None],
+            "clear": grid.clear[:, None],
+        }
+
+    @ti.func
+    def nearest(self, m, r):
+        """Return the place (m) nearest to r on triangle m."""
+        tr = ti.static(self.triangles)
+        a = ti.Vector([tr[m, 0], tr[m, 1], tr[m, 2]])
+        b = ti.Vector([tr[m, 3], tr[m, 4], tr[m, 5]])
+        c = ti.Vector([tr[m, 6], tr[m, 7], tr[m, 8]])
+        return nearest_on_triangle(a, b, c, r)
+
+    @ti.func
+    def distance(self, w, k, r):
+        """Return the distance (m) of r from the nearest of all triangles."""
+        least = ti.cast(ti.math.inf, float)
+        for m in range(self.triangles.shape[0]):
+            least = ti.min(least, (r - self.nearest(m, r)).norm())
+        return least
+
+    @ti.func
+    def cells(self):
+        """Return the number of cells along each axis."""
+        return ti.Vector([ti.cast(self.grid[0, 4 + a], ti.i32) for a in ti.static(range(3))])
+
+    @ti.func
+    def cell(self, r):
+        """Return the cell along each axis that is nearest to r."""
+        at = ti.Vector([0, 0, 0])
+        for a in ti.static(range(3)):
+            index = (r[a] - self.grid[0, a]) / self.grid[0, 3]
+            last = self.grid[0, 4 + a] - 1.0
+            at[a] = ti.cast(ti.min(ti.max(index, 0.0), last), ti.i32)
+        return at
+
+    @ti.func
+    def clearance(self, r):
+        """Return a distance (m) that r is from all triangles at least."""
+        dims, at, beside = self.cells(), self.cell(r), 0.0 * r
+        for a in ti.static(range(3)):
+            low = self.grid[0, a]
+            high = low + self.grid[0, 3] * self.grid[0, 4 + a]
+            beside[a] = ti.max(low - r[a], ti.max(r[a] - high, 0.0))
+        index = (at[0] * dims[1] + at[1]) * dims[2] + at[2]
+        return ti.max(beside.norm(), self.clear[index, 0] - beside.norm())
+
+    @ti.func
+    def search(self, r, reach, best, search: ti.template(), found, number):  # type: ignore[valid-type]
+        """Return what ``search.consider`` makes of all triangles that may be within ``reach`` (m) of r, one
+        after another, from ``best`` on; see tisim/effects/contact/wall_search.py."""
+        dims, low, high = self.cells(), self.cell(r - reach), self.cell(r + reach)
+        # With nothing within reach there is no cell to look at.
+        for x in range(low[0], ti.select(reach > 0.0, high[0] + 1, low[0])):
+            for y, z in ti.ndrange((low[1], high[1] + 1), (low[2], high[2] + 1)):
+                index = (x * dims[1] + y) * dims[2] + z
+                begin, end = self.begin[index, 0], self.begin[index + 1, 0]
+                for e in range(ti.cast(begin, ti.i32), ti.cast(end, ti.i32)):
+                    m = ti.cast(self.listed[e, 0], ti.i32)
+                    if self.is_new(m, x, y, z, low):
+                        best = search.consider(r, self.nearest(m, r), best, found, number)
+        return best
+
+    @ti.func
+    def is_new(self, m, x, y, z, low):
+        """Return whether triangle m, which may be in several of the cells from ``low`` on, has not been in
+        those before x, y, z."""
+        first = [ti.max(ti.cast(self.first[m, axis], ti.i32), low[axis]) for axis in ti.static(range(3))]
+        return x == first[0] and y == first[1] and z == first[2]
+
+
+@ti.func
+def nearest_on_triangle(a, b, c, r):
+    """Return the place nearest to r on the triangle a, b, c.
+
+    Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """
+    ab, ac = b - a, c - a
+    d1, d2 = ab.dot(r - a), ac.dot(r - a)
+    d3, d4 = ab.dot(r - b), ac.dot(r - b)
+    d5, d6 = ab.dot(r - c), ac.dot(r - c)
+    # Areas opposite to a, b and c.
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, u = 0.0 * d1, 0.0 * d1
+    if d1 <= 0.0 and d2 <= 0.0:
+        v = 0.0
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        u = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        u = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+        u = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - u
+    else:
+        v, u = vb / (va + vb + vc), vc / (va + vb + vc)
+    return a + v * ab + u * ac
