@@ -34,6 +34,7 @@ from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.read import read as read
 from .io.recording import Recording as Recording
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
+from .packing.grains import GrainClass as GrainClass
 from .packing.placement import (
     Lattice as Lattice,
 )
@@ -42,6 +43,9 @@ from .packing.placement import (
 )
 from .packing.placement import (
     RandomInBox as RandomInBox,
+)
+from .packing.placement import (
+    RandomInCylinder as RandomInCylinder,
 )
 from .packing.placement import (
     RandomInDomain as RandomInDomain,

@@ -101,13 +101,14 @@ class Scene(Component):
 
     def acting(self) -> tuple[Effect, ...]:
         """Return the effects, with what they take from the start filled in."""
-        masses = self.particles.masses()
+        masses = self.particles.masses(self.seed)
         return tuple(effect.at_start(masses) for effect in self.effects)
 
     def capacity(self) -> int:
         """Return how many particles may ever live at once."""
-        masses = self.particles.masses()
-        return max([len(masses), *(effect.capacity(masses) for effect in self.effects)])
+        masses = self.particles.masses(self.seed)
+        n = len(masses)
+        return n + sum(effect.capacity(masses) - n for effect in self.effects)
 
     def digest(self) -> str:
         """Return a hash, in hex, of everything that decides the result: physics version, every parameter, the
