@@ -23,6 +23,7 @@ from . import (
     steppers as steppers,
 )
 from .backend.runtime import init as init
+from .engine.measure_series import MeasureSeries as MeasureSeries
 from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
 from .engine.result import Status as Status

@@ -67,7 +67,10 @@ def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[st
     """Return the names of the ``counters``, ``world_quantities`` or ``flags`` that the parts of a scene
     declare, each once."""
     parts: tuple[Any, ...] = (*effects, stepper, stepper.control)
-    return tuple(dict.fromkeys(name for part in parts for name in getattr(part, what, ())))
+    names = [name for part in parts for name in getattr(part, what, ())]
+    if what == "world_quantities":
+        names += [name for effect in effects for name in effect.own_quantities()]
+    return tuple(dict.fromkeys(names))
 
 
 def picks_pairs(effects: Sequence[Effect], stepper: Stepper) -> bool:
@@ -105,9 +108,9 @@ class Assembly:
         self.derived_solvers = tuple(
             solver(s, effect, domain, self.pairs) for effect in effects.of(DerivedQuantity)
         )
-        for force in effects.of(Force):
-            for name, value in force.data.remembers(s).items():
-                setattr(force, name, value)
+        for effect in effects:
+            for name, value in effect.data.remembers(s).items():
+                setattr(effect, name, value)
         components = 6 if turning([effect.data for effect in effects]) else 3
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
         self.exported = ExportedTerms(self.pairs, components) if self.pairs and listed else None

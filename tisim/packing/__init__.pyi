@@ -22,6 +22,7 @@ from .size_laws import EqualSizes as EqualSizes
 from .size_laws import LognormalSizes as LognormalSizes
 from .size_laws import NormalSizes as NormalSizes
 from .size_laws import SieveCurve as SieveCurve
+from .size_laws import TruncatedSizes as TruncatedSizes
 from .size_laws import UniformSizes as UniformSizes
 from .size_laws import WeibullSizes as WeibullSizes
 from .sizes import SizeDistribution as SizeDistribution

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -25,7 +25,8 @@ class Effect(LawHints, Component):
     that are all elsewhere, or all faster by one velocity, as those in each layer of a sheared box are.
     counters : names of the integer counters that it keeps of a world. world_quantities : names of the
     quantities that it keeps of a world. requires_source : the quantities of which a scene must have at least
-    one source. repeatable : whether a scene can hold two of its kind.
+    one source. repeatable : whether a scene can hold two of its kind. ends :
+    what has come about when it ends a world.
     """
 
     contract: ClassVar[bool] = True
@@ -42,6 +43,7 @@ class Effect(LawHints, Component):
     homogeneous: ClassVar[bool] = True
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
+    ends: ClassVar[str] = "it ends"
     requires_source: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -56,6 +58,20 @@ class Effect(LawHints, Component):
     def connect(self, peers: Peers) -> dict[str, Any]:
         """Return attributes to set on its bound object, chosen among the bound effects of the scene."""
         return {}
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        """Return attributes to set on its bound object, chosen among the fields of the state."""
+        return {}
+
+    def own_quantities(self) -> tuple[str, ...]:
+        """Return names of further quantities that it keeps of a world, which begin with its own name, so that
+        each of a kind has its own; it finds them with ``remembers``."""
+        return ()
+
+    def newcomers(self) -> Collection[str] | None:
+        """Return the names of the fields, beside those that all particles have, that it gives to particles it
+        adds; None where it adds none, or only copies."""
+        return None
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""
