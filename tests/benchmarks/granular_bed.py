@@ -1,10 +1,10 @@
 """Time of a step of a settled bed of grains within five walls, beside LAMMPS or other settings of tisim.
 
     python tests/benchmarks/granular_bed.py [--numbers 8000 32000] [--threads 1] [--steps 100] [--repeats 9]
-        [--beside hertz/history granular] [--cpu]
+        [--beside hertz/history granular] [--cpu] [--beds FOLDER]
 
 Spheres of diameter 1 and density 1 fall into a box 20 wide under tilted gravity, and come to rest (once for
-each number; a minute of 8000). Then the steps of all go on from there in turns, lists and walls included;
+each number; a minute of 8000; ``--beds`` keeps them for the next time). Then the steps of all go on from there in turns, lists and walls included;
 ratios are medians of those of each turn, with the least and the largest. TISIM_BACKEND=quadrants chooses the
 other kernel compiler. What tisim as it is stands beside:
 
@@ -84,6 +84,15 @@ def settled(n: int, width: float) -> np.ndarray:
     return position[np.lexsort(np.floor(position[:, ::-1] / 4).T)]
 
 
+def kept(n: int, width: float, folder: Path) -> np.ndarray:
+    """The settled bed of a folder, put there where it is not."""
+    file = folder / f"bed_{n}.npy"
+    if not file.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        np.save(file, settled(n, width))
+    return np.load(file)
+
+
 def by_tisim(position: np.ndarray, width: float, setting: str = "") -> Steps:
     """tisim as it is, or with a setting, such as ``skin=0.1``."""
     name, _, value = setting.partition("=")
@@ -148,6 +157,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--beside", nargs="*", default=list(STYLES), metavar="WHAT", help="see above")
     parser.add_argument("--cpu", action="store_true", help="CPU time of all threads, not wall time")
+    parser.add_argument("--beds", type=Path, metavar="FOLDER", help="settled beds are kept here")
     options = parser.parse_args()
     for what in options.beside:
         if what not in STYLES and what.partition("=")[0] not in SETTINGS:
@@ -157,7 +167,7 @@ def main() -> None:
     print(f"{runtime.backend()}, {options.threads} threads, {platform.processor() or platform.machine()}")
     for n in options.numbers:
         width = WIDTH * (n / 8000) ** 0.5
-        position = settled(n, width)
+        position = kept(n, width, options.beds) if options.beds else settled(n, width)
         runs = {"tisim": by_tisim(position, width)}
         for what in options.beside:
             if what in STYLES:

@@ -7,10 +7,11 @@ from tisim.backend.memory import collected
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.worlds.fields import CORE
+from tisim.worlds.launched_program import LaunchedProgram
 from tisim.worlds.phases import Phase, Repeat
-from tisim.worlds.program import Program
 from tisim.worlds.state import State
 from tisim.worlds.status import NEVER, WorldStatus
+from tisim.worlds.world_program import in_pieces, world_programs
 
 WORLDS, STEPS = 5, 60
 
@@ -60,9 +61,9 @@ def made():
     @in_taichi_thread
     def make():
         s = State(WORLDS, 1, CORE, (), ("trace",), ("outer", "inner"))
-        one, two, three, four, five = (Mark(s, k) for k in range(1, 6))
+        one, two, three, four, five, six = (Mark(s, k) for k in range(1, 7))
         inner = While(s.inner, three, usual=1)
-        return s, (one, While(s.outer, two, inner, four, usual=0), five)
+        return s, (one, six, While(s.outer, two, inner, four, usual=0), six, five)
 
     with collected() as trees:
         yield make()
@@ -74,13 +75,25 @@ def ends(made, schedule, asks=False):
     """What becomes of the worlds, and how many launches and looks it takes."""
     s, items = made
     s.fill({**dict.fromkeys(s.columns, 0), "pause_time": np.inf, "goal": NEVER})
-    program = Program(s, items, schedule)
-    program.asks = asks
-    looks, learn = [], program._learn
-    program._learn = lambda found: looks.append(found) or learn(found)
+    looks = []
+    if schedule == "world":
+        # The list beside it shares items with the step, and is not taken.
+        _, program = world_programs(s, (items[1:3], items))
+    else:
+        program = LaunchedProgram(s, items)
+        program.asks, learn = asks, program._learn
+        program._learn = lambda found: looks.append(found) or learn(found)
     program.advance(STEPS // 2)
     program.advance(STEPS - STEPS // 2)
     return s.snapshot(("trace", "steps", "status", "outer", "inner")), looks
+
+
+def test_what_recurs_in_steps_is_a_piece_of_its_own():
+    a, b, c, d = (Phase() for _ in range(4))
+    pieces, spans = in_pieces(((a, b, c, a), (d, d, b), ()))
+    assert pieces == (((a,), (0, 3)), ((b,), (1, 6)), ((c,), (2,)), ((d,), (4, 5)))
+    assert spans == (range(4), range(4, 7), range(7, 7))
+    assert in_pieces(((a, b, c), (d,))) == ((((a, b, c), (0,)), ((d,), (1,))), (range(1), range(1, 2)))
 
 
 def test_all_schedules_and_ways_to_ask_take_the_same_steps_and_devices_are_asked_seldom(made):

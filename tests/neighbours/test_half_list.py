@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from tests.neighbours.test_pair_list import DOMAINS, clouds, motion, near_pairs
+from tests.neighbours.test_near_list import DOMAINS, clouds, motion, near_pairs
 from tests.scenes import scene
 from tests.throwaway import SoftShell
 from tisim import InputError, RunError, Simulation
 from tisim.backend import memory, runtime
+from tisim.backend.layout import Builder
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import PairForce, parameter
 from tisim.engine import monitor, replay
 from tisim.interactions import pair_chunks
-from tisim.neighbours import half_list, search_rows
+from tisim.neighbours import half_list, rebuild_half_list
 from tisim.steppers import Boris, FixedStep
 from tisim.worlds import prefix_sum
 
@@ -124,15 +125,35 @@ def simulation_of_bursts():
     simulation.close()
 
 
-def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(simulation_of_bursts):
-    """Beside a run whose list is long enough from the start, and others of skins that the scene says."""
+@pytest.fixture
+def kept(monkeypatch):
+    """Memory that is kept for later, 8 MB of it, until it is asked back."""
+
+    @in_taichi_thread
+    def keep():
+        builder = Builder()
+        builder.dense(ti.i, 2**20).place(ti.field(ti.f64))
+        return [memory.Tree(builder)]
+
+    kept = keep()
+    monkeypatch.setattr(memory, "reclaimers", [*memory.reclaimers, lambda: kept and kept.pop().destroy()])
+    return kept
+
+
+def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(simulation_of_bursts, kept, monkeypatch):
+    """Beside a run whose list is long enough from the start, and others of skins that the scene says. There
+    is room for it once what is kept for later has been given back."""
     simulation, rows, ends = simulation_of_bursts, [], []
+    simulation.load(burst())
+    present = memory.bytes_in_use()
+    monkeypatch.setattr(runtime, "memory", lambda: present + 1000)
     for skin in (None, None, 0.002, 0.02):
         simulation.load(burst().model_copy(update={"skin": skin}))
         simulation.run()
         ends += simulation.results()
         rows.append(simulation.assembly.pairs.half_list.row)
     assert half_list.ListSizes().row < rows[0] == rows[1]
+    assert not kept
     for end in ends:
         assert end.status.ok, end.status.reason
         for name, values in ends[0].state.items():
@@ -158,14 +179,14 @@ def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_th
     u = speed * dt / 2 / diameter / (1 - half_list.REACH_PART)
     # The least of 2 u / x * REBUILD_COST + n (1 + x)^3, of what a skin of x diameters costs.
     x = np.linspace(0.01, 0.5, 4901)
-    cost = 2 * u / x * search_rows.REBUILD_COST + search_rows.FEWEST_PAIRS * (1 + x) ** 3
+    cost = 2 * u / x * rebuild_half_list.REBUILD_COST + rebuild_half_list.FEWEST_PAIRS * (1 + x) ** 3
     assert chosen_skin(simulation) == pytest.approx(diameter * x[np.argmin(cost)], rel=1e-2)
     simulation.close()
 
 
 @in_taichi_thread
 def chosen_skin(simulation):
-    return simulation.assembly.pairs.half_list.grid.skin[0]
+    return simulation.assembly.pairs.half_list.grid.skin[0, 0]
 
 
 @pytest.mark.slow

@@ -27,10 +27,9 @@ from tisim.interactions.rearrangement import Rearrange, StoreBefore
 from tisim.interactions.rebuild_pairs import update_pairs
 from tisim.interactions.self_consistent import SelfConsistentSolver, solver
 from tisim.interactions.spatial_sort import SpatialSort
-from tisim.neighbours.cell_list import list_phases
 from tisim.neighbours.half_list import HalfList, ListSizes
 from tisim.neighbours.lists import NeighbourLists
-from tisim.neighbours.pair_list import NeighbourList
+from tisim.neighbours.near_list import NearList, update_near_list
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import FinishStep, FirstStep
@@ -101,7 +100,7 @@ class Assembly:
         events, operators = effects.of(PairEvent), effects.of(Operator)
         short_ranged = tuple(e for e in effects.of(PairForce, SelfConsistentQuantity) if e.data.short_ranged)
         surveyed = bool(events) or control.data.watches_pairs
-        near = NeighbourList(s, domain) if surveyed else None
+        near = NearList(s, domain, sizes.near) if surveyed else None
         self.pairs = self._listed(short_ranged, sizes) if short_ranged else None
         self.lists = NeighbourLists(s, near, self.pairs) if near or self.pairs else None
         contacts = ContactList(s, domain, events) if surveyed else None
@@ -115,8 +114,7 @@ class Assembly:
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
         self.exported = ExportedTerms(self.pairs, components) if self.pairs and listed else None
         pairs = update_pairs(self.pairs) if self.pairs else ()
-        events_lists = list_phases(near) if near else ()
-        lists = (*events_lists, *pairs)
+        lists = (*(update_near_list(near) if near else ()), *pairs)
         force_sum = self._sum(SumForces)
         context = StepContext(
             s=s,
@@ -146,10 +144,10 @@ class Assembly:
             if self.pairs and self.pairs.memories:
                 step += [StoreBefore(self.pairs, operators)]
             step += [Rearrange(s, domain, operators, self.lists)]
+            again: list[Item] = [*self._summed(SumForcesAfterEvents)]
             if near and contacts and control.data.watches_pairs:
-                step += [*lists, FindContactsAfterEvents(near, contacts, control)]
-            if context.sum_forces:
-                step += [*lists, *self._summed(SumForcesAfterEvents)]
+                again.insert(0, FindContactsAfterEvents(near, contacts, control))
+            step += [*lists, *again] if again else []
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
         # Events tell pairs apart by index, and operators on a world may add and remove particles.

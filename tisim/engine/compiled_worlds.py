@@ -17,9 +17,11 @@ from tisim.errors import InputError, RunError
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.finite import FiniteCheck
+from tisim.worlds.launched_program import LaunchedProgram
 from tisim.worlds.phases import nested
 from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
+from tisim.worlds.world_program import world_programs
 
 
 class CompiledWorlds:
@@ -47,6 +49,7 @@ class CompiledWorlds:
                 raise InputError(f"{what} must be {rule}; received {no.received}") from None
         self.s, self.table = self.allocation.s, self.allocation.table
         self.schedule = schedule or self._choose(capacity)
+        self.s.shared = self.schedule == "particle"
         self.s.write("status", WorldStatus.ENDED)
         self._compile()
         return trees
@@ -58,16 +61,20 @@ class CompiledWorlds:
 
     def _compile(self) -> None:
         """Compile the kernels of a step; no world may be running."""
-        sort = self.assembly.sort
-        self.program = Program(self.s, self.assembly.step, self.schedule, sort.every if sort else NEVER)
-        self.sort = Program(self.s, sort.items(), "particle", once=True) if sort else None
-        self.first = Program(self.s, self.assembly.first, self.schedule, once=True)
+        sort, first, step = self.assembly.sort, self.assembly.first, self.assembly.step
+        rest_every = sort.every if sort else NEVER
+        self.first: Program
+        self.program: Program
+        if self.schedule == "world":
+            self.first, self.program = world_programs(self.s, (first, step), rest_every)
+        else:
+            self.first = LaunchedProgram(self.s, first, once=True)
+            self.program = LaunchedProgram(self.s, step, rest_every)
+        self.sort = LaunchedProgram(self.s, sort.items(), once=True) if sort else None
         with law_errors.in_a_line():
-            self.program.compile()
-            if self.first.items:
-                self.first.compile()
-            if self.sort:
-                self.sort.compile()
+            for program in (self.program, self.first, self.sort):
+                if program and program.items:
+                    program.compile()
 
     @property
     def assembly(self) -> Assembly:
@@ -76,8 +83,8 @@ class CompiledWorlds:
 
     def list_sizes(self) -> ListSizes:
         """Return sizes in which the lists of pairs last made would have room."""
-        pairs = self.assembly.pairs
-        return pairs.half_list.wanted() if pairs else ListSizes()
+        lists = self.assembly.lists
+        return lists.wanted(self.assembly.sizes) if lists else ListSizes()
 
     @in_taichi_thread
     def grow_lists(self, sizes: ListSizes) -> None:
@@ -88,10 +95,16 @@ class CompiledWorlds:
         image, before = self.s.image(), self.assembly.sizes
         self.s.write("status", WorldStatus.ENDED)
         try:
-            self._assemble(sizes)
+            try:
+                self._assemble(sizes)
+            except NoRoom:
+                # Once more, without what is only kept for later.
+                memory.reclaim()
+                self._assemble(sizes)
         except RunError as full:
             self._assemble(before)
             rows = f"lists of {sizes.row} pairs for a particle, and {sizes.mean} in the mean"
+            rows += f", and of {sizes.near} for events and step control"
             raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
         finally:
             self.put(image)

@@ -16,7 +16,7 @@ from tisim.engine.observer import Observers, Observing
 from tisim.engine.particle_state import ParticleState
 from tisim.engine.result import Result
 from tisim.errors import InputError, is_number, is_whole, must
-from tisim.neighbours import pair_list
+from tisim.neighbours import near_list
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.worlds.status import NEVER, WorldStatus
@@ -71,7 +71,7 @@ class Simulation(CompiledWorlds):
         self.table.write([parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.edits = [[] for _ in scenes]
-        self.s.fill({"pause_time": np.inf, "goal": NEVER, "listed_above": pair_list.SMALL_WORLD})
+        self.s.fill({"pause_time": np.inf, "goal": NEVER, "listed_above": near_list.SMALL_WORLD})
         self.begin()
         try:
             check_reach(self.scenes, self.starts, self.assembly.pairs)

@@ -7,7 +7,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import PairEvent
-from tisim.neighbours.pair_list import NeighbourList
+from tisim.neighbours.near_list import NearList
 from tisim.worlds.bound import Bound
 from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.state import State
@@ -83,9 +83,9 @@ class ClearContacts(Phase):
 class FindContacts(PerParticle):
     """This phase looks at every near pair: it enters those in contact, and asks the control about all."""
 
-    def __init__(self, neighbour_list: NeighbourList, contacts: ContactList, control: Bound[Any]) -> None:
-        super().__init__(neighbour_list.s)
-        self.neighbour_list, self.contacts, self.control = neighbour_list, contacts, control
+    def __init__(self, near: NearList, contacts: ContactList, control: Bound[Any]) -> None:
+        super().__init__(near.s)
+        self.near, self.contacts, self.control = near, contacts, control
         self.hard = any(event.hard for event in contacts.events)
 
     @ti.func
@@ -101,14 +101,17 @@ class FindContacts(PerParticle):
 
     @ti.func
     def run(self, w, i):
+        near, s, listed = self.near, self.s, self.near.listed(w)
         soonest, overlaps = ti.cast(ti.math.inf, ti.f64), 0
-        for k in range(self.neighbour_list.size(w, i)):
-            j = self.neighbour_list.candidate(w, i, k)
-            if j != i:
-                here, there = self.s.position[w, i], self.s.position[w, j]
-                d = self.neighbour_list.domain.separation(w, here, there, self.s.time[w])
-                overlaps += self.enter(w, i, j, d)
-                soonest = ti.min(soonest, self.control.pair(self.s, w, i, j, d))
+        for k in range(near.offered(w, i, listed)):
+            j = near.candidate(w, i, k, listed)
+            leads = near.leads(w, i, j)
+            # A list has each pair once; of all pairs each is its first one's.
+            if leads or listed:
+                a, b = ti.select(leads, i, j), ti.select(leads, j, i)
+                d = near.domain.separation(w, s.position[w, a], s.position[w, b], s.time[w])
+                overlaps += self.enter(w, a, b, d)
+                soonest = ti.min(soonest, self.control.pair(s, w, a, b, d))
         self.control.note(self.s, w, i, soonest)
         if ti.static(self.hard):
             self.contacts.count_overlaps(w, overlaps)
@@ -119,8 +122,8 @@ class FindContactsAfterEvents(FindContacts):
 
     conditional = True
 
-    def __init__(self, neighbour_list: NeighbourList, contacts: ContactList, control: Bound[Any]) -> None:
-        super().__init__(neighbour_list, contacts, control)
+    def __init__(self, near: NearList, contacts: ContactList, control: Bound[Any]) -> None:
+        super().__init__(near, contacts, control)
         # Those that overlap have been counted.
         self.hard = False
 

@@ -2,8 +2,8 @@
 
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_chunks import PairChunks, PerChunk, PerWorld
-from tisim.neighbours.cell_grid import sort_row
-from tisim.neighbours.search_rows import search_rows, watch_reach
+from tisim.neighbours.cell_phases import sort_row
+from tisim.neighbours.rebuild_half_list import rebuild_half_list, watch_reach
 from tisim.worlds.phases import Item, Phase, Repeat
 from tisim.worlds.status import WorldStatus
 
@@ -13,7 +13,7 @@ def update_pairs(pairs: PairChunks) -> tuple[Item, ...]:
     store = (StoreMemory(pairs),) if pairs.memories else ()
     place = (CountPairs(pairs), *pairs.ends.phases(), PlacePairs(pairs), FillPairs(pairs))
     fetch = (*pairs.fetch_ends.phases(), EnterFetches(pairs), SortFetches(pairs))
-    rows = (*store, BeginRebuild(pairs), *search_rows(pairs.half_list))
+    rows = (*store, BeginRebuild(pairs), *rebuild_half_list(pairs.half_list))
     rebuild = RebuildPairs(pairs, (*rows, *place, *fetch, EndRebuild(pairs)))
     return (*watch_reach(pairs.half_list), rebuild)
 

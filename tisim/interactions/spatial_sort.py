@@ -14,9 +14,9 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rebuild_pairs import BeginRebuild, StoreMemory
-from tisim.neighbours.cell_grid import CellGrid, OfGrid, OfParticles, cell_phases, measure_phases
+from tisim.neighbours.cell_grid import CellGrid, OfGrid, OfParticles
+from tisim.neighbours.cell_phases import cell_phases, measure_phases
 from tisim.neighbours.lists import NeighbourLists
-from tisim.neighbours.search_rows import NoteReach
 from tisim.worlds.phases import Item, Repeat
 
 SORTED_FROM = 4096
@@ -32,6 +32,18 @@ BRICK = 8
 @ti.data_oriented
 class BrickGrid(CellGrid):
     """A brick grid numbers cells brick by brick; the last brick along an axis may be thinner."""
+
+    def shared(self) -> bool:
+        # Worlds are always sorted by all threads.
+        return True
+
+    @ti.func
+    def divide(self, cells, most):
+        # The order, and so last digits, must not go by how cells are best searched.
+        dims = ti.max(1, ti.floor(cells, ti.i32))
+        while dims[0] * dims[1] * dims[2] > most:
+            dims = (dims + 1) // 2
+        return dims
 
     @ti.func
     def cell_index(self, w, level, at):
@@ -91,7 +103,7 @@ class SpatialSort:
         """Return the items that sort the worlds whose turn it is; between two steps."""
         grid, pairs = self.grid, self.pairs
         store = (StoreMemory(pairs),) if pairs.memories else ()
-        cells = (NoteReach(grid, pairs.half_list), *measure_phases(grid), DropSkin(grid), *cell_phases(grid))
+        cells = (*measure_phases(grid, pairs.half_list), DropSkin(grid), *cell_phases(grid))
         permute = PermuteColumns(
             self, (GatherColumns(grid, self), WriteColumns(grid, self), EndColumns(grid, self))
         )
@@ -143,7 +155,8 @@ class DropSkin(OfGrid):
 
     @ti.func
     def run(self, w, _k):
-        self.g.skin[w] = 0.0
+        for k in ti.static(range(3)):
+            self.g.skin[w, k] = 0.0
 
 
 class GatherColumns(OfParticles):

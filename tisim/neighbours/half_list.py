@@ -1,12 +1,11 @@
 """Pairs that short-ranged forces may act between, each listed once, by its smaller particle.
 
-A particle lists those at least as large as itself (of equals, those of higher id), of which few find room
-around it, so rows are short whatever the ratio of sizes. A list is made anew when particles have moved so far
-that a pair it lacks could matter; the skin says how far that is. What a pair does depends on its distance,
-never on whether the list was due: results do not depend on when lists were made.
+A list is made anew when particles have moved so far that a pair it lacks could matter; the skin says how far
+that is.
 """
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,21 +15,21 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
 from tisim.effects.base import Pairwise
-from tisim.neighbours.cell_grid import LEVELS, CellGrid
+from tisim.neighbours.cell_grid import LEVELS
+from tisim.neighbours.neighbour_rows import ALL_PAIRS, NeighbourRows
 from tisim.numerics.ieee import far_away
 from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 
-ALL_PAIRS = 2**30
-"""This is the ``listed_above`` of a world in which all pairs are listed, however far apart."""
 REACH_PART = 0.125
 """Part of the skin that is kept for laws that come to reach farther, as that of particles that grow does."""
 
 
 @dataclass(frozen=True)
 class ListSizes:
-    """The list sizes say how much a list of pairs has room for: the pairs that a particle lists, and those of
-    each particle of a world in the mean.
+    """The list sizes say how much lists of pairs have room for: the pairs that a particle lists for forces,
+    those of each particle of a world in the mean, and the pairs that a particle lists for events and step
+    control, ``near``.
 
     Spheres that only touch, of any sizes, touch fewer than 14.93 others in the mean, and make half as many
     pairs (G. Kuperberg and O. Schramm, Math. Res. Lett. 1 (1994) 339). Where laws reach farther the list
@@ -39,49 +38,44 @@ class ListSizes:
 
     row: int = 16
     mean: int = 8
+    near: int = 16
 
     def joined(self, other: "ListSizes") -> "ListSizes":
         """Return sizes in which whatever either has room for finds room."""
-        return ListSizes(max(self.row, other.row), max(self.mean, other.mean))
+        largest = map(max, astuple(self), astuple(other))
+        return ListSizes(*largest)
 
 
 @ti.data_oriented
-class HalfList:
-    """A half list holds the listed pairs of every world: ``index[w, i, k]`` for k below ``size[w, i]``, in
-    order of index."""
+class HalfList(NeighbourRows):
+    """A half list has the pairs of the worlds by which laws may act, each row in order of index.
+
+    spent : part of the skin that movements may use up. pace : how far a particle moves in a step (m), found
+    from ``moves`` steps since the list was ``made`` (s).
+    """
+
+    ordered: ClassVar[bool] = True
 
     def __init__(
         self, s: State, domain: Bound[Domain], laws: tuple[Bound[Pairwise], ...], sizes: ListSizes
     ) -> None:
-        self.s, self.domain = s, domain
-        self.laws = tuple(law for law in laws if law.data.offers("reach"))
-        self.grid, self.spent = CellGrid(s, domain), 1.0 - REACH_PART if self.laws else 1.0
-        self.sizes, self.row = sizes, sizes.row
-        self.index, self.size, self.stale = (ti.field(ti.i32) for _ in range(3))
-        self.longest, self.total = ti.field(ti.i32), ti.field(ti.i64)
-        self.since, self.pace, self.moves = ti.field(ti.f64), ti.field(ti.f64), ti.field(ti.i32)
-        self.made = ti.field(ti.f64)
-        # Images that move past the box lie in other cells than the particles: they are looked for apart.
-        self.images = 1 if domain.shears() else 0
+        super().__init__(s, domain, sizes.row)
+        self.laws, self.sizes = tuple(law for law in laws if law.data.offers("reach")), sizes
+        self.spent = 1.0 - REACH_PART if self.laws else 1.0
+        self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
         builder = Builder()
-        particles = builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity)
-        particles.place(self.size)
-        particles.dense(ti.k, self.row).place(self.index)
-        for column in (self.stale, self.longest, self.total, self.pace, self.moves, self.made):
+        for column in (self.pace, self.moves, self.made):
             builder.dense(ti.i, s.worlds).place(column)
-        builder.dense(ti.i, s.worlds).dense(ti.j, 3).place(self.since)
-        self.tree = Tree(builder)
+        self.own = Tree(builder)
 
     def bytes(self) -> int:
-        """Return the device memory, in bytes."""
-        return self.tree.bytes + self.grid.bytes()
+        return super().bytes() + self.own.bytes
 
     @in_taichi_thread
     def wanted(self) -> ListSizes:
         """Return sizes in which the lists last made, which may have overflowed, have room to spare."""
-        longest, total = int(self.longest.to_numpy().max()), int(self.total.to_numpy().max())
-        row, mean = -(-5 * longest // 4), -(-5 * total // (4 * self.s.capacity))
-        return self.sizes.joined(ListSizes(row, mean))
+        mean = -(-5 * int(self.total.to_numpy().max()) // (4 * self.s.capacity))
+        return self.sizes.joined(ListSizes(self.wanted_row(), mean))
 
     @in_taichi_thread
     def outlook(self) -> np.ndarray:
@@ -92,13 +86,12 @@ class HalfList:
     def forget(self) -> None:
         """Have every list made anew before it is used again, as the first of a run: nothing is known of how
         fast particles move."""
-        self.stale.fill(1)
+        super().forget()
         self.moves.fill(0)
         self.pace.fill(0.0)
 
     @ti.func
     def reach(self, w, i):
-        """Return the widest gap (m) at which a law acts between i and a particle no larger."""
         gap = ti.cast(0.0, self.s.real)
         for law in ti.static(self.laws):
             gap = ti.max(gap, law.reach(self.s, w, i))
@@ -117,9 +110,13 @@ class HalfList:
 
     @ti.func
     def lists(self, w, i, j):
-        """Return whether the pair is i's to list."""
         a, b = self.s.radius[w, i], self.s.radius[w, j]
         return a < b or (a == b and self.s.id[w, i] < self.s.id[w, j])
+
+    @ti.func
+    def sees(self, d, distance, skin):
+        limit = distance + skin[0]
+        return d.norm_sqr() <= limit * limit
 
     @ti.func
     def moved(self, w):
@@ -133,7 +130,7 @@ class HalfList:
         apart = 2.0 * ti.sqrt(square)
         if ti.static(self.images > 0):
             apart += self.sheared(w, self.s.time[w] + self.s.dt[w] - self.made[w])
-        if not (apart <= self.spent * self.grid.skin[w]):
+        if not (apart <= self.spent * self.grid.skin[w, 0]):
             self.stale[w] = 1
 
     @ti.func
@@ -142,4 +139,4 @@ class HalfList:
         g, widest = self.grid, ti.cast(0.0, self.s.real)
         for level in range(LEVELS):
             widest = ti.max(widest, g.largest[w, level] + g.widest[w, level])
-        return ti.abs(ti.cast(g.domain.shear_rate(w), ti.f64)) * elapsed * (widest + g.skin[w])
+        return ti.abs(ti.cast(g.domain.shear_rate(w), ti.f64)) * elapsed * (widest + g.skin[w, 0])

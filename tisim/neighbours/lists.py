@@ -1,19 +1,24 @@
 """The lists of near pairs that a scene calls for, as steppers and operators see them: one object for all."""
 
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from tisim.backend.taichi import ti
-from tisim.neighbours.pair_list import NeighbourList
+from tisim.neighbours.half_list import ListSizes
+from tisim.neighbours.near_list import NearList
 from tisim.worlds.state import State
+
+if TYPE_CHECKING:
+    from tisim.interactions.pair_chunks import PairChunks
 
 
 @ti.data_oriented
 class NeighbourLists:
     """The neighbour lists have to hear how far particles have moved: the list of events and step control,
-    ``near``, and the pairs of short-ranged forces."""
+    ``near``, and the ``pairs`` of short-ranged forces."""
 
-    def __init__(self, s: State, near: NeighbourList | None, pairs: Any | None) -> None:
-        self.s, self.near, self.watched = s, near, near is not None
+    def __init__(self, s: State, near: NearList | None, pairs: "PairChunks | None") -> None:
+        self.s, self.near, self.pairs, self.watched = s, near, pairs, near is not None
         self.lists = tuple(one for one in (near, pairs) if one is not None)
 
     @ti.func
@@ -42,3 +47,12 @@ class NeighbourLists:
         """Have all lists made anew before they are used again."""
         for one in self.lists:
             one.forget()
+
+    def wanted(self, sizes: ListSizes) -> ListSizes:
+        """Return sizes, ``sizes`` at least, in which the lists last made, which may have overflowed, have
+        room to spare."""
+        if self.pairs is not None:
+            sizes = sizes.joined(self.pairs.half_list.wanted())
+        if self.near is not None:
+            sizes = replace(sizes, near=max(sizes.near, self.near.wanted_row()))
+        return sizes

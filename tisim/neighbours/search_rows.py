@@ -1,166 +1,179 @@
-"""The phases that make a list of pairs anew: they choose its skin, and search around each particle."""
+"""The phases that make rows of neighbours anew: each pair is found once, and entered with its smaller one.
+
+Within a level of cells a particle looks at those that come after it in the order of cells. Of two levels the
+particles of one search the other: those of the one that has less to search, so that a few large grains among
+many small ones look for these, but many large ones are looked for.
+"""
 
 from tisim.backend.taichi import ti
-from tisim.neighbours.cell_grid import LEVELS, CellGrid, OfGrid, OfParticles, cell_phases, measure_phases
-from tisim.neighbours.half_list import ALL_PAIRS, REACH_PART, HalfList
+from tisim.neighbours.cell_grid import LEVELS, OfBlocks, OfGrid, OfParticles, next_number
+from tisim.neighbours.neighbour_rows import ALL_PAIRS, NeighbourRows
+from tisim.numerics.ieee import far_away
 from tisim.worlds.phases import Phase
 from tisim.worlds.status import WorldStatus
 
-REBUILD_COST = 100.0
-"""Making a list takes, for each particle, as long as this many listed pairs take in a step that do not act on
-each other. Measured in a bed of grains (docs/performance.md): some 900 ns beside 9."""
-LEAST_SKIN, MOST_SKIN = 0.01, 0.5
-"""These bound the skin, in distances at which two of the smallest particles see each other."""
-FEWEST_PAIRS = 1.0
-"""So many pairs of each particle are taken to see each other, where there are fewer: they may come to."""
+
+def search_rows(rows: NeighbourRows) -> tuple[Phase, ...]:
+    """Return the phases that make the rows anew; their particles have been sorted into cells."""
+    return BeginRows(rows), CopySorted(rows), SearchRows(rows), EndRows(rows)
 
 
-def watch_reach(half_list: HalfList) -> tuple[Phase, ...]:
-    """Return the phase that finds out whether laws have come to reach farther, where they reach beyond
-    contact at all."""
-    return (WatchReach(half_list.grid, half_list),) if half_list.laws else ()
+class BeginRows(OfGrid):
+    """This phase chooses which levels the particles of each level search."""
 
-
-def search_rows(half_list: HalfList) -> tuple[Phase, ...]:
-    """Return the phases that make the rows anew."""
-    grid = half_list.grid
-    measure = (NoteReach(grid, half_list), *measure_phases(grid))
-    return (*measure, ChooseSkin(grid, half_list), *cell_phases(grid), SearchRows(grid, half_list))
-
-
-class ChooseSkin(OfGrid):
-    """This phase sets the skin: that of the scene, or the one with which steps should cost least.
-
-    A wider skin makes lists last longer, in proportion, and longer to go through. Particles that move by u in
-    a step take, of n pairs each that see each other within D, with a skin b
-
-        2 u / b * REBUILD_COST + n (1 + b/D)^3
-
-    times what a pair costs, which is least where b (1 + b/D) = sqrt(2 u D REBUILD_COST / 3 n). Both u and n
-    are counts of the list before. No clock is asked, so a run makes its lists in the same steps again.
-    """
-
-    def __init__(self, grid: CellGrid, half_list: HalfList) -> None:
-        super().__init__(grid)
-        self.n = half_list
+    def __init__(self, rows: NeighbourRows) -> None:
+        super().__init__(rows.grid)
+        self.n = rows
 
     @ti.func
     def run(self, w, _k):
-        g, n, s = self.g, self.n, self.s
-        square = ti.cast(0.0, ti.f64)
-        for k in ti.static(range(3)):
-            square += n.since[w, k] ** 2
-            n.since[w, k] = 0.0
-        apart = 2.0 * ti.sqrt(square)
-        if ti.static(n.images > 0):
-            apart += n.sheared(w, s.time[w] - n.made[w])
-        if n.moves[w] > 0:
-            n.pace[w] = 0.5 * apart / n.moves[w]
-        n.moves[w], n.made[w] = 0, s.time[w]
-        chosen = ti.cast(s.skin[w], s.real)
-        if chosen <= 0.0:
-            distance = g.largest[w, 0] + g.widest[w, 0]
-            wider = 1.0 + g.skin[w] / distance
-            near = ti.cast(n.total[w], s.real) / (s.count[w] * wider * wider * wider)
-            pace = ti.cast(n.pace[w], s.real) / n.spent
-            best = pace * REBUILD_COST / (1.5 * distance * ti.max(near, FEWEST_PAIRS))
-            part = 0.5 * (ti.sqrt(1.0 + 4.0 * ti.sqrt(best)) - 1.0)
-            chosen = distance * ti.max(LEAST_SKIN, ti.min(part, MOST_SKIN))
-        g.skin[w] = chosen
+        n, g = self.n, self.g
         n.longest[w], n.total[w] = 0, 0
-
-
-class NoteReach(OfParticles):
-    """This phase notes how far each particle looks beyond the surface of another."""
-
-    def __init__(self, grid: CellGrid, half_list: HalfList) -> None:
-        super().__init__(grid)
-        self.n = half_list
-
-    @ti.func
-    def run(self, w, i):
-        self.g.near[w, i] = self.s.radius[w, i] + self.n.reach(w, i)
-
-
-class WatchReach(NoteReach):
-    """Have the list made anew where particles look farther than it was made for."""
+        for low in range(LEVELS):
+            n.searched[w, low] = 1 << low
+        for low in range(LEVELS):
+            if g.population[w, low] > 0:
+                for high in range(low + 1, LEVELS):
+                    if g.population[w, high] > 0:
+                        reach = g.largest[w, low] + g.widest[w, high]
+                        up = g.population[w, low] * self.work(w, high, reach)
+                        if g.population[w, high] * self.work(w, low, reach) < up:
+                            n.searched[w, high] = n.searched[w, high] + (1 << low)
+                        else:
+                            n.searched[w, low] = n.searched[w, low] + (1 << high)
 
     @ti.func
-    def run(self, w, i):
-        g = self.g
-        farther = self.s.radius[w, i] + self.n.reach(w, i) - g.near[w, i]
-        if farther > 0.5 * REACH_PART * g.skin[w]:
-            self.n.stale[w] = 1
+    def work(self, w, level, reach):
+        """Return how many rows of cells of a level are within ``reach`` (m)."""
+        g, rows = self.g, ti.cast(1.0, self.s.real)
+        for k in ti.static((1, 2)):
+            cells = 2.0 * (reach + g.skin[w, k]) / g.cell[w, level, k] + 1.0
+            rows *= ti.min(cells, ti.cast(g.dims[w, level, k], self.s.real))
+        return rows
 
 
-class SearchRows(OfParticles):
-    """This phase lets each particle list those near it that are no smaller."""
+class CopySorted(OfParticles):
+    """This phase copies what a search reads in the order of cells, in which it is read, and empties all
+    rows."""
 
-    def __init__(self, grid: CellGrid, half_list: HalfList) -> None:
-        super().__init__(grid)
-        self.n = half_list
-
-    @ti.func
-    def run(self, w, i):
-        n, s, count = self.n, self.s, 0
-        for turn in range(-n.images, n.images + 1):
-            count = self.search(w, i, turn, count)
-        ti.atomic_add(n.total[w], ti.cast(count, ti.i64))
-        if count > n.longest[w]:
-            ti.atomic_max(n.longest[w], count)
-        if count > n.row:
-            s.fail(w, WorldStatus.LIST_OVERFLOW, i)
-        n.size[w, i] = ti.min(count, n.row)
-        self.order(w, i, n.size[w, i])
+    def __init__(self, rows: NeighbourRows) -> None:
+        super().__init__(rows.grid)
+        self.n = rows
 
     @ti.func
-    def search(self, w, i, turn, before):
-        """Enter the pairs of i with images of this ``turn`` behind the ``before`` that there are; return how
-        many there are then."""
-        n, g, s, count, t = self.n, self.g, self.s, before, self.s.time[w]
-        place, radius, skin = s.position[w, i], s.radius[w, i], g.skin[w]
-        r = g.domain.seen_from(w, place, turn, t)
-        for level in range(g.level(w, radius), LEVELS):
-            if g.population[w, level] > 0:
-                reach = radius + g.widest[w, level] + skin
-                first, cells = ti.Vector.zero(ti.i32, 3), ti.Vector.zero(ti.i32, 3)
+    def run(self, w, m):
+        n, s, i = self.n, self.s, self.g.order[w, m]
+        n.sorted_position[w, m], n.sorted_radius[w, m] = s.position[w, i], s.radius[w, i]
+        n.sorted_near[w, m], n.size[w, m] = self.g.near[w, i], 0
+
+
+class SearchRows(OfBlocks):
+    """This phase lets each particle look for those near it, in the order of cells: those that follow each
+    other search the same ones."""
+
+    def __init__(self, rows: NeighbourRows) -> None:
+        super().__init__(rows.grid)
+        self.n = rows
+
+    @ti.func
+    def run(self, w, b):
+        n = self.n
+        for m in range(self.begin(b), self.end(w, b)):
+            for turn in range(-n.images, n.images + 1):
+                self.search(w, m, turn)
+
+    @ti.func
+    def search(self, w, m, turn):
+        """Enter the pairs of the m-th in order of cells with images of this ``turn``."""
+        n, g, t = self.n, self.g, self.s.time[w]
+        # Copies: the compiler cannot know that writing a row does not change what it reads.
+        i, place, side = g.order[w, m], n.sorted_position[w, m], g.domain.side(w)
+        radius, near, skin = n.sorted_radius[w, m], n.sorted_near[w, m], g.skin_along(w)
+        r, every = g.domain.seen_from(w, place, turn, t), self.s.listed_above[w] >= ALL_PAIRS
+        sight, own = ti.select(every, ti.static(far_away()), near), g.level(w, radius)
+        searched = n.searched[w, own]
+        for level in range(LEVELS):
+            if (searched >> level) % 2 > 0:
+                dims, begun, reach = g.dims_of(w, level), 0, radius + g.widest[w, level]
+                if level == own:
+                    begun = m + 1
+                elif level < own:
+                    reach = near + g.largest[w, level]
+                first = g.floor_of(w, level, r - reach - skin)
+                last, whole = g.floor_of(w, level, r + reach + skin), every
                 for k in ti.static(range(3)):
-                    dims, width = g.dims[w, level, k], g.cell[w, level, k]
-                    a = ti.floor((r[k] - reach - g.low[w, k]) / width, ti.i32)
-                    b = ti.floor((r[k] + reach - g.low[w, k]) / width, ti.i32)
                     if ti.static(not g.joined[k]):
-                        a, b = ti.max(a, 0), ti.min(b, dims - 1)
-                    if b - a >= dims or s.listed_above[w] >= ALL_PAIRS:
+                        first[k], last[k] = ti.max(first[k], 0), ti.min(last[k], dims[k] - 1)
+                    if last[k] - first[k] >= dims[k] or every:
                         # Around the whole box: each cell once.
-                        a, b = 0, dims - 1
-                    first[k], cells[k] = a, ti.max(0, b - a + 1)
-                for zy in range(cells[2] * cells[1]):
-                    z = self.inside(first[2] + zy // cells[1], g.dims[w, level, 2])
-                    y = self.inside(first[1] + zy % cells[1], g.dims[w, level, 1])
-                    row, dims = g.row(w, level, z, y), g.dims[w, level, 0]
-                    # Cells of a row follow each other in memory; across a joined face it is two stretches.
-                    x, left = self.inside(first[0], dims), cells[0]
-                    while left > 0:
-                        length = ti.min(left, dims - x)
-                        for m in range(g.cell_start[w, row + x], g.cell_start[w, row + x + length]):
-                            j = g.order[w, m]
-                            if n.lists(w, i, j):
-                                limit = n.widest(w, i, j) + skin
-                                # Not as forces see it: the next step may take either through a face.
-                                d = g.domain.nearest(w, place, s.position[w, j], t)
-                                here = g.domain.turn(w, place, s.position[w, j]) == turn
-                                if here and d.norm_sqr() <= limit * limit:
-                                    if count < n.row:
-                                        n.index[w, i, count] = j
-                                    count += 1
-                        left -= length
-                        x = 0
-        return count
+                        first[k], last[k], whole = 0, dims[k] - 1, True
+                for z in range(first[2], last[2] + 1):
+                    for y in range(first[1], last[1] + 1):
+                        line = self.inside(z, dims[2]) * dims[1] + self.inside(y, dims[1])
+                        row = g.offset[w, level] + dims[0] * line
+                        # Cells of a row follow each other in memory; across a joined face in two stretches.
+                        x = first[0]
+                        while x <= last[0]:
+                            begin = self.inside(x, dims[0])
+                            end = ti.min(begin + last[0] - x, dims[0] - 1)
+                            here = r - self.turns(ti.Vector([x, y, z]), dims) * side
+                            a = ti.max(g.cell_start[w, row + begin], begun)
+                            for q in range(a, g.cell_start[w, row + end + 1]):
+                                there = n.sorted_position[w, q]
+                                d = there - here
+                                if ti.static(n.images > 0) or whole:
+                                    # Not as forces see it: the next step may take either through a face.
+                                    d = g.domain.nearest(w, place, there, t)
+                                smaller = ti.min(radius, n.sorted_radius[w, q])
+                                seen = n.sees(d, smaller + ti.max(sight, n.sorted_near[w, q]), skin)
+                                if ti.static(n.images > 0):
+                                    seen = seen and g.domain.turn(w, place, there) == turn
+                                if seen:
+                                    self.enter(w, i, g.order[w, q])
+                            x += end - begin + 1
+
+    @ti.func
+    def enter(self, w, i, j):
+        """Enter a pair with the one that lists it."""
+        n, mine = self.n, self.n.lists(w, i, j)
+        lister, other = ti.select(mine, i, j), ti.select(mine, j, i)
+        k = next_number(n.size, w, lister, ti.static(self.g.shared()))
+        if k < n.row:
+            n.index[w, lister, k] = other
+
+    @ti.func
+    def turns(self, c, cells):
+        """Return which image of the box a cell lies in, along each axis: -1, 0 or 1."""
+        return ti.select(c >= cells, 1, 0) - ti.select(c < 0, 1, 0)
 
     @ti.func
     def inside(self, c, cells):
         """Return the index of a cell that may lie across a joined face, by less than one turn."""
         return c + ti.select(c < 0, cells, 0) - ti.select(c >= cells, cells, 0)
+
+
+class EndRows(OfBlocks):
+    """This phase asks whether all pairs have found room, and puts rows in order where they are to be."""
+
+    def __init__(self, rows: NeighbourRows) -> None:
+        super().__init__(rows.grid)
+        self.n = rows
+
+    @ti.func
+    def run(self, w, b):
+        n, total, longest = self.n, ti.i64(0), 0
+        for i in range(self.begin(b), self.end(w, b)):
+            count = n.size[w, i]
+            total += count
+            longest = ti.max(longest, count)
+            if count > n.row:
+                self.s.fail(w, WorldStatus.LIST_OVERFLOW, i)
+                n.size[w, i] = n.row
+            if ti.static(n.ordered):
+                self.order(w, i, n.size[w, i])
+        ti.atomic_add(n.total[w], total)
+        if longest > n.longest[w]:
+            ti.atomic_max(n.longest[w], longest)
 
     @ti.func
     def order(self, w, i, size):

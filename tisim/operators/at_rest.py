@@ -15,13 +15,13 @@ LOOKS = 10
 
 
 class AtRest(Operator):
-    """A world ends when its grains have been at rest under gravity for a while; ``duration`` is the latest.
+    """A world ends when its grains have been at rest under gravity for a while.
 
         sum_i (m_i v_i^2 + 2/5 m_i R_i^2 w_i^2) / 2  <=  energy * g sum_i m_i R_i
         sum_i |F_i|                                  <=  force * g sum_i m_i
 
-    The first is the kinetic energy, over that of a fall by a radius. The second is the unbalanced force, the
-    resultant of all forces on a grain, over the weight. (YADE and PFC have the mean contact force in place of
+    The ``duration`` of the scene is the latest. The first is the kinetic energy, over that of a fall by a
+    radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and PFC have the mean contact force in place of
     the weight, which is larger in a deep bed; here a grain on top counts as one below.) Both alone can be
     deceived: by grains that are let go, and by those that fall at a steady speed. Grains are looked at ten
     times in ``time``, and must be at rest each time. Grains that are fixed do not count. While insertions are

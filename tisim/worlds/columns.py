@@ -13,7 +13,7 @@ WORLD_INTEGERS = (
     *("changed", "events", "next_id", "underway"),
 )
 """These integers of a world (i32) tell how many particles it has and how it is doing."""
-WORLD_VECTORS = ("frame", "displacement", "displacement_since_list")
+WORLD_VECTORS = ("frame", "displacement")
 """These vectors of a world (f64) tell how far its particles have moved."""
 WORLD_COUNTERS = ("steps", "particle_steps")
 """These counters (i64) are those that every world keeps."""
@@ -31,6 +31,7 @@ WORLD_SETTINGS = (
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "reported", "real", "records"),
+    "shared",
     *("domain", "before_reading", "columns", "singles", "slotted", "defaults", "copied", "means", "sums"),
 )
 

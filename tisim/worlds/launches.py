@@ -19,7 +19,7 @@ from tisim.worlds.routes import OVER, Items, Route, entry, first_group, launch_c
 from tisim.worlds.status import WorldStatus
 
 if TYPE_CHECKING:
-    from tisim.worlds.program import Program
+    from tisim.worlds.launched_program import LaunchedProgram
 
 TASK = 512
 """Taichi and Quadrants hand so many iterations to a CPU thread at once, whatever block size is asked for
@@ -39,7 +39,7 @@ class Launch:
     that waking a thread is not worth it.
     """
 
-    def __init__(self, program: "Program", phases: tuple[Phase, ...], route: Route) -> None:
+    def __init__(self, program: "LaunchedProgram", phases: tuple[Phase, ...], route: Route) -> None:
         self.program, self.s, self.route = program, program.s, route
         settings = runtime.current()
         self.iterations = TASK if settings.device == "cpu" else 1
@@ -58,7 +58,7 @@ class Launch:
 
     @ti.kernel
     def _run_and_look(self, place: ti.i32) -> ti.i64:
-        """Take the phases, and return where worlds are then, as ``Program._look`` does."""
+        """Take the phases, and return where worlds are then, as ``LaunchedProgram._look`` does."""
         self._take(place)
         places = ti.cast(0, ti.i64)
         if ti.static(self.program.serial):
@@ -132,7 +132,7 @@ Plan = tuple[Visit | Loop, ...]
 class Planner:
     """A planner makes the launches of a program, and its loops; launches that are the same only once."""
 
-    def __init__(self, program: "Program") -> None:
+    def __init__(self, program: "LaunchedProgram") -> None:
         self.program = program
         self.loops: list[Loop] = []
         self._launches: dict[tuple[tuple[Phase, ...], Route], Launch] = {}

@@ -32,6 +32,7 @@ from tisim.worlds.fields import Field
 class StateMemory:
     """A state memory is the device memory of ``worlds`` worlds of at most ``capacity`` particles.
 
+    shared : whether several threads may work on a world at once, as kernels are compiled.
     records : whether the real quantities of a particle lie together in memory.
     domain : the space of the worlds, as kernels see it.
     before_reading : called before particle fields are read, by what keeps some of their values elsewhere.
@@ -53,7 +54,7 @@ class StateMemory:
         self.fields, self.counters = fields, (*WORLD_COUNTERS, *counters)
         self.world_quantities, self.flags = world_quantities, flags
         self.reported = tuple(field for field in fields if not field.scratch)
-        self.real, self.records = runtime.current().real, records
+        self.real, self.records, self.shared = runtime.current().real, records, True
         builder = Builder()
         self._record: list[Any] | None = [] if records else None
         for field in fields:

@@ -102,7 +102,7 @@ def test_of_any_skin(simulation, usual):
 
 @in_taichi_thread
 def skin_of(simulation, w):
-    return simulation.assembly.pairs.half_list.grid.skin[w]
+    return simulation.assembly.pairs.half_list.grid.skin[w, 0]
 
 
 def test_a_step_is_few_launches_which_tell_how_far_worlds_have_come(simulation):
