@@ -21,12 +21,12 @@ class AtRest(Operator):
         sum_i |F_i|                                  <=  force * g sum_i m_i
 
     The ``duration`` of the scene is the latest. The first is the kinetic energy, over that of a fall by a
-    radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and PFC have the mean contact force in place of
-    the weight, which is larger in a deep bed; here a grain on top counts as one below.) Both alone can be
-    deceived: by grains that are let go, and by those that fall at a steady speed. Grains are looked at ten
-    times in ``time``, and must be at rest each time. Grains that are fixed do not count. While insertions are
-    not done nothing is at rest. The ratios at the last look are ``measures``: ``kinetic_ratio`` and
-    ``unbalanced_ratio``.
+    radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and
+    PFC have the mean contact force in place of the weight, which is larger in a deep bed; here a grain on top
+    counts as one below.) Either alone can be deceived: by grains that are let go, and by those that fall at a
+    steady speed. Grains are looked at ten times in ``time``, and must be at rest each time. Grains that are
+    fixed do not count. While insertions are not done nothing is at rest. The ratios at the last look are
+    ``measures``: ``kinetic_ratio`` and ``unbalanced_ratio``.
 
     Source: C. O'Sullivan, Particulate Discrete Element Modelling (2011), section 2.6.
     """
