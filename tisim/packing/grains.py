@@ -9,6 +9,7 @@ import numpy as np
 from tisim.components.component import Component, Text, Vector, option, parameter
 from tisim.errors import must
 from tisim.numerics.random_streams import GRAIN_SIZES
+from tisim.packing.size_laws import EqualSizes
 from tisim.packing.sizes import SizeDistribution
 
 
@@ -19,7 +20,7 @@ class GrainClass(Component):
     x / (rho <r^3>) of the number of grains, up to a factor that is the same for all classes.
     """
 
-    sizes: SizeDistribution = option("sizes of its grains")
+    sizes: SizeDistribution = option("sizes of its grains", examples=[EqualSizes(radius=1e-3)])
     density: float = parameter("kg/m^3", "density of its grains", examples=[2500.0], gt=0)
     share: float = parameter(
         "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
