@@ -102,7 +102,7 @@ def filling(
                 **region,
             ),
             Outflow(planes=[Plane(point=(2.0, 0, 0), normal=(-1, 0, 0))]),
-            AtRest(time=0.05, energy=1e-4, force=2e-2),
+            AtRest(time=0.05, energy=1e-4, unbalanced=2e-2),
         ),
         radius=0.065,
         density=1000.0,

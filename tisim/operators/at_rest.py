@@ -18,7 +18,7 @@ class AtRest(Operator):
     """A world ends when its grains have been at rest under gravity for a while.
 
         sum_i (m_i v_i^2 + 2/5 m_i R_i^2 w_i^2) / 2  <=  energy * g sum_i m_i R_i
-        sum_i |F_i|                                  <=  force * g sum_i m_i
+        sum_i |F_i|                                  <=  unbalanced * g sum_i m_i
 
     The ``duration`` of the scene is the latest. The first is the kinetic energy, over that of a fall by a
     radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and
@@ -37,7 +37,7 @@ class AtRest(Operator):
     ends: ClassVar = "grains are at rest"
 
     energy: float = parameter("", "kinetic energy at rest, over that of a fall by a radius", 1e-5, gt=0)
-    force: float = parameter("", "unbalanced force at rest, over the weight", 1e-2, gt=0)
+    unbalanced: float = parameter("", "unbalanced force at rest, over the weight", 1e-2, gt=0)
     time: float = parameter("s", "time for which grains must be at rest", gt=0, examples=[0.05])
 
     def connect(self, peers: Peers) -> dict[str, Any]:
@@ -64,7 +64,7 @@ class AtRest(Operator):
                 unbalanced += s.force[w, i].norm()
                 weight += m * g.norm()
                 depth += m * g.norm() * radius
-        calm = kinetic <= self.energy(w) * depth and unbalanced <= self.force(w) * weight
+        calm = kinetic <= self.energy(w) * depth and unbalanced <= self.unbalanced(w) * weight
         for insertion in ti.static(self.insertions):
             calm = calm and insertion.pending(s, w) == 0
         s.kinetic_ratio[w] = ti.cast(kinetic / ti.max(depth, 1e-300), ti.f64)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Self
 
 import numpy as np
+from pydantic import model_validator
 
 from tisim.components.component import Component, Text, Vector, option, parameter
+from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
 from tisim.numerics.random_streams import GRAIN_SIZES
 from tisim.packing.size_laws import EqualSizes
@@ -36,6 +39,13 @@ class GrainClass(Component):
 
     def values(self) -> list[float]:
         return [*super().values(), self.number()]
+
+    @model_validator(mode="after")
+    def _weighable(self) -> Self:
+        radius, rule = self.sizes.nodes()[0][[0, -1]], f"from {LEAST:g} to {MOST:g} kg"
+        for mass in (self.density * 4 / 3 * np.pi * radius**3).tolist():
+            must(LEAST <= mass <= MOST, "mass of a grain", rule, mass)
+        return self
 
     def number(self) -> float:
         """Return how many grains it has for each kg of share."""
