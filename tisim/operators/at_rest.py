@@ -67,8 +67,9 @@ class AtRest(Operator):
         calm = kinetic <= self.energy(w) * depth and unbalanced <= self.unbalanced(w) * weight
         for insertion in ti.static(self.insertions):
             calm = calm and insertion.pending(s, w) == 0
-        s.kinetic_ratio[w] = ti.cast(kinetic / ti.max(depth, 1e-300), ti.f64)
-        s.unbalanced_ratio[w] = ti.cast(unbalanced / ti.max(weight, 1e-300), ti.f64)
+        if weight > 0.0:
+            s.kinetic_ratio[w] = ti.cast(kinetic / depth, ti.f64)
+            s.unbalanced_ratio[w] = ti.cast(unbalanced / weight, ti.f64)
         s.looks_at_rest[w] = ti.select(calm, s.looks_at_rest[w] + 1, 0)
         if s.looks_at_rest[w] > LOOKS:
             s.finish(w, self.index)

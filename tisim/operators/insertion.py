@@ -175,7 +175,8 @@ class Insertion(FilledRegion, Operator):
                 high = middle
         a, b = ti.cast(self.nodes[low, 0], ti.f64), ti.cast(self.nodes[low + 1, 0], ti.f64)
         first, last = ti.cast(self.nodes[low, 1], ti.f64), ti.cast(self.nodes[low + 1, 1], ti.f64)
-        part = ti.max(0.0, ti.min((u - first) / ti.max(last - first, 1e-300), 1.0))
+        part = ti.select(last > first, (u - first) / (last - first), 0.0)
+        part = ti.max(0.0, ti.min(part, 1.0))
         ratio = a / b
         return ti.select(
             self.spans[c, 2] > 0.0, a + part * (b - a), a / ti.sqrt(1.0 - part * (1.0 - ratio * ratio))
