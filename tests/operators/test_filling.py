@@ -115,7 +115,7 @@ def filling(
 SCENES = {
     "pour": filling(duration=0.5),
     "fill": filling(begin=NEVER, fill=0.1, duration=0.5),
-    "rest": filling(flux=300.0, fill=0.0, duration=8.0),
+    "rest": filling(flux=300.0, begin=3.5, fill=0.0, duration=8.0),
     "alone": filling(begin=NEVER, velocity=0.05),
     "below": filling(velocity=0.05, flux=100.0),
     "leaving": filling(begin=NEVER, velocity=8.0, floor=1e-3),
@@ -236,12 +236,16 @@ def test_what_is_there_does_not_notice_what_is_put_in_elsewhere(results):
     np.testing.assert_allclose(below["sticking_spring_past"][: len(BED)], slid, rtol=0, atol=error)
 
 
-def test_grains_at_rest_end_the_run(results):
+def test_grains_at_rest_end_the_run(outcome):
     """When all have been put in, and not before; the two ratios are those of the state."""
-    result = results["rest"]
+    results, series = outcome
+    result, before = results["rest"], series["rest"]["time"] < 3.49
+    calm = (series["rest"]["kinetic_ratio"] <= 1e-4) & (series["rest"]["unbalanced_ratio"] <= 2e-2)
+    assert calm[before][-20:].all()
+    assert series["rest"]["fill_number"][before][-1] > 5
     assert result.status.ok
     assert result.status.reason == "grains are at rest, by effects.at_rest"
-    assert 0.5 < result.time < 8.0
+    assert 3.5 < result.time < 8.0
     assert result.measures["pour_number"] == FLUX_NUMBER
     m, radius, v, f = (result.state[name] for name in ("mass", "radius", "velocity", "force"))
     kinetic = 0.5 * (m * (v**2).sum(axis=1)).sum() / (G * (m * radius).sum())
