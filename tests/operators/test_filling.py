@@ -115,7 +115,7 @@ def filling(
 SCENES = {
     "pour": filling(duration=0.5),
     "fill": filling(begin=NEVER, fill=0.1, duration=0.5),
-    "rest": filling(flux=300.0, begin=3.5, fill=0.0, duration=8.0),
+    "rest": filling(flux=300.0, begin=3.5, fill=0.0, duration=16.0),
     "alone": filling(begin=NEVER, velocity=0.05),
     "below": filling(velocity=0.05, flux=100.0),
     "leaving": filling(begin=NEVER, velocity=8.0, floor=1e-3),
@@ -245,7 +245,7 @@ def test_grains_at_rest_end_the_run(outcome):
     assert series["rest"]["fill_number"][before][-1] > 5
     assert result.status.ok
     assert result.status.reason == "grains are at rest, by effects.at_rest"
-    assert 3.5 < result.time < 8.0
+    assert 3.5 < result.time < 16.0
     assert result.measures["pour_number"] == FLUX_NUMBER
     m, radius, v, f = (result.state[name] for name in ("mass", "radius", "velocity", "force"))
     kinetic = 0.5 * (m * (v**2).sum(axis=1)).sum() / (G * (m * radius).sum())
