@@ -150,12 +150,15 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
 
 def _required(kind: type[Component]) -> dict[str, Any]:
     """A value that will do for each parameter that must be given."""
-    fit = {"cutoff": 4.0}
-    return {
-        name: fit.get(name, 0.5) if size == 1 else (0.0, 0.0, 0.5)
+    fit = {"cutoff": 4.0, "low": (0.0, 0.0, 0.0), "high": (4.0, 4.0, 4.0)}
+    values = {
+        name: fit.get(name, 0.5 if size == 1 else (0.0, 0.0, 0.5))
         for name, info, size in kind.parameters()
         if info.is_required()
     }
+    others = kind.model_fields.keys() - values.keys() - dict(kind.lists()).keys()
+    options = {name: kind.model_fields[name] for name in others if kind.model_fields[name].is_required()}
+    return {**values, **{name: info.examples[0] for name, info in options.items() if info.examples}}
 
 
 def materials() -> dict[str, Any]:

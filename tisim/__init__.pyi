@@ -25,6 +25,7 @@ from . import (
 from .backend.runtime import init as init
 from .components.materials import Material as Material
 from .components.materials import MaterialPair as MaterialPair
+from .engine.measure_series import MeasureSeries as MeasureSeries
 from .engine.observer import Observer as Observer
 from .engine.result import Result as Result
 from .engine.result import Status as Status
@@ -36,6 +37,7 @@ from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.read import read as read
 from .io.recording import Recording as Recording
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
+from .packing.grains import GrainClass as GrainClass
 from .packing.placement import (
     Lattice as Lattice,
 )
@@ -44,6 +46,9 @@ from .packing.placement import (
 )
 from .packing.placement import (
     RandomInBox as RandomInBox,
+)
+from .packing.placement import (
+    RandomInCylinder as RandomInCylinder,
 )
 from .packing.placement import (
     RandomInDomain as RandomInDomain,

@@ -84,7 +84,7 @@ def test_more_fragments_than_room_is_a_clear_failure():
     # Compiled for more: the room is the scene's own.
     broken, whole = simulate([full, fine], worlds=2, capacity=256)
     assert not broken.status.ok
-    assert "more fragments than there is room for" in broken.status.reason
+    assert "more particles than there is room for" in broken.status.reason
     assert "at particle 0" in broken.status.reason
     assert "at t = " in broken.status.reason
     for name in ("position", "velocity", "mass", "radius", "temperature"):

@@ -26,7 +26,7 @@ def cylindrical(points):
 def test_spheres_lie_wholly_in_their_part_and_fill_it_evenly(part):
     radius, number = 0.002, 4000
     placement = RandomAroundCylinder(**CYLINDER, part=part)
-    points = placement.centres(number, radius, Open(), 1)
+    points = placement.centres(np.full(number, radius), Open(), 1)
     rho, z = cylindrical(points)
     assert len(points) == number
     assert len(cKDTree(points).query_pairs(2 * radius * (1 - 1e-12))) == 0
@@ -53,19 +53,19 @@ def test_volumes():
 @pytest.mark.parametrize("part", ["all", "top", "side"])
 def test_a_thin_layer_around_a_long_cylinder_has_room(part):
     placement = RandomAroundCylinder(radius=1.0, length=40.0, thickness=1e-3, part=part)
-    points = placement.centres(200, 1e-4, Open(), 0)
+    points = placement.centres(np.full(200, 1e-4), Open(), 0)
     assert len(points) == 200
 
 
 @pytest.mark.slow
 def test_no_room():
     with pytest.raises(InputError, match="thickness must be above a diameter"):
-        RandomAroundCylinder(**CYLINDER).centres(1, 0.3, Open(), 0)
+        RandomAroundCylinder(**CYLINDER).centres(np.full(1, 0.3), Open(), 0)
     with pytest.raises(InputError, match="length must be above a diameter"):
-        RandomAroundCylinder(**{**CYLINDER, "length": 0.1}, part="side").centres(1, 0.1, Open(), 0)
+        RandomAroundCylinder(**{**CYLINDER, "length": 0.1}, part="side").centres(np.full(1, 0.1), Open(), 0)
     with pytest.raises(InputError, match=r"cloud.number must be at most what finds room around the cylinder"):
-        RandomAroundCylinder(**CYLINDER).centres(1500, 0.1, Open(), 0)
+        RandomAroundCylinder(**CYLINDER).centres(np.full(1500, 0.1), Open(), 0)
     with pytest.raises(InputError, match=r"finds room around the cylinder, less than 1746; received 2000"):
-        RandomAroundCylinder(**CYLINDER).centres(2000, 0.1, Open(), 0)
+        RandomAroundCylinder(**CYLINDER).centres(np.full(2000, 0.1), Open(), 0)
     with pytest.raises(InputError, match="axis must be a direction"):
         RandomAroundCylinder(**{**CYLINDER, "axis": (0.0, 0.0, 0.0)})

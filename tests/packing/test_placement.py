@@ -121,7 +121,7 @@ def test_lattice_by_spacing_about_a_centre():
     expected = [[x, 2.0, z] for x in (0.5, 1.0, 1.5) for z in (2.75, 3.25)]
     np.testing.assert_array_equal(positions, expected)
     flat = Lattice(shape=(3, 1, 2), size=(1.0, 0.0, 0.5), centre=(1.0, 2.0, 3.0))
-    np.testing.assert_array_equal(flat.centres(6, 0.25, Open(), 0), expected)
+    np.testing.assert_array_equal(flat.centres(np.full(6, 0.25), Open(), 0), expected)
 
 
 WRONG = {

@@ -26,7 +26,7 @@ def tree_of(centres, periodic):
 @pytest.mark.parametrize("periodic", PERIODIC)
 def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
     for seed in range(5):
-        centres = place(1200, RADIUS, box(LOW, HIGH, periodic), seed)
+        centres = place(np.full(1200, RADIUS), box(LOW, HIGH, periodic), seed)
         assert ((centres >= LOW) & (centres < HIGH)).all()
         assert not tree_of(centres, periodic).query_pairs(2 * RADIUS * (1 - 1e-12))
     if not all(periodic):
@@ -35,13 +35,13 @@ def test_no_two_spheres_overlap_also_across_periodic_faces(periodic):
 
 
 def test_the_seed_decides():
-    first, again, other = (place(200, RADIUS, box(LOW, HIGH), seed) for seed in (1, 1, 2))
+    first, again, other = (place(np.full(200, RADIUS), box(LOW, HIGH), seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.1
 
 
 def test_places_are_uniform():
-    centres = np.concatenate([place(50, 1e-3, box(LOW, HIGH), seed) for seed in range(200)])
+    centres = np.concatenate([place(np.full(50, 1e-3), box(LOW, HIGH), seed) for seed in range(200)])
     u = (centres - LOW) / (HIGH - LOW)
     assert np.abs(u.mean(axis=0) - 0.5).max() < 4 / np.sqrt(12 * len(u))
     assert np.abs(u.var(axis=0) - 1 / 12).max() < 4 * np.sqrt(1 / 180 / len(u))
@@ -49,12 +49,12 @@ def test_places_are_uniform():
 
 def test_what_cannot_be_reached_is_refused():
     with pytest.raises(InputError, match=r"volume fraction must be at most 0.384.*; received 0\.8727"):
-        place(5000, RADIUS, box(LOW, HIGH), 0)
+        place(np.full(5000, RADIUS), box(LOW, HIGH), 0)
 
 
 def test_what_is_just_beyond_reach_says_what_was_reached():
     with pytest.raises(InputError, match=r"at most 0\.\d{4}, where no further sphere fits") as error_info:
-        place(2280, RADIUS, box(LOW, HIGH, periodic=(True,) * 3), 0)
+        place(np.full(2280, RADIUS), box(LOW, HIGH, periodic=(True,) * 3), 0)
     reached = float(str(error_info.value).split("at most ")[1][:6])
     # One sphere is 0.00017; saturated packings of this size differ by some ten spheres.
     assert reached == pytest.approx(SATURATION_FRACTION, abs=0.006)
@@ -97,7 +97,7 @@ def test_filling_voids_is_the_same_process_as_trying_everywhere():
 
     by_trial, by_voids = [], []
     for seed in range(8):
-        by_trial.append(neighbours(place(number, radius, region, seed)))
+        by_trial.append(neighbours(place(np.full(number, radius), region, seed)))
         generator = np.random.Generator(np.random.Philox(100 + seed))
         by_voids.append(neighbours(fill(np.empty((0, 3)), number, 2 * radius, region, generator)))
     spread = np.hypot(np.std(by_trial), np.std(by_voids)) / np.sqrt(7)

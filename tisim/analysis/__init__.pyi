@@ -1,4 +1,12 @@
+from .beds import contacts as contacts
+from .beds import coordination_numbers as coordination_numbers
+from .beds import mean_coordination as mean_coordination
+from .beds import solid_fraction as solid_fraction
 from .clusters import head_to_tail as head_to_tail
 from .clusters import labels as labels
 from .clusters import mean_size as mean_size
 from .clusters import near as near
+from .discharge import beverloo_rate as beverloo_rate
+from .discharge import discharge_rate as discharge_rate
+from .discharge import discharge_rates as discharge_rates
+from .heap import angle_of_repose as angle_of_repose

@@ -37,6 +37,11 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
     values: dict[str, Any] = {"kind": data} if isinstance(data, str) else table(data, where)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
+    return kind(**_with_parts(kind, values, where))
+
+
+def _with_parts(kind: type[Component], values: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return the parameters of a kind, with the parts in place of the tables that name their kinds."""
     listed = dict(kind.lists())
     for name, info in kind.model_fields.items():
         # Rows of a list are all of one kind, and need no name of it.
@@ -45,8 +50,10 @@ def from_dict(base: type[Part], data: Any, where: str) -> Part:
             values[name] = from_dict(inner, values[name], f"{where}.{name}")
     for name in listed.keys() & values.keys():
         if isinstance(values[name], list | tuple):
-            values[name] = [table(row, f"{where}.{name}.{k}") for k, row in enumerate(values[name])]
-    return kind(**values)
+            places = [f"{where}.{name}.{k}" for k in range(len(values[name]))]
+            rows = zip(values[name], places, strict=True)
+            values[name] = [_with_parts(listed[name], table(row, place), place) for row, place in rows]
+    return values
 
 
 def _part(annotation: Any) -> type[Component] | None:
@@ -58,7 +65,8 @@ def _part(annotation: Any) -> type[Component] | None:
 
 
 def to_dict(part: Component, named: bool = True, arrays: bool = False) -> dict[str, Any]:
-    """Return kind and parameters of a part and of those that it is made of, without what is left at None.
+    """Return kind and parameters of a part and of those that it is made of, without what is left at None and
+    lists that are left empty.
 
     arrays : whether arrays stay what they are; otherwise they become lists.
     """
@@ -69,6 +77,8 @@ def to_dict(part: Component, named: bool = True, arrays: bool = False) -> dict[s
             values[key] = to_dict(inner)
     for key, _ in part.lists():
         values[key] = [to_dict(row, named=False) for row in getattr(part, key)]
+        if not (values[key] or type(part).model_fields[key].is_required()):
+            del values[key]
     return {"kind": part.kind(), **values} if named else values
 
 

@@ -106,9 +106,9 @@ class Assembly:
         self.derived_solvers = tuple(
             solver(s, effect, domain, self.pairs) for effect in effects.of(DerivedQuantity)
         )
-        for force in effects.of(Force):
-            for name, value in force.data.remembers(s).items():
-                setattr(force, name, value)
+        for effect in effects:
+            for name, value in effect.data.remembers(s).items():
+                setattr(effect, name, value)
         components = 6 if turning([effect.data for effect in effects]) else 3
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
         self.exported = ExportedTerms(self.pairs, components) if self.pairs and listed else None

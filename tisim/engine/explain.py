@@ -89,7 +89,7 @@ def explain(scene: Scene) -> Explanation:
     absent = [kind for kind in known_effects() if kind not in {type(e) for e in scene.effects}]
     return Explanation(
         name=scene.name,
-        particles=len(scene.particles.masses()),
+        particles=len(scene.particles.masses(scene.seed)),
         capacity=capacity,
         steps=scene.stepper.fewest(scene.effects, scene.duration),
         schedule=schedule,

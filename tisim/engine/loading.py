@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from tisim.backend import runtime
-from tisim.effects.base import PairEvent, Pairwise
+from tisim.effects.base import Effect, PairEvent, Pairwise
 from tisim.errors import InputError, must
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.worlds.fields import SHARED, Field
+from tisim.worlds.fields import CORE, SHARED, Field
 from tisim.worlds.status import NO_ONE, WorldStatus
 
 ROUNDED_SIDE = 1e-6
@@ -45,6 +45,8 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
     if any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
         scene.stepper.control.suits_start(start["radius"], start["velocity"])
+    for effect in scene.effects:
+        check_newcomers(fields, effect)
     n = len(start["mass"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
@@ -61,6 +63,19 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     worst = float(farthest[coarse][0]) if coarse.any() else 0.0
     rule = f"so near the origin that {runtime.current().precision} rounds it by less than a radius"
     must(not coarse.any(), "particles.position", rule, worst)
+
+
+def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
+    """Raise InputError unless particles that an effect adds are given what the scene needs, and no more."""
+    given = effect.newcomers()
+    if given is None:
+        return
+    core, where = {f.name for f in CORE}, f"quantities of grains of effects.{effect.label}"
+    known = {f.name: f for f in fields if f.name not in core}
+    for name in given:
+        must(name in {*known, *SHARED}, where, f"fields of the scene ({', '.join(sorted(known))})", name)
+    missing = sorted(name for name, f in known.items() if f.default is None and name not in given)
+    must(not missing, where, f"given {', '.join(missing)}, which effects of the scene need", sorted(given))
 
 
 def check_sides(scene: Scene, start: Arrays) -> None:
@@ -156,6 +171,7 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
         "approach_time": np.inf,
         "failing_particle": NO_ONE,
         "failing_effect": NO_ONE,
+        "ending_effect": NO_ONE,
     }
 
 

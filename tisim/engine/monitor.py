@@ -19,7 +19,7 @@ REASONS: dict[int, str] = {
     WorldStatus.RUNNING: "running",
     WorldStatus.ENDED: "reached its end",
     WorldStatus.NOT_FINITE: "a quantity is not finite",
-    WorldStatus.OUT_OF_ROOM: "more fragments than there is room for",
+    WorldStatus.OUT_OF_ROOM: "more particles than there is room for",
     WorldStatus.CONTACT_OVERFLOW: "more simultaneous contacts than there is room for",
     WorldStatus.NOT_CONVERGED: "a quantity that particles give each other does not converge",
     WorldStatus.POSITION_LOST: "a step so long or so fast that rounding loses the place in the box",
@@ -151,6 +151,9 @@ class Monitor:
             return Status(
                 False, f"found at t = {when:.6g} s: {why}; kept t = {self.last_good['time'][w]:.6g} s"
             )
+        effects, by = self.simulation.scenes[w].effects, int(self.s.read("ending_effect")[w])
+        if code == WorldStatus.ENDED and by < len(effects):
+            return Status(True, f"{effects[by].ends}, by effects.{effects[by].label}")
         return Status(code == WorldStatus.ENDED, REASONS[code])
 
     def _fault(self, w: int, then: Image) -> str:

@@ -24,7 +24,9 @@ from tisim.engine import docstrings, template
 from tisim.errors import InputError, abbreviated, did_you_mean
 from tisim.geometry.shape import Shape
 from tisim.operators.base import Operator
+from tisim.packing.grains import GrainClass
 from tisim.packing.placement import Placement
+from tisim.packing.sizes import SizeDistribution
 from tisim.scene import plugins
 from tisim.scene.initial_state import Start
 from tisim.scene.initial_velocity import Pulse
@@ -69,6 +71,8 @@ FAMILIES = {
     "step_controls": Family("Step controls", StepControl, "stepper.control"),
     "starts": Family("Starts", Start, "particles"),
     "placements": Family("Placements", Placement, "particles.placement"),
+    "grain_classes": Family("Classes of grains", GrainClass, ""),
+    "size_distributions": Family("Size distributions", SizeDistribution, "particles.grains.sizes"),
     "pulses": Family("Pulses", Pulse, "particles.pulse"),
     "domains": Family("Domains", Domain, "domain"),
 }

@@ -206,8 +206,7 @@ class Simulation(CompiledWorlds):
         self._check_loaded()
         now, good = self.s.snapshot(self.s.columns), self.monitor.last_good
         counts = {name: now[name] for name in self.s.counters}
-        effects = self.scenes[0].effects
-        quantities = {name: now[name] for e in effects for name in e.keeps("world_quantities")}
+        quantities = {name: now[name] for name in self.measured()}
         status = now["status"]
         results = []
         for w in range(len(self.scenes)) if worlds is None else worlds:
@@ -230,6 +229,11 @@ class Simulation(CompiledWorlds):
                 )
             )
         return results
+
+    def measured(self) -> list[str]:
+        """Return the names of the quantities of worlds that effects keep."""
+        effects = self.scenes[0].effects
+        return [name for effect in effects for name in effect.keeps("world_quantities")]
 
     def _check_loaded(self) -> None:
         """Raise InputError before the first ``load``."""

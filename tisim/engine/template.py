@@ -34,7 +34,10 @@ def _lines(kind: type[Component], place: str, named: bool, row: bool = False) ->
     row_kinds, inner = dict(kind.lists()), []
     for name, info in fields(kind).items():
         value = example(info)
-        if name in row_kinds:
+        if name in row_kinds and not info.is_required():
+            yield f"# {text_of(info)}"
+            yield f"# [[{place}.{name}]]"
+        elif name in row_kinds:
             inner += ["", *_lines(row_kinds[name], f"{place}.{name}", named=False, row=True)]
         elif isinstance(value, Component):
             inner += ["", f"# {text_of(info)}", *_lines(type(value), f"{place}.{name}", named=True)]

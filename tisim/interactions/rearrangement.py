@@ -17,14 +17,14 @@ class StoreBefore(StoreMemory):
 
     def __init__(self, pairs: PairChunks, operators: tuple[Bound[Any], ...]) -> None:
         super().__init__(pairs)
-        self.always = any(operator.data.offers("world") for operator in operators)
+        self.operators = tuple(operator for operator in operators if operator.data.offers("world"))
 
     @ti.func
     def when(self, w):
-        due = self.p.unsaved[w]
-        if ti.static(not self.always):
-            due = ti.min(due, self.s.changed[w])
-        return due
+        due = self.s.changed[w]
+        for operator in ti.static(self.operators):
+            due = ti.max(due, operator.acts(self.s, w))
+        return ti.min(due, self.p.unsaved[w])
 
 
 class Rearrange(Phase):
@@ -46,10 +46,12 @@ class Rearrange(Phase):
     def run(self, w, _k):
         s = self.s
         # Before operators too: a slot that a merger has freed has room for a fragment.
-        self.fill(w)
-        for operator in ti.static(self.operators):
-            operator.world(s, w)
-        self.fill(w)
+        for turn in range(2):
+            if turn == 1:
+                for operator in ti.static(self.operators):
+                    if operator.acts(s, w) > 0:
+                        operator.world(s, w)
+            self.fill(w)
         if s.events[w] > 0:
             # What the survey told the controller is no longer true.
             s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0

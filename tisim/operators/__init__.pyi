@@ -1,5 +1,10 @@
+from .at_rest import AtRest as AtRest
 from .base import Operator as Operator
 from .capture import Capture as Capture
 from .cooling import Cooling as Cooling
 from .fragmentation import Fragmentation as Fragmentation
+from .insertion import Insertion as Insertion
+from .insertion_rules import InsertionByFlux as InsertionByFlux
+from .insertion_rules import InsertionByFraction as InsertionByFraction
+from .outflow import Outflow as Outflow
 from .peak_displacement import PeakDisplacement as PeakDisplacement

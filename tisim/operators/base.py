@@ -1,9 +1,9 @@
 """The contract of an operator: what changes the state between steps.
 
 An operator is an effect (see tisim/effects/base). ``particle`` is called for each particle on its own, and
-may write only that particle; then ``world`` is called once per world, serially, and may add particles and
-remove them. One that defines no ``world`` leaves a stepper free to take each particle through many steps by
-itself.
+may write only that particle; then ``world`` is called once per world, serially, where ``acts`` says so, and
+may add particles, remove them, and end the world. One that defines no ``world`` leaves a stepper free to take
+each particle through many steps by itself.
 """
 
 from __future__ import annotations
@@ -28,6 +28,12 @@ class Operator(Effect):
 
         ``s.time[w]`` is not that of a particle that takes steps of its own.
         """
+
+    @ti.func
+    def acts(self, s, w):
+        """Return whether ``world`` has something to do after this step; what pairs remember is put in store
+        before it does."""
+        return 1
 
     @ti.func
     def world(self, s, w):

@@ -1,4 +1,5 @@
 from .around_cylinder import RandomAroundCylinder as RandomAroundCylinder
+from .grains import GrainClass as GrainClass
 from .placement import (
     Lattice as Lattice,
 )
@@ -12,5 +13,16 @@ from .placement import (
     RandomInBox as RandomInBox,
 )
 from .placement import (
+    RandomInCylinder as RandomInCylinder,
+)
+from .placement import (
     RandomInDomain as RandomInDomain,
 )
+from .size_laws import EqualSizes as EqualSizes
+from .size_laws import LognormalSizes as LognormalSizes
+from .size_laws import NormalSizes as NormalSizes
+from .size_laws import SieveCurve as SieveCurve
+from .size_laws import TruncatedSizes as TruncatedSizes
+from .size_laws import UniformSizes as UniformSizes
+from .size_laws import WeibullSizes as WeibullSizes
+from .sizes import SizeDistribution as SizeDistribution

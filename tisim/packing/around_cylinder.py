@@ -13,6 +13,7 @@ from tisim.components.domain import Domain
 from tisim.components.ranges import check_direction, check_resolved
 from tisim.errors import InputError, must
 from tisim.packing.placement import Placement
+from tisim.packing.region import along_axis
 
 MAX_ROUNDS = 200
 """The region counts as full after so many rounds, each of as many tries as there are spheres."""
@@ -48,7 +49,9 @@ class RandomAroundCylinder(Placement):
         side = (outer - np.pi * self.radius**2) * self.length
         return float((self.part != "top") * side + (self.part != "side") * 2 * outer * self.thickness)
 
-    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        number, radius = len(radii), float(radii.max())
+        must(bool((radii == radius).all()), "spheres around a cylinder", "of one radius", float(radii.min()))
         rule = f"above a diameter, {2 * radius:g} m"
         must(self.thickness > 2 * radius, "thickness", rule, self.thickness)
         must(self.part != "side" or self.length > 2 * radius, "length", rule, self.length)
@@ -70,7 +73,7 @@ class RandomAroundCylinder(Placement):
                 f"cloud.number must be at most what finds room around the cylinder, {len(centres)} here; "
                 f"received {number}"
             )
-        return self._rotate(centres) + np.asarray(self.centre)
+        return along_axis(centres, self.axis) + np.asarray(self.centre)
 
     def _tries(self, number: int, radius: float, generator: np.random.Generator) -> np.ndarray:
         """Return points (m) of the part, evenly, in a frame whose z axis is that of the cylinder."""
@@ -87,12 +90,6 @@ class RandomAroundCylinder(Placement):
         angle = generator.uniform(0.0, 2 * np.pi, number)
         up = generator.choice([-1.0, 1.0], number)
         return np.stack([rho * np.cos(angle), rho * np.sin(angle), up * z], axis=1)
-
-    def _rotate(self, points: np.ndarray) -> np.ndarray:
-        axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
-        first = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-        first /= np.linalg.norm(first)
-        return points @ np.stack([first, np.cross(axis, first), axis])
 
 
 def _without_overlaps(points: np.ndarray, distance: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Where equal spheres lie at the start: at random in a domain, a box or a ball, or on a lattice."""
+"""Where spheres lie at the start: at random in a domain, a box, a ball or a cylinder, or on a lattice."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pydantic import model_validator
 
 from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.domain import Domain
-from tisim.components.ranges import PARTICLES, check_resolved
+from tisim.components.ranges import PARTICLES, check_direction, check_resolved
 from tisim.errors import must
 from tisim.packing import region
 from tisim.packing.random_sequential import place
 
 
 class Placement(Component):
-    """This is the contract of a placement, which gives places to equal spheres."""
+    """This is the contract of a placement, which gives places to spheres."""
 
     contract: ClassVar[bool] = True
 
@@ -25,8 +25,8 @@ class Placement(Component):
         """Return how many spheres it has room for; None where any number may be asked for."""
         return None
 
-    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        """Return centres, shape (number, 3) in m, of spheres of ``radius`` (m) that do not overlap.
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        """Return centres, shape (n, 3) in m, of spheres of these radii (m), shape (n,), that do not overlap.
 
         InputError is raised when there is no room for them. The centres depend on the arguments alone.
         """
@@ -42,8 +42,8 @@ class RandomInDomain(Placement):
     Source: Z04 section 8.
     """
 
-    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        return place(number, radius, region.in_domain(domain, radius), seed)
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        return place(radii, region.in_domain(domain, float(radii.max())), seed)
 
 
 class RandomInBox(Placement):
@@ -52,10 +52,9 @@ class RandomInBox(Placement):
     low: Vector = parameter("m", "lower corner of the box", examples=[(0.0, 0.0, 0.0)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.01, 0.01, 0.01)])
 
-    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        return place(
-            number, radius, region.inside_box(np.asarray(self.low), np.asarray(self.high), radius), seed
-        )
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        low, high = np.asarray(self.low), np.asarray(self.high)
+        return place(radii, region.inside_box(low, high, float(radii.max())), seed)
 
 
 class RandomInBall(Placement):
@@ -67,8 +66,28 @@ class RandomInBall(Placement):
     radius: float = parameter("m", "radius of the ball", examples=[0.01], gt=0)
     centre: Vector = parameter("m", "centre of the ball", (0.0, 0.0, 0.0))
 
-    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
-        return place(number, radius, region.inside_ball(np.asarray(self.centre), self.radius, radius), seed)
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        ball = region.inside_ball(np.asarray(self.centre), self.radius, float(radii.max()))
+        return place(radii, ball, seed)
+
+
+class RandomInCylinder(Placement):
+    """Spheres lie at random and wholly inside a cylinder, by random sequential addition."""
+
+    centre: Vector = parameter("m", "centre of the cylinder", (0.0, 0.0, 0.0))
+    axis: Vector = parameter("", "direction of the axis, of any length but 0", (0.0, 0.0, 1.0))
+    radius: float = parameter("m", "radius of the cylinder", examples=[0.01], gt=0)
+    length: float = parameter("m", "length of the cylinder", examples=[0.04], gt=0)
+
+    @model_validator(mode="after")
+    def _directed(self) -> Self:
+        check_direction(f"{self.label}.axis", self.axis)
+        return self
+
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        cylinder = region.inside_cylinder(self.radius, self.length, float(radii.max()))
+        check_resolved("places in the cylinder", np.abs(self.centre) + cylinder.high, float(radii.min()))
+        return np.asarray(self.centre) + region.along_axis(place(radii, cylinder, seed), self.axis)
 
 
 class Lattice(Placement):
@@ -106,7 +125,8 @@ class Lattice(Placement):
         gaps = np.maximum(np.asarray(self.shape) - 1, 1)
         return np.full(3, self.spacing) if self.size is None else np.asarray(self.size) / gaps
 
-    def centres(self, number: int, radius: float, domain: Domain, seed: int) -> np.ndarray:
+    def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
+        radius = float(radii.max())
         several = np.asarray(self.shape) > 1
         closest = self.steps()[several].min(initial=np.inf)
         # Touching is allowed, to rounding.

@@ -6,16 +6,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tisim.components.component import Vector
 from tisim.components.domain import NO_AXIS, Axes, Domain
 from tisim.errors import InputError, must
+
+ALL_AXES: Axes = (True, True, True)
+ROUND_PART = {0: 1.0, 2: np.pi / 4, 3: np.pi / 6}
+"""A box has this part of its volume in a shape that is round along so many axes."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """A region is a box ``low``..``high`` (m, shape (3,) each) of centres, or the ball that touches its
-    faces.
+    """A region is a box ``low``..``high`` (m, shape (3,) each) of the centres of spheres, or what is round
+    within it.
 
-    periodic : along which axes spheres see each other across opposite faces. ball : see above.
+    periodic : along which axes spheres see each other across opposite faces. round : the axes along which it
+    is round: none of a box, all of the ball and two of the cylinder that touch the faces. walled : the axes
+    along which spheres lie wholly inside a container, so that centres of smaller ones lie farther out.
     volume : m^3, of the container that volume fractions are of.
     """
 
@@ -23,7 +30,8 @@ class Region:
     high: np.ndarray
     volume: float
     periodic: Axes = NO_AXIS
-    ball: bool = False
+    round: Axes = NO_AXIS
+    walled: Axes = NO_AXIS
 
     @property
     def side(self) -> np.ndarray:
@@ -37,14 +45,18 @@ class Region:
 
     @property
     def reach(self) -> float:
-        """Return the radius of the ball, m."""
+        """Return the radius of the ball or cylinder, m."""
         return float(self.side[0]) / 2
 
     def reachable_volume(self, radius: float) -> float:
         """Return the volume that spheres of ``radius`` (m) with centres in the region can take up, m^3."""
-        if self.ball:
-            return 4 / 3 * np.pi * (self.reach + radius) ** 3
-        return float(np.prod(np.where(self.periodic, self.side, self.side + 2 * radius)))
+        part = ROUND_PART[sum(self.round)]
+        return part * float(np.prod(np.where(self.periodic, self.side, self.side + 2 * radius)))
+
+    def for_radius(self, radius: float, smaller: float) -> Region:
+        """Return the region of spheres that are smaller (m) than those of ``radius`` (m) that it is of."""
+        wider = np.where(self.walled, radius - smaller, 0.0)
+        return replace(self, low=self.low - wider, high=self.high + wider)
 
 
 def box(low: np.ndarray, high: np.ndarray, periodic: Axes = NO_AXIS) -> Region:
@@ -65,7 +77,12 @@ def in_domain(domain: Domain, radius: float) -> Region:
     room = bool((high - low > 2 * margin).all())
     rule = f"wider than a sphere, {2 * radius:g} m, along axes that are not periodic"
     must(room, "box", rule, (high - low).tolist())
-    return replace(box(low + margin, high - margin, domain.imaged()), volume=float(np.prod(high - low)))
+    joined = domain.joined()
+    return replace(
+        box(low + margin, high - margin, domain.imaged()),
+        volume=float(np.prod(high - low)),
+        walled=(not joined[0], not joined[1], not joined[2]),
+    )
 
 
 def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
@@ -73,7 +90,7 @@ def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
     low, high = np.asarray(low, float), np.asarray(high, float)
     room = bool((high - low > 2 * radius).all())
     must(room, "box", f"wider than a sphere, {2 * radius:g} m, in each direction", (high - low).tolist())
-    return Region(low + radius, high - radius, float(np.prod(high - low)))
+    return Region(low + radius, high - radius, float(np.prod(high - low)), walled=ALL_AXES)
 
 
 def inside_ball(centre: np.ndarray, size: float, radius: float) -> Region:
@@ -81,4 +98,23 @@ def inside_ball(centre: np.ndarray, size: float, radius: float) -> Region:
     must(size > radius, "ball", f"larger than a sphere, of radius {radius:g} m", size)
     centre = np.asarray(centre, float)
     reach = size - radius
-    return Region(centre - reach, centre + reach, 4 / 3 * np.pi * size**3, ball=True)
+    volume = 4 / 3 * np.pi * size**3
+    return Region(centre - reach, centre + reach, volume, round=ALL_AXES, walled=ALL_AXES)
+
+
+def inside_cylinder(size: float, length: float, radius: float) -> Region:
+    """Return the region of spheres of ``radius`` (m) wholly inside a cylinder of radius ``size`` (m) along z,
+    about the origin."""
+    room = size > radius and length > 2 * radius
+    must(room, "cylinder", f"wider and longer than a sphere, of radius {radius:g} m", (size, length))
+    half = np.array([size, size, length / 2]) - radius
+    volume = np.pi * size**2 * length
+    return Region(-half, half, volume, round=(True, True, False), walled=ALL_AXES)
+
+
+def along_axis(points: np.ndarray, axis: Vector) -> np.ndarray:
+    """Return points (m), shape (n, 3), turned about the origin so that their z axis lies along an axis."""
+    direction = np.asarray(axis) / np.linalg.norm(axis)
+    first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+    first /= np.linalg.norm(first)
+    return points @ np.stack([first, np.cross(direction, first), direction])

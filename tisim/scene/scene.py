@@ -119,7 +119,7 @@ class Scene(Component):
 
     def acting(self) -> tuple[Effect, ...]:
         """Return the effects, with what they take from the start and from the materials filled in."""
-        masses, materials = self.particles.masses(), Materials(self.materials, self.material_pairs)
+        masses, materials = self.particles.masses(self.seed), Materials(self.materials, self.material_pairs)
         return tuple(_of(effect, materials).at_start(masses) for effect in self.effects)
 
     def start(self, seed: int | None = None) -> Arrays:
@@ -130,8 +130,9 @@ class Scene(Component):
 
     def capacity(self) -> int:
         """Return how many particles may ever live at once."""
-        masses = self.particles.masses()
-        return max([len(masses), *(effect.capacity(masses) for effect in self.effects)])
+        masses = self.particles.masses(self.seed)
+        n = len(masses)
+        return n + sum(effect.capacity(masses) - n for effect in self.effects)
 
     def digest(self) -> str:
         """Return a hash, in hex, of everything that decides the result: physics version, every parameter, the

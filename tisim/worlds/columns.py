@@ -9,6 +9,7 @@ WORLD_QUANTITIES = (
 """These quantities of a world (f64) tell its time and how its steps go."""
 WORLD_INTEGERS = (
     *("count", "status", "failed", "failing_particle", "failing_effect"),
+    "ending_effect",
     *("changed", "events", "next_id", "underway"),
 )
 """These integers of a world (i32) tell how many particles it has and how it is doing."""
@@ -30,8 +31,8 @@ WORLD_SETTINGS = (
 """These numbers of a world say what it is and what it waits for."""
 ATTRIBUTES = (
     *("worlds", "capacity", "fields", "counters", "world_quantities", "flags", "totals", "reported"),
-    *("real", "records", "shared", "domain", "before_reading", "columns", "singles", "slotted", "means"),
-    "sums",
+    *("real", "records", "shared", "domain", "before_reading", "columns", "singles", "slotted", "defaults"),
+    *("copied", "means", "sums"),
 )
 
 

@@ -56,6 +56,30 @@ class State(StateMemory):
         """Copy particle i to a new slot, and return its index. The caller has checked ``room``."""
         k = self.count[w]
         self.copy(w, i, k)
+        self.enter(w, k)
+        return k
+
+    @ti.func
+    def insert(self, w, position, velocity, radius, mass):
+        """Put a new particle in, with what all fields start with besides; return its index. The caller has
+        checked ``room``."""
+        k = self.count[w]
+        for column in ti.static(self.defaults):
+            if ti.static(column[2] == 3):
+                column[0][w, k] = ti.Vector([column[1], column[1], column[1]])
+            else:
+                column[0][w, k] = column[1]
+        self.position[w, k], self.velocity[w, k] = position, velocity
+        self.radius[w, k], self.mass[w, k] = radius, mass
+        for column in ti.static(self.copied):
+            column[0][w, k] = column[1][w, k]
+        self.enter(w, k)
+        return k
+
+    @ti.func
+    def enter(self, w, k):
+        """Count slot k as that of a new particle, which has an id of its own and nothing that is its own
+        yet."""
         for column in ti.static(self.slotted):
             for m in range(column[1]):
                 column[0][w, k, m] = column[2]
@@ -63,7 +87,12 @@ class State(StateMemory):
         self.next_id[w] += 1
         self.count[w] = k + 1
         self.changed[w] = 1
-        return k
+
+    @ti.func
+    def finish(self, w, effect):
+        """Have a world end after this step, by an effect, by its index in the scene."""
+        self.end[w] = self.time[w]
+        ti.atomic_min(self.ending_effect[w], effect)
 
     @ti.func
     def room(self, w):

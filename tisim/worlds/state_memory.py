@@ -98,13 +98,18 @@ class StateMemory:
         self.columns = (*quantities, *integers, *WORLD_VECTORS, *whole, *WORLD_SETTINGS)
         self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
         self.slotted = tuple(
-            (
-                getattr(self, field.name),
-                field.slots,
-                int(field.default or 0) if field.integer else float(field.default or 0.0),
-            )
+            (getattr(self, field.name), field.slots, _number(field)) for field in fields if field.slots
+        )
+        # What a particle that is put in has besides: a number, or the value of another field.
+        self.defaults = tuple(
+            (getattr(self, field.name), _number(field), field.components)
             for field in fields
-            if field.slots
+            if not field.slots and not isinstance(field.default, str)
+        )
+        self.copied = tuple(
+            (getattr(self, field.name), getattr(self, field.default))
+            for field in fields
+            if isinstance(field.default, str)
         )
         self.means = self._by_merge_rule("mean")
         self.sums = self._by_merge_rule("sum")
@@ -197,3 +202,8 @@ class StateMemory:
             raise RunError("a Simulation must be used with the settings it was made under; start it anew")
         if not self.alive:
             raise RunError("a Simulation must be used before it is closed; make another")
+
+
+def _number(field: Field) -> int | float:
+    """Return what a new particle has in a field, where that is a number."""
+    return int(field.default or 0) if field.integer else float(field.default or 0.0)

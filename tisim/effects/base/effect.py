@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -28,7 +28,7 @@ class Effect(LawHints, Component):
     quantities that it keeps of a world. totals : names of whole numbers of a world that sum up what all
     particles add in a step, in any order (``ti.atomic_add``), and that no Result has. requires_source : the
     quantities of which a scene must have at least one source. repeatable : whether a scene can hold two of
-    its kind.
+    its kind. ends : what has come about when it ends a world.
     """
 
     contract: ClassVar[bool] = True
@@ -46,6 +46,7 @@ class Effect(LawHints, Component):
     counters: ClassVar[tuple[str, ...]] = ()
     world_quantities: ClassVar[tuple[str, ...]] = ()
     totals: ClassVar[tuple[str, ...]] = ()
+    ends: ClassVar[str] = "it ends"
     requires_source: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -59,12 +60,22 @@ class Effect(LawHints, Component):
 
     def keeps(self, what: str) -> tuple[str, ...]:
         """Return the names of the ``counters``, ``world_quantities`` or ``totals`` that it keeps of a world,
-        given its options; by default those of its class."""
+        given its options; by default those of its class. Names that begin with its own are of it alone, where
+        there are several of a kind; it finds them with ``remembers``."""
         return getattr(self, what, ())
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         """Return attributes to set on its bound object, chosen among the bound effects of the scene."""
         return {}
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        """Return attributes to set on its bound object, chosen among the fields of the state."""
+        return {}
+
+    def newcomers(self) -> Collection[str] | None:
+        """Return the names of the fields, beside those that all particles have, that it gives to particles it
+        adds; None where it adds none, or only copies."""
+        return None
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base.effect import Effect
@@ -37,10 +37,6 @@ class Force(Effect):
         """Return the fields in which particles remember what it has done to them, given all effects of the
         scene; by default none. A bound force finds them with ``remembers``."""
         return ()
-
-    def remembers(self, s: Any) -> dict[str, Any]:
-        """Return attributes to set on its bound object, chosen among the fields of the state."""
-        return {}
 
     @ti.func
     def velocity_jacobian(self, s, w, i, t):

@@ -1,0 +1,333 @@
+"""Insertions, outflow and coming to rest: one scene of soft grains over a floor, compiled once."""
+
+import numpy as np
+import pytest
+
+from tests.judged import check_message
+from tests.numerics.test_philox import twin
+from tests.scenes import by_id, compiled, fixed, scene
+from tisim import GrainClass, InputError, MeasureSeries, Particles, Scene
+from tisim.backend.taichi import ti
+from tisim.effects import Force, Gravity, PairForce, parameter
+from tisim.geometry import Plane
+from tisim.numerics.random_streams import INSERTION
+from tisim.operators import AtRest, InsertionByFlux, InsertionByFraction, Outflow
+from tisim.packing import EqualSizes, UniformSizes
+from tisim.worlds.fields import Field
+
+STIFFNESS, DAMPING, DT, G = 2e4, 60.0, 4e-4, 9.81
+"""N/m, N s/m, s, m/s^2."""
+NEVER = 1e3
+"""Begins after the end of any run, s."""
+
+
+class StickingSpring(PairForce):
+    """Springs along and across the line of centres; that across remembers how far two have slid."""
+
+    fields = ("radius",)
+    short_ranged = True
+    memory = 3
+    depends_on_velocity = True
+
+    @ti.func
+    def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        n, v = separation / distance, s.relative_velocity(w, i, j, separation)
+        depth, along = s.radius[w, i] + s.radius[w, j] - distance, v.dot(n)
+        touching = depth > 0.0
+        slid = ti.select(touching, 1.0, 0.0) * (past + dt * (v - along * n))
+        normal = ti.select(touching, DAMPING * along - STIFFNESS * depth, 0.0)
+        force = normal * n + 0.2 * STIFFNESS * slid
+        return force, 0.0 * force, 0.0 * force, slid
+
+
+class Floor(Force):
+    """A spring and damping below z = 0."""
+
+    fields = ("radius",)
+    damping: float = parameter("N s/m", "damping", DAMPING, gt=0)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        depth = s.radius[w, i] - s.position[w, i][2]
+        up, v = ti.Vector([0.0, 0.0, 1.0]), s.velocity[w, i]
+        return ti.select(depth > 0.0, 1.0, 0.0) * (STIFFNESS * depth * up - self.damping(w) * v)
+
+
+GRAINS = (
+    GrainClass(
+        sizes=EqualSizes(radius=0.06), density=1000.0, quantities={"tag": 7, "origin": (1.0, 2.0, 3.0)}
+    ),
+    GrainClass(
+        sizes=UniformSizes(by="volume", smallest=0.03, largest=0.05),
+        density=1200.0,
+        share=2.0,
+        quantities={"tag": 8, "origin": (0.0, 0.0, 4.0)},
+    ),
+)
+FLUX_NUMBER, FRACTION_NUMBER = 40, 30
+LOW, HIGH = np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.6, 1.4])
+BED = np.array([[0.3, 0.3, 0.065], [0.3, 0.428, 0.065], [0.411, 0.364, 0.065], [0.34, 0.36, 0.17]])
+
+
+class Tagged(Force):
+    """Pulls nobody, but has grains carry two fields."""
+
+    fields = (
+        Field("tag", "", 1, "keep", integer=True, default=1),
+        Field("origin", "m", 3, default="position"),
+    )
+
+
+def filling(
+    flux=20.0, begin=0.0, fraction=0.05, fill=NEVER, seed=5, duration=0.3, velocity=0.0, floor=DAMPING
+):
+    region = {"low": tuple(LOW), "high": tuple(HIGH), "grains": GRAINS}
+    return scene(
+        BED,
+        np.tile([velocity, 0.0, 0.0], (len(BED), 1)),
+        (
+            StickingSpring(),
+            Floor(damping=floor),
+            Tagged(),
+            Gravity(acceleration=(0.0, 0.0, -G)),
+            InsertionByFlux(name="pour", flux=flux, begin=begin, number=FLUX_NUMBER, **region),
+            InsertionByFraction(
+                name="fill",
+                fraction=fraction,
+                begin=fill,
+                interval=0.25,
+                number=FRACTION_NUMBER,
+                shape="cylinder",
+                deviation=(0.5, 0.5, 0.0),
+                **region,
+            ),
+            Outflow(planes=[Plane(point=(2.0, 0, 0), normal=(-1, 0, 0))]),
+            AtRest(time=0.05, energy=1e-4, unbalanced=2e-2),
+        ),
+        radius=0.065,
+        density=1000.0,
+        stepper=fixed(DT),
+        duration=duration,
+        seed=seed,
+    )
+
+
+SCENES = {
+    "pour": filling(duration=0.5),
+    "fill": filling(begin=NEVER, fill=0.1, duration=0.5),
+    "rest": filling(flux=300.0, begin=3.5, fill=0.0, duration=16.0),
+    "alone": filling(begin=NEVER, velocity=0.05),
+    "below": filling(velocity=0.05, flux=100.0),
+    "leaving": filling(begin=NEVER, velocity=8.0, floor=1e-3),
+}
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    return compiled(SCENES["pour"], worlds=8, capacity=80)
+
+
+@pytest.fixture(scope="module")
+def outcome(simulation):
+    """All scenes side by side, with what they counted on the way."""
+    simulation.load(list(SCENES.values()))
+    series = MeasureSeries(0.02)
+    simulation.run(observers=[series])
+    return dict(zip(SCENES, simulation.results(), strict=True)), dict(zip(SCENES, series, strict=True))
+
+
+@pytest.fixture(scope="module")
+def results(outcome):
+    return outcome[0]
+
+
+def uniforms(seed, stream, k):
+    """The six numbers of grain k."""
+    numbers = []
+    for draw in range(3):
+        a, b, c, d = twin((0, draw << 16, k, stream), (seed, 0))
+        numbers += [((x >> 5) * 2**26 + (y >> 6) + 0.5) / 2**53 for x, y in ((a, b), (c, d))]
+    return numbers
+
+
+def drawn(seed, effect, number):
+    """Class, radius and lambda of each grain, in NumPy."""
+    counts = np.array([one.number() for one in GRAINS])
+    u = np.array([uniforms(seed, INSERTION + effect, k) for k in range(number)])
+    which = (u[:, 0] * counts.sum() >= counts[0]).astype(int)
+    radius = np.array([GRAINS[c].sizes.radii(np.array([x]))[0] for c, x in zip(which, u[:, 1], strict=True)])
+    return which, radius, 2 * u[:, 2:5] - 1
+
+
+def test_grains_come_by_mass_in_the_order_they_are_drawn(results):
+    result = results["pour"]
+    state, mass = by_id(result), result.measures["pour_mass"]
+    which, radius, _ = drawn(5, 4, FLUX_NUMBER)
+    new = slice(len(BED), None)
+    n = int(result.measures["pour_number"])
+    assert len(state["mass"]) == len(BED) + n
+    np.testing.assert_allclose(state["radius"][new], radius[:n], rtol=1e-13)
+    density = np.array([1000.0, 1200.0])[which[:n]]
+    np.testing.assert_allclose(state["mass"][new], density * 4 / 3 * np.pi * radius[:n] ** 3, rtol=1e-13)
+    assert mass == pytest.approx(state["mass"][new].sum(), rel=1e-13)
+    # The last one was due when those before it were less than what had come through.
+    assert mass - state["mass"][-1] < 20.0 * 0.5 <= mass + 1e-9
+    # What its class gives it, and what it has of itself.
+    np.testing.assert_array_equal(state["tag"][new], 7 + which[:n])
+    np.testing.assert_array_equal(state["origin"][new][:, 2], 3 + which[:n])
+    assert (state["tag"][: len(BED)] == 1).all()
+    assert 0 < which[:n].mean() < 1
+
+
+def test_no_grain_is_put_where_another_is(simulation):
+    """Looked at after each step, before they have moved; the region is so full that some must wait."""
+    scenes = [filling(flux=3000.0), filling(begin=NEVER, fill=0.0)]
+    simulation.load(scenes)
+    known, waited = [len(BED)] * 2, False
+    _, _, spread = drawn(5, 5, FRACTION_NUMBER)
+    for _ in range(30):
+        simulation.run(steps=1)
+        for w, now in enumerate(simulation.states):
+            order = np.argsort(now["id"])
+            r, radius = now["position"][order], now["radius"][order]
+            new = slice(known[w], None)
+            size = radius[new, None]
+            assert ((r[new] >= LOW + size) & (r[new] <= HIGH - size)).all()
+            for k in range(known[w], len(r)):
+                others = np.linalg.norm(r[:k] - r[k], axis=1) - radius[:k] - radius[k]
+                assert others.min() >= 0
+            if w == 1 and known[1] == len(BED):
+                axis = np.linalg.norm(r[new, :2] - 0.3, axis=1)
+                assert (axis <= 0.3 - radius[new]).all()
+                sideways = now["velocity"][order][new, :2]
+                np.testing.assert_allclose(sideways, 0.5 * spread[: len(axis), :2], rtol=1e-12)
+            known[w] = len(r)
+        waited |= 0 < known[0] - len(BED) < FLUX_NUMBER
+    assert waited
+    filled = simulation.results()[1]
+    volume = (4 / 3 * np.pi * filled.state["radius"] ** 3)[np.argsort(filled.state["id"])][len(BED) :]
+    container = np.pi * 0.3**2 * 0.4
+    assert volume[:-1].sum() < 0.05 * container <= volume.sum()
+
+
+def test_a_region_is_filled_again_when_grains_have_left_it(outcome):
+    """At 0.1 s and 0.35 s, when most have fallen out of it."""
+    result, series = outcome[0]["fill"], outcome[1]["fill"]
+    steps = np.flatnonzero(np.diff(series["fill_number"]))
+    np.testing.assert_allclose(series["time"][steps + 1], [0.1, 0.36], atol=0.02)
+    first, second = np.diff(series["fill_number"])[steps]
+    assert 5 < first < FRACTION_NUMBER
+    assert first + second == result.measures["fill_number"] <= FRACTION_NUMBER
+
+
+def test_what_is_there_does_not_notice_what_is_put_in_elsewhere(results):
+    """The bed slides on itself, and remembers how far, while grains come in far above it.
+
+    To the order of the step: after an insertion forces are those at velocities of the end of a step.
+    """
+    alone, below = by_id(results["alone"]), by_id(results["below"])
+    assert len(below["mass"]) > len(alone["mass"]) == len(BED)
+    # They began with 0.05 m/s, and have come some millimetres far.
+    for name, error in (("position", 1e-5), ("velocity", 1e-4)):
+        np.testing.assert_allclose(below[name][: len(BED)], alone[name], rtol=0, atol=error)
+    slid = alone["sticking_spring_past"]
+    assert np.abs(slid).max() > 1e-5
+    error = 0.01 * np.abs(slid).max()
+    np.testing.assert_allclose(below["sticking_spring_past"][: len(BED)], slid, rtol=0, atol=error)
+
+
+def test_grains_at_rest_end_the_run(outcome):
+    """When all have been put in, and not before; the two ratios are those of the state."""
+    results, series = outcome
+    result, before = results["rest"], series["rest"]["time"] < 3.49
+    calm = (series["rest"]["kinetic_ratio"] <= 1e-4) & (series["rest"]["unbalanced_ratio"] <= 2e-2)
+    assert calm[before][-20:].all()
+    assert series["rest"]["fill_number"][before][-1] > 5
+    assert result.status.ok
+    assert result.status.reason == "grains are at rest, by effects.at_rest"
+    assert 3.5 < result.time < 16.0
+    assert result.measures["pour_number"] == FLUX_NUMBER
+    m, radius, v, f = (result.state[name] for name in ("mass", "radius", "velocity", "force"))
+    kinetic = 0.5 * (m * (v**2).sum(axis=1)).sum() / (G * (m * radius).sum())
+    unbalanced = np.linalg.norm(f, axis=1).sum() / (G * m.sum())
+    assert result.measures["kinetic_ratio"] == pytest.approx(kinetic, rel=1e-12)
+    assert result.measures["unbalanced_ratio"] == pytest.approx(unbalanced, rel=1e-12)
+    assert kinetic <= 1e-4
+    assert unbalanced <= 2e-2
+    assert results["alone"].status.reason == "reached its end"
+
+
+def test_what_leaves_is_counted(outcome):
+    result, series = outcome[0]["leaving"], outcome[1]["leaving"]
+    assert result.status.ok
+    mass = result.start["mass"]
+    assert result.work["outflow"] == len(BED)
+    assert len(result.state["mass"]) == 0
+    assert result.measures["outflow_mass"] == pytest.approx(mass.sum(), rel=1e-13)
+    np.testing.assert_allclose(series["outflow_mass"], mass[0] * series["outflow"], rtol=1e-13)
+    assert (series["outflow"] + series["particles"] == len(BED)).all()
+    assert (np.diff(series["outflow"]) >= 0).all()
+
+
+@pytest.mark.parametrize("name", ["pour", "rest"])
+def test_alone_and_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
+    simulation.load(SCENES[name])
+    simulation.run(until=0.21)
+    simulation.checkpoint(tmp_path / "half")
+    simulation.load(SCENES[name])
+    simulation.restore(tmp_path / "half")
+    simulation.run()
+    (again,) = simulation.results()
+    assert again.status == results[name].status
+    assert again.measures == results[name].measures
+    for field, values in results[name].state.items():
+        np.testing.assert_array_equal(again.state[field], values, err_msg=field)
+
+
+@pytest.mark.slow
+def test_on_the_other_schedule_it_is_the_same_run(results):
+    simulation = compiled(SCENES["pour"], worlds=2, capacity=80, schedule="particle")
+    simulation.load([SCENES["rest"], SCENES["leaving"]])
+    simulation.run()
+    for result, name in zip(simulation.results(), ("rest", "leaving"), strict=True):
+        assert result.measures == results[name].measures
+        for field, values in results[name].state.items():
+            np.testing.assert_array_equal(result.state[field], values, err_msg=field)
+
+
+def test_room_is_made_for_all_that_come():
+    assert SCENES["pour"].capacity() == len(BED) + FLUX_NUMBER + FRACTION_NUMBER
+
+
+ONE = (GrainClass(sizes=EqualSizes(radius=0.1), density=1.0),)
+WRONG = {
+    "no room": (
+        lambda: InsertionByFlux(flux=1.0, number=1, grains=ONE, low=(0, 0, 0), high=(1, 1, 0.1)),
+        r"insertion_by_flux.high must be at least 0\.2 m from low along each axis",
+    ),
+    "not round": (
+        lambda: InsertionByFlux(
+            flux=1.0, number=1, grains=ONE, low=(0, 0, 0), high=(1, 2, 1), shape="cylinder"
+        ),
+        "insertion_by_flux.high must be as far from low along each axis as a cylinder is",
+    ),
+    "nothing": (
+        lambda: InsertionByFlux(flux=1.0, number=1, grains=(), low=(0, 0, 0), high=(1, 1, 1)),
+        "insertion_by_flux.grains must",
+    ),
+    "rest without weight": (
+        lambda: Scene(
+            particles=Particles(position=[[0, 0, 0]], velocity=[[0, 0, 0]], radius=1.0, mass=1.0),
+            effects=(AtRest(time=1.0),),
+            duration=1.0,
+        ),
+        "effects.at_rest must be used together with effects.gravity",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_insertions_are_refused(make, message):
+    with pytest.raises(InputError, match=message) as error_info:
+        make()
+    check_message(str(error_info.value))

@@ -1,0 +1,49 @@
+"""How fast a hopper empties: rates from a time series of what has flowed out, and Beverloo's law."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.constants import g as STANDARD_GRAVITY
+
+from tisim.errors import must
+
+STEADY = (0.2, 0.8)
+"""Between these parts of what flows out in all the flow is taken as steady."""
+
+
+def discharge_rate(time: np.ndarray, mass: np.ndarray, steady: tuple[float, float] = STEADY) -> float:
+    """Return the rate (kg/s) at which the mass (kg) that has flowed out grows while the flow is steady: the
+    slope of the straight line, by least squares, through the times (s) at which it is between two parts of
+    what flows out in all."""
+    time, mass = np.asarray(time, float), np.asarray(mass, float)
+    part = (mass - mass[0]) / max(mass[-1] - mass[0], np.finfo(float).tiny)
+    chosen = (part >= steady[0]) & (part <= steady[1])
+    must(int(chosen.sum()) >= 3, "times of steady flow", "at least 3", int(chosen.sum()))
+    return float(np.polyfit(time[chosen], mass[chosen], 1)[0])
+
+
+def discharge_rates(time: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Return the rate (kg/s) from each time (s) to the next; shape (times - 1,)."""
+    return np.asarray(np.diff(mass) / np.diff(time))
+
+
+def beverloo_rate(
+    outlet: float,
+    diameter: float,
+    bulk_density: float,
+    gravity: float = STANDARD_GRAVITY,
+    discharge: float = 0.58,
+    empty: float = 1.4,
+) -> float:
+    """Return the rate (kg/s) at which grains flow through a circular outlet in a flat bottom.
+
+        W = C rho_b sqrt(g) (D_0 - k d)^(5/2)
+
+    outlet : its diameter D_0, m. diameter : d of the grains, m. bulk_density : rho_b of the bed, kg/m^3.
+    discharge : C, 0.55 to 0.65. empty : k, 1 to 2, the part of a diameter along the rim that stays empty.
+
+    Source: W. A. Beverloo, H. A. Leniger, J. van de Velde, Chem. Eng. Sci. 15 (1961) 260.
+    """
+    free = outlet - empty * diameter
+    must(free > 0, "outlet", f"wider than {empty:g} diameters of a grain", outlet)
+    return float(discharge * bulk_density * np.sqrt(gravity) * free**2.5)

@@ -1,0 +1,82 @@
+"""At rest: a run ends when its grains have come to rest, rather than after a time."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.effects.external.gravity import Gravity
+from tisim.operators.base import Operator, parameter
+from tisim.operators.insertion import Insertion
+from tisim.worlds.bound import Peers
+
+LOOKS = 10
+"""Grains are looked at so many times while they have to be at rest."""
+
+
+class AtRest(Operator):
+    """A world ends when its grains have been at rest under gravity for a while.
+
+        sum_i (m_i v_i^2 + 2/5 m_i R_i^2 w_i^2) / 2  <=  energy * g sum_i m_i R_i
+        sum_i |F_i|                                  <=  unbalanced * g sum_i m_i
+
+    The ``duration`` of the scene is the latest. The first is the kinetic energy, over that of a fall by a
+    radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and
+    PFC have the mean contact force in place of the weight, which is larger in a deep bed; here a grain on top
+    counts as one below.) Either alone can be deceived: by grains that are let go, and by those that fall at a
+    steady speed. Grains are looked at ten times in ``time``, and must be at rest each time. Grains that are
+    fixed do not count. While insertions are not done nothing is at rest. The ratios at the last look are
+    ``measures``: ``kinetic_ratio`` and ``unbalanced_ratio``.
+
+    Source: C. O'Sullivan, Particulate Discrete Element Modelling (2011), section 2.6.
+    """
+
+    world_quantities = ("kinetic_ratio", "unbalanced_ratio")
+    flags: ClassVar = ("looks_at_rest",)
+    requires: ClassVar = (Gravity,)
+    ends: ClassVar = "grains are at rest"
+
+    energy: float = parameter("", "kinetic energy at rest, over that of a fall by a radius", 1e-5, gt=0)
+    unbalanced: float = parameter("", "unbalanced force at rest, over the weight", 1e-2, gt=0)
+    time: float = parameter("s", "time for which grains must be at rest", gt=0, examples=[0.05])
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"gravity": peers.of(Gravity), "insertions": peers.of(Insertion)}
+
+    @ti.func
+    def acts(self, s, w):
+        interval = ti.cast(self.time(w), ti.f64) / LOOKS
+        before = s.time[w] - s.dt[w]
+        return ti.cast(ti.floor(s.time[w] / interval) > ti.floor(before / interval), ti.i32)
+
+    @ti.func
+    def world(self, s, w):
+        g = 0.0 * s.position[w, 0]
+        for gravity in ti.static(self.gravity):
+            g += gravity.acceleration(w)
+        kinetic, unbalanced, weight, depth = 0.0 * g[0], 0.0 * g[0], 0.0 * g[0], 0.0 * g[0]
+        for i in range(s.count[w]):
+            if not self.is_fixed(s, w, i):
+                m, radius = s.mass[w, i], s.radius[w, i]
+                kinetic += 0.5 * m * s.velocity[w, i].norm_sqr()
+                if ti.static(hasattr(s, "spin")):
+                    kinetic += 0.2 * m * radius * radius * s.spin[w, i].norm_sqr()
+                unbalanced += s.force[w, i].norm()
+                weight += m * g.norm()
+                depth += m * g.norm() * radius
+        calm = kinetic <= self.energy(w) * depth and unbalanced <= self.unbalanced(w) * weight
+        for insertion in ti.static(self.insertions):
+            calm = calm and insertion.pending(s, w) == 0
+        if weight > 0.0:
+            s.kinetic_ratio[w] = ti.cast(kinetic / depth, ti.f64)
+            s.unbalanced_ratio[w] = ti.cast(unbalanced / weight, ti.f64)
+        s.looks_at_rest[w] = ti.select(calm, s.looks_at_rest[w] + 1, 0)
+        if s.looks_at_rest[w] > LOOKS:
+            s.finish(w, self.index)
+
+    @ti.func
+    def is_fixed(self, s, w, i):
+        fixed = 0
+        if ti.static(hasattr(s, "fixed")):
+            fixed = s.fixed[w, i]
+        return fixed > 0

@@ -1,0 +1,184 @@
+"""The contract of insertions, which put grains into a region in the course of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.numerics import philox
+from tisim.numerics.random_streams import INSERTION
+from tisim.operators.base import Operator, option, parameter
+from tisim.operators.filled_region import FilledRegion
+from tisim.packing.grains import GrainClass, check_quantities
+
+MOST_TRIES = 20_000
+"""A draw of Philox has room for so many tries of a grain in a step."""
+
+
+class Insertion(FilledRegion, Operator):
+    """An insertion puts grains at random places of a region, where they overlap none that are there.
+
+    Grains come one after another, each drawn from the classes, with v = velocity + deviation * lambda, lambda
+    uniform in -1..1 along each axis. One that finds no place within ``tries`` is tried again in the next
+    step, and those after it wait, so that sizes come as they are drawn however full it is. They depend on the
+    seed of the scene alone; where they lie also on what is there. They do not turn, and have what
+    their class gives them besides.
+
+    ``measures`` have the number and the mass (kg) that have been put in so far, under its name: NAME_number
+    and NAME_mass.
+    """
+
+    contract: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = True
+    fields = ("radius",)
+
+    grains: tuple[GrainClass, ...] = option("classes of the grains that are put in", min_length=1)
+    number: int = option("grains that are put in, at most", gt=0, le=10**8, examples=[1000])
+    velocity: Vector = parameter("m/s", "mean velocity of the grains", (0.0, 0.0, 0.0))
+    deviation: Vector = parameter(
+        "m/s", "largest deviation from the mean velocity, along each axis", (0.0, 0.0, 0.0)
+    )
+    begin: float = parameter("s", "time from which on grains are put in", 0.0, ge=0)
+    tries: int = option("places that are tried for a grain in a step", 20, gt=0, le=MOST_TRIES)
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        check_quantities(self.grains, ("position", "velocity", "mass", "radius", "id"))
+        self.check_room(max(float(one.sizes.nodes()[0][-1]) for one in self.grains))
+        return self
+
+    def structure(self) -> tuple[Any, ...]:
+        """Return what is compiled in: sizes and further quantities too."""
+        classes = ((one.sizes, *sorted(one.quantities.items())) for one in self.grains)
+        return (*super().structure(), *classes)
+
+    def keeps(self, what: str) -> tuple[str, ...]:
+        own = (f"{self.label}_number", f"{self.label}_mass") if what == "world_quantities" else ()
+        return *super().keeps(what), *own
+
+    def newcomers(self) -> Collection[str]:
+        return self.grains[0].quantities
+
+    def capacity(self, masses: np.ndarray) -> int:
+        return len(masses) + self.number
+
+    def lookups(self) -> dict[str, np.ndarray]:
+        tables = [one.sizes.table() for one in self.grains]
+        lengths = np.array([len(table) for table in tables])
+        ends, by_number = np.cumsum(lengths), [one.sizes.by == "number" for one in self.grains]
+        given = [[value for _, value in sorted(one.quantities.items())] for one in self.grains]
+        return {
+            "nodes": np.concatenate(tables),
+            "spans": np.column_stack([ends - lengths, ends - 1, by_number]).astype(float),
+            # A column more, as there may be nothing given.
+            "given": np.array([np.hstack([*values, 0.0]) for values in given]),
+        }
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        """Return the fields of its own quantities, and of what classes give: each with its first column."""
+        number, mass = (getattr(s, name) for name in self.keeps("world_quantities"))
+        given, first = [], 0
+        for name, value in sorted(self.grains[0].quantities.items()):
+            if hasattr(s, name):
+                given.append((getattr(s, name), first, np.size(value)))
+            first += np.size(value)
+        return {"inserted": number, "inserted_mass": mass, "given_fields": tuple(given)}
+
+    @ti.func
+    def pending(self, s, w):
+        """Return whether more is to come, for which what waits for rest waits too."""
+        return 0
+
+    @ti.func
+    def insert(self, s, w):
+        """Put the next grain in, where it finds a place; return whether it did."""
+        k = ti.cast(self.inserted[w], ti.i32)
+        of_grain = self.uniforms(s, w, k, 0)
+        c = self.draw_class(w, of_grain[0])
+        radius = ti.cast(self.draw_radius(c, of_grain[1]), s.real)
+        done = 0
+        if s.room(w) > 0:
+            attempt = 0
+            while attempt < self.tries and done == 0:
+                of_place = self.uniforms(s, w, k, 1 + attempt)
+                place = self.point(w, radius, ti.Vector([of_place[0], of_place[1], of_place[2]]))
+                if self.is_free(s, w, place, radius):
+                    lambda_ = 2.0 * ti.Vector([of_grain[2], of_grain[3], of_grain[4]]) - 1.0
+                    self.put(s, w, c, place, self.velocity(w) + self.deviation(w) * lambda_, radius)
+                    done = 1
+                attempt += 1
+        return done
+
+    @ti.func
+    def uniforms(self, s, w, k, attempt):
+        """Return six numbers in 0..1: what grain k is like, or where it is tried in this step, from the first
+        attempt on."""
+        step = ti.select(attempt > 0, s.steps[w], ti.cast(0, ti.i64))
+        numbers = ti.Vector.zero(s.real, 6)
+        for m in range(3):
+            words = philox.bits(s.seed[w], INSERTION + self.index, k, step, 3 * attempt + m)
+            two = philox.uniform(words)
+            numbers[2 * m], numbers[2 * m + 1] = ti.cast(two[0], s.real), ti.cast(two[1], s.real)
+        return numbers
+
+    @ti.func
+    def put(self, s, w, c, place, velocity, radius):
+        """Put a grain of class c at a place (m)."""
+        mass = self.grains.density(w, c) * ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * radius**3
+        i = s.insert(w, place, velocity, radius, mass)
+        for given in ti.static(self.given_fields):
+            if ti.static(given[2] == 3):
+                given[0][w, i] = ti.Vector([self.given[c, given[1] + m] for m in range(3)])
+            else:
+                given[0][w, i] = ti.cast(self.given[c, given[1]], given[0].dtype)
+        self.inserted[w] += 1.0
+        self.inserted_mass[w] += ti.cast(mass, ti.f64)
+
+    @ti.func
+    def is_free(self, s, w, place, radius):
+        """Return whether a grain overlaps none of those that are there."""
+        j, free = 0, 1
+        while j < s.count[w] and free == 1:
+            apart = s.domain.nearest(w, place, s.position[w, j], s.time[w])
+            least = radius + s.radius[w, j]
+            if apart.norm_sqr() < least * least and s.mass[w, j] > 0.0:
+                free = 0
+            j += 1
+        return free
+
+    @ti.func
+    def draw_class(self, w, u):
+        """Return the class of a grain, by a number in 0..1."""
+        total = 0.0 * self.grains.number(w, 0)
+        for k in range(self.grains.size(w)):
+            total += self.grains.number(w, k)
+        c, below = 0, self.grains.number(w, 0)
+        while c < self.grains.size(w) - 1 and below <= u * total:
+            c += 1
+            below += self.grains.number(w, c)
+        return c
+
+    @ti.func
+    def draw_radius(self, c, u):
+        """Return the radius (m) of a grain of a class, by a number in 0..1, as ``SizeDistribution.radii``
+        does."""
+        low, high = ti.cast(self.spans[c, 0], ti.i32), ti.cast(self.spans[c, 1], ti.i32)
+        while high - low > 1:
+            middle = (low + high) // 2
+            if self.nodes[middle, 1] <= u:
+                low = middle
+            else:
+                high = middle
+        a, b = ti.cast(self.nodes[low, 0], ti.f64), ti.cast(self.nodes[low + 1, 0], ti.f64)
+        first, last = ti.cast(self.nodes[low, 1], ti.f64), ti.cast(self.nodes[low + 1, 1], ti.f64)
+        part = ti.select(last > first, (u - first) / (last - first), 0.0)
+        part = ti.max(0.0, ti.min(part, 1.0))
+        ratio = a / b
+        return ti.select(
+            self.spans[c, 2] > 0.0, a + part * (b - a), a / ti.sqrt(1.0 - part * (1.0 - ratio * ratio))
+        )

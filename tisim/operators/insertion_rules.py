@@ -1,0 +1,91 @@
+"""The insertions: by a flux, and by the part of a region that grains fill."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from tisim.backend.taichi import ti
+from tisim.operators.base import option, parameter
+from tisim.operators.insertion import MOST_TRIES, Insertion
+
+
+class InsertionByFlux(Insertion):
+    """Grains come into a region at a given flux, until there are as many as asked for.
+
+        a grain is due at t when those before it are less than flux * (t - begin)
+
+    by mass, or by number. Where the region is full they wait, and come as soon as there is room: put it where
+    grains fall out of it, or give them a velocity. It is what LAMMPS has as ``fix pour``, and LIGGGHTS as
+    ``fix insert/rate/region``.
+    """
+
+    flux: float = parameter(
+        "kg/s", "mass that comes in each second; in 1/s where it is by number", gt=0, examples=[0.1]
+    )
+    by: Literal["mass", "number"] = option(
+        "what the flux is of: the mass of the grains, or their number", "mass"
+    )
+
+    @ti.func
+    def acts(self, s, w):
+        return ti.cast(self.is_due(s, w), ti.i32)
+
+    @ti.func
+    def pending(self, s, w):
+        return ti.cast(self.inserted[w] < self.number, ti.i32)
+
+    @ti.func
+    def is_due(self, s, w):
+        """Return whether the next grain is due."""
+        so_far = self.inserted[w]
+        if ti.static(self.by == "mass"):
+            so_far = self.inserted_mass[w]
+        elapsed = s.time[w] - ti.cast(self.begin(w), ti.f64)
+        due = so_far < ti.cast(self.flux(w), ti.f64) * elapsed
+        return due and self.inserted[w] < self.number
+
+    @ti.func
+    def world(self, s, w):
+        placed = 1
+        while placed == 1 and self.is_due(s, w):
+            placed = self.insert(s, w)
+
+
+class InsertionByFraction(Insertion):
+    """Grains are put into a region until they fill a given part of its volume, now and again.
+
+    At ``begin``, and whenever an ``interval`` has passed, grains are put in until those whose centres are in
+    the region have the ``fraction`` of its volume, or until one finds no place. At random places the fraction
+    of equal spheres comes to 0.3 with some thousand tries, and to 0.38 with no number of them. It is what
+    LIGGGHTS has as ``fix insert/pack``.
+    """
+
+    fraction: float = parameter("", "part of the region's volume that is filled", gt=0, lt=1, examples=[0.2])
+    interval: float = parameter("s", "time from one filling to the next", gt=0, examples=[1.0])
+    tries: int = option("places that are tried for a grain", 1000, gt=0, le=MOST_TRIES)
+
+    @ti.func
+    def acts(self, s, w):
+        begin, interval = ti.cast(self.begin(w), ti.f64), ti.cast(self.interval(w), ti.f64)
+        before = s.time[w] - s.dt[w]
+        due = ti.floor((s.time[w] - begin) / interval) > ti.floor((before - begin) / interval)
+        first = before <= begin and s.time[w] >= begin
+        due = (due and before > begin) or first
+        return ti.cast(due and self.inserted[w] < self.number, ti.i32)
+
+    @ti.func
+    def pending(self, s, w):
+        return ti.cast(s.time[w] <= self.begin(w), ti.i32)
+
+    @ti.func
+    def world(self, s, w):
+        filled = 0.0 * s.radius[w, 0]
+        for i in range(s.count[w]):
+            if self.contains(w, s.position[w, i]):
+                filled += s.radius[w, i] ** 3
+        most = self.fraction(w) * self.volume(w) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
+        placed = 1
+        while placed == 1 and filled < most and self.inserted[w] < self.number:
+            placed = self.insert(s, w)
+            if placed == 1:
+                filled += s.radius[w, s.count[w] - 1] ** 3

@@ -1,0 +1,86 @@
+"""What grains are drawn from: classes of a mixture, each with its sizes, its density and its share."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Self
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.components.component import Component, Text, Vector, option, parameter
+from tisim.components.ranges import LEAST, MOST
+from tisim.errors import must
+from tisim.numerics.random_streams import GRAIN_SIZES
+from tisim.packing.size_laws import EqualSizes
+from tisim.packing.sizes import SizeDistribution
+
+
+class GrainClass(Component):
+    """A class of grains is one of those that a mixture is made of.
+
+    A class with a share x of the mass, density rho and sizes with the mean <r^3> over their number has
+    x / (rho <r^3>) of the number of grains, up to a factor that is the same for all classes.
+    """
+
+    sizes: SizeDistribution = option("sizes of its grains", examples=[EqualSizes(radius=1e-3)])
+    density: float = parameter("kg/m^3", "density of its grains", examples=[2500.0], gt=0)
+    share: float = parameter(
+        "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
+    )
+    quantities: Mapping[Text, float | Vector] = option(
+        "further fields of its grains by name, in SI, such as temperature", default_factory=dict
+    )
+
+    @classmethod
+    def columns(cls) -> Iterator[tuple[str, int]]:
+        yield from super().columns()
+        yield "number", 1
+
+    def values(self) -> list[float]:
+        return [*super().values(), self.number()]
+
+    @model_validator(mode="after")
+    def _weighable(self) -> Self:
+        radius, rule = self.sizes.nodes()[0][[0, -1]], f"from {LEAST:g} to {MOST:g} kg"
+        for mass in (self.density * 4 / 3 * np.pi * radius**3).tolist():
+            must(LEAST <= mass <= MOST, "mass of a grain", rule, mass)
+        return self
+
+    def number(self) -> float:
+        """Return how many grains it has for each kg of share."""
+        return self.share / (self.density * 4 / 3 * np.pi * self.sizes.mean_cube())
+
+
+def draw(classes: Sequence[GrainClass], number: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the class, by its index, and the radius (m) of each of a number of grains, drawn independently.
+
+    They depend on the arguments alone, and the first of many are those of few.
+    """
+    uniform = np.random.Generator(np.random.Philox(key=[seed, GRAIN_SIZES])).random((number, 2))
+    counts = np.array([one.number() for one in classes])
+    edges = np.cumsum(counts) / counts.sum()
+    which = np.minimum(np.searchsorted(edges, uniform[:, 0], side="right"), len(classes) - 1)
+    radius = np.empty(number)
+    for k, one in enumerate(classes):
+        radius[which == k] = one.sizes.radii(uniform[which == k, 1])
+    return which, radius
+
+
+def masses(classes: Sequence[GrainClass], which: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Return the mass (kg) of grains of these classes and radii (m)."""
+    return np.array([one.density for one in classes])[which] * 4 / 3 * np.pi * radius**3
+
+
+def quantity(classes: Sequence[GrainClass], name: str, which: np.ndarray) -> np.ndarray:
+    """Return a quantity that all classes give, for grains of these classes."""
+    return np.array([one.quantities[name] for one in classes], float)[which]
+
+
+def check_quantities(classes: Sequence[GrainClass], taken: Collection[str]) -> None:
+    """Raise InputError unless all classes give the same quantities, and none that is given otherwise."""
+    for k, one in enumerate(classes):
+        names, where = sorted(one.quantities), f"grains.{k}.quantities"
+        must(names == sorted(classes[0].quantities), where, "those of the other classes", ", ".join(names))
+        for name, value in one.quantities.items():
+            must(name not in taken, f"{where}.{name}", "given once, and none that the grains have", value)

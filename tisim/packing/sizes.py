@@ -1,0 +1,64 @@
+"""The contract of size distributions, and how sizes are drawn from any of them."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from tisim.components.component import Component, option
+
+By = Literal["number", "volume"]
+
+
+class SizeDistribution(Component):
+    """A size distribution says which part of some grains has which radii.
+
+    It is that of their number, or that of their volume, which is that of their mass as all have one density:
+    what sieves and weighing give. Parts by volume q_3 and by number q_0 are bound by
+
+        q_0(r) = q_3(r) / r^3 / integral of q_3(r) / r^3
+
+    so of two radii with the same part of the volume, the smaller one has more grains by the cube of their
+    ratio. Between nodes, which each distribution lays as densely as it takes, a density is constant in what
+    the distribution is of.
+
+    Source: T. Allen, Particle Size Measurement (1997), chapter 2.
+    """
+
+    contract: ClassVar[bool] = True
+
+    by: By = option("what the parts are of: the number of grains, or their volume", examples=["volume"])
+
+    def nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return radii (m), rising, and the part, 0 to 1, of the number or volume that is no larger than
+        each."""
+        raise NotImplementedError(f"{type(self).__name__} must define nodes")
+
+    def table(self) -> np.ndarray:
+        """Return radii (m), and the part of the number of grains that is no larger; shape (nodes, 2)."""
+        radius, passing = self.nodes()
+        counts = np.diff(passing) * self._counts_per_part(radius)
+        return np.column_stack([radius, np.concatenate([[0.0], np.cumsum(counts)]) / counts.sum()])
+
+    def radii(self, uniform: np.ndarray) -> np.ndarray:
+        """Return the radii (m) below which are these parts, 0 to 1, of the number of grains."""
+        table = self.table()
+        at = np.clip(np.searchsorted(table[:, 1], uniform, side="right") - 1, 0, len(table) - 2)
+        (a, first), (b, last) = table[at].T, table[at + 1].T
+        part = np.clip((uniform - first) / np.where(last > first, last - first, 1.0), 0.0, 1.0)
+        return a + part * (b - a) if self.by == "number" else a / np.sqrt(1 - part * (1 - (a / b) ** 2))
+
+    def mean_cube(self) -> float:
+        """Return the mean of r^3 over the number of grains, m^3."""
+        radius, passing = self.nodes()
+        a, b, part = radius[:-1], radius[1:], np.diff(passing)
+        if self.by == "number":
+            return float((part * (a + b) * (a * a + b * b) / 4).sum())
+        return float(1 / (part * self._counts_per_part(radius)).sum())
+
+    def _counts_per_part(self, radius: np.ndarray) -> np.ndarray:
+        """Return how many grains a part has between two nodes, up to a factor: the mean there of 1, or of
+        1/r^3."""
+        a, b = radius[:-1], radius[1:]
+        return np.ones(len(a)) if self.by == "number" else (a + b) / (2 * a**2 * b**2)
