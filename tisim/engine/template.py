@@ -34,7 +34,7 @@ def _lines(kind: type[Component], place: str, named: bool, row: bool = False) ->
     row_kinds, inner = dict(kind.lists()), []
     for name, info in fields(kind).items():
         value = example(info)
-        if name in row_kinds and not info.is_required():
+        if name in row_kinds and not (info.is_required() or any(info.examples or ())):
             yield f"# {text_of(info)}"
             yield f"# [[{place}.{name}]]"
         elif name in row_kinds:

@@ -53,7 +53,7 @@ class Walls(WallContacts, MaterialLaw, Force):
     requires: ClassVar = (GranularContact,)
 
     planes: tuple[Plane, ...] = option(
-        "planes; their number may differ per world, as that of others", (), examples=[()]
+        "planes; their number may differ per world, as that of others", (), examples=[(Plane(),)]
     )
     discs: tuple[Disc, ...] = option("flat discs", (), examples=[()])
     spheres: tuple[SphericalSurface, ...] = option("spheres, from within or around", (), examples=[()])
