@@ -150,7 +150,7 @@ from .magnetic.mutual_moment import (
 from .magnetic.mutual_moment import (
     MutualMoment as MutualMoment,
 )
-from .motion.base import AtRest as AtRest
+from .motion.base import Fixed as Fixed
 from .motion.base import Motion as Motion
 from .motion.oscillation import Oscillation as Oscillation
 from .motion.rotation import Rotation as Rotation

@@ -16,7 +16,7 @@ from tisim.effects.base import Effect, Field, Force, option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.wall_contacts import WallContacts
 from tisim.effects.contact.wall_search import CONTACTS
-from tisim.effects.motion.base import AtRest, Motion, MotionState
+from tisim.effects.motion.base import Fixed, Motion, MotionState
 from tisim.errors import must
 from tisim.geometry.box import BoxSurface
 from tisim.geometry.cone import ConicalSurface
@@ -61,7 +61,7 @@ class Walls(WallContacts, MaterialLaw, Force):
     cones: tuple[ConicalSurface, ...] = option("cones, from within or around", (), examples=[()])
     boxes: tuple[BoxSurface, ...] = option("boxes, from within or around", (), examples=[()])
     surface: TriangulatedSurface | None = option("a surface of triangles, such as that of an STL file", None)
-    motion: Motion = option("how the body moves", AtRest())
+    motion: Motion = option("how the body moves", Fixed())
     material: Text | None = option("material of the walls; the first of the scene unless given", None)
 
     @model_validator(mode="after")

@@ -67,7 +67,7 @@ class Motion(Component):
         ``resistance``; once also before the first step."""
 
 
-class AtRest(Motion):
+class Fixed(Motion):
     """The body rests where its shapes say."""
 
     moves: ClassVar[bool] = False
