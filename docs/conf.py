@@ -32,11 +32,11 @@ OTHERS = (
     "DataFrame",
 )
 # Names that are imported for type checkers alone stand without their modules.
-TYPES = ("Bound", "Buffer", "Domain", "Item", "NeighbourLists", "Peers", "State", "SumForces")
+TYPES = ("Bound", "Buffer", "Domain", "Item", "Materials", "NeighbourLists", "Peers", "State", "SumForces", "Touching")
 INNER = "|".join(
     (
         r"tisim\.(io\.(recording|trajectory|recorder)|engine\.particle_state|backend\.runtime)\.\w+",
-        r"(tisim\.(steppers\.context|worlds\.(bound|program|state)|neighbours\.(lists|half_list)|engine\.assembly|interactions\.force_sum)|optimize\.methods\.\w+)\.\w+",
+        r"(tisim\.(components\.materials|steppers\.context|worlds\.(bound|program|state)|neighbours\.(lists|half_list)|engine\.assembly|interactions\.force_sum)|optimize\.methods\.\w+)\.\w+",
     )
 )
 nitpick_ignore_regex = [("py:.*", INNER), *(("py:.*", rf"{package}(\..*)?") for package in (*OTHERS, *TYPES))]
