@@ -32,7 +32,10 @@ OTHERS = (
     "DataFrame",
 )
 # Names that are imported for type checkers alone stand without their modules.
-TYPES = ("Bound", "Buffer", "Domain", "Item", "Materials", "NeighbourLists", "Peers", "State", "SumForces", "Touching")
+TYPES = (
+    *("Bound", "Buffer", "Domain", "Item", "Materials", "NeighbourLists", "Peers", "State", "SumForces"),
+    "Touching",
+)
 INNER = "|".join(
     (
         r"tisim\.(io\.(recording|trajectory|recorder)|engine\.particle_state|backend\.runtime)\.\w+",
