@@ -208,7 +208,8 @@ def joined(kinds):
     effects = {name: values for data in every for name, values in data["effects"].items()}
     carried = {name: values for data in every for name, values in data["particles"]["quantities"].items()}
     particles = {**every[0]["particles"], "quantities": carried}
-    return Scene.from_dict({**every[0], "effects": effects, "particles": particles})
+    materials = {name: values for data in every for name, values in data.get("materials", {}).items()}
+    return Scene.from_dict({**every[0], "effects": effects, "particles": particles, "materials": materials})
 
 
 SHORT = [kind for kind in known_effects() if getattr(kind, "short_ranged", False)]
@@ -216,10 +217,10 @@ SHORT = [kind for kind in known_effects() if getattr(kind, "short_ranged", False
 
 @pytest.mark.long
 def test_every_law_is_zero_beyond_its_reach():
-    """All in one scene; only friction has nothing to do there before particles have slid."""
+    """All in one scene; only friction and bonds have nothing to do there before particles have moved."""
     most = assert_reach(joined(SHORT))
     assert most.keys() == {kind.kind() for kind in SHORT}
-    assert {name for name, size in most.items() if size == 0} <= {"contact_friction"}
+    assert {name for name, size in most.items() if size == 0} <= {"contact_friction", "parallel_bond"}
 
 
 class Tally(SoftShell):

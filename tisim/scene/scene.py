@@ -180,6 +180,9 @@ class Scene(Component):
             fields["stepper"] = cls._stepper(rest.pop("stepper"))
         effects_table = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
         fields["effects"] = tuple(_effect(name, values) for name, values in effects_table.items())
+        for name in rest.keys() & {"materials", "material_pairs"}:
+            named = serialization.table(rest.pop(name), f"scene.{name}", "a table of tables")
+            fields[name] = {key: serialization.table(row, f"{name}.{key}") for key, row in named.items()}
         return cls(**fields, **rest)
 
     @staticmethod

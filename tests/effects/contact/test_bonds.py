@@ -9,7 +9,7 @@ from tests.scenes import by_id, compiled, scene
 from tisim.effects import CapillaryBridge, Lorentz, ParallelBond
 from tisim.sources import ElectricField
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 WORLDS, CAPACITY = 16, 16
 LIQUID = {"surface_tension": 0.07, "contact_angle": 0.4, "volume": 1e-9}

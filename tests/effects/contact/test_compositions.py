@@ -11,7 +11,11 @@ from tests.scenes import by_id
 pytestmark = pytest.mark.long
 
 
-@pytest.mark.parametrize("name", LAWS)
+EACH = [name if name == "jkr" else pytest.param(name, marks=pytest.mark.slow) for name in LAWS]
+"""A composition takes seconds to compile."""
+
+
+@pytest.mark.parametrize("name", EACH)
 def test_one_step_and_some_hundred_are_those_of_the_twin(name, rng):
     """Every part of a law acts, remembers, sticks and slides; pairs of materials by their rules, and by a
     table."""
@@ -56,7 +60,7 @@ def couples(name, rng, each=16, **more):
     )
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", EACH)
 def test_energy_never_grows_in_impacts_and_momentum_stays(name, rng):
     """Of grains of two materials that have met and parted; those that adhere have given up more."""
     met = 0

@@ -6,7 +6,7 @@ import pytest
 from tests.effects.contact.grains import CAPACITY, FLOOR, HERTZ_MINDLIN, USUAL, WORLDS, grains
 from tests.scenes import scene, simulate
 from tisim import InputError, Material, MaterialPair
-from tisim.effects import DMT, JKR, Granular, Hertz, TwistingMarshall, Walls
+from tisim.effects import DMT, JKR, CapillaryBridge, Granular, Hertz, TwistingMarshall, Walls
 from tisim.geometry import Plane
 from tisim.steppers import Verlet
 
@@ -20,6 +20,7 @@ def one(*acting, **more):
 
 
 LACKING = {"grain": Material(young=1e7, poisson=0.3, restitution=0.5), "glass": material()}
+ALONE = f"effects.walls must be used together with effects.{CapillaryBridge.kind()} or effects.granular"
 WRONG = {
     "material.young must be greater than 0.0; received 0": lambda: material(young=0),
     "material.poisson must be greater than -1.0; received -1": lambda: material(poisson=-1),
@@ -32,12 +33,8 @@ WRONG = {
     "plane.normal must be a direction, not of length 0; received (0.0, 0.0, 0.0)": lambda: Plane(
         normal=(0, 0, 0)
     ),
-    "effects.walls must be used together with effects.granular; received 'walls'": lambda: one(
-        Walls(planes=[Plane()])
-    ),
-    "effects.walls must be used together with effects.granular; received 'hertz, walls'": lambda: one(
-        Hertz(young=1, poisson=0), Walls(planes=[Plane()])
-    ),
+    f"{ALONE}; received 'walls'": lambda: one(Walls(planes=[Plane()])),
+    f"{ALONE}; received 'hertz, walls'": lambda: one(Hertz(young=1, poisson=0), Walls(planes=[Plane()])),
     "stepper.control must be one that suits granular, such as fixed_step or that of an implicit "
     "stepper; received 'approach_time'": lambda: one(HERTZ_MINDLIN, stepper=Verlet()),
     "effects.granular must be given once; received 2": lambda: one(HERTZ_MINDLIN, HERTZ_MINDLIN),

@@ -64,6 +64,7 @@ def test_beside_hookes_spring_an_impact_has_the_restitution_too():
         np.testing.assert_allclose(found, e, rtol=0, atol=3 / steps)
 
 
+@pytest.mark.slow
 def test_viscoelastic_restitution_falls_as_the_fifth_root_of_the_speed():
     """1 - C (3/2 A k^(2/5) v^(1/5)) + 3/5 (...)^2, k = 4/3 E* sqrt(R*) / m* (Ramirez and others 1999)."""
     speeds, lag = np.array([0.01, 0.1, 1.0]), 2e-4

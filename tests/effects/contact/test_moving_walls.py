@@ -81,7 +81,7 @@ def test_a_moving_wall_is_one_at_rest_for_those_who_go_along():
     assert np.linalg.norm(rest.state["velocity"] - velocity) > 0.5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
     """While it slides: v = mu g t along the wall, and mu m g R on the drum."""
     friction, size, t = 0.3, 2.0, 0.05
