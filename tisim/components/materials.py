@@ -71,7 +71,8 @@ class ContactProperties(Component):
 
 
 HARMONIC = ("stiffness", "rolling_stiffness", "twisting_stiffness")
-"""Of these the harmonic mean is taken, as of springs in a row; of the others the geometric one."""
+"""These properties of two materials are mixed by the harmonic mean, as springs in a row are; the others are
+mixed by the geometric one."""
 
 
 class Material(ContactProperties):
