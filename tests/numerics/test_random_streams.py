@@ -9,10 +9,14 @@ from tisim.numerics import random_streams
 STREAMS = {name: value for name, value in vars(random_streams).items() if name.isupper()}
 
 
-def stream_names(tree):
-    """The stream of every call of ``bits`` in a module, as it is written."""
+def named(tree):
+    """The streams that an expression or a module names."""
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in STREAMS}
+
+
+def calls_of_bits(tree):
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
-    return [ast.unparse(call.args[1]) for call in calls if ast.unparse(call.func).endswith("philox.bits")]
+    return [call for call in calls if ast.unparse(call.func).endswith("philox.bits")]
 
 
 def test_no_two_streams_are_the_same():
@@ -22,8 +26,12 @@ def test_no_two_streams_are_the_same():
 
 def test_whoever_draws_names_its_stream_and_no_other_does():
     files = rooms.modules(Path(__file__).parents[2])
-    uses_by_file = {
-        name: set(stream_names(ast.parse(file.read_text(encoding="utf-8")))) for name, file in files.items()
-    }
-    uses = [stream for streams in uses_by_file.values() for stream in streams]
+    trees = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in files.items()}
+    assert all(len(named(call.args[1])) == 1 for tree in trees.values() for call in calls_of_bits(tree))
+    uses = [
+        stream
+        for name, tree in trees.items()
+        if not name.endswith("random_streams")
+        for stream in named(tree)
+    ]
     assert sorted(uses) == sorted(STREAMS)
