@@ -9,6 +9,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cases
@@ -87,6 +88,7 @@ class Case:
     scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
     quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
     problem : (size, variant) -> Problem; variants : its names, the first the default.
+    calibration : (size, variant, file) -> Problem, the same for measurements that a file has.
     pictures : what the case is about, drawn from a run's trajectory; by name of file.
     figures : (size, progress) -> what takes many runs: figures, and tables as text; by name of file.
     """
@@ -102,15 +104,19 @@ class Case:
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None
     pictures: Callable[[Frames], Mapping[str, Figure]] | None = None
     figures: Callable[[str, Progress], Mapping[str, Figure | str]] | None = None
+    calibration: Callable[[str, str, Path], Problem] | None = None
 
     def size(self, name: str) -> Size:
         """Return a size by name; InputError when there is none of that name."""
         return size_named(name, self.sizes)
 
-    def inverse(self, size: str, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
+    def inverse(
+        self, size: str, variant: str | None, measured: Path | None = None
+    ) -> tuple[Problem, Mapping[str, Any]]:
         """Return the inverse problem (its first variant for None), and the settings of its search.
 
-        InputError when the case has none, or not of that size.
+        measured : a file of measurements that it is to meet, in place of the case's own.
+        InputError when the case has none, or not of that size, or takes no measurements.
         """
         search = self.size(size).search
         if self.problem is None:
@@ -121,7 +127,13 @@ class Case:
         chosen = next(iter(self.variants), "") if variant is None else variant
         rule = f"one of {', '.join(self.variants)}"
         must(chosen in self.variants or not self.variants, "variant", rule, chosen)
-        return self.problem(size, chosen), search
+        if measured is None:
+            return self.problem(size, chosen), search
+        if self.calibration is None:
+            raise InputError(
+                f"--measured must be given for a case that is calibrated; received {self.name!r}"
+            )
+        return self.calibration(size, chosen, measured), search
 
 
 def every() -> dict[str, Case]:

@@ -14,13 +14,16 @@ from functools import cache
 from random import Random
 from typing import Any
 
+import numpy as np
+
 from tests.hostile import materials, with_needed
-from tisim import Scene, steppers
+from tisim import Clump, Scene, steppers
 from tisim.components import serialization
 from tisim.effects import (
     Agglomeration,
     DerivedQuantity,
     Effect,
+    Granular,
     Impact,
     InducedMoment,
     LangevinMoment,
@@ -30,10 +33,12 @@ from tisim.effects import (
     NearField,
     StokesDrag,
     Tether,
+    Walls,
 )
 from tisim.effects.magnetic.moment import MOMENT
 from tisim.engine.assembly import needed_fields
 from tisim.engine.explain import known_effects
+from tisim.packing.clump import clump_columns, sphere_columns
 from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Source
 
 MAGNITUDES = (
@@ -64,6 +69,11 @@ COMMON: dict[str, dict[str, Any]] = {
     },
     "capillary_bridge": {"volume": 1e-12},
     "parallel_bond": {"gap": 1e-4, "young": 1e6, "tensile_strength": 1e6, "shear_strength": 1e6},
+    "walls": {
+        "planes": [{"point": [0.0, 0.0, -9e-4], "normal": [0.0, 0.0, 1.0]}],
+        "discs": [{"centre": [0.0, -9.5e-4, 0.0], "normal": [0.0, 1.0, 0.0], "radius": 1e-3}],
+        "boxes": [{"low": [-1.0, -1.0, -1.0], "high": [1.0, 1.0, 1.0]}],
+    },
     "contact_bond": {"stiffness": 1e9, "grip_stiffness": 1e6, "threshold": 1e-3},
     "contact_dissipation": {"damping": 1e3},
     "contact_friction": {"stiffness": 1e6},
@@ -125,6 +135,17 @@ QUANTITIES: dict[str, Any] = {
     "domain_moment": 1e-18, "polarity": 1,
 }  # fmt: skip
 """What each particle carries, where something needs it."""
+PAIR, _SIZES = clump_columns(
+    Clump(centres=[(0, 0, 0), (1.99e-3, 0, 1e-4)], radii=[1e-3], density=2e3),
+    [(0.995e-3, 0, 0.5e-4)],
+    velocity=(0.1, -0.5, 0.2),
+    angular_velocity=(0.0, 100.0, 30.0),
+)
+LONE = sphere_columns(np.array([2e-6]))
+EACH = {"group": [1, 0, 0]} | {
+    name: [*PAIR[name].tolist(), *LONE[name].tolist()] for name in LONE if name != "spin"
+}
+"""What each of the three has of its own, where something needs it: two are a clump."""
 FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 
 
@@ -146,6 +167,8 @@ def _company(kind: type[Effect]) -> dict[str, Any]:
     felt: tuple[type[Effect], ...] = ()
     if issubclass(kind, Source):
         felt = FIELDS.get(kind.quantity, (Lorentz, LangevinMoment, Magnetophoresis))
+    elif issubclass(kind, Walls):
+        felt = (Granular,)
     elif issubclass(kind, DerivedQuantity):
         felt = (MagneticSpheres, Magnetophoresis)
     elif MOMENT in kind.fields or "magnetic_flux_density" in kind.requires_source:
@@ -181,12 +204,16 @@ def _scene(effects: dict[str, Any], stepper: dict[str, Any] | None = None) -> di
     }
     if "granular" in effects:
         data["materials"] = materials()
+    if "rigid_clumps" in effects:
+        for name in ("position", "velocity"):
+            data["particles"][name][:2] = PAIR[name].tolist()
+        data["particles"]["quantities"] = EACH
     scene = Scene.from_dict(data)
     names = {
         need if isinstance(need, str) else need.name for need in needed_fields(scene.effects, scene.stepper)
     }
     quantities = {name: [value] * 3 for name, value in QUANTITIES.items() if name in names}
-    data["particles"]["quantities"] = quantities
+    data["particles"]["quantities"] = quantities | {n: v for n, v in EACH.items() if n in names}
     return Scene.from_dict(data).to_dict()
 
 

@@ -8,10 +8,10 @@ from tests.scenes import compiled, fixed, flow, scene
 from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
-from tisim.effects import Force, Lorentz, PairForce, Tether, option
+from tisim.effects import Force, Lorentz, PairForce, PrescribedMotion, RigidClumps, Tether, option
 from tisim.engine.explain import known_effects
 from tisim.interactions.force_sum import FORCE
-from tisim.operators import Capture, Operator
+from tisim.operators import Capture, Operator, Outflow
 from tisim.sources import MagneticCylinders, MagneticField, MagneticSpheres
 from tisim.steppers import (
     Boris,
@@ -148,7 +148,7 @@ class Drift(PerParticle):
         s.position[w, i] += dt * s.velocity[w, i]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_stepper_that_does_not_say_so_is_reported():
     with pytest.raises(AssertionError, match=r"^position at the end must be with lists what it"):
         assert_lists(crossing(Silent(), (SHELL,), velocity=3.0))
@@ -313,11 +313,16 @@ def test_a_field_that_only_others_declare_is_reported():
         assert_fields(two(*effects, charge=[1.0, 1.0]))
 
 
-# Capture excludes impacts. No law of its own, and a series that takes long to compile, has the cylinder.
-TOGETHER = [kind for kind in known_effects() if kind not in (Capture, MagneticCylinders)]
+# Capture and constraints exclude impacts. No law of its own, and a series that takes long to compile, has the
+# cylinder. What passes is weighed before it is taken out.
+HOLDING = [PrescribedMotion, RigidClumps]
+TOGETHER = [kind for kind in known_effects() if kind not in (Capture, MagneticCylinders, Outflow, *HOLDING)]
+TOGETHER.append(Outflow)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kinds", [TOGETHER, [Capture]], ids=["all that go together", "capture"])
+@pytest.mark.parametrize(
+    "kinds", [TOGETHER, [Capture], HOLDING], ids=["all that go together", "capture", "constraints"]
+)
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))

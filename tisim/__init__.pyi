@@ -37,6 +37,7 @@ from .io.checkpoint import PeriodicCheckpoint as PeriodicCheckpoint
 from .io.read import read as read
 from .io.recording import Recording as Recording
 from .packing.around_cylinder import RandomAroundCylinder as RandomAroundCylinder
+from .packing.clump import Clump as Clump
 from .packing.grains import GrainClass as GrainClass
 from .packing.placement import (
     Lattice as Lattice,
@@ -53,7 +54,7 @@ from .packing.placement import (
 from .packing.placement import (
     RandomInDomain as RandomInDomain,
 )
-from .scene.initial_state import Cloud as Cloud
+from .scene.cloud import Cloud as Cloud
 from .scene.initial_state import Particles as Particles
 from .scene.initial_velocity import Blast as Blast
 from .scene.scene import Box as Box

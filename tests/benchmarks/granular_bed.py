@@ -10,7 +10,7 @@ largest. TISIM_BACKEND=quadrants chooses the other kernel compiler. What tisim a
 
 - hertz/history, granular: LAMMPS's gran/hertz/history, which has two roots less a contact as its damping is
   simpler, and its granular style with the same law (python -m pip install ".[bench]");
-- skin=0.1: lists with this skin, in diameters; schedule=world or particle: see tisim/worlds/program.py;
+- skin=0.1: lists with this skin, in diameters; schedule=world, team or particle: see tisim/worlds/program.py;
 - order=random: grains in random order, which the package sorts; order=unsorted: it does not;
 - lanes=1: so many pairs are computed at once.
 """
@@ -111,6 +111,7 @@ def by_tisim(position: np.ndarray, width: float, setting: str = "") -> Steps:
         listed_pairs.LANES = int(value)
     simulation = tisim.Simulation(bed, schedule=value if name == "schedule" else None)
     simulation.load(bed)
+    print(f"  {len(position)} {setting}: schedule {simulation.schedule}", file=sys.stderr)
     spatial_sort.SORTED_FROM, listed_pairs.LANES = sorted_from, lanes
     return lambda steps: simulation.run(steps=steps)
 

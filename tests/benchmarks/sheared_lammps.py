@@ -78,7 +78,7 @@ def by_lammps(made: Scene, steps: int) -> State:
     """Where LAMMPS is, in the same box, and what its virial was every EVERY steps, Pa: xx, yy, zz, xy."""
     start = made.particles.arrays(made.domain, made.seed)
     with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder) / "in.npz", friction=made.effects[0].friction, steps=steps, **start)
+        np.savez(Path(folder) / "in.npz", friction=made.materials["grain"].friction, steps=steps, **start)
         paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
         environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
         command = [sys.executable, __file__, "--worker", folder]

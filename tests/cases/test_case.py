@@ -21,7 +21,7 @@ def test_variants_are_those_of_the_inverse_problem(name):
 
 
 ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pictures": (None,),
-             "figures": ("default", None)}  # fmt: skip
+             "figures": ("default", None), "calibration": ("default", "", None)}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", every())

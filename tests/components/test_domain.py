@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.scenes import HEAT_CAPACITY, by_id, check_sums, scene, simulate
-from tisim import Box, InputError
+from tests.scenes import HEAT_CAPACITY, by_id, check_sums, compiled, scene, simulate
+from tests.throwaway import SoftShell
+from tisim import Box, GrainClass, InputError
+from tisim.backend.taichi import ti
 from tisim.effects import Heating, Impact
 from tisim.engine.loading import check_sides
+from tisim.operators import InsertionByFlux
+from tisim.packing import UniformSizes
 from tisim.steppers import FixedStep, Verlet
 
 
@@ -85,7 +89,46 @@ def test_a_box_in_which_two_could_touch_twice_is_refused():
                 check_sides(made, start)
 
 
+class FarShell(SoftShell):
+    """One that reaches farther the larger the larger grain is."""
+
+    @ti.func
+    def reach(self, s, w, i):
+        return self.width(w) * s.radius[w, i]
+
+
 @pytest.mark.long
+def test_a_box_is_wide_enough_for_those_that_are_put_in_later():
+    """Grains of 0.1 m are there, and up to 0.4 m come: four radii and twice the reach must have room."""
+
+    def filled(side, width, number=5):
+        coming = InsertionByFlux(
+            flux=1.0,
+            number=number,
+            grains=[GrainClass(sizes=UniformSizes(by="number", smallest=0.1, largest=0.4), density=1.0)],
+            low=(0.1,) * 3,
+            high=(1.0,) * 3,
+        )
+        law = FarShell(stiffness=1.0, width=width)
+        return scene(
+            [[0.5] * 3, [1.0, 0.5, 0.5]], np.zeros((2, 3)), (law, coming), 0.1,
+            domain=Box(low=(0.0,) * 3, high=(side,) * 3), dt=1e-3,
+        )  # fmt: skip
+
+    for made, least in ((filled(1.59, 0.1), 1.6), (filled(1.61, 0.1), 0), (filled(0.99, 0.1, 1), 1.0)):
+        if least:
+            with pytest.raises(InputError, match=f"^box must be at least {least:g} m wide where it is per"):
+                check_sides(made, made.start())
+        else:
+            check_sides(made, made.start())
+    simulation = compiled(filled(1.9, 0.3), 2, 8)
+    simulation.load([filled(1.9, 0.3), filled(1.9, 0.3)])
+    # 2 (0.4 + 0.4 + 0.4 width).
+    with pytest.raises(InputError, match=r"box must be at least 1\.92 m wide .* as far_shell reaches"):
+        simulation.load([filled(1.9, 0.3), filled(1.9, 0.4)])
+
+
+@pytest.mark.slow
 def test_meets_what_is_at_the_other_side_only_where_faces_are_images():
     """A joined box with images has contacts across its faces; Z04's control volume has not."""
     place, speed = [[-0.9995, 0, 0], [0.9995, 0, 0]], [[-1.0, 0, 0], [1.0, 0, 0]]

@@ -91,6 +91,17 @@ def test_what_is_wrong_is_named(message):
     assert str(fault.value) == message
 
 
+def test_a_file_that_is_wrong_about_a_material_is_told_which():
+    data = two().to_dict()
+    with pytest.raises(
+        InputError, match=r"^scene.materials.rubber.young must be greater than 0.0; received -1"
+    ):
+        Scene.from_dict({**data, "materials": {**data["materials"], "rubber": {"young": -1}}})
+    pairs = {"steel-rubber": {"friktion": 1}}
+    with pytest.raises(InputError, match=r"^scene.material_pairs.steel-rubber.friktion must be a known key"):
+        Scene.from_dict({**data, "material_pairs": pairs})
+
+
 def test_what_a_table_gives_need_not_be_known_of_each():
     """The friction of a pair, where no grain touches its like."""
     alone = {name: Material(young=1e7, poisson=0.3, restitution=0.5) for name in ("a", "b")}

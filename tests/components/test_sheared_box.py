@@ -67,6 +67,7 @@ def _images(domain: ti.template(), a: Array, b: Array, t: Array, out: Array):
             out[w, k, c] = d[c]
 
 
+@pytest.mark.slow
 def test_an_image_is_the_nearest_of_all(rng):
     """Of 75 images of each, as they lie in NumPy, after up to a thousand turns; either way round."""
     made = [crowd(rng, rate=rate, low=-0.3) for rate in (RATE, -7.0)]
@@ -170,6 +171,7 @@ def layers(rate=RATE, steps=3000):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", ["crowd", "sparse", "layers", "reverse"])
 def test_lists_give_what_all_pairs_give(rng, made):
     """Also where grains do not move but with the flow, so that shear alone brings them together."""

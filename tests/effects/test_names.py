@@ -32,7 +32,7 @@ def one(*effects, **more):
     return scene(*ONE, effects, mass=1.0, **more)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_each_acts_with_its_own_parameters(rng):
     """The forces of two Mie pairs, one of them without a name, are the sum of their twins in NumPy."""
     for other in (CORE, Mie(epsilon=2.0)):

@@ -1,6 +1,7 @@
 """What explain says is what is compiled: nothing more is allocated, nothing less is listed."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,19 +15,23 @@ from tests.interactions.test_self_consistent import Potential
 from tests.scenes import scene
 from tests.steppers.brownian.colloids import colloids
 from tests.throwaway import SoftShell
-from tisim import Simulation
+from tisim import Material, MaterialPair, Simulation
 from tisim.backend import memory
 from tisim.backend.thread import in_taichi_thread
+from tisim.components.materials import Materials
+from tisim.effects import Granular, MindlinForce, RollingEPSD, Rotation, Walls
 from tisim.engine.allocation import Allocation
 from tisim.engine.explain import explain, known_effects, render
+from tisim.engine.explained_parts import explained, explained_materials
+from tisim.geometry import Plane
 from tisim.interactions.spatial_sort import SORTED_FROM
 from tisim.neighbours.half_list import ListSizes
 from tisim.steppers import Collocation, Trapezoid
 
 
-def text(scene):
+def text(explanation):
     stream = io.StringIO()
-    Console(file=stream, width=150).print(render(explain(scene)))
+    Console(file=stream, width=150).print(render(explanation))
     return stream.getvalue()
 
 
@@ -109,12 +114,48 @@ def test_memory_beside_the_state_is_what_is_allocated_for_a_step(kind):
 
 
 def test_parameters_have_units_and_sources():
-    output = text(agglomeration(BEST, 1, grains=60))
+    output = text(explain(agglomeration(BEST, 1, grains=60)))
     assert "hardness = 265480 Pa" in output
     assert "heat_capacity = 1796.3 J/(kg K)" in output
     assert "Z04 Eq. (6.9)" in output
     assert "Rounds" not in output
     assert "Resolve*" in output
+
+
+def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
+    """By the names that a scene file gives them, with the numbers that kernels get."""
+    law = Granular(tangential=MindlinForce(), rolling=RollingEPSD(damping_ratio=0.2))
+    materials = {
+        "steel": Material(young=2e11, poisson=0.3, friction=0.4, rolling_friction=0.1),
+        "rubber": Material(young=2e8, poisson=0.49, friction=0.9, rolling_friction=0.2, stiffness=1.0),
+    }
+    walls = Walls(planes=[Plane()], motion=Rotation(rate=(0.0, 0.0, 2.0)))
+    table = {"rubber-steel": MaterialPair(friction=0.7)}
+    granular, body = explained(law), explained(walls)
+    assert [part.name for part in granular.all()] == [
+        "granular",
+        "granular.normal: hertz_material",
+        "granular.tangential: mindlin_force",
+        "granular.rolling: rolling_epsd",
+    ]
+    assert granular.parts[2].parameters[0][:2] == ("damping_ratio", "0.2")
+    assert [part.name for part in body.parts] == ["walls.motion: rotation"]
+    names = ["steel", "rubber", "steel-steel", "steel-rubber", "rubber-rubber"]
+    parts = tuple(explained_materials(Materials(materials, table)))
+    assert [part.name for part in parts] == names
+    mixed = {name: (float(value), text) for name, value, _, text in parts[3].parameters}
+    assert mixed["friction"] == (0.7, "given for the pair")
+    assert mixed["rolling_friction"] == (pytest.approx(0.02**0.5, rel=1e-5), "geometric mean")
+    expected = 1 / ((1 - 0.09) / 2e11 + (1 - 0.49**2) / 2e8)
+    assert mixed["E*"][0] == pytest.approx(expected, rel=1e-5)
+    # Of what one of them lacks there is nothing to tell.
+    assert "stiffness" not in mixed
+    bare = agglomeration(BEST, 1, grains=60)
+    explanation = explain(bare.without(*(effect.kind() for effect in bare.effects)))
+    assert explanation.materials == ()
+    output = text(replace(explanation, effects=(granular,), materials=parts))
+    assert "rolling_friction = 0.141421" in output
+    assert "granular.rolling: rolling_epsd" in output
 
 
 @pytest.mark.long

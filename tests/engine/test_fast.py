@@ -225,7 +225,7 @@ def test_the_field_beside_a_long_cylinder_keeps_its_digits(fast):
     np.testing.assert_allclose(fast[4], beside_a_long_cylinder(), rtol=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_heap_is_that_of_its_twin_and_grains_too_deep_in_each_other_are_reported(in_fast_arithmetic):
     off, sliding, reason, time = in_fast_arithmetic("engine.test_fast", "piled")
     assert off < CLOSE

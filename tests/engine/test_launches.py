@@ -1,19 +1,26 @@
-"""Steps launched unasked, as on a GPU, are those of worlds that are asked after each launch."""
+"""Steps launched unasked, as on a GPU, and those of teams of threads are those of worlds that are asked after
+each launch."""
 
 import numpy as np
 import pytest
 
-from tisim.backend.memory import collected
+from tests.conftest import elsewhere_with
+from tisim.backend import runtime
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree, collected
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.worlds import team
 from tisim.worlds.fields import CORE
 from tisim.worlds.launched_program import LaunchedProgram
 from tisim.worlds.phases import Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import NEVER, WorldStatus
-from tisim.worlds.world_program import in_pieces, world_programs
+from tisim.worlds.team import Teams
+from tisim.worlds.team_trials import FIRST_ALONE, TRIAL_COST, TeamTrials
+from tisim.worlds.world_program import in_pieces, in_shares, world_programs
 
-WORLDS, STEPS = 5, 60
+WORLDS, STEPS, ITEMS = 5, 60, 1000
 
 
 class Mark(Phase):
@@ -42,6 +49,22 @@ class Mark(Phase):
             s.status[w] = WorldStatus.ENDED
 
 
+class Mix(Phase):
+    """Every item reads what another member of a team has made of it in the phase before."""
+
+    def __init__(self, s, source, target):
+        self.s, self.source, self.target, self.extent = s, source, target, ITEMS
+
+    @ti.func
+    def size(self, w):
+        return ITEMS - ti.cast(self.s.steps[w], ti.i32) % 7
+
+    @ti.func
+    def run(self, w, k):
+        other = self.source[w, (k + ITEMS // 2) % ITEMS]
+        self.target[w, k] = 1103515245 * other + k + self.s.inner[w]
+
+
 class While(Repeat):
     """This repeat goes on while a flag is up."""
 
@@ -54,38 +77,52 @@ class While(Repeat):
         return self.flag[w]
 
 
+@in_taichi_thread
+def make():
+    """A state with two columns of items, and a step with a repeat in a repeat that is not in every step."""
+    s = State(WORLDS, 1, CORE, (), ("trace",), ("outer", "inner"))
+    columns, builder = (ti.field(ti.i32), ti.field(ti.i32)), Builder()
+    builder.dense(ti.ij, (WORLDS, ITEMS)).place(*columns)
+    s.mixed, s.mixed_tree = columns, Tree(builder)
+    one, two, three, four, five, six = (Mark(s, k) for k in range(1, 7))
+    there, back = Mix(s, *columns), Mix(s, *columns[::-1])
+    inner = While(s.inner, there, three, usual=1)
+    return s, (one, there, six, While(s.outer, two, back, inner, four, usual=0), six, five, back)
+
+
 @pytest.fixture(scope="module")
 def made():
-    """A state, and a step with a repeat within a repeat that is not in every step."""
-
-    @in_taichi_thread
-    def make():
-        s = State(WORLDS, 1, CORE, (), ("trace",), ("outer", "inner"))
-        one, two, three, four, five, six = (Mark(s, k) for k in range(1, 7))
-        inner = While(s.inner, three, usual=1)
-        return s, (one, six, While(s.outer, two, inner, four, usual=0), six, five)
-
+    """What ``make`` makes."""
     with collected() as trees:
         yield make()
     for tree in trees:
         tree.destroy()
 
 
-def ends(made, schedule, asks=False):
+def ends(made, schedule, asks=False, threads=1, number=1, steps=STEPS):
     """What becomes of the worlds, and how many launches and looks it takes."""
     s, items = made
     s.fill({**dict.fromkeys(s.columns, 0), "pause_time": np.inf, "goal": NEVER})
+    in_taichi_thread(lambda: [column.fill(0) for column in s.mixed])()
     looks = []
-    if schedule == "world":
-        # The list beside it shares items with the step, and is not taken.
-        _, program = world_programs(s, (items[1:3], items))
-    else:
+    if schedule == "particle":
         program = LaunchedProgram(s, items)
         program.asks, learn = asks, program._learn
         program._learn = lambda found: looks.append(found) or learn(found)
-    program.advance(STEPS // 2)
-    program.advance(STEPS - STEPS // 2)
-    return s.snapshot(("trace", "steps", "status", "outer", "inner")), looks
+    else:
+        # The list beside it shares items with the step, and is not taken.
+        _, program = world_programs(s, (items[2:4], items), Teams(WORLDS, ITEMS, threads, number))
+        launch = program._launch
+        program._launch = lambda *a: looks.append(a) or launch(*a)
+    program.advance(steps // 2)
+    program.advance(steps - steps // 2)
+    mixed = in_taichi_thread(lambda: [column.to_numpy() for column in s.mixed])()
+    return {**s.snapshot(("trace", "steps", "status", "outer", "inner")), "mixed": np.array(mixed)}, looks
+
+
+def same(found, expected, what):
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=f"{name}, {what}")
 
 
 def test_what_recurs_in_steps_is_a_piece_of_its_own():
@@ -102,7 +139,72 @@ def test_all_schedules_and_ways_to_ask_take_the_same_steps_and_devices_are_asked
     assert len(set(expected["trace"])) == WORLDS
     for asks in (True, False):
         found, looks = ends(made, "particle", asks)
-        for name, values in expected.items():
-            np.testing.assert_array_equal(found[name], values, err_msg=f"{name}, asks: {asks}")
+        same(found, expected, f"asks: {asks}")
         # A world waits in every other step, which asks for more looks than lists of pairs do.
         assert len(looks) < STEPS if not asks else not looks
+
+
+IN_TIME, IN_STEPS, NEVER_WAITED_FOR = 10**9, 1000, -1
+TEAMS = (
+    *((2, 1, IN_TIME, STEPS), (3, 1, IN_TIME, 6), (8, 1, IN_TIME, 6)),
+    *((8, 3, IN_STEPS, STEPS), (8, 1, NEVER_WAITED_FOR, STEPS)),
+)
+"""Threads, of which Taichi has eight, how many teams they are in, how often they look for the others before
+these are late, and steps. Where there are fewer cores they wait long for each other."""
+
+
+def of_eight_threads():
+    """The teams that do not take the same steps as threads alone."""
+    made, wrong = make(), []
+    expected = {steps: ends(made, "world", steps=steps)[0] for steps in (6, STEPS)}
+    for threads, number, late, steps in TEAMS:
+        team.LOOKS_WHEN_LATE = late
+        try:
+            same(ends(made, "team", False, threads, number, steps)[0], expected[steps], "")
+        except AssertionError as difference:
+            wrong.append(f"{threads} threads in {number} teams, {late}: {difference}")
+    return wrong
+
+
+@pytest.mark.long
+@pytest.mark.skipif(runtime.cores() < 2, reason="threads that wait for each other awake have a core each")
+def test_teams_take_the_same_steps_late_or_not():
+    assert elsewhere_with("threads=8")("engine.test_launches", "of_eight_threads") == []
+
+
+def test_a_team_that_parts_is_tried_again(made, monkeypatch):
+    """After each step here, and threads alone take some steps before the next trial."""
+    expected, _ = ends(made, "world", threads=2, number=2)
+    monkeypatch.setattr(team, "TIMES_LATE", 0)
+    found, launches = ends(made, "team", False, 2, 1)
+    same(found, expected, "parting")
+    assert len(launches) > STEPS * WORLDS / 50
+    # Whom nobody waits for is not in the team.
+    monkeypatch.setattr(team, "LOOKS_WHEN_LATE", -1)
+    found, _ = ends(made, "team", False, 64, 1)
+    same(found, expected, "without each other")
+
+
+def test_what_has_one_item_is_not_shared():
+    one, two, three = (Phase() for _ in range(3))
+    many = Phase()
+    many.extent = 2
+    repeat = Repeat((many,))
+    assert in_shares((one, two, many, repeat, three)) == (((one, two), many), ((), repeat), ((), three))
+    assert in_shares((one, two)) == (((one,), two),)
+
+
+def test_teams_are_tried_again_at_little_cost():
+    trials = TeamTrials(worlds=2)
+    trials.learn(100, 100, 1.0, parted=False)
+    assert not trials.alone
+    # What threads take alone is not known yet.
+    trials.learn(100, 100, 1.0, parted=True)
+    assert trials.alone == FIRST_ALONE
+    trials.learn(FIRST_ALONE, FIRST_ALONE, 2e-3 * FIRST_ALONE, parted=True)
+    assert not trials.alone
+    # Faster all the same, and slower.
+    trials.learn(100, 1000, 0.19, parted=True)
+    assert not trials.alone
+    trials.learn(100, 1000, 0.21, parted=True)
+    assert trials.alone == pytest.approx(0.21 / TRIAL_COST / 2e-3 / 2, abs=1)

@@ -85,7 +85,7 @@ def refusals():
     return messages
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_single_precision_cannot_hold_is_refused(single):
     """Not an infinite hardness, nor a mass of zero, which would make the particle vanish."""
     hardness, mass, temperature = single("engine.test_precision", "refusals")

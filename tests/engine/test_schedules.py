@@ -1,4 +1,4 @@
-"""The same scene gives the same bits: on both schedules, one thread or two, alone or in a batch."""
+"""The same scene gives the same bits: on all schedules, one thread or two, alone or in a batch."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,9 @@ import pytest
 from tests.effects.test_contract import kicked
 from tests.scenes import GRAIN, compiled, flow, simulate
 from tisim import InputError, Simulation
+from tisim.engine import compiled_worlds
+from tisim.worlds import team
+from tisim.worlds.team import Teams
 
 WORLDS = [
     flow(seed=1, grains=150),
@@ -66,11 +69,30 @@ def test_two_runs_the_second_in_portions(usual):
         same(a, b)
 
 
-def test_both_schedules(usual):
+def test_a_launch_for_each_phase(usual):
     """A launch per phase over all particles, against a thread that takes a world through all phases."""
     launched = simulate(WORLDS, worlds=len(WORLDS), capacity=200, schedule="particle")
     for a, b in zip(usual, launched, strict=True):
         same(a, b)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("worlds", "times"), [(4, 8), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((4, 0), (1, 8)))]
+)
+def test_a_team_of_threads(usual, monkeypatch, worlds, times):
+    """All threads share a world, here one after the other; once they part after each step. What each has
+    done the others see: events of two grains of different shares, lists, failures."""
+    monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
+    monkeypatch.setattr(team, "TIMES_LATE", times)
+    simulation = Simulation(WORLDS[0], worlds, 200, "team")
+    assert simulation.teams.shared == (simulation.runtime.threads > 1)
+    simulation.load(WORLDS[:worlds])
+    simulation.run(steps=3)
+    simulation.run()
+    for a, b in zip(usual, simulation.results(), strict=False):
+        same(a, b)
+    simulation.close()
 
 
 @pytest.mark.slow
@@ -100,5 +122,5 @@ def test_noise_with_one_thread_and_two(elsewhere):
 
 
 def test_unknown_schedule_is_refused():
-    with pytest.raises(InputError, match=r"^schedule must be world or particle; received 'galaxy'$"):
+    with pytest.raises(InputError, match=r"^schedule must be world, team or particle; received 'galaxy'$"):
         Simulation(WORLDS[3], schedule="galaxy")

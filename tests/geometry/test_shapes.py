@@ -1,24 +1,17 @@
 """Shapes: how far places are from them, against samples of their faces, in one kernel."""
 
+import meshio
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from tisim import InputError
+import tisim
+from tisim import InputError, Scene, geometry
 from tisim.backend import runtime
 from tisim.backend.memory import collected
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.component import Component, option
-from tisim.geometry import (
-    BoxSurface,
-    ConicalSurface,
-    CylindricalSurface,
-    Disc,
-    Plane,
-    SphericalSurface,
-    TriangulatedSurface,
-)
 from tisim.worlds.parameter_table import ParameterTable
 
 POINTS = 300
@@ -30,13 +23,13 @@ MESH = 6
 class Shapes(Component):
     """Some of each kind, as walls have them."""
 
-    planes: tuple[Plane, ...] = option("planes")
-    discs: tuple[Disc, ...] = option("discs")
-    spheres: tuple[SphericalSurface, ...] = option("spheres")
-    cylinders: tuple[CylindricalSurface, ...] = option("cylinders")
-    cones: tuple[ConicalSurface, ...] = option("cones")
-    boxes: tuple[BoxSurface, ...] = option("boxes")
-    surface: TriangulatedSurface = option("triangles")
+    planes: tuple[geometry.Plane, ...] = option("planes")
+    discs: tuple[geometry.Disc, ...] = option("discs")
+    spheres: tuple[geometry.SphericalSurface, ...] = option("spheres")
+    cylinders: tuple[geometry.CylindricalSurface, ...] = option("cylinders")
+    cones: tuple[geometry.ConicalSurface, ...] = option("cones")
+    boxes: tuple[geometry.BoxSurface, ...] = option("boxes")
+    surface: geometry.TriangulatedSurface = option("triangles")
 
     def members(self):
         return {"surface": self.surface}
@@ -52,7 +45,7 @@ def mesh(rng, count=40):
         [rng.uniform(-1, 1, (count, 3)) * [1, 1, 0.3], [[9, 9, 9], [9.1, 9, 9], [9, 9.1, 9]]]
     )
     faces = [rng.choice(count, 3, replace=False) for _ in range(count)]
-    return TriangulatedSurface(
+    return geometry.TriangulatedSurface(
         vertices=sites, faces=np.array([*faces, [0, 1, 1], [count, count + 1, count + 2]])
     )
 
@@ -66,14 +59,16 @@ def some(seed):
     a, b, c, d = (vector(rng.normal(size=3)) for _ in range(4))
     odd = bool(seed % 2)
     return Shapes(
-        planes=(Plane(point=a, normal=b),),
-        discs=(Disc(centre=a, normal=c, radius=0.7),),
-        spheres=(SphericalSurface(centre=b, radius=0.8),),
-        cylinders=(CylindricalSurface(start=a, end=d, radius=0.6, closed=odd),),
+        planes=(geometry.Plane(point=a, normal=b),),
+        discs=(geometry.Disc(centre=a, normal=c, radius=0.7),),
+        spheres=(geometry.SphericalSurface(centre=b, radius=0.8),),
+        cylinders=(geometry.CylindricalSurface(start=a, end=d, radius=0.6, closed=odd),),
         cones=(
-            ConicalSurface(start=b, end=c, start_radius=0.2, end_radius=0.0 if odd else 0.9, closed=not odd),
+            geometry.ConicalSurface(
+                start=b, end=c, start_radius=0.2, end_radius=0.0 if odd else 0.9, closed=not odd
+            ),
         ),
-        boxes=(BoxSurface(low=(-1, -0.5, -0.2), high=vector(rng.uniform(0.3, 1, 3))),),
+        boxes=(geometry.BoxSurface(low=(-1, -0.5, -0.2), high=vector(rng.uniform(0.3, 1, 3))),),
         surface=SURFACE,
     )
 
@@ -198,36 +193,104 @@ def test_triangles_are_as_far_as_their_cells_tell(measured):
     assert (told > 0).mean() > 0.1
 
 
-def test_a_file_is_read(tmp_path):
-    """Of STL, where each triangle has vertices of its own: a tetrahedron has four."""
+def tetrahedron():
+    """The text of an STL file, where each triangle has vertices of its own."""
     facet = "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n"
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     faces = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
     text = "".join(facet.format("".join(f"vertex {x} {y} {z}\n" for x, y, z in corners[f])) for f in faces)
-    (tmp_path / "t.stl").write_text(f"solid t\n{text}endsolid t\n")
-    surface = TriangulatedSurface.read(tmp_path / "t.stl", scale=1e-3)
+    return f"solid t\n{text}endsolid t\n"
+
+
+def test_a_file_is_read(tmp_path):
+    """A tetrahedron has four vertices."""
+    (tmp_path / "t.stl").write_text(tetrahedron())
+    surface = geometry.TriangulatedSurface.read(tmp_path / "t.stl", scale=1e-3)
     assert surface.vertices.shape == (4, 3)
     np.testing.assert_allclose(np.sort(surface.corners(), axis=None)[-1], 1e-3)
     assert len(surface.corners()) == 4
     (tmp_path / "none.stl").write_text("nothing")
     for path in ("none.stl", "missing.stl"):
         with pytest.raises(InputError, match=r"^surface must be a file that meshio reads; received "):
-            TriangulatedSurface.read(tmp_path / path)
+            geometry.TriangulatedSurface.read(tmp_path / path)
+
+
+def test_a_file_with_other_faces_than_triangles_is_refused(tmp_path):
+    """A quadrilateral left out would be a hole in a wall; lines bound nothing."""
+    vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
+    for faces in ("f 1 2 3 4\n", "f 1 2 5\nf 1 2 3 4\n"):
+        (tmp_path / "quad.obj").write_text(vertices + faces)
+        with pytest.raises(InputError, match=r"^surface must be of triangles alone .*; received 'quad in "):
+            geometry.TriangulatedSurface.read(tmp_path / "quad.obj")
+    mesh = meshio.Mesh(np.eye(3), [("line", [[0, 1]]), ("triangle", [[0, 1, 2]])])
+    mesh.write(tmp_path / "edge.vtk")
+    assert len(geometry.TriangulatedSurface.read(tmp_path / "edge.vtk").corners()) == 1
+
+
+@pytest.mark.parametrize("scale", [-1.0, 0.0, float("nan"), "1", True])
+def test_a_scale_that_is_no_length_is_refused(scale, tmp_path):
+    """One below 0 would mirror the surface."""
+    (tmp_path / "t.stl").write_text(tetrahedron())
+    with pytest.raises(InputError, match=r"^surface.scale must be a number of m above 0; received "):
+        geometry.TriangulatedSurface.read(tmp_path / "t.stl", scale)
+
+
+def in_a_scene(tmp_path, surface):
+    """A scene file, with a surface in its walls as it is written there; next to it, a folder with t.stl."""
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "t.stl").write_text(tetrahedron())
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        "duration = 1.0\n"
+        "particles = {kind = 'particles', position = [[0, 0, 9]], velocity = [[0, 0, 0]], radius = 1, "
+        "mass = 1}\n[stepper.control]\nkind = 'fixed_step'\ndt = 1e-3\n"
+        "[materials.steel]\nyoung = 1e7\npoisson = 0.3\n[effects.granular]\n"
+        "[effects.hopper]\nkind = 'walls'\n"
+        f"[effects.hopper.surface]\nkind = 'triangulated_surface'\n{surface}\n"
+    )
+    return path
+
+
+def test_a_scene_file_names_the_file_of_a_surface(tmp_path, monkeypatch):
+    """Its name leads from the folder of the scene file; the scene has the triangles, and needs no file."""
+    path = in_a_scene(tmp_path, 'file = "parts/t.stl"\nscale = 1e-3')
+    monkeypatch.chdir(tmp_path / "parts")
+    for made in (Scene.from_toml(path), tisim.read(path)):
+        assert made.effects[1].surface == geometry.TriangulatedSurface.read("t.stl", scale=1e-3)
+        assert Scene.from_dict(made.to_dict()) == made
+
+
+FILES = {
+    "file = 'parts/t.st'": r"hopper.surface.file must be there; received '.*parts/t.st'",
+    "file = 3": r"hopper.surface.file must be text; received 3",
+    "file = 'parts'": r"surface must be a file that meshio reads; received .*parts",
+    "file = 'parts/t.stl'\nscale = 0": r"hopper.surface.scale must be a number of m above 0; received 0",
+    "file = 'parts/t.stl'\nfaces = []": "hopper.surface must be given a file and a scale alone, or "
+    "vertices and faces; received 'faces'",
+}
+
+
+@pytest.mark.parametrize(("surface", "message"), FILES.items())
+def test_a_surface_that_is_not_in_a_file_is_named(surface, message, tmp_path):
+    with pytest.raises(InputError, match=message):
+        Scene.from_toml(in_a_scene(tmp_path, surface))
 
 
 LONG = "cylindrical_surface.end - cylindrical_surface.start must be a direction; received (0.0, 0.0, 0.0)"
 INDEX = "triangulated_surface.faces must be whole numbers below the number of vertices, 3; received [3.0]"
 HIGH = "box_surface.high must be above low, (0.0, 0.0, 0.0), along each axis; received (1.0, 1.0, 0.0)"
 WRONG = {
-    LONG: lambda: CylindricalSurface(end=(0, 0, 0), radius=1),
+    LONG: lambda: geometry.CylindricalSurface(end=(0, 0, 0), radius=1),
     "conical_surface.start_radius and end_radius must be not both 0; received (0.0, 0.0)": lambda: (
-        ConicalSurface(end=(0, 0, 1), start_radius=0, end_radius=0)
+        geometry.ConicalSurface(end=(0, 0, 1), start_radius=0, end_radius=0)
     ),
-    "disc.normal must be a direction; received (0.0, 0.0, 0.0)": lambda: Disc(normal=(0, 0, 0), radius=1),
-    HIGH: lambda: BoxSurface(high=(1, 1, 0)),
-    INDEX: lambda: TriangulatedSurface(vertices=np.eye(3), faces=[[0, 1, 3]]),
-    "triangulated_surface.faces must be triangles with an area; received 'none'": lambda: TriangulatedSurface(
-        vertices=np.eye(3), faces=[[0, 1, 1]]
+    "disc.normal must be a direction; received (0.0, 0.0, 0.0)": lambda: geometry.Disc(
+        normal=(0, 0, 0), radius=1
+    ),
+    HIGH: lambda: geometry.BoxSurface(high=(1, 1, 0)),
+    INDEX: lambda: geometry.TriangulatedSurface(vertices=np.eye(3), faces=[[0, 1, 3]]),
+    "triangulated_surface.faces must be triangles with an area; received 'none'": lambda: (
+        geometry.TriangulatedSurface(vertices=np.eye(3), faces=[[0, 1, 1]])
     ),
 }
 

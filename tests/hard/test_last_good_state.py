@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from tests.operators.test_filling import StickingSpring
 from tests.scenes import compiled, fixed, scene
+from tisim import Simulation
 from tisim.backend.taichi import ti
-from tisim.effects import Force, Impact, parameter
+from tisim.effects import Force, Gravity, Impact, parameter
 from tisim.engine import monitor
 from tisim.io.checkpoint import restore, save
+from tisim.operators.base import Operator
 from tisim.steppers import Brownian, DriftLimit, IterationControl, Trapezoid
 
 WHEN = 0.783
@@ -203,3 +206,35 @@ def test_a_checkpoint_keeps_why_worlds_have_failed(batch, tmp_path, steps):
     simulation.run()
     for result, expected in zip(simulation.results(), alone, strict=True):
         same(result, expected)
+
+
+class Doubles(Operator):
+    """After five steps it puts a grain where there is one."""
+
+    @ti.func
+    def world(self, s, w):
+        if s.steps[w] > 5:
+            s.append(w, 0)
+
+    def capacity(self, masses):
+        return len(masses) + 8
+
+
+@pytest.mark.long
+def test_what_fails_after_events_is_taken_up_as_any_step():
+    """Forces are summed in the middle of a step then: what was kept goes on with whole steps all the same."""
+    place, speed = [[0, 0, 0], [0, 0, 1.9e-3], [0, 0.1, 0]], [[0.1, 0, 0], [0, 0, 0], [0, 0, 0]]
+    effects = (StickingSpring(), Gravity(acceleration=(0, 0, -9.81)), Doubles())
+    setup = scene(place, speed, effects, stepper=fixed(1e-3), duration=0.02)
+    simulation = Simulation(setup, capacity=16)
+    simulation.load(setup)
+    simulation.run(steps=5)
+    (good,) = simulation.results()
+    simulation.load(setup)
+    simulation.run()
+    (failed,) = simulation.results()
+    simulation.close()
+    assert not failed.status.ok
+    assert failed.time == good.time
+    for name in ("position", "velocity"):
+        np.testing.assert_array_equal(failed.state[name], good.state[name])

@@ -121,6 +121,7 @@ def test_surfaces_that_just_touch_do_not_push(couples):
     np.testing.assert_array_equal(outside["force"], 0.0)
 
 
+@pytest.mark.slow
 def test_a_thousand_pressed_into_each_other(rng):
     """Random places, a dozen overlaps each: the energy released is what was stored, momentum stays."""
     place = rng.uniform(0, 1, (CROWD, 3))

@@ -57,6 +57,7 @@ def test_it_forms_at_contact_holds_beyond_it_and_breaks(simulation):
     assert held == pytest.approx(slow - PULL / reduced * scenes[1].duration, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_more_than_a_particle_can_remember_is_reported(simulation):
     """A grain that larger ones, which lie in each other, touch all around: no bridge is lost without a
     word."""
@@ -104,7 +105,7 @@ def tried(made, effects, **control):
     return changed, compiled(changed, worlds=2, capacity=80)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_trial_that_is_given_up_takes_no_memory_away():
     """The first attempt throws a wet pair far out of reach, and is rejected: the pair stays wet, and swings
     about where the bridge holds what a soft shell presses, as it does from a short first step."""

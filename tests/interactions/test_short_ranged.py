@@ -177,7 +177,7 @@ def test_contacts_that_remember_are_their_numpy_twin(schedule, tmp_path):
         np.testing.assert_array_equal(again.state[name], result.state[name])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_is_remembered_is_bounded_and_forgotten():
     """No grain keeps more than it touches, each pair is kept once, and grains far apart keep nothing."""
     setup = grains()

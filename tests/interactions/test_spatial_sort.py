@@ -7,19 +7,27 @@ import pytest
 
 from tests.effects.contact import sheared
 from tests.effects.contact.grains import heap
+from tests.scenes import by_id
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.geometry import Plane
 from tisim.interactions import pair_chunks, spatial_sort
 from tisim.io import checkpoint
+from tisim.operators import Outflow, Passage
 
 GRAINS, STEPS, EVERY = 200, 100, 40
 THROWN = 3
 
 
-def bed(seed, n=GRAINS):
-    """Grains in a cell too small for them, in any order."""
-    return heap(np.random.default_rng(seed), n, side=2.7, dt=2e-4, steps=STEPS)
+def bed(seed, n=GRAINS, exit_height=-1e3):
+    """Grains in a cell too small for them, in any order; those that sink to a height (m) are weighed and
+    taken out."""
+    made = heap(np.random.default_rng(seed), n, side=2.7, dt=2e-4, steps=STEPS)
+    planes = [Plane(point=(0.0, 0.0, exit_height))]
+    return made.model_copy(
+        update={"effects": (*made.effects, Passage(planes=planes), Outflow(planes=planes))}
+    )
 
 
 def made(patch, schedule, least, worlds=2, scene=None):
@@ -34,6 +42,14 @@ def simulation():
     """Worlds of 150 and more are sorted."""
     with pytest.MonkeyPatch.context() as patch:
         simulation = made(patch, "world", 150)
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(scope="module")
+def unsorted():
+    with pytest.MonkeyPatch.context() as patch:
+        simulation = made(patch, "particle", GRAINS + 1)
     yield simulation
     simulation.close()
 
@@ -95,18 +111,42 @@ def test_the_bits_are_those_of_one_alone_and_of_a_run_that_is_restarted(simulati
             np.testing.assert_array_equal(state["position"], expected.state["position"])
 
 
-def test_they_are_those_of_an_unsorted_run_but_for_rounding(simulation, usual):
-    with pytest.MonkeyPatch.context() as patch:
-        unsorted = made(patch, "particle", GRAINS + 1)
-    assert unsorted.sort is None
-    (expected,) = ends(unsorted, [bed(1)])
-    unsorted.close()
+def alike(found, expected):
+    """The same grains, and what is theirs to rounding."""
+    assert found.work == expected.work
+    assert found.measures == pytest.approx(expected.measures, rel=1e-9)
+    one, other = by_id(found), by_id(expected)
+    np.testing.assert_array_equal(one["id"], other["id"])
     for name in ("position", "velocity", "spin", "force", "granular_past"):
-        scale, found = np.abs(expected.state[name]).max(), [usual[0].state[name], expected.state[name]]
+        values, scale = [one[name], other[name]], np.abs(other[name]).max()
         if name == "granular_past":
             # A grain remembers its partners in any order.
-            found = [np.sort(values.reshape(GRAINS, -1)) for values in found]
-        np.testing.assert_allclose(*found, rtol=0, atol=1e-9 * scale, err_msg=name)
+            values = [np.sort(each.reshape(len(each), -1)) for each in values]
+        np.testing.assert_allclose(*values, rtol=0, atol=1e-9 * scale, err_msg=name)
+
+
+def test_they_are_those_of_an_unsorted_run_but_for_rounding(unsorted, usual):
+    assert unsorted.sort is None
+    alike(usual[0], ends(unsorted, [bed(1)])[0])
+
+
+def test_grains_are_taken_out_of_a_sorted_world(simulation, unsorted, tmp_path):
+    """As of one that is not; also beside another, and in a run that is restarted."""
+    leaving = bed(3, exit_height=0.4)
+    (alone,) = ends(simulation, [leaving])
+    assert (np.diff(simulation.s.read("id")[0, : len(alone.state["id"])]) < 0).any()
+    assert 20 < alone.work["outflow"] == GRAINS - len(alone.state["id"]) < GRAINS - 100
+    assert alone.measures["passed_mass"] == alone.measures["outflow_mass"] > 0
+    alike(alone, ends(unsorted, [leaving])[0])
+    same(ends(simulation, [bed(1), leaving])[1], alone)
+    simulation.load([leaving])
+    simulation.run(steps=EVERY + 7)
+    assert 0 < simulation.results()[0].work["outflow"] < alone.work["outflow"]
+    simulation.checkpoint(tmp_path / "half.h5")
+    simulation.run(steps=3)
+    simulation.restore(tmp_path / "half.h5")
+    simulation.run()
+    same(simulation.results()[0], alone)
 
 
 def test_a_world_that_fails_after_a_sort_names_the_particle_and_gives_its_last_good_step(simulation, usual):

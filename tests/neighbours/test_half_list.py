@@ -61,7 +61,9 @@ def listed(simulation):
 
 @pytest.mark.long
 @pytest.mark.parametrize("schedule", ["world", pytest.param("particle", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("domain", ["joined", "slab", pytest.param("open", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "domain", ["joined", *(pytest.param(d, marks=pytest.mark.slow) for d in ("slab", "open"))]
+)
 def test_every_near_pair_is_listed_once(rng, monkeypatch, domain, schedule):
     """At the start, and after steps in which some move far and most do not; crowds make the list grow."""
     monkeypatch.setattr(pair_chunks, "CHUNK_SLOTS", SLOTS)
@@ -140,6 +142,7 @@ def kept(monkeypatch):
     return kept
 
 
+@pytest.mark.slow
 def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(simulation_of_bursts, kept, monkeypatch):
     """Beside a run whose list is long enough from the start, and others of skins that the scene says. There
     is room for it once what is kept for later has been given back."""
@@ -161,6 +164,7 @@ def test_a_list_that_overflows_on_the_way_grows_and_changes_no_bit(simulation_of
         assert ends[0].work == end.work
 
 
+@pytest.mark.slow
 def test_a_list_is_made_for_the_pace_of_the_particles_also_where_a_step_moves_them_twice():
     """Boris' stepper reports how far they have moved before the list is made."""
     speed, dt, diameter = 1.0, 1e-3, 0.2
@@ -249,7 +253,7 @@ def through_a_ring(steps=60, n=18, dt=0.05, window=0.06, gap=0.01):
     return scene(position, velocity, (law,), radius=radius, mass=1.0, dt=dt, steps=steps)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_list_that_overflows_at_one_time_and_not_at_another_stops_no_world(monkeypatch):
     """Run once more from an image the list is made in other steps, none of them in the ring: the world is as
     good as any."""

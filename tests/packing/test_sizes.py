@@ -5,7 +5,7 @@ import pytest
 from scipy import integrate, stats
 
 from tests.judged import check_message
-from tisim import Box, Cloud, GrainClass, InputError, Open, RandomInBox, RandomInCylinder, Scene
+from tisim import Box, Cloud, GrainClass, InputError, Material, Open, RandomInBox, RandomInCylinder, Scene
 from tisim.packing import EqualSizes, LognormalSizes, NormalSizes, SieveCurve, UniformSizes, WeibullSizes
 from tisim.packing.grains import draw, masses
 
@@ -144,6 +144,25 @@ def test_spheres_lie_wholly_inside_a_cylinder():
     assert np.hypot(*start["position"][:, :2].T).max() <= 9e-3
 
 
+def test_classes_name_their_materials():
+    """One that does not is of that of the cloud, or of the first of the scene."""
+    named = (MIXTURE[0], MIXTURE[1].model_copy(update={"material": "ore"}))
+    materials = {name: Material() for name in ("glass", "ore", "sand")}
+    for material, index in ((None, 0), ("sand", 2)):
+        cloud = Cloud(number=200, grains=named, material=material)
+        scene = Scene(
+            particles=cloud, materials=materials, domain=Box(low=(0, 0, 0), high=(1, 1, 1)), duration=1.0
+        )
+        for seed in (0, 5):
+            start = scene.start(seed)
+            expected = np.where(start["radius"] == 2e-3, index, 1)
+            np.testing.assert_array_equal(start["material"], expected)
+            assert 0 < np.mean(expected == 1) < 1
+        assert Scene.from_dict(scene.to_dict()) == scene
+    with pytest.raises(InputError, match=r"grains.1.material must be one of the materials .*glass.*'ore'"):
+        scene.replace({"materials": {"glass": {}, "sand": {}}})
+
+
 def test_a_file_gives_a_mixture_back():
     scene = Scene(
         particles=Cloud(number=9, grains=MIXTURE), domain=Box(low=(0, 0, 0), high=(1, 1, 1)), duration=1.0
@@ -178,6 +197,13 @@ WRONG = {
     "both": (
         lambda: Cloud(number=1, radius=1.0, density=1.0, grains=MIXTURE),
         "cloud must be given radius and density, or grains; received 'radius and density and grains'",
+    ),
+    "a number for a material": (
+        lambda: Cloud(
+            number=1,
+            grains=(GrainClass(sizes=EqualSizes(radius=1.0), density=1.0, quantities={"material": 1}),),
+        ),
+        "grains.0.quantities.material must be given once, and none that the grains have",
     ),
     "one class says more": (
         lambda: Cloud(number=1, grains=(MIXTURE[0], GrainClass(sizes=EqualSizes(radius=1.0), density=1.0))),

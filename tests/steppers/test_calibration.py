@@ -74,6 +74,7 @@ def from_first_steps(tolerances):
     return [ratios(make, tolerances, oscillator)["oscillator"].tolist() for make in makes]
 
 
+@pytest.mark.slow
 def test_steps_are_solved_whatever_the_first_one():
     """A first step so short that a sweep changes nothing there says nothing of longer ones: taken for a
     contraction of 0 it had them all unsolved, and the end 20 times as far off as asked for."""

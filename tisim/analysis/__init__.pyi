@@ -2,6 +2,8 @@ from .beds import contacts as contacts
 from .beds import coordination_numbers as coordination_numbers
 from .beds import mean_coordination as mean_coordination
 from .beds import solid_fraction as solid_fraction
+from .clumps import ClumpBodies as ClumpBodies
+from .clumps import clump_bodies as clump_bodies
 from .clusters import head_to_tail as head_to_tail
 from .clusters import labels as labels
 from .clusters import mean_size as mean_size

@@ -38,6 +38,13 @@ Inverse = Annotated[
         metavar="CASE_OR_FILE", help="A case of 'tisim cases', or your own NAME.py with a PROBLEM or a CASE."
     ),
 ]
+Measurements = Annotated[
+    Path | None,
+    typer.Option(
+        "--measured", metavar="FILE.csv", callback=nameable,
+        help="Measurements that a case which is calibrated is to meet, in place of its own.",
+    ),
+]  # fmt: skip
 SearchChanges = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="search.KEY=VALUE", help="Any setting of the search. Repeatable."),
@@ -61,6 +68,7 @@ def optimize(
     ] = None,
     budget_evaluations: Annotated[int | None, typer.Option(help="Stop after so many runs.")] = None,
     budget_minutes: Annotated[float | None, typer.Option(help="Stop after so much time.")] = None,
+    measured: Measurements = None,
     changes: SearchChanges = None,
     fresh: Fresh = None,
     overwrite: Overwrite = False,
@@ -80,7 +88,7 @@ def optimize(
     from optimize.session import session
     from optimize.settings import Settings, fit, proposed, without_dependent_options
 
-    problem, defaults = targets.inverse_problem(case, size, variant)
+    problem, defaults = targets.inverse_problem(case, size, variant, measured)
     options = {
         "seed": seed,
         "generations": generations,
@@ -124,6 +132,7 @@ def compare(
     size: Size = None,
     folder: Out = None,
     variant: Annotated[str | None, typer.Option(help="Which inverse problem of the case.")] = None,
+    measured: Measurements = None,
     changes: SearchChanges = None,
     fresh: Fresh = None,
     overwrite: Overwrite = False,
@@ -143,7 +152,7 @@ def compare(
     from optimize.settings import without_dependent_options
     from optimize.storage.cache import Cache
 
-    problem, defaults = targets.inverse_problem(case, size, variant)
+    problem, defaults = targets.inverse_problem(case, size, variant, measured)
     changed = scene_arguments.table_changes("search", scene_arguments.assignments(changes or ()))
     base = scene_arguments.with_changes(without_dependent_options(defaults, changed), changed)
     names = [name.strip() for name in methods.split(",") if name.strip()]

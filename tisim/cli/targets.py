@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -42,16 +43,22 @@ def case(target: str, alternatives: str = OWN_FILE) -> Case:
     return module.CASE
 
 
-def inverse_problem(target: str, size: str | None, variant: str | None) -> tuple[Problem, Mapping[str, Any]]:
-    """Return the inverse problem of a case or a file, and settings of its search; InputError without one."""
+def inverse_problem(
+    target: str, size: str | None, variant: str | None, measured: Path | None = None
+) -> tuple[Problem, Mapping[str, Any]]:
+    """Return the inverse problem of a case or a file, and settings of its search; InputError without one.
+
+    measured : a file of measurements that it is to meet.
+    """
     if not is_python_file(target):
-        return case(target, f"{OWN_FILE} or a PROBLEM").inverse(size or "default", variant)
+        return case(target, f"{OWN_FILE} or a PROBLEM").inverse(size or "default", variant, measured)
     module = plugins.load(target)
     if hasattr(module, "PROBLEM"):
+        must(measured is None, "--measured", "given for a case only", measured)
         problem, settings = _problem(module, target, size, variant)
     else:
         must(hasattr(module, "CASE"), target, "a file with a PROBLEM or a CASE", _module_names(module))
-        problem, settings = case(target).inverse(size or "default", variant)
+        problem, settings = case(target).inverse(size or "default", variant, measured)
     # The whole file, and those that it may have taken something from: an objective made elsewhere from
     # numbers that stand here is another when they change.
     checksums = [file.checksum[:12] for file in python_file.loaded_files()]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
 
 import numpy as np
@@ -94,7 +95,7 @@ class Component(AccuracyHints, Checked):
         """Return the subclass of this name; raise InputError naming ``where`` and the known names
         otherwise."""
         known = cls.known()
-        rule = f"one of {', '.join(sorted(known))} (of your own: give --plugin FILE.py, or import it first)"
+        rule = f"one of {', '.join(sorted(known))}, or your own (--plugin, import)"
         must(isinstance(kind, str) and kind in known, where, rule, kind)
         return known[kind]
 
@@ -141,6 +142,12 @@ class Component(AccuracyHints, Checked):
             row, *rest = get_args(info.annotation) if get_origin(info.annotation) is tuple else (None,)
             if rest == [...] and isinstance(row, type) and issubclass(row, Component):
                 yield name, row
+
+    @classmethod
+    def from_files(cls, values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
+        """Return the parameters that a table of a scene gives, ``where`` in it, with what it names in other
+        files read from these; ``folder`` is that of the scene. By default a table names no files."""
+        return values
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
@@ -197,6 +204,8 @@ class Component(AccuracyHints, Checked):
     """These are the effects without which this one means nothing."""
     excludes: ClassVar[tuple[type[Component], ...]] = ()
     """These are the effects that cannot be in a scene with this one."""
+    precedes: ClassVar[tuple[type[Component], ...]] = ()
+    """These are the effects that must come after this one, where a scene has them."""
     incompatible_controls: ClassVar[tuple[str, ...]] = ()
     """These kinds of step control do not see what this effect needs them to."""
     least_rows: ClassVar[int] = 32

@@ -95,6 +95,12 @@ def _is_choice(part: int | str) -> bool:
 
 
 def _named_within(name: str, loc: tuple[int | str, ...], text: str) -> list[str]:
-    """Return what a part says of itself; a row of a list, which row it is."""
-    row = bool(loc) and isinstance(loc[-1], int)
-    return [f"{name}.{line.partition('.')[2]}" if row else line for line in text.splitlines()]
+    """Return what a part says of itself; one of several, in a list or by name, which of them it is."""
+    if len(loc) < 2:
+        return text.splitlines()
+    lines = (line.partition(" must ") for line in text.splitlines())
+    # What is no property of the row by itself, such as the mass that follows from two, has no name before it.
+    return [
+        f"{name}{'.' + what.partition('.')[2] if '.' in what else ', ' + what} must {rest}"
+        for what, _, rest in lines
+    ]

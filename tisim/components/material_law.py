@@ -1,4 +1,4 @@
-"""What laws have in common whose numbers depend on the materials that touch."""
+"""What parts have in common that go by the materials of a scene, such as laws between two that touch."""
 
 from __future__ import annotations
 
@@ -13,7 +13,29 @@ from tisim.components.materials import Material, Materials, Touching
 from tisim.errors import must
 
 
-class MaterialLaw(Component):
+class UsesMaterials(Component):
+    """This is the contract of a part that goes by the materials of its scene."""
+
+    contract: ClassVar[bool] = True
+    _materials: Materials = PrivateAttr(default=Materials({}, {}))
+
+    def with_materials(self, materials: Materials) -> Self:
+        """Return it with the materials of a scene, and so the parts of this contract that it is made of."""
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        update = {
+            name: part.with_materials(materials)
+            for name, part in parts.items()
+            if isinstance(part, UsesMaterials)
+        }
+        made = self.model_copy(update=update)
+        made._materials = materials
+        return made
+
+    def check_materials(self, materials: Materials) -> None:
+        """Raise InputError unless the materials of a scene have what it needs."""
+
+
+class MaterialLaw(UsesMaterials):
     """This is the contract of a part of a law whose numbers depend on the materials that touch.
 
     uses : names of the properties of materials that it needs. ``mix`` makes its numbers of those of two
@@ -22,22 +44,12 @@ class MaterialLaw(Component):
 
     contract: ClassVar[bool] = True
     uses: ClassVar[tuple[str, ...]] = ()
-    _materials: Materials = PrivateAttr(default=Materials({}, {}))
 
     def mix(self, pair: Touching) -> dict[str, float]:
         """Return its numbers for two materials, by name, the same names for all."""
         return {}
 
-    def with_materials(self, materials: Materials) -> Self:
-        """Return it with the materials of a scene, and so the laws that it is made of."""
-        laws = {name: getattr(self, name) for name in type(self).model_fields}
-        update = {n: law.with_materials(materials) for n, law in laws.items() if isinstance(law, MaterialLaw)}
-        made = self.model_copy(update=update)
-        made._materials = materials
-        return made
-
     def check_materials(self, materials: Materials) -> None:
-        """Raise InputError unless the materials of a scene have what it needs."""
         must(
             bool(materials.named) or not self.uses, "materials", f"given, as {self.label} needs them", "none"
         )

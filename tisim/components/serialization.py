@@ -8,6 +8,7 @@ import pkgutil
 import re
 import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar, get_args
 
@@ -15,6 +16,8 @@ from tisim.components.component import Component
 from tisim.errors import InputError, abbreviated, must, printable
 
 Part = TypeVar("Part", bound=Component)
+HERE = Path()
+"""This is the working directory."""
 
 
 def load(package: ModuleType) -> None:
@@ -31,28 +34,34 @@ def table(data: Any, where: str, what: str = "a table") -> dict[str, Any]:
     return dict(data)
 
 
-def from_dict(base: type[Part], data: Any, where: str) -> Part:
+def from_dict(base: type[Part], data: Any, where: str, folder: Path = HERE) -> Part:
     """Return the part that ``data["kind"]`` names; its other keys are its parameters. Text is a kind by
-    itself."""
+    itself.
+
+    folder : that from which names of files in the data lead; the working directory unless given.
+    """
     values: dict[str, Any] = {"kind": data} if isinstance(data, str) else table(data, where)
     must("kind" in values, f"{where}.kind", f"given, to name a kind of {base.kind()}", "nothing")
     kind = base.named(values.pop("kind"), f"{where}.kind")
-    return kind(**_with_parts(kind, values, where))
+    return kind(**_with_parts(kind, values, where, folder))
 
 
-def _with_parts(kind: type[Component], values: dict[str, Any], where: str) -> dict[str, Any]:
+def _with_parts(kind: type[Component], values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
     """Return the parameters of a kind, with the parts in place of the tables that name their kinds."""
+    values = kind.from_files(values, where, folder)
     listed = dict(kind.lists())
     for name, info in kind.model_fields.items():
         # Rows of a list are all of one kind, and need no name of it.
         inner = None if name in listed else _part(info.annotation)
         if name in values and inner is not None:
-            values[name] = from_dict(inner, values[name], f"{where}.{name}")
+            values[name] = from_dict(inner, values[name], f"{where}.{name}", folder)
     for name in listed.keys() & values.keys():
         if isinstance(values[name], list | tuple):
             places = [f"{where}.{name}.{k}" for k in range(len(values[name]))]
             rows = zip(values[name], places, strict=True)
-            values[name] = [_with_parts(listed[name], table(row, place), place) for row, place in rows]
+            values[name] = [
+                _with_parts(listed[name], table(row, place), place, folder) for row, place in rows
+            ]
     return values
 
 

@@ -1,4 +1,7 @@
 from .base import (
+    Constraint as Constraint,
+)
+from .base import (
     DerivedQuantity as DerivedQuantity,
 )
 from .base import (
@@ -28,6 +31,8 @@ from .base import (
 from .base import (
     parameter as parameter,
 )
+from .constraint.prescribed_motion import PrescribedMotion as PrescribedMotion
+from .constraint.rigid_clumps import RigidClumps as RigidClumps
 from .contact.bond import ContactBond as ContactBond
 from .contact.capillary_bridge import CapillaryBridge as CapillaryBridge
 from .contact.dissipation import ContactDissipation as ContactDissipation

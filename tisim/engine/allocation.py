@@ -7,6 +7,7 @@ from typing import Any
 from tisim.backend import runtime
 from tisim.backend.memory import Tree, collected, require_memory
 from tisim.engine.assembly import Assembly, declared, needed_fields, picks_pairs
+from tisim.engine.loading import check_newcomers
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.bound import connected
@@ -37,6 +38,9 @@ class Allocation:
             declared(*asked, what) for what in ("counters", "world_quantities", "flags", "totals")
         )
         fields = resolve_fields(needed_fields(*asked))
+        # Before anything is compiled: a vector for a number would end the process.
+        for effect in scene.effects:
+            check_newcomers(fields, effect)
         real = 8 if runtime.current().precision == "f64" else 4
         # Before anything is placed: the compiler cannot refuse what is too much for it.
         require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))

@@ -6,21 +6,21 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from tisim.components.domain import Domain
-from tisim.effects.base import DerivedQuantity, Effect, Force, PairEvent, PairForce, SelfConsistentQuantity
+from tisim.effects.base import (
+    Constraint,
+    DerivedQuantity,
+    Effect,
+    Force,
+    PairEvent,
+    PairForce,
+    SelfConsistentQuantity,
+)
 from tisim.interactions import spatial_sort
 from tisim.interactions.collision_rounds import Rounds
-from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts, FindContactsAfterEvents
+from tisim.interactions.contact_list import ClearContacts, ContactList, FindContacts
 from tisim.interactions.contact_memory import ContactMemory, memory_fields
 from tisim.interactions.failure_attribution import FailureAttribution
-from tisim.interactions.force_sum import (
-    FORCE,
-    TORQUE,
-    SumForces,
-    SumForcesAfterEvents,
-    SumTrialForces,
-    turning,
-)
-from tisim.interactions.forces_at_start import SumForcesAtStart
+from tisim.interactions.force_sum import FORCE, TORQUE, SumForces, SumTrialForces, turning
 from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, ExportedTerms, fuse, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rearrangement import Rearrange, StoreBefore
@@ -33,10 +33,12 @@ from tisim.neighbours.near_list import NearList, update_near_list
 from tisim.operators.base import Operator
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import EndStep, FinishStep, FirstStep
+from tisim.steppers.constraints import begin_constraints
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.step_control import FixedStep, StepControl
 from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.fields import Field
+from tisim.worlds.occasion import Enter, EnterAfterEvents, Occasion
 from tisim.worlds.phases import Item
 from tisim.worlds.state import State
 
@@ -114,7 +116,8 @@ class Assembly:
         self.exported = ExportedTerms(self.pairs, components) if self.pairs and listed else None
         pairs = update_pairs(self.pairs) if self.pairs else ()
         lists = (*(update_near_list(near) if near else ()), *pairs)
-        force_sum = self._sum(SumForces)
+        force_sum = SumForces(*self._sees())
+        derived, forces = self._derived(), self._forces(force_sum)
         context = StepContext(
             s=s,
             effects=effects,
@@ -125,8 +128,8 @@ class Assembly:
             independent=stepper.data.independent([effect.data for effect in effects]),
             update_lists=lists,
             advance_memory=self._advance(force_sum, pairs),
-            sum_forces=self._summed(SumForces),
-            sum_trial_forces=self._summed(SumTrialForces),
+            sum_forces=(*derived, *forces),
+            sum_trial_forces=(*self._derived(trial=True), *self._forces(SumTrialForces(*self._sees()))),
             force_sum=force_sum,
         )
         self.failure_attribution = FailureAttribution(context.force_sum)
@@ -134,7 +137,13 @@ class Assembly:
         known = (FirstStep(s, control),) if isinstance(control.data, FixedStep) and context.forced else ()
         keepers = tuple(e for e in effects if e.data.offers("end_step") and e.data.keeps("world_quantities"))
         ends = (EndStep(s, keepers),) if keepers else ()
-        step, first = [*fuse(own.items), *ends], [*known, *lists, *self._summed(SumForcesAtStart), *ends]
+        # What stands here as it does in the step is compiled once.
+        items, again = fuse(own.items, forces)
+        begin = (*begin_constraints(s, effects.of(Constraint)), *known)
+        step, first = [*items, *ends], [*begin, *lists, *derived]
+        if known and force_sum.remembers:
+            first += [Enter(s, Occasion.AHEAD), *again]
+        first += [Enter(s, Occasion.START), *again, Enter(s, Occasion.STEP), *ends]
         if near and contacts:
             survey = FindContacts(near, contacts, control)
             step += [ClearContacts(contacts), survey]
@@ -145,15 +154,14 @@ class Assembly:
             if self.pairs and self.pairs.memories:
                 step += [StoreBefore(self.pairs, operators)]
             step += [Rearrange(s, domain, operators, self.lists)]
-            again: list[Item] = [*self._summed(SumForcesAfterEvents)]
-            if near and contacts and control.data.watches_pairs:
-                again.insert(0, FindContactsAfterEvents(near, contacts, control))
-            step += [*lists, *again] if again else []
+            surveys = (survey,) if near and contacts and control.data.watches_pairs else ()
+            if anew := (*surveys, *derived, *again):
+                step += [*lists, EnterAfterEvents(s), *anew, Enter(s, Occasion.STEP)]
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
-        # Events tell pairs apart by index, and operators on a world may add and remove particles.
-        fixed_order = not events and not any(operator.data.offers("world") for operator in operators)
-        sorts = s.records and fixed_order and s.capacity >= spatial_sort.SORTED_FROM
+        # Events tell pairs apart by index.
+        ordered = events or any(one.data.offers("world") and not one.data.any_order for one in operators)
+        sorts = s.records and not ordered and s.capacity >= spatial_sort.SORTED_FROM
         self.sort = SpatialSort(self.pairs, self.lists) if sorts and self.pairs and self.lists else None
         sudden, steady = "impacts, step control", "short-ranged forces"
         beside = (
@@ -182,7 +190,8 @@ class Assembly:
             if isinstance(law.data, PairForce) and memory_fields(law.data):
                 law.past = ContactMemory(self.s, law)
                 memories.append(law.past)
-        pairs = PairChunks(HalfList(self.s, self.domain, laws, sizes), tuple(memories))
+        half_list = HalfList(self.s, self.domain, laws, self.effects.of(Constraint), sizes)
+        pairs = PairChunks(half_list, tuple(memories))
         if memories:
             self.s.before_reading.append(pairs.store_memory)
         return pairs
@@ -199,14 +208,14 @@ class Assembly:
             items.append(AdvanceParticles(force_sum))
         return tuple(items)
 
-    def _summed(self, kind: type[SumForces]) -> tuple[Item, ...]:
-        """Set derived quantities, then sum the forces."""
-        items: list[Item] = []
-        for part in self.derived_solvers:
-            items += part.phases(after_events=kind.conditional, trial=kind.trial)
-        if self.effects.of(Force, PairForce):
-            items += sum_phases(self._sum(kind), self.exported)
-        return tuple(items)
+    def _derived(self, trial: bool = False) -> tuple[Item, ...]:
+        """Return the items that set derived quantities."""
+        return tuple(item for part in self.derived_solvers for item in part.phases(trial))
 
-    def _sum(self, kind: type[SumForces]) -> SumForces:
-        return kind(self.s, self.domain, self.effects, self.pairs, self.derived_solvers)
+    def _forces(self, total: SumForces) -> tuple[Item, ...]:
+        """Return the items that sum the forces, where there are any."""
+        return sum_phases(total, self.exported) if self.effects.of(Force, PairForce) else ()
+
+    def _sees(self) -> tuple[Any, ...]:
+        """Return what a sum of forces is made of."""
+        return self.s, self.domain, self.effects, self.pairs, self.derived_solvers

@@ -13,15 +13,21 @@ from tisim.backend.thread import in_taichi_thread
 from tisim.engine import law_errors
 from tisim.engine.allocation import Allocation
 from tisim.engine.assembly import Assembly
-from tisim.errors import InputError, RunError
+from tisim.errors import InputError, RunError, must
 from tisim.neighbours.half_list import ListSizes
 from tisim.scene.scene import Scene
 from tisim.worlds.finite import FiniteCheck
 from tisim.worlds.launched_program import LaunchedProgram
+from tisim.worlds.occasion import Occasion
 from tisim.worlds.phases import nested
 from tisim.worlds.program import Program
 from tisim.worlds.status import NEVER, WorldStatus
+from tisim.worlds.team import Teams
 from tisim.worlds.world_program import world_programs
+
+TEAM_FROM = 2000
+"""Worlds of so many particles are shared by threads, where there are more of these than worlds: of 8000 grains
+two threads are faster than one (docs/performance.md), of 500 slower."""
 
 
 class CompiledWorlds:
@@ -31,33 +37,46 @@ class CompiledWorlds:
     def __init__(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> None:
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
-        self.trees = self._make(scene, worlds, capacity, schedule)
+        awake = schedule != "team" or self.runtime.device == "cpu"
+        must(awake, "schedule", "another than team, whose threads wait awake, but on a CPU", schedule)
+        self.trees: list[Tree] = []
+        self._make(scene, worlds, capacity, schedule)
 
     @in_taichi_thread
-    def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> list[Tree]:
-        """Place all fields, which are returned, and compile the kernels of a step."""
+    def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> None:
+        """Place all fields, and compile the kernels of a step."""
         try:
-            trees = self._allocate(scene, worlds, capacity)
+            self._allocate(scene, worlds, capacity)
         except NoRoom:
             # Once more, without what is only kept for later.
             memory.reclaim()
             try:
-                trees = self._allocate(scene, worlds, capacity)
+                self._allocate(scene, worlds, capacity)
             except NoRoom as no:
                 what, others = f"{no.what} for {worlds} x {capacity} particles", memory.bytes_in_use()
                 rule = f"{no.rule}, with {others / 1e9:.3g} GB that others use" if others else no.rule
                 raise InputError(f"{what} must be {rule}; received {no.received}") from None
         self.s, self.table = self.allocation.s, self.allocation.table
         self.schedule = schedule or self._choose(capacity)
-        self.s.shared = self.schedule == "particle"
+        self.s.shared = self.schedule != "world"
         self.s.write("status", WorldStatus.ENDED)
+        if self.schedule != "particle":
+            self._make_teams(capacity)
         self._compile()
-        return trees
 
-    def _allocate(self, scene: Scene, worlds: int, capacity: int) -> list[Tree]:
+    def _allocate(self, scene: Scene, worlds: int, capacity: int) -> None:
         with collected() as trees:
             self.allocation = Allocation(scene, worlds, capacity)
-        return trees
+        self.trees += trees
+
+    def _make_teams(self, capacity: int) -> None:
+        """Make a team for each world, or for each thread."""
+        # Who waits for others awake has a core.
+        threads = min(self.runtime.threads, runtime.cores())
+        number = min(self.worlds, threads) if self.schedule == "team" else threads
+        with collected() as trees:
+            self.teams = Teams(self.worlds, capacity, threads, number)
+        self.trees += trees
 
     def _compile(self) -> None:
         """Compile the kernels of a step; no world may be running."""
@@ -65,11 +84,11 @@ class CompiledWorlds:
         rest_every = sort.every if sort else NEVER
         self.first: Program
         self.program: Program
-        if self.schedule == "world":
-            self.first, self.program = world_programs(self.s, (first, step), rest_every)
-        else:
+        if self.schedule == "particle":
             self.first = LaunchedProgram(self.s, first, once=True)
             self.program = LaunchedProgram(self.s, step, rest_every)
+        else:
+            self.first, self.program = world_programs(self.s, (first, step), self.teams, rest_every)
         self.sort = LaunchedProgram(self.s, sort.items(), once=True) if sort else None
         with law_errors.in_a_line():
             for program in (self.program, self.first, self.sort):
@@ -116,16 +135,17 @@ class CompiledWorlds:
         self._compile()
 
     def _choose(self, capacity: int) -> str:
-        if any(phase.long for phase, _ in nested(self.assembly.step)):
+        long = any(phase.long for phase, _ in nested(self.assembly.step))
+        if long or self.runtime.device != "cpu":
             return "particle"
-        # A world per thread needs as many worlds as threads; one small world is faster without launches.
-        small = capacity * self.worlds <= 20_000
+        # A thread for each world is best; fewer are shared, where that is worth waiting for each other.
         many = self.worlds >= self.runtime.threads
-        return "world" if self.runtime.device == "cpu" and (small or many) else "particle"
+        return "world" if many or capacity < TEAM_FROM else "team"
 
     def put(self, image: Mapping[str, np.ndarray]) -> None:
         """Put all worlds where they were when ``s.image()`` was made of them."""
-        self.s.fill(image)
+        # One that has failed may have been in the middle of a step.
+        self.s.fill({**image, "occasion": Occasion.STEP})
         self.forget_lists()
 
     def forget_lists(self) -> None:

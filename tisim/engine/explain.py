@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tisim.components.component import Component
-from tisim.components.invalid import text_of, unit_of
+from tisim.components.materials import Materials
 from tisim.effects.base import Effect
-from tisim.engine import docstrings, reference
+from tisim.engine import reference
 from tisim.engine.assembly import needed_fields
+from tisim.engine.explained_parts import Part, explained, explained_kind, explained_materials
 from tisim.engine.simulation import Simulation
 from tisim.scene.scene import Scene
 from tisim.worlds.fields import CORE
-
-ROWS_SHOWN = 3
-"""This many rows of a list are shown."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """A part is an effect, the domain or the step control of a scene.
-
-    name : in files. summary : one line. source : where the law is from. parameters : name, value, unit and
-    text of each.
-    """
-
-    name: str
-    summary: str
-    source: str
-    parameters: tuple[tuple[str, str, str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -49,10 +32,10 @@ class Memory:
 class Explanation:
     """An explanation describes a scene, as one world of it is compiled.
 
-    particles, capacity : at the start, and room for. steps : that a run takes at least. memory : every
-    allocation, fields first. phases : of a step, in order; those with * are repeated until nothing waits.
-    absent_effects : known, and left out.
-    absent_fields : (field, effects that would need it), not allocated.
+    particles, capacity : at the start, and room for. steps : that a run takes at least. materials : by name,
+    then what each two of them are to each other, by both names. memory : every allocation, fields first.
+    phases : of a step, in order; those with * are repeated until nothing waits. absent_effects : known, and
+    left out. absent_fields : (field, effects that would need it), not allocated.
     """
 
     name: str
@@ -63,6 +46,7 @@ class Explanation:
     precision: str
     effects: tuple[Part, ...]
     others: tuple[Part, ...]
+    materials: tuple[Part, ...]
     memory: tuple[Memory, ...]
     phases: tuple[str, ...]
     absent_effects: tuple[Part, ...]
@@ -94,11 +78,12 @@ def explain(scene: Scene) -> Explanation:
         steps=scene.stepper.fewest(scene.effects, scene.duration),
         schedule=schedule,
         precision=precision,
-        effects=tuple(_part(effect) for effect in scene.acting()),
-        others=(_part(scene.domain), _part(scene.stepper), _part(scene.stepper.control)),
+        effects=tuple(explained(effect) for effect in scene.acting()),
+        others=(explained(scene.domain), explained(scene.stepper)),
+        materials=tuple(explained_materials(Materials(scene.materials, scene.material_pairs))),
         memory=memory,
         phases=phases,
-        absent_effects=tuple(_what(kind) for kind in absent),
+        absent_effects=tuple(explained_kind(kind) for kind in absent),
         absent_fields=tuple(_absent_fields(absent, present)),
     )
 
@@ -142,30 +127,6 @@ def _absent_fields(absent: list[type[Effect]], present: set[str]) -> Iterator[tu
         yield name, ", ".join(kinds_)
 
 
-def _part(spec: Component) -> Part:
-    return replace(_what(type(spec), tuple(_values(spec))), name=spec.label)
-
-
-def _what(kind: type[Component], values: tuple[tuple[str, str, str, str], ...] = ()) -> Part:
-    return Part(kind.kind(), docstrings.summary(kind), docstrings.source(kind), values)
-
-
-def _values(spec: Component, within: str = "") -> Iterator[tuple[str, str, str, str]]:
-    """Yield (name, value, unit, text) of each parameter; of a long list, of its first rows."""
-    lists = dict(spec.lists())
-    for name, info in type(spec).model_fields.items():
-        value = getattr(spec, name)
-        if name == "name":
-            continue  # It stands at the head.
-        if name in lists:
-            for k, row in enumerate(value[:ROWS_SHOWN]):
-                yield from _values(row, f"{within}{name}.{k}.")
-            if not 0 < len(value) <= ROWS_SHOWN:
-                yield f"{within}{name}", f"{len(value)} in all", "", text_of(info)
-        elif not isinstance(value, Component):
-            yield f"{within}{name}", reference.shown(value), unit_of(info), text_of(info)
-
-
 def render(explanation: Explanation) -> RenderableType:
     """Return the explanation for a terminal."""
     head = Text.assemble(
@@ -175,10 +136,12 @@ def render(explanation: Explanation) -> RenderableType:
         f"at least {explanation.steps:.3g} steps",
     )
     what = _table("It has", "effect", "what it is", "source")
-    for part in (*explanation.effects, *explanation.others):
-        what.add_row(part.name, part.summary, part.source)
-        for name, value, unit, text in part.parameters:
-            what.add_row("", f"{name} = {value} {unit}".rstrip(), text)
+    for whole in (*explanation.effects, *explanation.others):
+        for part in whole.all():
+            _add(what, part)
+    materials = _table("Its materials", "material", "what it is", "source")
+    for part in explanation.materials:
+        _add(materials, part)
     memory = _table("It allocates", "", "bytes", "for")
     memory.columns[1].justify = "right"
     for item in explanation.memory:
@@ -190,7 +153,15 @@ def render(explanation: Explanation) -> RenderableType:
     fields = [f"{name} (of {kinds_})" for name, kinds_ in explanation.absent_fields]
     lacking = Text.assemble(("Fields it does without  ", "italic"), "; ".join(fields) or "none")
     left_out = absent if explanation.absent_effects else Text("It leaves out no effect that tisim knows.")
-    return Group(head, "", what, "", memory, "", phases, "", left_out, lacking)
+    of_materials = (materials, "") if explanation.materials else ()
+    return Group(head, "", what, "", *of_materials, memory, "", phases, "", left_out, lacking)
+
+
+def _add(table: Table, part: Part) -> None:
+    """Add a part and its parameters to a table."""
+    table.add_row(part.name, part.summary, part.source)
+    for name, value, unit, text in part.parameters:
+        table.add_row("", f"{name} = {value} {unit}".rstrip(), text)
 
 
 def _table(title: str, *columns: str) -> Table:

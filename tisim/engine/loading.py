@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from tisim.backend import runtime
-from tisim.effects.base import Effect, PairEvent, Pairwise
+from tisim.components.ranges import WHOLE
+from tisim.effects.base import Constraint, Effect, PairEvent, Pairwise
 from tisim.errors import InputError, must
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.scene.initial_state import Arrays
@@ -45,8 +46,6 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
     if any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
         scene.stepper.control.suits_start(start["radius"], start["velocity"])
-    for effect in scene.effects:
-        check_newcomers(fields, effect)
     n = len(start["mass"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
@@ -54,6 +53,7 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             check_field(f, start[f.name], n)
+    check_held(scene, start)
     with np.errstate(over="ignore", invalid="ignore"):
         momentum = np.abs(start["mass"][:, None] * start["velocity"]).sum(axis=0).max()
     must(bool(np.isfinite(momentum)), "particles.velocity", "of a momentum that is a number", float(momentum))
@@ -65,8 +65,23 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     must(not coarse.any(), "particles.position", rule, worst)
 
 
+def check_held(scene: Scene, start: Arrays) -> None:
+    """Raise InputError where two constraints hold one particle, or hold one that is put in later."""
+    constraints = [effect for effect in scene.effects if isinstance(effect, Constraint)]
+    by = np.zeros(len(start["mass"]), int)
+    for constraint in constraints:
+        by += constraint.held(start, scene.domain)
+        rule = f"held by one of {', '.join(one.label for one in constraints)}"
+        must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max()}")
+        for effect in scene.effects:
+            where = f"quantities of grains of effects.{effect.label}"
+            rule = f"without {constraint.mark}, as effects.{constraint.label} holds no grains that are put in"
+            must(constraint.mark not in (effect.newcomers() or ()), where, rule, constraint.mark)
+
+
 def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
-    """Raise InputError unless particles that an effect adds are given what the scene needs, and no more."""
+    """Raise InputError unless particles that an effect adds are given what the scene needs, and no more, of
+    the shape and the range that a start must have."""
     given = effect.newcomers()
     if given is None:
         return
@@ -76,6 +91,15 @@ def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
         must(name in {*known, *SHARED}, where, f"fields of the scene ({', '.join(sorted(known))})", name)
     missing = sorted(name for name, f in known.items() if f.default is None and name not in given)
     must(not missing, where, f"given {', '.join(missing)}, which effects of the scene need", sorted(given))
+    for name, values in given.items():
+        for k in range(len(values)):
+            of_class = f"effects.{effect.label}.grains.{k}.quantities"
+            check_field({**SHARED, **known}[name], values[k : k + 1], 1, of_class)
+
+
+def radii(scene: Scene, start: Arrays) -> np.ndarray:
+    """Return the radii (m) of the particles of a start, then of the largest that may be put in later."""
+    return np.concatenate([start["radius"], *(effect.newcomer_radii() for effect in scene.effects)])
 
 
 def check_sides(scene: Scene, start: Arrays) -> None:
@@ -85,9 +109,10 @@ def check_sides(scene: Scene, start: Arrays) -> None:
         isinstance(effect, PairEvent) or (isinstance(effect, Pairwise) and effect.short_ranged)
         for effect in scene.effects
     )
-    if low is None or high is None or not near or len(start["radius"]) < 2:
+    radius = radii(scene, start)
+    if low is None or high is None or not near or len(radius) < 2:
         return
-    reach = 2 * float(np.partition(start["radius"], -2)[-2:].sum())
+    reach = 2 * float(np.partition(radius, -2)[-2:].sum())
     narrow = np.array(scene.domain.imaged()) & (high - low < reach)
     rule = f"at least {reach:g} m wide where it is periodic, twice what two of its particles that touch take"
     must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
@@ -103,8 +128,11 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
     if pairs is None or not pairs.half_list.laws or not any(scenes[0].domain.imaged()):
         return
     laws = ", ".join(law.data.label for law in pairs.half_list.laws)
-    for scene, start, outlook in zip(scenes, starts, pairs.half_list.outlook(), strict=False):
-        (low, high), radius = scene.domain.bounds(), start["radius"]
+    known = [radii(scene, start) for scene, start in zip(scenes, starts, strict=True)]
+    later = [radius[len(start["radius"]) :] for radius, start in zip(known, starts, strict=True)]
+    outlooks = pairs.half_list.outlooks(later)
+    for scene, radius, outlook in zip(scenes, known, outlooks, strict=True):
+        low, high = scene.domain.bounds()
         if low is None or high is None or len(radius) < 2:
             continue
         order = np.argsort(radius, kind="stable")
@@ -114,9 +142,15 @@ def check_reach(scenes: Sequence[Scene], starts: Sequence[Arrays], pairs: PairCh
         must(not narrow.any(), scene.domain.label, rule, (high - low).tolist())
 
 
-def check_field(f: Field, values: np.ndarray, n: int) -> None:
-    """Raise InputError unless values of n particles have the shape and the range of a field."""
-    must(values.shape == f.shape(n), f"particles.{f.name}", f"of shape {f.shape(n)}", values.shape)
+def check_field(f: Field, values: np.ndarray, n: int, where: str = "particles") -> None:
+    """Raise InputError unless values of n particles, given at ``where``, have the shape and the range of a
+    field."""
+    label = f"{where}.{f.name}"
+    must(values.shape == f.shape(n), label, f"of shape {f.shape(n)}", values.shape)
+    if f.integer:
+        whole = (values == np.rint(values)) & (np.abs(values) < WHOLE)
+        worst = float(values[~whole][0]) if not whole.all() else 0
+        must(bool(whole.all()), label, "whole numbers", worst)
     rounded: np.ndarray
     with np.errstate(over="ignore"):
         rounded = values.astype(_real())
@@ -129,10 +163,10 @@ def check_field(f: Field, values: np.ndarray, n: int) -> None:
         unrepresentable |= (rounded < least ** (1 / 3)) | (rounded > float(np.finfo(_real()).max) ** (1 / 3))
     if unrepresentable.any():
         rule = f"within the range of {runtime.current().precision}"
-        must(False, f"particles.{f.name}", rule, float(values[unrepresentable][0]))
+        must(False, label, rule, float(values[unrepresentable][0]))
     if f.minimum is not None:
         least = float(values.min())
-        must(least >= f.minimum, f"particles.{f.name}", f"at least {f.minimum:g} {f.unit}", least)
+        must(least >= f.minimum, label, f"at least {f.minimum:g} {f.unit}", least)
 
 
 def _real() -> type:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
+import numpy as np
 from pydantic.fields import FieldInfo
 
 from tisim import packing
@@ -63,7 +64,7 @@ FAMILIES = {
     "sources": Family("Sources", Source, "effects.NAME"),
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
-    "motions": Family("Motions of walls", Motion, "effects.walls.motion"),
+    "motions": Family("Motions of walls and groups", Motion, "effects.walls.motion"),
     "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
     "materials": Family("Materials", ContactProperties, ""),
     "operators": Family("Operators", Operator, "effects.NAME"),
@@ -177,6 +178,8 @@ def _needs(kind: type[Component]) -> Iterator[str]:
         yield f"a source of {' or '.join(quantities)}"
     for other in kind.excludes:
         yield f"no {' or '.join(sorted(other.known()))}"
+    for other in kind.precedes:
+        yield f"a place before {' or '.join(sorted(other.known()))}"
     if getattr(kind, "depends_on_velocity", False):
         yield "a stepper with inertia, not brownian"
     if kind.incompatible_controls:
@@ -226,6 +229,8 @@ def shown(value: object) -> str:
     """Return a value as people read it."""
     if isinstance(value, Component):
         return value.kind()
+    if isinstance(value, np.ndarray):
+        return " x ".join(map(str, value.shape)) + " numbers"
     if isinstance(value, tuple):
         return "(" + ", ".join(shown(item) for item in value) + ")"
     if isinstance(value, bool | None):

@@ -25,12 +25,14 @@ CHUNK_SECONDS, FIRST = 0.25, 2**16
 """The first is the wall time (s) between looks at progress, at Ctrl-C and at whether every quantity is
 finite; the second is the number of steps of all particles together before the first look."""
 
+SCHEDULES = ("world", "team", "particle")
+
 
 class Simulation(CompiledWorlds):
     """A simulation is compiled for the structure of a scene, a number of worlds and a capacity of particles.
 
     scene : any scene of the structure; its values do not matter here.
-    schedule : "world" or "particle" (see program.py), or None to choose by device and size.
+    schedule : "world", "team" or "particle" (see program.py), or None to choose by device and size.
     Loading and running other scenes of the same structure compiles nothing. It is for one thread at a time.
     """
 
@@ -39,7 +41,7 @@ class Simulation(CompiledWorlds):
     ) -> None:
         must(isinstance(scene, Scene), "scene", "a Scene", scene)
         must(is_whole(worlds, 1), "worlds", "a whole number, at least 1", worlds)
-        must(schedule in ("world", "particle", None), "schedule", "world or particle", schedule)
+        must(schedule in (*SCHEDULES, None), "schedule", "world, team or particle", schedule)
         began = time.perf_counter()
         super().__init__(scene, worlds, capacity or scene.capacity(), schedule)
         self.scenes: list[Scene] = []

@@ -10,7 +10,8 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.arrays import Rows, equal
 from tisim.components.component import parameter
-from tisim.errors import InputError, must
+from tisim.errors import InputError, is_number, must
+from tisim.files import regular_file
 from tisim.geometry.shape import Shape
 from tisim.geometry.triangle_grid import TriangleGrid
 
@@ -19,7 +20,9 @@ class TriangulatedSurface(Shape):
     """A surface of triangles, with particles on either side of it, such as that of an STL file.
 
     The same in all worlds of a batch. ``TriangulatedSurface.read("drum.stl", scale=1e-3)`` reads a file;
-    triangles without area are left out. Particles find those near them in a grid of cells.
+    triangles without area are left out. In a scene file ``surface = {kind = "triangulated_surface",
+    file = "drum.stl", scale = 1e-3}`` does; the name leads from the folder of that file. Particles find those
+    near them in a grid of cells.
     """
 
     vertices: Rows = parameter("m", "places of the vertices", examples=[((0, 0, 0), (1, 0, 0), (0, 1, 0))])
@@ -32,9 +35,14 @@ class TriangulatedSurface(Shape):
         listed: ClassVar[Any]
 
     @classmethod
-    def read(cls, path: str | Path, scale: float = 1.0) -> Self:
+    def read(cls, path: str | Path, scale: float = 1.0, where: str = "surface") -> Self:
         """Return the surface in a file of a format that meshio reads, such as STL, PLY or OBJ; ``scale`` is
-        the length of its unit in m."""
+        the length of its unit in m.
+
+        InputError, which calls the surface ``where``, is raised for a file that cannot be read or has faces
+        other than triangles, and for a scale that is not above 0.
+        """
+        must(is_number(scale) and scale > 0, f"{where}.scale", "a number of m above 0", scale)
         try:
             import meshio
         except ImportError:
@@ -46,10 +54,26 @@ class TriangulatedSurface(Shape):
                 mesh = meshio.read(path)
         except (OSError, ValueError, meshio.ReadError, SystemExit) as fault:
             rule = "a file that meshio reads"
-            raise InputError(f"surface must be {rule}; received {path!s} ({fault})") from None
-        must("triangle" in mesh.cells_dict, "surface", "of triangles", str(path))
+            raise InputError(f"{where} must be {rule}; received {path!s} ({fault})") from None
+        # Without the others there would be holes in it.
+        others = {block.type for block in mesh.cells if block.dim == 2} - {"triangle"}
+        rule = "of triangles alone (triangulate it with a program for meshes)"
+        must(not others, where, rule, f"{', '.join(sorted(others))} in {path!s}")
+        must("triangle" in mesh.cells_dict, where, "of triangles", str(path))
         vertices, index = np.unique(mesh.points.astype(float), axis=0, return_inverse=True)
         return cls(vertices=scale * vertices, faces=index.reshape(-1)[mesh.cells_dict["triangle"]])
+
+    @classmethod
+    def from_files(cls, values: dict[str, Any], where: str, folder: Path) -> dict[str, Any]:
+        if "file" not in values:
+            return values
+        others = sorted(values.keys() - {"file", "scale"})
+        must(not others, where, "given a file and a scale alone, or vertices and faces", ", ".join(others))
+        file, scale = values["file"], values.get("scale", 1.0)
+        must(isinstance(file, str), f"{where}.file", "text", file)
+        must(regular_file.exists(folder / file), f"{where}.file", "there", str(folder / file))
+        surface = cls.read(folder / file, scale, where)
+        return {"vertices": surface.vertices, "faces": surface.faces}
 
     @model_validator(mode="after")
     def _indexed(self) -> Self:

@@ -9,6 +9,7 @@ from tisim.components.domain import Domain
 from tisim.effects.base import PairEvent
 from tisim.neighbours.near_list import NearList
 from tisim.worlds.bound import Bound
+from tisim.worlds.occasion import Occasion, OnOccasion
 from tisim.worlds.phases import PerParticle, Phase
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
@@ -80,8 +81,11 @@ class ClearContacts(Phase):
         self.c.overlaps[w] = 0
 
 
-class FindContacts(PerParticle):
-    """This phase looks at every near pair: it enters those in contact, and asks the control about all."""
+class FindContacts(OnOccasion, PerParticle):
+    """This phase looks at every near pair: it enters those in contact, and asks the control about all.
+
+    After events it looks for the control only: those in contact have been dealt with.
+    """
 
     def __init__(self, near: NearList, contacts: ContactList, control: Bound[Any]) -> None:
         super().__init__(near.s)
@@ -103,6 +107,7 @@ class FindContacts(PerParticle):
     def run(self, w, i):
         near, s, listed = self.near, self.s, self.near.listed(w)
         soonest, overlaps = ti.cast(ti.math.inf, ti.f64), 0
+        enters = s.occasion[w] != Occasion.AFTER_EVENTS
         for k in range(near.offered(w, i, listed)):
             j = near.candidate(w, i, k, listed)
             leads = near.leads(w, i, j)
@@ -110,27 +115,9 @@ class FindContacts(PerParticle):
             if leads or listed:
                 a, b = ti.select(leads, i, j), ti.select(leads, j, i)
                 d = near.domain.separation(w, s.position[w, a], s.position[w, b], s.time[w])
-                overlaps += self.enter(w, a, b, d)
+                if enters:
+                    overlaps += self.enter(w, a, b, d)
                 soonest = ti.min(soonest, self.control.pair(s, w, a, b, d))
         self.control.note(self.s, w, i, soonest)
-        if ti.static(self.hard):
+        if ti.static(self.hard) and enters:
             self.contacts.count_overlaps(w, overlaps)
-
-
-class FindContactsAfterEvents(FindContacts):
-    """After events, this phase looks at every near pair once more, for the control only."""
-
-    conditional = True
-
-    def __init__(self, near: NearList, contacts: ContactList, control: Bound[Any]) -> None:
-        super().__init__(near, contacts, control)
-        # Those that overlap have been counted.
-        self.hard = False
-
-    @ti.func
-    def when(self, w):
-        return self.s.events[w]
-
-    @ti.func
-    def enter(self, w, i, j, separation):
-        return 0

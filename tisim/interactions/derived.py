@@ -1,10 +1,11 @@
 """Quantities of particles that are set before forces are summed (``DerivedQuantity``)."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
 from tisim.worlds.bound import Bound
+from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import Item, PerParticle
 from tisim.worlds.state import State
 
@@ -51,13 +52,13 @@ class DerivedSolver:
         self.packed, self.unpacked = (_same, _same) if vector else (_packed, _unpacked)
         self.size = _length if vector else _magnitude
 
-    def phases(self, after_events: bool = False, trial: bool = False) -> tuple[Item, ...]:
+    def phases(self, trial: bool = False) -> tuple[Item, ...]:
         """Return the phases that set the quantity.
 
-        after_events : whether only in worlds where events have changed who is where. trial : whether in a
-        state that may be far from any solution; what is not finite is then left to the forces to show.
+        trial : whether in a state that may be far from any solution; what is not finite is then left to the
+        forces to show.
         """
-        return ((SetDerivedAfterEvents if after_events else SetDerived)(self, trial),)
+        return (SetDerived(self, trial),)
 
     @ti.func
     def set(self, s, w, i, t):
@@ -66,7 +67,7 @@ class DerivedSolver:
         self.value[w, i] = self.effect.response(s, w, i, nothing, t)
 
 
-class SetDerived(PerParticle):
+class SetDerived(OnOccasion, PerParticle):
     """This phase sets value_i = response(0)."""
 
     def __init__(self, solver: DerivedSolver, trial: bool) -> None:
@@ -84,13 +85,3 @@ class SetDerived(PerParticle):
         a = self.solver
         if not finite(a.size(a.value[w, i])):
             self.s.fail_by_effect(w, i, a.effect.index)
-
-
-class SetDerivedAfterEvents(SetDerived):
-    """This phase sets the quantity anew in worlds where events have changed who is where."""
-
-    conditional: ClassVar[bool] = True
-
-    @ti.func
-    def when(self, w):
-        return self.s.events[w]

@@ -10,6 +10,7 @@ from tisim.numerics.ieee import finite
 from tisim.numerics.roots import estimates_roots
 from tisim.numerics.vectors import piece
 from tisim.worlds.fields import Field
+from tisim.worlds.occasion import Occasion
 from tisim.worlds.status import WorldStatus
 
 if TYPE_CHECKING:
@@ -50,12 +51,11 @@ class SumForces(PairSum):
     Where an effect of the scene exerts torques these are summed along with it: one vector of six. A particle
     that is ``fixed``, where the scene has that field, takes none. What pairs remember advances with the sum.
 
-    trial : whether the state is one that may be given up. elapsed : whether pairs have gone on for ``dt``
-    since their memory was last brought up to date. commits : whether it now is.
+    trial : whether the state is one that may be given up. commits : whether what pairs remember may be
+    brought up to date with it.
     """
 
     trial: ClassVar[bool] = False
-    elapsed: ClassVar[bool] = True
     commits: ClassVar[bool] = True
 
     def __init__(
@@ -78,6 +78,10 @@ class SumForces(PairSum):
             laws.append((law, self.pair_values))
             self.pair_values += law.data.memory if self.commits else 0
         self.laws = tuple(laws)
+        self.remembers = any(
+            effect.data.offers("load" if isinstance(effect.data, Force) else "interaction")
+            for effect in (*self.forces, *self.pair_forces)
+        )
         able = all(effect.data.offers_inverse() for effect in self.long_ranged)
         self.by_inverse = able and not self.turning and estimates_roots()
 
@@ -164,7 +168,7 @@ class SumForces(PairSum):
 
     @ti.func
     def write_memory(self, w, m, values):
-        if ti.static(self.commits):
+        if self.updates_memory(w):
             for law, begin in ti.static(self.laws):
                 if ti.static(law.memory > 0):
                     law.past.write(w, m, piece(values, begin, law.memory))
@@ -172,14 +176,23 @@ class SumForces(PairSum):
     @ti.func
     def elapsed_time(self, w):
         """Return the time (s) since what particles remember was last brought up to date."""
-        dt = ti.cast(0.0, self.s.real)
-        if ti.static(self.elapsed):
-            dt = ti.cast(self.s.dt[w], self.s.real)
-        return dt
+        s, now = self.s, self.s.occasion[w]
+        none = now == Occasion.START or now == Occasion.AFTER_EVENTS
+        step = ti.select(now == Occasion.AHEAD, s.step_ahead[w], s.dt[w])
+        return ti.cast(ti.select(none, 0.0, step), s.real)
+
+    @ti.func
+    def updates_memory(self, w):
+        """Return whether what particles remember is brought up to date with this sum."""
+        updates = False
+        if ti.static(self.commits):
+            occasion = self.s.occasion[w]
+            updates = occasion == Occasion.STEP or occasion == Occasion.START
+        return updates
 
     @ti.func
     def out_of_reach(self, w, m):
-        if ti.static(self.commits):
+        if self.updates_memory(w):
             for effect in ti.static(self.short_ranged):
                 if ti.static(effect.memory > 0):
                     effect.past.forget(w, m)
@@ -203,12 +216,15 @@ class SumForces(PairSum):
     @ti.func
     def check(self, w, i, total):
         if not finite(total.norm_sqr()):
+            if self.s.occasion[w] == Occasion.AHEAD:
+                # The law at fault is found by a sum over the step.
+                self.s.dt[w] = self.s.step_ahead[w]
             self.s.fail_by_force(w, WorldStatus.NOT_FINITE, i)
 
     @ti.func
     def load_by(self, effect: ti.template(), w, i, t):  # type: ignore[valid-type]
         """Return the force on i by one law that no other particle exerts, with its torque."""
-        force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.commits)
+        force, torque = effect.load(self.s, w, i, t, self.elapsed_time(w), self.updates_memory(w))
         return self.wrench(force, torque)
 
     @ti.func
@@ -233,13 +249,3 @@ class SumTrialForces(SumForces):
     @ti.func
     def check(self, w, i, total):
         pass
-
-
-class SumForcesAfterEvents(SumForces):
-    """After events have changed who is where, this phase sums the forces that the next step begins with."""
-
-    conditional, elapsed, commits = True, False, False
-
-    @ti.func
-    def when(self, w):
-        return self.s.events[w]

@@ -13,6 +13,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.interactions.pair_chunks import PairChunks, PerChunk
+from tisim.worlds.occasion import Occasion
 from tisim.worlds.phases import Item, PerParticle, Phase
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class PartOfSum(PerChunk):
     @ti.func
     def note_memory(self, w):
         """Note that pairs remember what the particles have not stored, where the sum brings it up to date."""
-        if ti.static(self.commits):
+        if ti.static(self.commits) and self.total.updates_memory(w):
             self.p.unsaved[w] = 1
 
     @ti.func
@@ -167,7 +168,7 @@ class AddPairs(PartOfSum):
 class CloseSum(PartOfSum):
     """This phase adds what other chunks have exported to the particles of this one; then the sums are done.
 
-    after : what follows with each particle at once, while it is in the cache.
+    after : what follows in a step with each particle at once, while it is in the cache.
     """
 
     def __init__(
@@ -191,21 +192,24 @@ class CloseSum(PartOfSum):
                 result += self.total.start(w, i, t)
             self.total.finish(w, i, result, t)
             # What has failed stays as it was, so that the law at fault can be found.
-            if self.s.failed[w] == 0:
+            if self.s.failed[w] == 0 and self.s.occasion[w] == Occasion.STEP:
                 for phase in ti.static(self.after):
                     phase.run(w, i)
 
 
-def fuse(items: Sequence[Item]) -> list[Item]:
-    """Return the items of a step, in which what is local follows the end of a sum at once."""
+def fuse(step: Sequence[Item], sums: Sequence[Item]) -> tuple[list[Item], list[Item]]:
+    """Return the items of a step, in which what is local follows the end of a sum at once, and sums that are
+    taken there and elsewhere, with such ends."""
     fused: list[Item] = []
-    for item in items:
+    ends: dict[Item, Item] = {}
+    for item in step:
         last = fused[-1] if fused else None
         if isinstance(last, CloseSum) and isinstance(item, PerParticle) and item.local:
             fused[-1] = CloseSum(last.total, last.exported, (*last.after, item))
+            ends |= {end: fused[-1] for end in (last, *(key for key in ends if ends[key] is last))}
         else:
             fused.append(item)
-    return fused
+    return fused, [ends.get(item, item) for item in sums]
 
 
 def sum_phases(total: "PairSum", exported: ExportedTerms | None) -> tuple[Phase, ...]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.numerics.roots import inverse_root
+from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import PerParticle
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ MANY = 1000
 launches cost a step 0.2 ms, as much as the pairs of 400)."""
 
 
-class PairSum(PerParticle):
+class PairSum(OnOccasion, PerParticle):
     """A pair sum is, for each particle, a sum over the others: all of them, then those near enough to be
     listed.
 
@@ -44,7 +45,7 @@ class PairSum(PerParticle):
     ``pair_values``, in ``compute_pair``, and what of it is added to the sums of the two, in
     ``pair_contributions``.
 
-    commits : whether what pairs remember is brought up to date with the sum, by ``write_memory``.
+    commits : whether what pairs remember may be brought up to date with the sum, by ``write_memory``.
     by_inverse : whether terms of all pairs are made by ``term_by_inverse``.
     """
 
@@ -108,6 +109,11 @@ class PairSum(PerParticle):
         """Return what the values computed for a pair add to the sums of i and of j."""
         nothing = ti.Vector.zero(self.s.real, self.components)
         return nothing, nothing
+
+    @ti.func
+    def updates_memory(self, w):
+        """Return whether what pairs remember is now brought up to date with the sum."""
+        return False
 
     @ti.func
     def write_memory(self, w, m, values):

@@ -1,7 +1,7 @@
 """Sweeps that solve for a quantity which particles give each other, such as induced dipoles
 (``SelfConsistentQuantity``)."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from tisim.interactions.pair_sum import PairSum
 from tisim.numerics.ieee import finite
 from tisim.numerics.vectors import piece
 from tisim.worlds.bound import Bound
+from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
 from tisim.worlds.state import State
 from tisim.worlds.status import WorldStatus
@@ -52,18 +53,15 @@ class SelfConsistentSolver(DerivedSolver):
             builder.dense(ti.i, s.worlds).place(column)
         self.tree = Tree(builder)
 
-    def phases(self, after_events: bool = False, trial: bool = False) -> tuple[Item, ...]:
-        return (
-            (BeginSweepsAfterEvents if after_events else BeginSweeps)(self),
-            SweepUntilConverged(self, trial),
-        )
+    def phases(self, trial: bool = False) -> tuple[Item, ...]:
+        return BeginSweeps(self), SweepUntilConverged(self, trial)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
         return self.tree.bytes + (self.exported.bytes() if self.exported else 0)
 
 
-class BeginSweeps(PerParticle):
+class BeginSweeps(OnOccasion, PerParticle):
     """This phase asks for a sweep, from the last values, or from nothing where they have been lost."""
 
     def __init__(self, solver: SelfConsistentSolver) -> None:
@@ -80,16 +78,6 @@ class BeginSweeps(PerParticle):
                 change[w] = 0.0
         if not finite(a.size(a.value[w, i])):
             a.value[w, i] = a.unpacked(ti.Vector.zero(self.s.real, a.components))
-
-
-class BeginSweepsAfterEvents(BeginSweeps):
-    """This phase begins sweeps in worlds where events have changed who is where."""
-
-    conditional: ClassVar[bool] = True
-
-    @ti.func
-    def when(self, w):
-        return self.s.events[w]
 
 
 class SweepUntilConverged(Repeat):

@@ -88,4 +88,4 @@ def _read_text(path: Path) -> Any:
         if path.suffix == ".toml":
             return Scene.from_toml(path)
         raise InputError(f"file to read must be {READABLE}; received {str(path)!r}") from None
-    return Scene.from_dict(table)
+    return Scene.from_dict(table, path.parent)

@@ -4,6 +4,7 @@ A list is made anew when particles have moved so far that a pair it lacks could 
 that is.
 """
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from typing import ClassVar
 
@@ -14,7 +15,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.domain import Domain
-from tisim.effects.base import Pairwise
+from tisim.effects.base import Constraint, Pairwise
 from tisim.neighbours.cell_grid import LEVELS
 from tisim.neighbours.neighbour_rows import ALL_PAIRS, NeighbourRows
 from tisim.numerics.ieee import far_away
@@ -48,7 +49,8 @@ class ListSizes:
 
 @ti.data_oriented
 class HalfList(NeighbourRows):
-    """A half list has the pairs of the worlds by which laws may act, each row in order of index.
+    """A half list has the pairs of the worlds by which laws may act, each row in order of index; not those
+    within a rigid body.
 
     spent : part of the skin that movements may use up. pace : how far a particle moves in a step (m), found
     from ``moves`` steps since the list was ``made`` (s).
@@ -57,9 +59,15 @@ class HalfList(NeighbourRows):
     ordered: ClassVar[bool] = True
 
     def __init__(
-        self, s: State, domain: Bound[Domain], laws: tuple[Bound[Pairwise], ...], sizes: ListSizes
+        self,
+        s: State,
+        domain: Bound[Domain],
+        laws: tuple[Bound[Pairwise], ...],
+        constraints: tuple[Bound[Constraint], ...],
+        sizes: ListSizes,
     ) -> None:
         super().__init__(s, domain, sizes.row)
+        self.constraints = constraints
         self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
@@ -78,10 +86,31 @@ class HalfList(NeighbourRows):
         return self.sizes.joined(ListSizes(self.wanted_row(), mean))
 
     @in_taichi_thread
-    def outlook(self) -> np.ndarray:
-        """Return how far (m) each particle looked from its centre when lists were last made."""
-        farthest: np.ndarray = self.grid.near.to_numpy()
-        return farthest
+    def outlooks(self, newcomers: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return how far (m) each particle looked from its centre when lists were last made, then how far one
+        of each of some radii (m) would, of the worlds for which ``newcomers`` has any."""
+        farthest, counts = self.grid.near.to_numpy(), self.s.count.to_numpy()
+        most = max(map(len, newcomers))
+        later = np.zeros((self.s.worlds, most))
+        for row, radius in zip(later, newcomers, strict=False):
+            row[: len(radius)] = radius
+        if most:
+            self._look(later)
+        return [
+            np.concatenate([farthest[w, : counts[w]], later[w, : len(radius)]])
+            for w, radius in enumerate(newcomers)
+        ]
+
+    @ti.kernel
+    def _look(self, later: ti.types.ndarray()):  # type: ignore[valid-type]
+        """Put how far particles of these radii (m) look in place of them; each is in turn what a world has
+        room for beyond its last particle."""
+        for w in range(self.s.worlds):
+            for k in range(later.shape[1]):
+                i = self.s.count[w]
+                if later[w, k] > 0.0:
+                    self.s.radius[w, i] = ti.cast(later[w, k], self.s.real)
+                    later[w, k] = ti.cast(self.s.radius[w, i] + self.reach(w, i), ti.f64)
 
     def forget(self) -> None:
         """Have every list made anew before it is used again, as the first of a run: nothing is known of how
@@ -112,6 +141,13 @@ class HalfList(NeighbourRows):
     def lists(self, w, i, j):
         a, b = self.s.radius[w, i], self.s.radius[w, j]
         return a < b or (a == b and self.s.id[w, i] < self.s.id[w, j])
+
+    @ti.func
+    def joined(self, w, i, j):
+        joined = False
+        for constraint in ti.static(self.constraints):
+            joined = joined or constraint.joined(self.s, w, i, j)
+        return joined
 
     @ti.func
     def sees(self, d, distance, skin):

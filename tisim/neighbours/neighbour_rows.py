@@ -89,6 +89,11 @@ class NeighbourRows:
         return 0
 
     @ti.func
+    def joined(self, w, i, j):
+        """Return whether the pair is within a rigid body, and not listed."""
+        return False
+
+    @ti.func
     def sees(self, d, distance, skin):
         """Return whether two that are d (m) apart may come within a distance (m) before the list is made
         anew, with this skin along each axis (m)."""

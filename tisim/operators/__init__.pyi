@@ -7,4 +7,5 @@ from .insertion import Insertion as Insertion
 from .insertion_rules import InsertionByFlux as InsertionByFlux
 from .insertion_rules import InsertionByFraction as InsertionByFraction
 from .outflow import Outflow as Outflow
+from .passage import Passage as Passage
 from .peak_displacement import PeakDisplacement as PeakDisplacement

@@ -5,7 +5,10 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.effects.base import Constraint
+from tisim.effects.constraint.rigid_clumps import RigidClumps
 from tisim.effects.external.gravity import Gravity
+from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator, parameter
 from tisim.operators.insertion import Insertion
 from tisim.worlds.bound import Peers
@@ -25,15 +28,18 @@ class AtRest(Operator):
     PFC have the mean contact force in place of the weight, which is larger in a deep bed; here a grain on top
     counts as one below.) Either alone can be deceived: by grains that are let go, and by those that fall at a
     steady speed. Grains are looked at ten times in ``time``, and must be at rest each time. Grains that are
-    fixed do not count. While insertions are not done nothing is at rest. The ratios at the last look are
-    ``measures``: ``kinetic_ratio`` and ``unbalanced_ratio``.
+    fixed, or held by a constraint, do not count, and without others nothing is at rest; nor is it while
+    insertions are not done (by fraction: not begun). The ratios at the last look are ``measures``:
+    ``kinetic_ratio`` and ``unbalanced_ratio``.
 
     Source: C. O'Sullivan, Particulate Discrete Element Modelling (2011), section 2.6.
     """
 
     world_quantities = ("kinetic_ratio", "unbalanced_ratio")
     flags: ClassVar = ("looks_at_rest",)
+    any_order: ClassVar[bool] = True
     requires: ClassVar = (Gravity,)
+    excludes: ClassVar = (RigidClumps,)
     ends: ClassVar = "grains are at rest"
 
     energy: float = parameter("", "kinetic energy at rest, over that of a fall by a radius", 1e-5, gt=0)
@@ -41,7 +47,11 @@ class AtRest(Operator):
     time: float = parameter("s", "time for which grains must be at rest", gt=0, examples=[0.05])
 
     def connect(self, peers: Peers) -> dict[str, Any]:
-        return {"gravity": peers.of(Gravity), "insertions": peers.of(Insertion)}
+        return {
+            "gravity": peers.of(Gravity),
+            "insertions": peers.of(Insertion),
+            "constraints": peers.of(Constraint),
+        }
 
     @ti.func
     def acts(self, s, w):
@@ -64,19 +74,24 @@ class AtRest(Operator):
                 unbalanced += s.force[w, i].norm()
                 weight += m * g.norm()
                 depth += m * g.norm() * radius
-        calm = kinetic <= self.energy(w) * depth and unbalanced <= self.unbalanced(w) * weight
+        calm = weight > 0.0 and kinetic <= self.energy(w) * depth
+        calm = calm and unbalanced <= self.unbalanced(w) * weight
         for insertion in ti.static(self.insertions):
             calm = calm and insertion.pending(s, w) == 0
         if weight > 0.0:
             s.kinetic_ratio[w] = ti.cast(kinetic / depth, ti.f64)
             s.unbalanced_ratio[w] = ti.cast(unbalanced / weight, ti.f64)
+            if not finite(s.kinetic_ratio[w] + s.unbalanced_ratio[w]):
+                s.fail_world_by_effect(w, self.index)
         s.looks_at_rest[w] = ti.select(calm, s.looks_at_rest[w] + 1, 0)
         if s.looks_at_rest[w] > LOOKS:
             s.finish(w, self.index)
 
     @ti.func
     def is_fixed(self, s, w, i):
-        fixed = 0
+        fixed = False
         if ti.static(hasattr(s, "fixed")):
-            fixed = s.fixed[w, i]
-        return fixed > 0
+            fixed = s.fixed[w, i] > 0
+        for constraint in ti.static(self.constraints):
+            fixed = fixed or constraint.holds(s, w, i)
+        return fixed

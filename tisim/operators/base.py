@@ -17,10 +17,15 @@ __all__ = ["Operator", "option", "parameter"]
 
 
 class Operator(Effect):
-    """An operator changes the state between steps."""
+    """An operator changes the state between steps.
+
+    any_order : whether ``world`` does the same in whatever order particles are in memory, but for rounding;
+    then large worlds may be sorted by place.
+    """
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
+    any_order: ClassVar[bool] = False
 
     @ti.func
     def particle(self, s, w, i, t, dt):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import PairEvent
+from tisim.effects.base import Constraint, PairEvent
 from tisim.operators.base import Operator
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.worlds.bound import Peers
@@ -33,7 +33,7 @@ class Capture(Operator):
     )
     counters: ClassVar = ("captures",)
     requires: ClassVar = (Magnets,)
-    excludes: ClassVar = (PairEvent,)
+    excludes: ClassVar = (PairEvent, Constraint)
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {"magnets": peers.of(Magnets)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -10,17 +10,19 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
+from tisim.components.material_law import UsesMaterials
+from tisim.components.materials import Materials
 from tisim.numerics import philox
 from tisim.numerics.random_streams import INSERTION
 from tisim.operators.base import Operator, option, parameter
 from tisim.operators.filled_region import FilledRegion
-from tisim.packing.grains import GrainClass, check_quantities
+from tisim.packing.grains import GrainClass, check_quantities, class_materials, quantity
 
 MOST_TRIES = 20_000
 """A draw of Philox has room for so many tries of a grain in a step."""
 
 
-class Insertion(FilledRegion, Operator):
+class Insertion(FilledRegion, UsesMaterials, Operator):
     """An insertion puts grains at random places of a region, where they overlap none that are there.
 
     Grains come one after another, each drawn from the classes, with v = velocity + deviation * lambda, lambda
@@ -36,6 +38,7 @@ class Insertion(FilledRegion, Operator):
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
     fields = ("radius",)
+    any_order: ClassVar[bool] = True
 
     grains: tuple[GrainClass, ...] = option("classes of the grains that are put in", min_length=1)
     number: int = option("grains that are put in, at most", gt=0, le=10**8, examples=[1000])
@@ -48,21 +51,38 @@ class Insertion(FilledRegion, Operator):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        check_quantities(self.grains, ("position", "velocity", "mass", "radius", "id"))
-        self.check_room(max(float(one.sizes.nodes()[0][-1]) for one in self.grains))
+        check_quantities(self.grains, ("position", "velocity", "mass", "radius", "id", "material"))
+        self.check_room(self.newcomer_radii()[0])
         return self
 
     def structure(self) -> tuple[Any, ...]:
-        """Return what is compiled in: sizes and further quantities too."""
-        classes = ((one.sizes, *sorted(one.quantities.items())) for one in self.grains)
+        """Return what is compiled in: sizes, materials and further quantities too."""
+        classes = ((one.sizes, one.material, *sorted(one.quantities.items())) for one in self.grains)
         return (*super().structure(), *classes)
 
     def keeps(self, what: str) -> tuple[str, ...]:
         own = (f"{self.label}_number", f"{self.label}_mass") if what == "world_quantities" else ()
         return *super().keeps(what), *own
 
-    def newcomers(self) -> Collection[str]:
-        return self.grains[0].quantities
+    def check_materials(self, materials: Materials) -> None:
+        class_materials(self.grains, materials)
+
+    def given_quantities(self) -> list[dict[str, Any]]:
+        """Return what each class gives its grains besides, by name; the index of its material too, where one
+        has a material of its own."""
+        given: list[dict[str, Any]] = [dict(sorted(one.quantities.items())) for one in self.grains]
+        indices = class_materials(self.grains, self._materials)
+        if indices is None:
+            return given
+        return [{**one, "material": index} for one, index in zip(given, indices, strict=True)]
+
+    def newcomer_radii(self) -> tuple[float, ...]:
+        largest = max(float(one.sizes.nodes()[0][-1]) for one in self.grains)
+        return (largest,) * min(self.number, 2)
+
+    def newcomers(self) -> Mapping[str, np.ndarray]:
+        every = np.arange(len(self.grains))
+        return {name: quantity(self.grains, name, every) for name in self.grains[0].quantities}
 
     def capacity(self, masses: np.ndarray) -> int:
         return len(masses) + self.number
@@ -71,19 +91,18 @@ class Insertion(FilledRegion, Operator):
         tables = [one.sizes.table() for one in self.grains]
         lengths = np.array([len(table) for table in tables])
         ends, by_number = np.cumsum(lengths), [one.sizes.by == "number" for one in self.grains]
-        given = [[value for _, value in sorted(one.quantities.items())] for one in self.grains]
         return {
             "nodes": np.concatenate(tables),
             "spans": np.column_stack([ends - lengths, ends - 1, by_number]).astype(float),
             # A column more, as there may be nothing given.
-            "given": np.array([np.hstack([*values, 0.0]) for values in given]),
+            "given": np.array([np.hstack([*one.values(), 0.0]) for one in self.given_quantities()]),
         }
 
     def remembers(self, s: Any) -> dict[str, Any]:
         """Return the fields of its own quantities, and of what classes give: each with its first column."""
         number, mass = (getattr(s, name) for name in self.keeps("world_quantities"))
         given, first = [], 0
-        for name, value in sorted(self.grains[0].quantities.items()):
+        for name, value in self.given_quantities()[0].items():
             if hasattr(s, name):
                 given.append((getattr(s, name), first, np.size(value)))
             first += np.size(value)

@@ -57,7 +57,8 @@ class InsertionByFraction(Insertion):
     At ``begin``, and whenever an ``interval`` has passed, grains are put in until those whose centres are in
     the region have the ``fraction`` of its volume, or until one finds no place. At random places the fraction
     of equal spheres comes to 0.3 with some thousand tries, and to 0.38 with no number of them. It is what
-    LIGGGHTS has as ``fix insert/pack``.
+    LIGGGHTS has as ``fix insert/pack``. For ``at_rest`` it is done after the first filling: whether there
+    will be room for more, nobody knows.
     """
 
     fraction: float = parameter("", "part of the region's volume that is filled", gt=0, lt=1, examples=[0.2])
@@ -69,8 +70,8 @@ class InsertionByFraction(Insertion):
         begin, interval = ti.cast(self.begin(w), ti.f64), ti.cast(self.interval(w), ti.f64)
         before = s.time[w] - s.dt[w]
         due = ti.floor((s.time[w] - begin) / interval) > ti.floor((before - begin) / interval)
-        first = before <= begin and s.time[w] >= begin
-        due = (due and before > begin) or first
+        first = s.time[w] >= begin and (before < begin or before <= 0.0)
+        due = (due and before >= begin) or first
         return ti.cast(due and self.inserted[w] < self.number, ti.i32)
 
     @ti.func

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.effects.constraint.rigid_clumps import RigidClumps
 from tisim.geometry.plane import Plane
 from tisim.operators.base import Operator, option
 
@@ -17,9 +18,11 @@ class Outflow(Operator):
     """
 
     fields = ("radius",)
+    any_order: ClassVar[bool] = True
     counters = ("outflow",)
     world_quantities = ("outflow_mass",)
     flags: ClassVar = ("outflow_due",)
+    excludes: ClassVar = (RigidClumps,)
 
     planes: tuple[Plane, ...] = option("planes behind which grains are taken out", min_length=1)
 

@@ -1,4 +1,5 @@
 from .around_cylinder import RandomAroundCylinder as RandomAroundCylinder
+from .clump import Clump as Clump
 from .grains import GrainClass as GrainClass
 from .placement import (
     Lattice as Lattice,

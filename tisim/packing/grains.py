@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Component, Text, Vector, option, parameter
+from tisim.components.materials import Materials
 from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
 from tisim.numerics.random_streams import GRAIN_SIZES
@@ -27,6 +28,9 @@ class GrainClass(Component):
     density: float = parameter("kg/m^3", "density of its grains", examples=[2500.0], gt=0)
     share: float = parameter(
         "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
+    )
+    material: Text | None = option(
+        "material of its grains; unless given, that of the cloud, or the first of the scene", None
     )
     quantities: Mapping[Text, float | Vector] = option(
         "further fields of its grains by name, in SI, such as temperature", default_factory=dict
@@ -77,10 +81,28 @@ def quantity(classes: Sequence[GrainClass], name: str, which: np.ndarray) -> np.
     return np.array([one.quantities[name] for one in classes], float)[which]
 
 
+def class_materials(
+    classes: Sequence[GrainClass], materials: Materials, otherwise: int = 0
+) -> np.ndarray | None:
+    """Return the index of the material of each class, ``otherwise`` where it has none of its own; None where
+    no class has one. Raise InputError for one that the scene does not have."""
+    if all(one.material is None for one in classes):
+        return None
+    indices = [
+        otherwise if one.material is None else materials.index(one.material, f"grains.{k}.material")
+        for k, one in enumerate(classes)
+    ]
+    return np.array(indices)
+
+
 def check_quantities(classes: Sequence[GrainClass], taken: Collection[str]) -> None:
-    """Raise InputError unless all classes give the same quantities, and none that is given otherwise."""
+    """Raise InputError unless all classes give the same quantities, with as many components, and none that
+    is given otherwise."""
     for k, one in enumerate(classes):
         names, where = sorted(one.quantities), f"grains.{k}.quantities"
         must(names == sorted(classes[0].quantities), where, "those of the other classes", ", ".join(names))
         for name, value in one.quantities.items():
             must(name not in taken, f"{where}.{name}", "given once, and none that the grains have", value)
+            components = np.size(classes[0].quantities[name])
+            rule = f"of as many components as in the other classes, {components}"
+            must(np.size(value) == components, f"{where}.{name}", rule, value)

@@ -1,4 +1,4 @@
-"""A picture of a cloud: its start and its end on one scale, grains as spheres of their true size."""
+"""A picture of a cloud: its start and its end on one scale, grains as spheres of their size, and walls."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from tisim.effects.external.gravity import Gravity
 from tisim.engine.result import Result
 from tisim.plotting.style import empty, letters, si
+from tisim.plotting.walls import outlines
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
@@ -27,6 +28,8 @@ AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
 """The viewer stands in this direction: its angle to x in the xy plane and above it, rad."""
 GRAIN_COLOUR = (0.36, 0.55, 0.73)
 """Grains without a temperature have this colour: red, green and blue, 0..1."""
+WALL_COLOUR = "0.55"
+"""Outlines of walls have this grey; grains are in front of them."""
 GRAVITY_COLOUR = "#b3413e"
 """The arrow of gravity has this colour."""
 # Without its black end, against which neither shade nor edge of a cold grain would show.
@@ -55,14 +58,16 @@ def start_and_end(
     last : what the second is called.
 
     Grains are coloured by temperature where they have one. A grain too small to be seen is drawn as a dot.
+    Walls are drawn as outlines, where their motion has them at the time.
     """
     figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
     norm = temperatures(states)
     box = corners(*scene.domain.bounds())
-    square = common(states, box)
-    for axis, state, heading, time in zip(axes, states, ("start", last), times, strict=True):
-        panel(axis, state, square, box, norm)
+    walls = [walls_at(scene, states, time) for time in times]
+    square = common(states, np.vstack([box, *itertools.chain(*walls)]))
+    for axis, state, heading, time, lines in zip(axes, states, ("start", last), times, walls, strict=True):
+        panel(axis, state, square, box, norm, lines)
         directions(axis, square, gravity(scene))
         axis.set_title(f"{heading}, {caption(state, time)}")
     letters(axes)
@@ -112,6 +117,16 @@ def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
     return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
+def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.ndarray]:
+    """Return the outlines of the walls at a time (s) as seen, m; planes end around the grains of all
+    states."""
+    place, size = (np.concatenate([state[name] for state in states]) for name in ("position", "radius"))
+    if not len(size):
+        return []
+    low, high = (place - size[:, None]).min(axis=0), (place + size[:, None]).max(axis=0)
+    return [_project(line) for line in outlines(scene, time, low, high, _TOWARDS)]
+
+
 def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
     """Return a ``view`` that all states are seen in."""
     both = {name: np.concatenate([state[name] for state in states]) for name in ("position", "radius")}
@@ -129,9 +144,11 @@ def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
 
 
 def panel(
-    axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray, norm: Normalize | None
-) -> None:
-    """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``."""
+    axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray, norm: Normalize | None,
+    walls: Sequence[np.ndarray] = (),
+) -> None:  # fmt: skip
+    """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``,
+    with lines of ``walls_at``."""
     left, bottom, side = square
     colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
     if norm is not None:
@@ -140,6 +157,8 @@ def panel(
     axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
     if len(box):
         _edges(axis, box)
+    for line in walls:
+        axis.plot(*line[:, :2].T, color=WALL_COLOUR, lw=0.8, zorder=1)
     _scale_bar(axis, left, bottom, side)
     axis.set_xlim(left, left + side)
     axis.set_ylim(bottom, bottom + side)

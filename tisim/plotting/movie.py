@@ -37,7 +37,8 @@ def movie(
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
     box = cloud.corners(*frames.scene.domain.bounds())
-    square = cloud.view(ranges, box)
+    ends = [cloud.walls_at(frames.scene, [ranges], float(time)) for time in frames.times[[0, -1]]]
+    square = cloud.view(ranges, np.vstack([box, *ends[0], *ends[1]]))
     if coloured is not None:
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         cloud.scale(figure, None, coloured, side)
@@ -48,7 +49,8 @@ def movie(
         with replacing(path, unfinished), writer.saving(figure, str(unfinished), DPI):
             for k, frame in enumerate(frames):
                 axis.clear()
-                cloud.panel(axis, frame.arrays, square, box, coloured)
+                walls = cloud.walls_at(frames.scene, [ranges], frame.time)
+                cloud.panel(axis, frame.arrays, square, box, coloured, walls)
                 cloud.directions(axis, square, cloud.gravity(frames.scene))
                 figure.suptitle(cloud.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
                 writer.grab_frame()

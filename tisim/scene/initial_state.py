@@ -1,27 +1,23 @@
-"""What a scene starts with: particles given one by one, or a cloud of spheres at random."""
+"""What a scene starts with: the contract, and particles given one by one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import ConfigDict, field_serializer, field_validator, model_validator
 
 from tisim.components.arrays import Numbers, Rows, equal, frozen
-from tisim.components.component import Component, Text, Vector, option, parameter
-from tisim.components.domain import Domain
+from tisim.components.component import Component, Text, option, parameter
+from tisim.components.domain import Box, Domain, Open
 from tisim.components.materials import Materials
-from tisim.components.ranges import LEAST, MOST, PARTICLES, check_memory, limits
+from tisim.components.ranges import MOST, limits
 from tisim.errors import InputError, abbreviated, must
-from tisim.packing.grains import GrainClass, check_quantities, draw, masses, quantity
-from tisim.packing.placement import Placement, RandomInDomain
-from tisim.scene.initial_velocity import Pulse
+from tisim.packing.clump import Clump, clump_columns, sphere_columns
 
 Arrays = dict[str, np.ndarray]
 """These are particle quantities by field name: shape (n,) or (n, 3), SI."""
-
-APART = "given beside quantities, and once"
 
 
 class Start(Component):
@@ -37,7 +33,7 @@ class Start(Component):
         """Return position (m), velocity (m/s), mass (kg), radius (m) and any further quantity, n of each."""
         raise NotImplementedError(f"{type(self).__name__} must define arrays")
 
-    def material_indices(self, materials: Materials) -> np.ndarray | None:
+    def material_indices(self, materials: Materials, seed: int) -> np.ndarray | None:
         """Return the index of the material of each particle, shape (n,), given those of the scene; None where
         all are of the first."""
         return None
@@ -68,6 +64,50 @@ class Particles(Start):
         "further fields by name, in SI, such as temperature", default_factory=dict
     )
 
+    @classmethod
+    def of_clumps(
+        cls,
+        clumps: Clump | Sequence[Clump],
+        position: Any,
+        velocity: Any = (0.0, 0.0, 0.0),
+        orientation: Any = (1.0, 0.0, 0.0, 0.0),
+        angular_velocity: Any = (0.0, 0.0, 0.0),
+        spheres: Particles | None = None,
+        box: Box | None = None,
+        quantities: Mapping[str, Any] | None = None,
+        material: Any = None,
+    ) -> Self:
+        """Return the particles that rigid clumps are, for a scene with the effect RigidClumps.
+
+        clumps : the template of each, or of all. position : centres of mass, m, shape (n, 3). velocity : of
+        these, m/s. orientation : quaternions w, x, y, z by which templates are turned, shape (n, 4).
+        angular_velocity : rad/s, in space. Of these three one row may stand for all. spheres : particles of
+        no clump, which follow. box : that of the scene, through whose joined faces clumps may reach.
+        quantities : further fields of all members, one value for all or one of each clump. material : of the
+        clumps, one for all or one of each, where not all are of the first; then ``spheres`` have theirs.
+        """
+        columns, sizes = clump_columns(clumps, position, velocity, orientation, angular_velocity)
+        for name, value in (quantities or {}).items():
+            must(name not in columns, f"clumps.{name}", "a further quantity", value)
+            columns[name] = np.repeat(_of_each(f"clumps.{name}", value, len(sizes)), sizes, axis=0)
+        materials = None
+        if material is not None:
+            materials = [*np.repeat(_of_each("clumps.material", material, len(sizes)), sizes)]
+        if spheres is not None:
+            both = (material is None) == (spheres.material is None)
+            must(both, "material", "given of clumps and of the spheres beside them, or of neither", material)
+            columns = _beside(columns, spheres.masses(0), spheres.arrays(Open(), 0))
+            if materials is not None:
+                materials += [*_of_each("particles.material", spheres.material, len(spheres.masses(0)))]
+        if box is not None:
+            low, side, joined = np.array(box.low), np.diff([box.low, box.high], axis=0), box.joined()
+            inside = low + (columns["position"] - low) % side
+            # A remainder may round up to the whole side.
+            inside = np.where(inside < np.array(box.high), inside, low)
+            columns["position"] = np.where(joined, inside, columns["position"])
+        core = {name: columns.pop(name) for name in ("position", "velocity", "radius", "mass")}
+        return cls(**core, quantities=columns, material=materials)
+
     # Not that of pydantic, which takes the comparison of two arrays for a truth.
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -94,7 +134,7 @@ class Particles(Start):
         if column.ndim == 0 or column.shape == (1,):
             column = np.full(n, float(column.reshape(-1)[0]))
         must(len(column) == n, f"particles.{name}", f"one value or {n} of them", column.shape)
-        must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", _worst(column))
+        must(bool(np.isfinite(column).all()), f"particles.{name}", "finite", worst(column))
         return column
 
     @field_validator("quantities")
@@ -119,7 +159,7 @@ class Particles(Start):
     def _listed(self, value: Any) -> Any:
         return value.tolist() if isinstance(value, np.ndarray) else value
 
-    def material_indices(self, materials: Materials) -> np.ndarray | None:
+    def material_indices(self, materials: Materials, seed: int) -> np.ndarray | None:
         if self.material is None:
             return None
         given, where = self.material, "particles.material"
@@ -160,7 +200,10 @@ class Particles(Start):
         check_sizes("mass", "kg", arrays["mass"])
         for name, value in self.quantities.items():
             must(
-                name not in (*arrays, "id"), f"particles.quantities.{name}", "given beside quantities", value
+                name not in (*arrays, "id", "material"),
+                f"particles.quantities.{name}",
+                "given beside quantities",
+                value,
             )
             arrays[name] = self._column(name, value, n)
         return arrays
@@ -169,7 +212,25 @@ class Particles(Start):
         return (type(self),)
 
 
-def _worst(column: np.ndarray) -> float:
+def _beside(clumps: Arrays, mass: np.ndarray, spheres: Arrays) -> Arrays:
+    """Return the quantities of the members of clumps, and after them of spheres, which are of no clump and
+    may be of a group."""
+    given = {**sphere_columns(mass), **spheres}
+    clumps = {**clumps, **({"group": np.zeros(len(clumps["mass"]))} if "group" in given else {})}
+    must(given.keys() == clumps.keys(), "spheres beside clumps", f"given {sorted(clumps)}", sorted(given))
+    return {name: np.concatenate([values, given[name]]) for name, values in clumps.items()}
+
+
+def _of_each(name: str, value: Any, n: int) -> np.ndarray:
+    """Return n rows: those given, or the one that is given for all."""
+    rows = np.asarray(value)
+    rows = rows[None] if rows.ndim == 0 else rows
+    must(len(rows) in (1, n), name, f"one value or {n} of them", len(rows))
+    return np.resize(rows, (n, *rows.shape[1:]))
+
+
+def worst(column: np.ndarray) -> float:
+    """Return the first number that is not finite; 0 where there is none."""
     return float(column[~np.isfinite(column)].flat[0]) if not np.isfinite(column).all() else 0.0
 
 
@@ -178,116 +239,5 @@ def check_sizes(name: str, unit: str, column: np.ndarray) -> None:
     least, most = limits(unit)
     must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min()))
     outside = column[(column < least) | (column > most)]
-    worst = float(outside[0]) if len(outside) else 0.0
-    must(not len(outside), f"particles.{name}", f"from {least:g} to {most:g} {unit}", worst)
-
-
-class Cloud(Start):
-    """A cloud of spheres starts with random velocities.
-
-        v = mean_velocity + deviation * lambda + pulse
-
-    lambda is uniform in -1..1 for each particle and component. The same seed gives the same lambdas whatever
-    the other parameters. The spheres are equal, of a radius and a density, or drawn from the grains of a
-    mixture: each is of a class by the class's part of the number of grains, with a size of its own.
-
-    Source: Z04 section 7.
-    """
-
-    number: int | None = option(
-        "number of spheres; left out where the placement fixes it, as a lattice does",
-        None,
-        gt=0,
-        le=PARTICLES,
-        examples=[100],
-    )
-    radius: float | None = parameter("m", "radius of equal spheres", None, examples=[1e-3], gt=0)
-    density: float | None = parameter("kg/m^3", "density of equal spheres", None, examples=[2000.0], gt=0)
-    grains: tuple[GrainClass, ...] = option("classes of unlike spheres, instead of radius and density", ())
-    placement: Placement = option("where the centres lie", RandomInDomain())
-    mean_velocity: Vector = parameter("m/s", "mean velocity", (0.0, 0.0, 0.0))
-    deviation: Vector = parameter(
-        "m/s", "largest deviation from the mean velocity, along each axis", (0.0, 0.0, 0.0)
-    )
-    pulse: Pulse | None = option("velocities that are added at the start, such as a blast's", None)
-    temperature: float = parameter("K", "temperature", 300.0, gt=0)
-    material: Text | None = option("material of the spheres; the first of the scene unless given", None)
-    specific_charge: float | None = parameter(
-        "C/kg", "charge over mass of each sphere; unless given, there is none", None
-    )
-    quantities: Mapping[Text, float | Vector] = option(
-        "further fields by name, in SI; one number or three components, for all", default_factory=dict
-    )
-
-    @model_validator(mode="after")
-    def _sound(self) -> Self:
-        sites = self.placement.sites()
-        rule = "given" if sites is None else f"{sites}, as the placement has sites, or left out"
-        agrees = self.number is not None if sites is None else self.number in (None, sites)
-        must(agrees, "cloud.number", rule, "nothing" if self.number is None else self.number)
-        given = [name for name in ("radius", "density", "grains") if getattr(self, name)]
-        rule = "given radius and density, or grains"
-        must(given in (["radius", "density"], ["grains"]), "cloud", rule, " and ".join(given) or "none")
-        own = {"position", "velocity", "radius", "mass", "temperature", "id"}
-        own |= {"charge"} if self.specific_charge is not None else set()
-        for name, value in self.quantities.items():
-            must(name not in own, f"cloud.quantities.{name}", APART, value)
-        check_quantities(self.grains, {*own, *self.quantities} - {"temperature"})
-        mass, rule = self._equal_mass(), f"from {LEAST:g} to {MOST:g} kg"
-        must(mass is None or LEAST <= mass <= MOST, "mass of a particle of the cloud", rule, mass)
-        return self
-
-    def count(self) -> int:
-        """Return the number of spheres."""
-        return self.placement.sites() or self.number or 0
-
-    def _equal_mass(self) -> float | None:
-        """Return the mass of each sphere, kg; None of unlike ones."""
-        if self.radius is None or self.density is None:
-            return None
-        return self.density * 4 / 3 * np.pi * self.radius**3
-
-    def material_indices(self, materials: Materials) -> np.ndarray | None:
-        index = 0 if self.material is None else materials.index(self.material, "cloud.material")
-        return np.full(self.count(), index) if index else None
-
-    def masses(self, seed: int) -> np.ndarray:
-        mass = self._equal_mass()
-        if mass is None:
-            return masses(self.grains, *draw(self.grains, self.count(), seed))
-        # All in one place of memory, as the number may be large and a scene is checked before it is run.
-        return np.broadcast_to(mass, self.count())
-
-    @np.errstate(over="ignore", invalid="ignore")
-    def arrays(self, domain: Domain, seed: int) -> Arrays:
-        n = self.count()
-        check_memory(f"a cloud of {n} particles", n)
-        draws = np.random.Generator(np.random.Philox(seed)).uniform(-1.0, 1.0, (n, 3))
-        spheres = self._spheres(n, seed)
-        arrays = {
-            "position": self.placement.centres(spheres["radius"], domain, seed),
-            "velocity": np.asarray(self.mean_velocity) + np.asarray(self.deviation) * draws,
-            "temperature": np.full(n, self.temperature),
-            **{name: np.repeat([value], n, axis=0).astype(float) for name, value in self.quantities.items()},
-            **spheres,
-        }
-        if self.specific_charge is not None:
-            arrays["charge"] = arrays["mass"] * self.specific_charge
-        if self.pulse is not None:
-            arrays["velocity"] = arrays["velocity"] + self.pulse.velocity(arrays["position"], arrays["mass"])
-        for name, values in arrays.items():
-            must(bool(np.isfinite(values).all()), f"{name} of the cloud", "finite", _worst(values))
-        return arrays
-
-    def _spheres(self, n: int, seed: int) -> Arrays:
-        """Return radius and mass of each sphere, and what its class says of it."""
-        mass = self._equal_mass()
-        if mass is not None:
-            return {"radius": np.full(n, self.radius), "mass": np.full(n, mass)}
-        which, radius = draw(self.grains, n, seed)
-        names = self.grains[0].quantities
-        further = {name: quantity(self.grains, name, which) for name in names}
-        return {"radius": radius, "mass": masses(self.grains, which, radius), **further}
-
-    def structure(self) -> tuple[Any, ...]:
-        return (type(self),)
+    first = float(outside[0]) if len(outside) else 0.0
+    must(not len(outside), f"particles.{name}", f"from {least:g} to {most:g} {unit}", first)

@@ -14,13 +14,13 @@ from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.json_text import json_pieces
-from tisim.components.material_law import MaterialLaw
+from tisim.components.material_law import UsesMaterials
 from tisim.components.materials import Material, MaterialPair, Materials
 from tisim.components.sheared_box import ShearedBox
 from tisim.effects.base import Effect
-from tisim.errors import InputError, abbreviated, did_you_mean, must, printable
+from tisim.errors import InputError, abbreviated, must
 from tisim.files import python_file
-from tisim.scene import plugins
+from tisim.scene import plain_data
 from tisim.scene.initial_state import Arrays, Start
 from tisim.sources.base import Source
 from tisim.steppers.base import Stepper
@@ -85,6 +85,8 @@ class Scene(Component):
             for other, other_label in zip(present, labels, strict=True):
                 apart = not issubclass(other, kind.excludes)
                 must(apart, f"effects.{label}", f"used without {other.kind()}", other_label)
+                late = issubclass(other, kind.precedes) and labels.index(other_label) < labels.index(label)
+                must(not late, f"effects.{label}", f"before effects.{other_label}", ", ".join(labels))
             must(
                 self.stepper.control.kind() not in kind.incompatible_controls,
                 "stepper.control",
@@ -107,9 +109,9 @@ class Scene(Component):
     def _check_materials(self) -> None:
         """Raise InputError unless the materials have what effects need of them, and all names are known."""
         materials = Materials(self.materials, self.material_pairs)
-        self.particles.material_indices(materials)
+        self.particles.material_indices(materials, self.seed)
         for part in (part for effect in self.effects for part in effect.parts()):
-            if isinstance(part, MaterialLaw):
+            if isinstance(part, UsesMaterials):
                 part.check_materials(materials)
 
     def structure(self) -> tuple[Any, ...]:
@@ -124,8 +126,9 @@ class Scene(Component):
 
     def start(self, seed: int | None = None) -> Arrays:
         """Return the quantities of particles at the start, by name; of another seed where one is given."""
-        arrays = self.particles.arrays(self.domain, self.seed if seed is None else seed)
-        indices = self.particles.material_indices(Materials(self.materials, self.material_pairs))
+        seed = self.seed if seed is None else seed
+        arrays = self.particles.arrays(self.domain, seed)
+        indices = self.particles.material_indices(Materials(self.materials, self.material_pairs), seed)
         return arrays if indices is None else {**arrays, "material": indices}
 
     def capacity(self) -> int:
@@ -140,7 +143,7 @@ class Scene(Component):
         order = [effect.label for effect in self.effects]
         files = python_file.module_checksums(*dict.fromkeys(map(type, self.parts())))
         digest = hashlib.sha256(f"{json.dumps([PHYSICS_VERSION, order])[:-1]}, ".encode())
-        data = self._data(serialization.to_dict(self.particles, arrays=True))
+        data = plain_data.scene_table(self, serialization.to_dict(self.particles, arrays=True))
         data.pop("skin", None)
         for piece in json_pieces(data):
             digest.update(piece.encode())
@@ -149,52 +152,20 @@ class Scene(Component):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, as in a TOML file; ``from_dict`` is the inverse."""
-        return self._data(serialization.to_dict(self.particles))
-
-    def _data(self, particles: dict[str, Any]) -> dict[str, Any]:
-        return {
-            "name": self.name,
-            "duration": self.duration,
-            **({} if self.skin is None else {"skin": self.skin}),
-            "seed": self.seed,
-            "particles": particles,
-            **_tables("materials", self.materials),
-            **_tables("material_pairs", self.material_pairs),
-            "domain": serialization.to_dict(self.domain),
-            "stepper": serialization.to_dict(self.stepper),
-            "effects": {effect.label: _table(effect) for effect in self.effects},
-        }
+        return plain_data.scene_table(self, serialization.to_dict(self.particles))
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Scene:
-        """Make a scene of plain data; InputError names the key that is wrong."""
-        rest = serialization.table(data, "scene")
-        must("particles" in rest, "scene.particles", "given", "nothing")
-        plugins.load_parts()
-        fields: dict[str, Any] = {
-            "particles": serialization.from_dict(Start, rest.pop("particles"), "particles")
-        }
-        if "domain" in rest:
-            fields["domain"] = serialization.from_dict(Domain, rest.pop("domain"), "domain")
-        if "stepper" in rest:
-            fields["stepper"] = cls._stepper(rest.pop("stepper"))
-        effects_table = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
-        fields["effects"] = tuple(_effect(name, values) for name, values in effects_table.items())
-        for name in rest.keys() & {"materials", "material_pairs"}:
-            named = serialization.table(rest.pop(name), f"scene.{name}", "a table of tables")
-            fields[name] = {key: serialization.table(row, f"{name}.{key}") for key, row in named.items()}
-        return cls(**fields, **rest)
+    def from_dict(cls, data: Mapping[str, Any], folder: str | Path = "") -> Scene:
+        """Make a scene of plain data; InputError names the key that is wrong.
 
-    @staticmethod
-    def _stepper(data: Any) -> Stepper:
-        plugins.load_parts()
-        return serialization.from_dict(
-            Stepper, {"kind": Verlet.kind(), **serialization.table(data, "stepper")}, "stepper"
-        )
+        folder : that from which names of files in the data lead; the working directory unless given.
+        """
+        return cls(**plain_data.scene_fields(data, Path(folder)))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Scene:
-        """Read a scene from a TOML file; InputError when it is not one."""
+        """Read a scene from a TOML file, and what it names in other files, whose names lead from its folder;
+        InputError when it is not one."""
         file, label = Path(path), "scene file"
         text = None
         try:
@@ -211,7 +182,7 @@ class Scene(Component):
             raise InputError(f"{label} must be TOML; received {abbreviated(str(path))} ({fault})") from None
         if text is None:
             raise InputError(f"{label} must be a file; received {abbreviated(str(path))}")
-        return cls.from_dict(serialization.read_toml(text, label, str(path)))
+        return cls.from_dict(serialization.read_toml(text, label, str(path)), file.parent)
 
     def to_toml(self) -> str:
         """Return the scene as TOML text; ``from_toml`` gives it back."""
@@ -222,12 +193,7 @@ class Scene(Component):
         list by number, from 0: ``"effects.magnetic_cylinders.cylinders.0.radius"``."""
         data = self.to_dict()
         for key, value in settings.items():
-            *path, last = key.split(".")
-            place: Any = data
-            for depth, step in enumerate(path):
-                place = place[_step(place, step, key, ".".join(path[:depth]))]
-            # A key that is not there may be one that is left at its default.
-            place[last if isinstance(place, dict) else _step(place, last, key, ".".join(path))] = value
+            plain_data.change(data, key, value)
         return type(self).from_dict(data)
 
     def without(self, *names: str) -> Scene:
@@ -242,45 +208,7 @@ class Scene(Component):
 
 def _of(effect: Effect, materials: Materials) -> Effect:
     """Return an effect that knows the materials, if it is one that goes by them."""
-    return effect.with_materials(materials) if isinstance(effect, MaterialLaw) else effect
-
-
-def _tables(key: str, parts: Mapping[str, Component]) -> dict[str, Any]:
-    """Return a key with a table of each part by name; nothing where there is none."""
-    tables = {name: serialization.to_dict(part, named=False) for name, part in parts.items()}
-    return {key: tables} if tables else {}
-
-
-def _table(effect: Effect) -> dict[str, Any]:
-    """Return the parameters of an effect, with its kind where that is not the name of its table."""
-    values = serialization.to_dict(effect, named=effect.label != effect.kind())
-    return {key: value for key, value in values.items() if key != "name"}
-
-
-def _effect(name: str, values: Any) -> Effect:
-    """Return the effect of a table; the name of the table is its own, and its kind unless it has one."""
-    where = f"effects.{name}"
-    table = serialization.table(values, where)
-    own = table.pop("name", None)
-    must(own in (None, name), f"{where}.name", "left out, as it is that of the table", own)
-    name_entry = {"name": name} if table.get("kind", name) != name else {}
-    return serialization.from_dict(Effect, {"kind": name, **table, **name_entry}, where)
-
-
-def _step(place: Any, step: str, key: str, path: str) -> Any:
-    """Return the key or number by which a place in plain data is entered; InputError with the whole ``key``.
-
-    path : dotted name of the place; empty for the scene itself.
-    """
-    # Of few digits: Python does not read numbers of some thousand.
-    in_list = isinstance(place, list) and step.isdecimal() and len(step) < 10 and int(step) < len(place)
-    if not in_list and not (isinstance(place, dict) and step in place):
-        names = list(place) if isinstance(place, dict) else []
-        rows = f"rows 0 to {len(place) - 1}" if isinstance(place, list) and place else "none"
-        rule = f"a setting of this scene ({path or 'the scene'} has {', '.join(names) or rows})"
-        nearest = did_you_mean(step, names)
-        raise InputError(f"{printable(key)} must be {rule}; received {abbreviated(step)}{nearest}")
-    return int(step) if in_list else step
+    return effect.with_materials(materials) if isinstance(effect, UsesMaterials) else effect
 
 
 def _names(kind: type[Component]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import StepperHints
 from tisim.components.domain import Domain
-from tisim.effects.base import DerivedQuantity, Effect, Force, PairEvent, SelfConsistentQuantity
+from tisim.effects.base import Constraint, DerivedQuantity, Effect, Force, PairEvent, SelfConsistentQuantity
 from tisim.errors import must
 from tisim.sources.base import Source
 from tisim.steppers.context import Step, StepContext
@@ -33,7 +33,8 @@ class Stepper(StepperHints, Component):
     (i64), which a Result gives back, quantities (f64) and integers (i32), 0 at the start. random : whether it
     draws random numbers, so that only statistics converge. all_pairs : whether it sums over all pairs itself.
     follows_shear : whether it puts particles where they have moved to by ``domain.put``, at the time of that,
-    and reports displacements relative to ``drift``, so that it can step a sheared box.
+    and reports displacements relative to ``drift``, so that it can step a sheared box. follows_constraints :
+    whether it leaves the particles that constraints hold to these.
     """
 
     contract: ClassVar[bool] = True
@@ -43,6 +44,7 @@ class Stepper(StepperHints, Component):
     flags: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
     follows_shear: ClassVar[bool] = False
+    follows_constraints: ClassVar[bool] = False
     control: StepControl = option("step control, which chooses the length of the next step")
 
     @property
@@ -52,6 +54,10 @@ class Stepper(StepperHints, Component):
 
     def suits(self, effects: Sequence[Effect], domain: Domain) -> None:
         """Raise InputError when the stepper cannot step a scene of these effects in this domain."""
+        for effect in effects:
+            if isinstance(effect, Constraint):
+                rule = f"one that follows constraints, such as verlet, with effects.{effect.label}"
+                must(self.follows_constraints, "stepper", rule, self.kind())
         if domain.shears():
             where = f"in a {domain.kind()}"
             rule = f"one that follows shear, such as verlet or boris, {where}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tisim.effects.base import Force
+from tisim.effects.base import Constraint, Force
 from tisim.operators.base import Operator
 
 if TYPE_CHECKING:
@@ -56,6 +56,11 @@ class StepContext:
     def single_forces(self) -> tuple[Bound[Force], ...]:
         """Return the forces on particles by themselves, in scene order."""
         return self.effects.of(Force)
+
+    @property
+    def constraints(self) -> tuple[Bound[Constraint], ...]:
+        """Return the constraints of the scene, in scene order."""
+        return self.effects.of(Constraint)
 
     @property
     def forced(self) -> bool:

@@ -12,6 +12,7 @@ from tisim.components.component import option
 from tisim.effects.base import Effect, Force, PairEvent
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import BeginStep, advance_clock, apply_displacement, drift
+from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, steer_held
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
 from tisim.worlds.phases import PerParticle, Phase
@@ -31,6 +32,7 @@ class Verlet(Stepper):
     control: Controller = option("step control", ApproachTime())
 
     follows_shear: ClassVar = True
+    follows_constraints: ClassVar = True
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
@@ -41,8 +43,8 @@ class Verlet(Stepper):
         return (cls(control=FixedStep(dt=dt)), *((cls(),) if events else ()))
 
     def step(self, context: StepContext) -> Step:
-        kick = (Kick(context),) if context.forced else ()
-        drift = (BeginStep(context), Move(context), Advance(context))
+        kick = (*kick_bodies(context), Kick(context)) if context.forced else ()
+        drift = (BeginStep(context), *advance_bodies(context), Move(context), Advance(context))
         return Step((*drift, *context.update_lists, *context.sum_forces, *kick))
 
 
@@ -57,25 +59,33 @@ def half_kick(s, w, i, turning: ti.template()):  # type: ignore[valid-type]
 
 
 class Move(PerParticle):
-    """This phase kicks, drifts and wraps particles, and lets operators change single particles."""
+    """This phase kicks, drifts and wraps particles, or has them go where constraints say, and lets operators
+    change single particles."""
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
         self.domain, self.operators = context.domain, context.operators
         self.forced, self.turning = context.forced, context.turning
+        self.constraints = context.constraints
 
     @ti.func
     def run(self, w, i):
         s = self.s
         dt = ti.cast(s.dt[w], s.real)
-        if ti.static(self.forced):
-            half_kick(s, w, i, self.turning)
         before, size, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
-        s.position[w, i] = before + dt * s.velocity[w, i]
+        held = put_held(s, self.domain, self.constraints, w, i, end)
+        if held == 0:
+            if ti.static(self.forced):
+                half_kick(s, w, i, self.turning)
+            s.position[w, i] = before + dt * s.velocity[w, i]
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, end, dt)
         after, grown = s.position[w, i], ti.cast(s.radius[w, i] - size, ti.f64)
-        moved = ti.cast(after - before, ti.f64) - drift(s, self.domain, w, before) * s.dt[w]
+        path = after - before
+        if ti.static(len(self.constraints) > 0):
+            # What is held may have been put through a face already.
+            path = ti.select(held > 0, self.domain.nearest(w, before, after, end), path)
+        moved = ti.cast(path, ti.f64) - drift(s, self.domain, w, before) * s.dt[w]
         apply_displacement(s, self.domain, w, i, after, moved, grown, end)
 
 
@@ -86,11 +96,12 @@ class Kick(PerParticle):
 
     def __init__(self, context: StepContext) -> None:
         super().__init__(context.s)
-        self.turning = context.turning
+        self.turning, self.constraints = context.turning, context.constraints
 
     @ti.func
     def run(self, w, i):
-        half_kick(self.s, w, i, self.turning)
+        if steer_held(self.s, self.constraints, w, i, self.s.time[w]) == 0:
+            half_kick(self.s, w, i, self.turning)
 
 
 class Advance(Phase):

@@ -24,6 +24,7 @@ WORLD_SETTINGS = (
     "most",
     "pause_time",
     "place",
+    "occasion",
     "goal",
     "step_limit",
     "listed_above",

@@ -66,6 +66,7 @@ SHARED = {
         Field("spin", "rad/s", 3),
         Field("charge", "C", 1, "sum", default=None),
         Field("fixed", "", 1, "keep", integer=True, minimum=0.0),
+        Field("group", "", 1, "keep", integer=True, minimum=0.0),
         Field("material", "", 1, "keep", integer=True, minimum=0.0),
     )
 }

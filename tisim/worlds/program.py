@@ -1,14 +1,18 @@
-"""A step as a list of loops, and the two ways to run it.
+"""A step as a list of loops, and the three ways to run it.
 
 A ``Phase`` is one loop over the items of a world (its particles, its contacts, or the world itself) whose
 items are independent of each other. A ``Program`` is the list of phases that make one step, some of them in
-a ``Repeat``. The same phases run on two schedules, with the same bits:
+a ``Repeat``. The same phases run on three schedules, with the same bits:
 
 "world"    - a thread takes a world through many steps in one launch. No launches and no barriers between
              phases, and a world stays in cache: the way for batches and small systems on a CPU.
-"particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs and for one
-             large system on many cores. What may be repeated begins a launch of its own. On a GPU many
-             steps are launched in a row before anybody asks how far worlds have come.
+"team"     - so does a team of threads: each takes a share of the items of a phase, and they wait for each
+             other, awake, before the next (team.py): the way for large systems on many cores of a CPU. Where
+             other programs want the cores, each thread takes a world alone meanwhile (team_trials.py).
+"particle" - each phase is one loop of a launch over all particles of all worlds: the way for GPUs, and for
+             phases of few long items on a CPU, where threads take tasks as they are done with others. What
+             may be repeated begins a launch of its own. On a GPU many steps are launched in a row before
+             anybody asks how far worlds have come.
 
 That the bits agree needs no luck: phases only combine through sums in a fixed order, integer atomics and
 floating-point minima and maxima, none of which depend on the order of parallel work.

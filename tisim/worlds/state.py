@@ -4,6 +4,10 @@ from tisim.backend.taichi import ti
 from tisim.worlds.state_memory import StateMemory
 from tisim.worlds.status import ASKED, WorldStatus
 
+HEAVY = 2.0**40
+"""A particle that is fixed or moves as prescribed counts in contacts as so many times as heavy as it is: as a
+wall."""
+
 
 @ti.data_oriented
 class State(StateMemory):
@@ -29,6 +33,32 @@ class State(StateMemory):
         """Return the velocity (m/s) of j, as i sees it at ``separation`` (m), relative to i; of an image that
         moves past the box it is not the difference of the two velocities."""
         return self.domain.relative_velocity(self, w, i, j, separation)
+
+    @ti.func
+    def mass_behind(self, w, i):
+        """Return the mass (kg) that a contact of particle i meets: that of its rigid body, where it is part
+        of one; HEAVY times its own, where it is fixed."""
+        mass = self.mass[w, i]
+        if ti.static(hasattr(self, "body_mass")):
+            mass = self.body_mass[w, i]
+        if ti.static(hasattr(self, "fixed")):
+            mass = ti.select(self.fixed[w, i] > 0, HEAVY * self.mass[w, i], mass)
+        return mass
+
+    @ti.func
+    def mass_at_wall(self, w, i):
+        """Return the mass (kg) that damps a contact of particle i with a wall; its own, where it is as heavy
+        as one itself: nothing moves by it, and the force on either is that of a particle."""
+        mass, own = self.mass_behind(w, i), self.mass[w, i]
+        return ti.select(mass >= HEAVY * own, own, mass)
+
+    @ti.func
+    def masses_behind(self, w, i, j):
+        """Return the masses (kg) that a contact of particles i and j meets; their own, where both are as
+        heavy as walls."""
+        m, n, own, other = self.mass_behind(w, i), self.mass_behind(w, j), self.mass[w, i], self.mass[w, j]
+        both = (m >= HEAVY * own) & (n >= HEAVY * other)
+        return ti.select(both, own, m), ti.select(both, other, n)
 
     @ti.func
     def copy(self, w, source, target):

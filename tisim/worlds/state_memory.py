@@ -80,11 +80,13 @@ class StateMemory:
         builder.dense(ti.i, worlds).place(self.most)
         # No part of what a run is: a world waits at the first end of a step at or after ``pause_time`` (s),
         # at ``goal`` steps, and for the next launches at ``step_limit`` steps; ``place`` tells which of
-        # these it takes next. With more particles than ``listed_above`` it looks for pairs in cells.
+        # these it takes next, and ``occasion`` why. With more particles than ``listed_above`` it looks for
+        # pairs in cells.
         self.pause_time, self.place = ti.field(ti.f64), ti.field(ti.i32)
         self.goal, self.step_limit = ti.field(ti.i64), ti.field(ti.i64)
-        self.listed_above = ti.field(ti.i32)
-        for column in (self.pause_time, self.place, self.goal, self.step_limit, self.listed_above):
+        self.listed_above, self.occasion = ti.field(ti.i32), ti.field(ti.i32)
+        waits = (self.pause_time, self.place, self.occasion, self.goal, self.step_limit, self.listed_above)
+        for column in waits:
             builder.dense(ti.i, worlds).place(column)
         for name in WORLD_VECTORS:
             # Scalars with an axis index: an atomic operation on a component of a vector field is lost.

@@ -251,21 +251,23 @@ def hertz_mindlin(young, poisson, restitution, friction, levers="contact"):
 class Grains:
     """Spheres and planes (point, normal), under one law and a constant acceleration.
 
-    material : index of that of each; planes are of the first. Between loads ``past`` and ``held`` keep what
-    contacts remember, of pairs i < j and of grains at planes. ``sliding`` and ``sticking`` count contacts of
-    all loads so far. ``virial`` is the sum of r F over pairs, J, (3, 3), which presses outwards where it is
-    positive.
+    turning : (angular velocity, centre) of all planes, which that maps onto themselves. material : index of
+    that of each; planes are of the first. Between loads ``past`` and ``held`` keep what contacts remember, of
+    pairs i < j and of grains at planes. ``sliding`` and ``sticking`` count contacts of all loads so far.
+    ``virial`` is the sum of r F over pairs, J, (3, 3), which presses outwards where it is positive.
     """
 
     law: Any
 
     def __init__(
-        self, law, position, velocity, spin, radius, mass, planes=(), acceleration=(0, 0, 0), material=None
-    ):
+        self, law, position, velocity, spin, radius, mass, planes=(), acceleration=(0, 0, 0), material=None,
+        turning=((0, 0, 0), (0, 0, 0)),
+    ):  # fmt: skip
         self.law, self.radius, self.mass = law, np.asarray(radius), np.asarray(mass)
         self.x, self.v, self.w = (np.array(values, float) for values in (position, velocity, spin))
         self.planes = [(np.asarray(p, float), np.asarray(n) / np.linalg.norm(n)) for p, n in planes]
         self.acceleration, n = np.asarray(acceleration, float), len(self.x)
+        self.turning = np.asarray(turning, float)
         self.material = np.zeros(n, int) if material is None else np.asarray(material)
         self.past, self.held = np.zeros((n, n, SLOTS)), np.zeros((n, len(self.planes), SLOTS))
         self.sliding = self.sticking = 0
@@ -335,9 +337,11 @@ class Grains:
         n, arm = np.broadcast_to(-normal, (len(i), 3)), (self.radius[i] - overlap[i] / 2)[:, None]
         if self.law.levers == "radius":
             arm = self.radius[i][:, None]
-        slip = -self.v[i] - np.cross(arm * self.w[i], n)
+        rate, centre = self.turning
+        surface = np.cross(rate, self.x[i] + arm * n - centre)
+        slip, spinning = surface - self.v[i] - np.cross(arm * self.w[i], n), rate - self.w[i]
         force, couple, known = self._contact(
-            which[i], n, overlap[i], self.radius[i], self.mass[i], slip, -self.w[i], self.held[i, k], dt
+            which[i], n, overlap[i], self.radius[i], self.mass[i], slip, spinning, self.held[i, k], dt
         )
         self.held[:, k] = 0
         self.held[i, k] = known

@@ -4,17 +4,8 @@ import numpy as np
 
 from tests.effects.contact.grains import HERTZ_MINDLIN
 from tests.scenes import scene, simulate
-from tisim import Material
+from tisim import Material, geometry
 from tisim.effects import Gravity, Walls
-from tisim.geometry import (
-    BoxSurface,
-    ConicalSurface,
-    CylindricalSurface,
-    Disc,
-    Plane,
-    SphericalSurface,
-    TriangulatedSurface,
-)
 
 WORLDS, CAPACITY = 32, 2
 RADIUS, YOUNG, POISSON = 0.1, 1e7, 0.3
@@ -38,17 +29,19 @@ def sheet():
     flat = np.column_stack([x, y, np.full(81, SHEET)])
     ridge = [[a, 4 + b, SHEET + h] for a in (-2, 2) for b, h in ((-1, 0), (0, 1), (1, 0))]
     slopes = 81 + np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
-    return TriangulatedSurface(vertices=np.concatenate([flat, ridge]), faces=np.concatenate([faces, slopes]))
+    return geometry.TriangulatedSurface(
+        vertices=np.concatenate([flat, ridge]), faces=np.concatenate([faces, slopes])
+    )
 
 
 TRIANGLES = sheet()
 FAR = {
-    "planes": (Plane(point=(0, 0, -AWAY)),),
-    "discs": (Disc(centre=(AWAY, 0, 0), radius=1),),
-    "spheres": (SphericalSurface(centre=(AWAY, 9, 0), radius=1),),
-    "cylinders": (CylindricalSurface(start=(0, AWAY, 0), end=(0, AWAY, 1), radius=1),),
-    "cones": (ConicalSurface(start=(0, AWAY, 9), end=(0, AWAY, 10), start_radius=1, end_radius=0),),
-    "boxes": (BoxSurface(low=(AWAY,) * 3, high=(2 * AWAY,) * 3),),
+    "planes": (geometry.Plane(point=(0, 0, -AWAY)),),
+    "discs": (geometry.Disc(centre=(AWAY, 0, 0), radius=1),),
+    "spheres": (geometry.SphericalSurface(centre=(AWAY, 9, 0), radius=1),),
+    "cylinders": (geometry.CylindricalSurface(start=(0, AWAY, 0), end=(0, AWAY, 1), radius=1),),
+    "cones": (geometry.ConicalSurface(start=(0, AWAY, 9), end=(0, AWAY, 10), start_radius=1, end_radius=0),),
+    "boxes": (geometry.BoxSurface(low=(AWAY,) * 3, high=(2 * AWAY,) * 3),),
 }
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from cases.granular_bench.closed_forms import beam_deflection, bridge_force, bridge_rupture
 from tests.effects.contact.loads import close
 from tests.scenes import by_id, compiled, scene
 from tisim.effects import CapillaryBridge, Lorentz, ParallelBond
@@ -19,8 +20,8 @@ R = 0.01
 """m."""
 HEAVY = 1e9
 """kg; what is so heavy goes on as it began."""
-RUPTURE = 1.2 * 1e-3
-"""m; (1 + theta / 2) V^(1/3)."""
+RUPTURE = bridge_rupture(0.4, 1e-9)
+"""m."""
 X, Y, Z = np.eye(3)
 
 
@@ -51,9 +52,7 @@ def bridge(gap, radius=(R, R), **liquid):
     """Its force, N."""
     law = {**LIQUID, **liquid}
     mean = 2 * radius[0] * radius[1] / sum(radius)
-    s = max(gap, 0) * np.sqrt(mean / law["volume"])
-    line = 2 * np.pi * mean * law["surface_tension"] * np.cos(law["contact_angle"])
-    return line / (1 + 1.05 * s + 2.5 * s**2)
+    return float(bridge_force(gap, mean, law["surface_tension"], law["contact_angle"], law["volume"]))
 
 
 def test_a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures():
@@ -153,7 +152,7 @@ def test_a_row_of_bonded_grains_bends_like_a_beam():
     for n, load in ((3, 0.5), (6, 0.25)):
         (state,) = simulated([beam(n, load)])
         assert np.abs(state["velocity"]).max() < 0.1 * np.abs(state["position"][:, 1]).max()
-        bent = load * (n * SIDE) ** 3 / (3 * 1e8 * SECOND)
+        bent = beam_deflection(load, n * SIDE, 1e8, SECOND)
         discrete = bent * (1 - 1 / (4 * n**2)) + n * load / (SOFT * AREA)
         assert state["position"][-1, 1] == pytest.approx(discrete, rel=2e-3)
         assert discrete == pytest.approx(bent, rel=0.08 if n == 6 else 0.25)
@@ -167,6 +166,58 @@ def test_a_beam_breaks_at_its_root_by_the_load_of_its_strength():
     made = [beam(n, part * most, rises=True) for part in (0.97, 1.03)]
     held, broken = ((state["parallel_bond_past"] != 0).any(axis=1).sum() for state in simulated(made))
     assert (held, broken) == (n, n - 1)
+
+
+def critical(stiffness, damping, mass):
+    """The step (s) beyond which a spring and a dashpot of a reduced mass, kicked by halves, alternate and
+    grow."""
+    return (np.sqrt(damping**2 + 4 * stiffness * mass) - damping) / stiffness
+
+
+def test_what_no_step_can_follow_stops_the_world():
+    """A bond that is stretched, sheared, bent or twisted, whichever is the stiffest: in steps of 0.98 of its
+    limit it holds, in those of 1.02 it is named; with damping too. So is it in a row."""
+    n, ways = 0.5e-2, (("stretch", 100, 0.8), ("shear", 2, 0.8), ("bend", 100, 2.5), ("twist", 1, 4.0))
+    turning, made, names = 0.4 * n * R**2, [], []
+    for name, kappa, wide in ways:
+        stiff, r = 1e8 / SIDE, wide * R
+        area, second = np.pi * r**2, np.pi * r**4 / 4
+        springs = {
+            "stretch": (stiff * area, n, n),
+            "shear": (stiff / kappa * area, n, 2 / 7 * n),
+            "bend": (stiff * second, turning, turning),
+            "twist": (stiff / kappa * 2 * second, turning, turning),
+        }
+        for ratio in (0.0, 0.7):
+            limits = {
+                key: critical(k, 2 * ratio * np.sqrt(k * nominal), mass)
+                for key, (k, nominal, mass) in springs.items()
+            }
+            assert min(limits, key=limits.get) == name
+            for part in (0.98, 1.02):
+                cement = {"gap": 1e-6, "stiffness_ratio": kappa, "radius_ratio": wide, "damping_ratio": ratio,
+                          "tensile_strength": 1e12, "shear_strength": 1e12}  # fmt: skip
+                spins = 1e-6 * np.array([X + Y, X - Y]) * [[1], [-1]]
+                made.append(grains([[0, 0, 0], SIDE * X], [[0, 0, 0], 1e-8 * (X + Y)], spins, cement=cement,
+                                   mass=1e-2, dt=part * limits[name], steps=500))  # fmt: skip
+                names.append((name, ratio, part))
+    simulation = compiled(made[0], WORLDS, CAPACITY)
+    simulation.load(made)
+    simulation.run()
+    for name, result in zip(names, simulation.results(), strict=True):
+        assert result.status.ok == (name[2] < 1), (name, result.status.reason)
+        assert result.status.ok or "not finite" in result.status.reason, name
+        assert result.status.ok or "effects.parallel_bond" in result.status.reason, name
+        assert np.abs(result.state["velocity"]).max() < 1e-6, name
+    row = 2e-3 * np.arange(5)[:, None] * X
+    speed = 1e-6 * np.random.default_rng(0).normal(size=(5, 3))
+    made = grains(row, speed, cement={"gap": 1e-6, "young": 1e9, "stiffness_ratio": 2.5, "radius_ratio": 1},
+                  radius=1e-3, mass=8e-6, dt=4e-6, steps=1000)  # fmt: skip
+    simulation.load([made])
+    simulation.run()
+    (result,) = simulation.results()
+    assert "effects.parallel_bond" in result.status.reason
+    assert np.abs(result.state["velocity"]).max() < 1e-5
 
 
 def test_bonded_grains_turn_as_one():

@@ -14,9 +14,11 @@ from tisim.backend import memory, runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import parameter
+from tisim.engine import compiled_worlds
 from tisim.interactions import pair_chunks
 from tisim.neighbours.half_list import ListSizes
 from tisim.operators import Operator
+from tisim.worlds.team import Teams
 
 GRAINS, STEPS, DT = 200, 200, 2e-4
 CHUNK_SLOTS = 32
@@ -112,8 +114,12 @@ def test_a_step_is_few_launches_which_tell_how_far_worlds_have_come(simulation):
 
 
 @pytest.mark.slow
-def test_of_both_schedules(usual):
-    simulation = simulated("world")
+@pytest.mark.parametrize("schedule", ["world", "team"])
+def test_of_all_schedules(usual, monkeypatch, schedule):
+    if schedule == "team":
+        # All threads take the three beds one after the other.
+        monkeypatch.setattr(compiled_worlds, "Teams", lambda *of: Teams(*of[:-1], number=1))
+    simulation = simulated(schedule)
     for found, expected in zip(ends(simulation, [bed(k) for k in range(3)]), usual, strict=True):
         same(found, expected)
     simulation.close()
@@ -166,6 +172,7 @@ def test_of_one_thread_and_two_and_nearly_those_of_single_precision(usual, tmp_p
             assert 0 < np.median(moved) < 1e-3
 
 
+@pytest.mark.slow
 def test_no_room_for_longer_lists_is_no_fault_of_what_follows(simulation, monkeypatch):
     """Grains remember beside their pairs, in fields that are made before there is room for them or not."""
     row = simulation.assembly.pairs.half_list.row

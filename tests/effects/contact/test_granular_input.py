@@ -77,8 +77,8 @@ def ends(scenes):
 
 
 def test_what_no_step_can_follow_stops_the_world_and_is_named():
-    """Centres in one place, a modulus beyond numbers, and steps too long for a pair and for a wall; the state
-    of before is kept."""
+    """Centres in one place, a modulus beyond numbers, and steps too long for a pair, its damping and a wall;
+    the state of before is kept."""
     far = {"dt": 1e-3, "steps": 1000}
     stiff = {"law": {"young": 1e15}, **far}
     couple = [[0, 0, 9], [2.1, 0, 9]]
@@ -92,6 +92,11 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
         "wall": (grains([[0, 0, 1.1]], [[0, 0, -9]], planes=[FLOOR], **stiff), "walls"),
         "deep at the start": (
             grains([[0, 0, 9], [1.9, 0, 9]], [[0, 0, 0]] * 2, law={"young": 1e10}, **far),
+            "granular",
+        ),
+        # S_n dt^2 is 1.2 m* after a step: too long by its damping alone.
+        "damping": (
+            grains([[0, 0, 9], [1.9, 0, 9]], [[0, 0, 0]] * 2, law={"restitution": 1e-3}, dt=6.4e-4, steps=9),
             "granular",
         ),
         "in a wall at the start": (

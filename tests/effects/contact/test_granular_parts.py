@@ -6,6 +6,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma
 
+from cases.granular_bench import closed_forms
 from tests.effects.contact.compositions import NEUTRAL, along, grains, loaded
 from tests.effects.contact.grains import run
 from tests.scenes import by_id
@@ -31,6 +32,7 @@ def at(n, *steps):
     return path
 
 
+@pytest.mark.slow
 def test_hooke_pushes_like_a_spring_and_damping_goes_by_speed():
     """k delta; of constant damping gamma v, beside Hertz's force."""
     force, _, _ = along("hooke", np.linspace(0, 0.1, 5))
@@ -86,6 +88,7 @@ def test_a_linear_spring_is_remembered_and_slides():
     np.testing.assert_allclose(force[10:, 1], limit - 0.4 * K * 1e-4 * np.arange(1, 6), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure():
     """8 G* a xi; pressed at a displacement it holds more."""
     overlap = np.array([0.01, 0.01, 0.04, 0.0025])
@@ -111,6 +114,7 @@ ROLLS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROLLS)
 def test_a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once(name):
     """k_r R* theta, up to mu_r R* N, at right angles to the normal; about that it does nothing."""
@@ -189,19 +193,15 @@ def test_cohesion_pulls_while_surfaces_touch():
 
 GAMMA = 20.0
 """J/m^2; of soft grains that adhere much."""
-PARTS = 3 * np.pi * GAMMA
+PARTS = closed_forms.jkr_pull_off(GAMMA, 1.0)
 """N; the force that parts them, of R* = 1 m."""
-STRETCH = 1.5 * (np.pi * GAMMA / E_STAR) ** (2 / 3) * 0.5 ** (1 / 3)
+STRETCH = closed_forms.jkr_stretch(GAMMA, 1.0, E_STAR)
 """m; how far they stretch."""
 
 
 def jkr_force(overlap):
-    """The stable force (N) of R* = 1 m, by bisection of a in delta(a)."""
-    low, high = (np.pi * GAMMA / (4 * E_STAR)) ** (1 / 3), 10.0
-    for _ in range(200):
-        a = 0.5 * (low + high)
-        high, low = (a, low) if a**2 - 2 * np.sqrt(np.pi * GAMMA * a / E_STAR) > overlap else (high, a)
-    return 4 * E_STAR * a**3 / 3 - 4 * np.sqrt(np.pi * GAMMA * E_STAR * a**3)
+    """The stable force (N) of R* = 1 m."""
+    return closed_forms.jkr_force(overlap, GAMMA, 1.0, E_STAR)
 
 
 def test_jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most():

@@ -106,7 +106,7 @@ def test_a_turning_drum_drags_a_grain_with_mu_times_its_weight():
     assert np.linalg.norm(slip) < 0.02 < np.linalg.norm(v)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_floor_bears_the_weight_of_a_column():
     """Of three grains, at rest."""
     place = [[0, 0, (2 * k + 0.99) * RADIUS] for k in range(3)]

@@ -14,16 +14,7 @@ from tests.effects.contact.surfaces import (
     moving,
     run,
 )
-from tisim import Scene
-from tisim.geometry import (
-    BoxSurface,
-    ConicalSurface,
-    CylindricalSurface,
-    Disc,
-    Plane,
-    SphericalSurface,
-    TriangulatedSurface,
-)
+from tisim import Scene, geometry
 
 E_STAR = YOUNG / (2 * (1 - POISSON**2))
 SOFT = {"restitution": 0.5, "friction": 0.5}
@@ -35,31 +26,41 @@ def unit(rng):
 
 
 WITHIN = {
-    "sphere": {"spheres": (SphericalSurface(radius=1.0),)},
+    "sphere": {"spheres": (geometry.SphericalSurface(radius=1.0),)},
     "cylinder": {
-        "cylinders": (CylindricalSurface(start=(0, -1, -1), end=(0, 1, 1), radius=1.0, closed=True),)
+        "cylinders": (geometry.CylindricalSurface(start=(0, -1, -1), end=(0, 1, 1), radius=1.0, closed=True),)
     },
     "cone": {
         "cones": (
-            ConicalSurface(start=(0, 0, -1), end=(0, 0, 1), start_radius=0.3, end_radius=1.5, closed=True),
+            geometry.ConicalSurface(
+                start=(0, 0, -1), end=(0, 0, 1), start_radius=0.3, end_radius=1.5, closed=True
+            ),
         )
     },
     "silo": {
-        "cylinders": (CylindricalSurface(start=(0, 0, 0), end=(0, 0, 1), radius=1.0),),
-        "cones": (ConicalSurface(start=(0, 0, -1), end=(0, 0, 0), start_radius=0.2, end_radius=1.0),),
-        "discs": (Disc(centre=(0, 0, 1), radius=1.0), Disc(centre=(0, 0, -1), radius=0.2)),
+        "cylinders": (geometry.CylindricalSurface(start=(0, 0, 0), end=(0, 0, 1), radius=1.0),),
+        "cones": (
+            geometry.ConicalSurface(start=(0, 0, -1), end=(0, 0, 0), start_radius=0.2, end_radius=1.0),
+        ),
+        "discs": (geometry.Disc(centre=(0, 0, 1), radius=1.0), geometry.Disc(centre=(0, 0, -1), radius=0.2)),
     },
-    "box": {"boxes": (BoxSurface(low=(-0.7, -1, -0.5), high=(0.5, 1, 0.8)),)},
+    "box": {"boxes": (geometry.BoxSurface(low=(-0.7, -1, -0.5), high=(0.5, 1, 0.8)),)},
 }
 BLOCKS = {
-    "ball": {"spheres": (SphericalSurface(radius=0.5),)},
-    "rod": {"cylinders": (CylindricalSurface(start=(0, -0.5, 0), end=(0, 0.5, 0), radius=0.4, closed=True),)},
-    "ring": {"cylinders": (CylindricalSurface(start=(0, -0.1, 0), end=(0, 0.1, 0), radius=0.6),)},
-    "tip": {
-        "cones": (ConicalSurface(start=(0, 0, -0.5), end=(0, 0, 0.4), start_radius=0.5, end_radius=0.0),)
+    "ball": {"spheres": (geometry.SphericalSurface(radius=0.5),)},
+    "rod": {
+        "cylinders": (
+            geometry.CylindricalSurface(start=(0, -0.5, 0), end=(0, 0.5, 0), radius=0.4, closed=True),
+        )
     },
-    "brick": {"boxes": (BoxSurface(low=(-0.4, -0.3, -0.5), high=(0.4, 0.3, 0.5)),)},
-    "coin": {"discs": (Disc(radius=0.5),)},
+    "ring": {"cylinders": (geometry.CylindricalSurface(start=(0, -0.1, 0), end=(0, 0.1, 0), radius=0.6),)},
+    "tip": {
+        "cones": (
+            geometry.ConicalSurface(start=(0, 0, -0.5), end=(0, 0, 0.4), start_radius=0.5, end_radius=0.0),
+        )
+    },
+    "brick": {"boxes": (geometry.BoxSurface(low=(-0.4, -0.3, -0.5), high=(0.4, 0.3, 0.5)),)},
+    "coin": {"discs": (geometry.Disc(radius=0.5),)},
 }
 
 
@@ -70,7 +71,7 @@ def test_a_scene_with_all_shapes_goes_to_a_file_and_back():
     assert again.effects == made.effects
     assert again.digest() == made.digest()
     assert again.structure() == made.structure()
-    other = TriangulatedSurface(vertices=2 * TRIANGLES.vertices, faces=TRIANGLES.faces)
+    other = geometry.TriangulatedSurface(vertices=2 * TRIANGLES.vertices, faces=TRIANGLES.faces)
     walls = made.effects[1].model_copy(update={"surface": other})
     effects = (made.effects[0], walls, made.effects[2])
     assert made.model_copy(update={"effects": effects}).structure() != made.structure()
@@ -124,7 +125,7 @@ def test_a_sphere_rolls_over_seams_as_on_a_plane():
     law, gravity = {"friction": 0.5, "restitution": 0.5}, (0.0, 0.0, -10.0)
     more = {"law": law, "gravity": gravity, "steps": 40_000}
     ends = []
-    for height, shapes in ((SHEET, {}), (0.0, {"planes": (Plane(),)})):
+    for height, shapes in ((SHEET, {}), (0.0, {"planes": (geometry.Plane(),)})):
         start = (-1.5, 0.03, height + RADIUS - sunk)
         ends.append(beside(start, (3.0, 0.0, 0.0), shapes, spin=(0.0, 3 / lever, 0.0), **more))
         ends.append(beside(start, (2.0, 0.7, 0.0), shapes, **more))
@@ -137,6 +138,25 @@ def test_a_sphere_rolls_over_seams_as_on_a_plane():
     # The weight is on the sheet, wherever it lies.
     for result in (rolls, slides):
         assert result.measures["walls_force_z"] == pytest.approx(-10.0, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip():
+    """The sheet aslant: friction of 2/7 of the pull turns it, of a spring that goes along from triangle to
+    triangle; without it the sphere would slip."""
+    sunk = (3 * 10 / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3)
+    more = {"law": {"friction": 0.5, "restitution": 1.0}, "gravity": (2.0, 0.5, -10.0), "steps": 40_000}
+    sheet, plane = run(
+        [
+            beside((-1.5, 0.03, height + RADIUS - sunk), (0.0, 0.0, 0.0), shapes, **more)
+            for height, shapes in ((SHEET, {}), (0.0, {"planes": (geometry.Plane(),)}))
+        ]
+    )
+    assert sheet.state["position"][0, 0] > -1.5 + 0.9 * 5 / 7 * sheet.time**2
+    for name in ("velocity", "spin"):
+        np.testing.assert_allclose(sheet.state[name], plane.state[name], rtol=0, atol=1e-6)
+    slip = plane.state["velocity"] - np.cross(plane.state["spin"], [0, 0, RADIUS - sunk / 2])
+    assert np.abs(slip[0, :2]).max() < 0.01
 
 
 @pytest.mark.slow
@@ -153,10 +173,10 @@ def test_a_grain_on_a_seam_is_held_once():
 @pytest.mark.slow
 def test_faces_of_a_box_are_planes():
     """In a corner with all three of them, sliding and spinning: as of planes, with what they remember."""
-    planes = tuple(Plane(point=(0, 0, 0), normal=tuple(axis)) for axis in np.eye(3))
+    planes = tuple(geometry.Plane(point=(0, 0, 0), normal=tuple(axis)) for axis in np.eye(3))
     law = {"friction": 0.4, "restitution": 0.3}
     more = {"law": law, "gravity": (-3.0, -2.0, -9.0), "steps": 60_000, "spin": (30.0, -20.0, 10.0)}
-    shapes = ({"planes": planes}, {"boxes": (BoxSurface(high=(2, 2, 2)),)})
+    shapes = ({"planes": planes}, {"boxes": (geometry.BoxSurface(high=(2, 2, 2)),)})
     flat, box = run([beside((0.11, 0.12, 0.13), (0.5, -1.0, -1.0), one, **more) for one in shapes])
     for name in ("position", "velocity", "spin"):
         np.testing.assert_allclose(box.state[name], flat.state[name], rtol=0, atol=1e-9)
@@ -169,7 +189,7 @@ def test_faces_of_a_box_are_planes():
 def test_a_grain_lies_in_a_groove():
     """Each side of a groove of 90 degrees holds 1 / sqrt 2 of the weight; a sharp ridge holds all of it."""
     half, whole = ((3 * push / (4 * E_STAR * RADIUS**0.5)) ** (2 / 3) for push in (10 / 2**0.5, 10))
-    sides = tuple(Disc(centre=(x, 0, 1), normal=(-x, 0, 1), radius=2**0.5) for x in (-1, 1))
+    sides = tuple(geometry.Disc(centre=(x, 0, 1), normal=(-x, 0, 1), radius=2**0.5) for x in (-1, 1))
     places = [(0, 0.2, 2**0.5 * (RADIUS - half)), (0.3, 4, SHEET + 1 + RADIUS - whole)]
     more = {"gravity": (0, 0, -10), "law": SOFT, "steps": 500}
     scenes = [

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cases.granular_bench.closed_forms import hertz_overlap
 from tests.effects.contact.grains import CAPACITY, FLOOR, USUAL, WORLDS, grains, run
 from tests.scenes import compiled
 
@@ -12,7 +13,7 @@ G_STAR = USUAL["young"] / (4 * (2 - USUAL["poisson"]) * (1 + USUAL["poisson"]))
 
 def sunk(push):
     """The overlap (m) at which a wall pushes a grain of 1 m with so much (N)."""
-    return (3 * push / (4 * E_STAR)) ** (2 / 3)
+    return float(hertz_overlap(push, 1.0, E_STAR))
 
 
 def lying(velocity, gravity, planes=(FLOOR,), spin=(0, 0, 0), **more):

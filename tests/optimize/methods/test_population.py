@@ -23,6 +23,7 @@ USUAL = {
     "vibration": {"options": {"population": 24, "parents": 8}},
     "agglomeration": {"options": {"population": 10, "parents": 4}},
     "capture": {"method": "cma-es", "options": {"population": 16}},
+    "granular_bench": {"options": {"population": 12, "parents": 4}},
 }
 
 

@@ -1,8 +1,9 @@
 """The contract of an effect. One effect is one file: its law, its source, its parameters.
 
 Each kind of effect is made after a class of a file beside this one: ``effect.py`` is what all of them have,
-``force.py``, ``pair_force.py``, ``pair_event.py`` and ``derived_quantity.py`` say which methods a law of that
-kind defines, ``pairwise.py`` what is summed over pairs. These are the rules for all of them:
+``force.py``, ``pair_force.py``, ``pair_event.py``, ``constraint.py`` and ``derived_quantity.py`` say which
+methods a law of that kind defines, ``pairwise.py`` what is summed over pairs. These are the rules for all of
+them:
 
 What a scene holds is plain data; what kernels hold is a bound object (tisim/worlds/bound.py).
 
@@ -36,11 +37,13 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
 8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It is handed each pair in ``contact`` with exclusive access
    to both, earliest first (see tisim/interactions/collision_rounds.py); it may remove either.
-10. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
-    ``requires`` names the effects without which it means nothing. Nobody asks what an effect is called.
-11. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may ever
+10. A ``Constraint`` moves the particles that it holds, in place of the stepper, whatever the forces on them.
+11. ``connect`` returns what an effect wants to know of the other bound effects, ``peers.of(Heating)``;
+    ``requires`` names the effects without which it means nothing, ``excludes`` those that it does not go
+    with, ``precedes`` those that must come after it. Nobody asks what an effect is called.
+12. ``at_start`` fills in what an effect takes from the start; ``capacity`` says how many particles may ever
     live at once, given the start.
-12. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
+13. Particles are removed with ``s.remove(w, i)`` and added with ``s.append(w, i)``; ``world`` and ``resolve``
     say with ``s.invalidate_lists(w)`` that they have moved or resized one. Indices move only between steps.
     Nothing may depend on the order of parallel work: no float atomics.
 
@@ -57,6 +60,7 @@ What Taichi asks of a method with ``ti.func``:
 """
 
 from tisim.components.component import Vector, option, parameter
+from tisim.effects.base.constraint import Constraint
 from tisim.effects.base.derived_quantity import DerivedQuantity, SelfConsistentQuantity
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.force import Force
@@ -66,6 +70,7 @@ from tisim.effects.base.pairwise import Pairwise
 from tisim.worlds.fields import Field
 
 __all__ = [
+    "Constraint",
     "DerivedQuantity",
     "Effect",
     "Field",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -18,8 +18,9 @@ class Effect(LawHints, Component):
     """An effect is anything physical that a scene can call for: the contract of all of them.
 
     Laws are made after one of its kinds: ``Force``, ``PairForce``, ``PairEvent``, ``DerivedQuantity``,
-    ``SelfConsistentQuantity``, ``Source`` or ``Operator``. A scene has each name once, so that it can hold
-    two of a kind where they make sense: each acts with its own parameters, and what both count is added up.
+    ``SelfConsistentQuantity``, ``Constraint``, ``Source`` or ``Operator``. A scene has each name once, so
+    that it can hold two of a kind where they make sense: each acts with its own parameters, and what both
+    count is added up.
 
     fields : the particle fields that it reads or writes, by name or as a ``Field``. depends_on_velocity :
     whether it reads or changes velocities or spins. homogeneous : whether it would be the same for particles
@@ -72,10 +73,15 @@ class Effect(LawHints, Component):
         """Return attributes to set on its bound object, chosen among the fields of the state."""
         return {}
 
-    def newcomers(self) -> Collection[str] | None:
-        """Return the names of the fields, beside those that all particles have, that it gives to particles it
-        adds; None where it adds none, or only copies."""
+    def newcomers(self) -> Mapping[str, np.ndarray] | None:
+        """Return what it gives to particles it adds, beside what all particles have: by the name of the
+        field, its values in SI, a row for each class of them; None where it adds none, or only copies."""
         return None
+
+    def newcomer_radii(self) -> tuple[float, ...]:
+        """Return the radii (m) of the largest two particles that it may put in, or of the one; by default it
+        puts in none."""
+        return ()
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""

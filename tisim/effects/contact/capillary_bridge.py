@@ -18,14 +18,15 @@ class CapillaryBridge(GranularContact):
 
     S is the gap between the surfaces, 0 while they overlap, and R = 2 R_i R_j / (R_i + R_j). A bridge of the
     volume V forms when surfaces touch, and ruptures where S is above (1 + theta / 2) V^(1/3). The liquid wets
-    both alike; V is at most some thousandths of R^3, so that gravity does not deform it. It pulls beside what
-    pushes grains apart, such as ``granular``.
+    both alike. The fit is for V of at most some thousandths of R^3, and of grains so small that gravity does
+    not deform the liquid. It pulls beside what pushes grains apart, such as ``granular``.
 
     Source: C. D. Willett, M. J. Adams, S. A. Johnson and J. P. K. Seville, Langmuir 16 (2000) 9396, Eq. (12);
     G. Lian, C. Thornton and M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138, for the rupture.
     """
 
     memory: ClassVar[int] = 1
+    depends_on_velocity: ClassVar[bool] = False
 
     surface_tension: float = parameter("N/m", "surface tension gamma", examples=[0.072], ge=0)
     contact_angle: float = parameter("rad", "contact angle theta", 0.0, ge=0, lt=math.pi / 2)

@@ -108,7 +108,8 @@ class WallContacts(WallSearch):
         overlap = s.radius[w, i] - distance
         place = s.position[w, i] + (s.radius[w, i] - 0.5 * overlap) * normal
         velocity = self.motion.velocity_at(self.kept, w, place, t)
-        return law.at_wall(s, w, i, normal, overlap, velocity, self.wall_material, past, dt)
+        turning = self.motion.angular_velocity(w)
+        return law.at_wall(s, w, i, normal, overlap, velocity, turning, self.wall_material, past, dt)
 
     @ti.func
     def touch_plane(self, s, w, i, k, r, t, dt, commit):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -10,13 +9,14 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Component, Text
-from tisim.components.material_law import MaterialLaw
+from tisim.components.material_law import UsesMaterials
 from tisim.components.materials import Materials
 from tisim.effects.base import Effect, Field, Force, option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.wall_contacts import WallContacts
 from tisim.effects.contact.wall_search import CONTACTS
 from tisim.effects.motion.base import Fixed, Motion, MotionState
+from tisim.effects.motion.resultant import resultant
 from tisim.errors import must
 from tisim.geometry.box import BoxSurface
 from tisim.geometry.cone import ConicalSurface
@@ -33,7 +33,7 @@ FIELDS = ("past", "surface_past", "loads", "touched", "clear")
 load, how many contacts there are, and where it was how far from the wall."""
 
 
-class Walls(WallContacts, MaterialLaw, Force):
+class Walls(WallContacts, UsesMaterials, Force):
     """Walls hold grains back by the contact laws of the scene; together they are one rigid body, at rest or
     in motion.
 
@@ -136,9 +136,5 @@ class Walls(WallContacts, MaterialLaw, Force):
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
         loads = state[f"{self.label}_loads"]
-        arms = state["position"] - np.array(self.motion.centre_of_torque())
-        moments = np.cross(arms, loads[:, :3]) + loads[:, 3:]
-        # Exactly rounded sums, so the same in any order.
-        sums = (-math.fsum(column) for column in np.concatenate([loads[:, :3], moments], axis=1).T)
-        names = (f"{self.label}_{what}_{axis}" for what in ("force", "torque") for axis in "xyz")
-        return dict(zip(names, sums, strict=True))
+        centre = self.motion.centre_of_torque()
+        return resultant(self.label, state["position"], -loads[:, :3], -loads[:, 3:], centre)

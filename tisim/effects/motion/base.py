@@ -40,6 +40,11 @@ class Motion(Component):
         return r
 
     @ti.func
+    def from_body(self, kept, w, r, t):
+        """Return where a place r (m) of the body is in space at time t; the inverse of ``to_body``."""
+        return r
+
+    @ti.func
     def to_space(self, kept, w, direction, t):
         """Return a direction of the body as it is in space at time t."""
         return direction
@@ -48,6 +53,11 @@ class Motion(Component):
     def velocity_at(self, kept, w, r, t):
         """Return the velocity (m/s) of the body at a place r in space at time t."""
         return 0.0 * r
+
+    @ti.func
+    def angular_velocity(self, w):
+        """Return the angular velocity (rad/s) of the body."""
+        return ti.Vector.zero(float, 3)
 
     @ti.func
     def fastest(self, w, r, around):

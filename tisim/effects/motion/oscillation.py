@@ -24,8 +24,17 @@ class Oscillation(Motion):
         return 2.0 * math.pi * ti.cast(self.frequency(w), ti.f64) * t + self.phase(w)
 
     @ti.func
+    def displacement(self, w, t):
+        """Return how far (m) the body is from where its shapes say."""
+        return ti.cast(elementary.sin(self.angle(w, t)), float) * self.amplitude(w)
+
+    @ti.func
     def to_body(self, kept, w, r, t):
-        return r - ti.cast(elementary.sin(self.angle(w, t)), float) * self.amplitude(w)
+        return r - self.displacement(w, t)
+
+    @ti.func
+    def from_body(self, kept, w, r, t):
+        return r + self.displacement(w, t)
 
     @ti.func
     def velocity_at(self, kept, w, r, t):

@@ -48,12 +48,20 @@ class Rotation(Motion):
         return self.centre(w) + self.turned(w, r - self.centre(w), -t)
 
     @ti.func
+    def from_body(self, kept, w, r, t):
+        return self.centre(w) + self.turned(w, r - self.centre(w), t)
+
+    @ti.func
     def to_space(self, kept, w, direction, t):
         return self.turned(w, direction, t)
 
     @ti.func
     def velocity_at(self, kept, w, r, t):
         return self.rate(w).cross(r - self.centre(w))
+
+    @ti.func
+    def angular_velocity(self, w):
+        return self.rate(w)
 
     @ti.func
     def fastest(self, w, r, around):

@@ -49,9 +49,18 @@ class Servo(Motion):
         return [*super().values(), *(component / length for component in self.direction)]
 
     @ti.func
-    def to_body(self, kept, w, r, t):
+    def displacement(self, kept, w, t):
+        """Return how far (m) the body is from where its shapes say."""
         travel = kept.travel[w] + kept.speed[w] * (t - kept.moved_at[w])
-        return r - ti.cast(travel, float) * self.axis(w)
+        return ti.cast(travel, float) * self.axis(w)
+
+    @ti.func
+    def to_body(self, kept, w, r, t):
+        return r - self.displacement(kept, w, t)
+
+    @ti.func
+    def from_body(self, kept, w, r, t):
+        return r + self.displacement(kept, w, t)
 
     @ti.func
     def velocity_at(self, kept, w, r, t):

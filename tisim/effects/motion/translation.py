@@ -18,6 +18,10 @@ class Translation(Motion):
         return r - ti.cast(ti.cast(self.velocity(w), ti.f64) * t, float)
 
     @ti.func
+    def from_body(self, kept, w, r, t):
+        return r + ti.cast(ti.cast(self.velocity(w), ti.f64) * t, float)
+
+    @ti.func
     def velocity_at(self, kept, w, r, t):
         return self.velocity(w)
 

@@ -54,7 +54,7 @@ class GranularContact(MaterialLaw, PairForce):
         normal = (1.0 / distance) * separation
         turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
         slip = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
-        m, n = s.mass[w, i], s.mass[w, j]
+        m, n = s.masses_behind(w, i, j)
         # R* and m*, by one division.
         sizes, masses = a + b, m + n
         inverse = 1.0 / (sizes * masses)
@@ -75,20 +75,19 @@ class GranularContact(MaterialLaw, PairForce):
         return 0.0 * s.radius[w, i]
 
     @ti.func
-    def at_wall(self, s, w, i, normal, overlap, velocity, material, past, dt):
+    def at_wall(self, s, w, i, normal, overlap, velocity, turning, material, past, dt):
         """Return force and torque of a wall on i, and what the contact remembers.
 
-        normal : unit vector into the wall. velocity : that of its surface at the contact (m/s). material :
-        index of its material.
+        normal : unit vector into the wall. velocity : that of its surface at the contact (m/s). turning :
+        its angular velocity (rad/s). material : index of its material.
         """
         arm, radius = s.radius[w, i] - 0.5 * overlap, s.radius[w, i]
         pair, spin = 0, s.spin[w, i]
         if ti.static(self.several):
             pair = s.material[w, i] * self.number_of_materials + material
         slip = velocity - s.velocity[w, i] - (arm * spin).cross(normal)
-        force, couple, known = self.contact(
-            w, pair, normal, overlap, radius, s.mass[w, i], slip, -spin, past, dt
-        )
+        mass, spinning = s.mass_at_wall(w, i), turning - spin
+        force, couple, known = self.contact(w, pair, normal, overlap, radius, mass, slip, spinning, past, dt)
         lasts = self.lasts(w, pair, overlap, radius, past)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
         return force, arm * normal.cross(force) + couple, ti.select(lasts, known, 0.0)

@@ -1,0 +1,21 @@
+"""The tests of contacts that codes of grains are held to; a heap from a silo; calibration."""
+
+from __future__ import annotations
+
+from cases.case import Case, Late
+from cases.granular_bench.accuracy import quantities
+from cases.granular_bench.scene import SIZES, TITLE, scene_for
+
+CASE = Case(
+    name="granular_bench",
+    title=TITLE,
+    source="Y. C. Chung and J. Y. Ooi, Granul. Matter 13 (2011) 643-656, and others",
+    sizes=SIZES,
+    scene=scene_for,
+    check=Late("cases.granular_bench.checks", "check"),
+    quantities=quantities,
+    problem=Late("cases.granular_bench.problem", "problem"),
+    variants=("calibrate",),
+    calibration=Late("cases.granular_bench.problem", "calibration"),
+    figures=Late("cases.granular_bench.figures", "figures"),
+)

@@ -1,0 +1,134 @@
+"""Draw-down tests of grains that differ in one property, and of silos with other outlets, as one batch.
+
+The rate of discharge is held against Beverloo's law, W = C rho_b sqrt(g) (D - k d)^(5/2), by a straight line
+through W^(2/5): its slope has C and where it meets 0 has k.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.constants import g as STANDARD_GRAVITY
+
+from cases.granular_bench.measures import discharge, heap, repose
+from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
+from tisim import Result, RunError, run
+from tisim.engine.batches import Progress
+from tisim.plotting.cloud import common, corners, panel
+from tisim.plotting.style import empty, letters, plain
+
+VALUES = {
+    "friction": (0.1, 0.3, 0.5, 0.8),
+    "rolling_friction": (0.0, 0.1, 0.2, 0.4),
+    "restitution": (0.3, 0.5, 0.8),
+    "outlet": (4.5, 5.0, 6.0, 7.0, 8.0),
+}
+"""What is varied alone, of NATURAL and of the silo, whose outlet is in diameters of a grain."""
+PACKED = 0.6
+"""The part of the space that grains in the silo fill, for the bulk density in Beverloo's law."""
+COLOURS = ("#4477aa", "#cc6677", "#228833")
+
+
+@dataclass(frozen=True)
+class Bed:
+    """A bed has what was varied and to what, and its result."""
+
+    what: str
+    value: float
+    result: Result
+
+    @property
+    def angle(self) -> float:
+        """Return the angle of repose, degrees."""
+        return repose(self.result)
+
+    @property
+    def rate(self) -> float:
+        """Return the discharge rate, kg/s."""
+        return discharge(self.result)
+
+
+def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
+    """Run the beds of VALUES as one batch, those that are alike once."""
+    wanted = [(what, value) for what, values in VALUES.items() for value in values]
+    scenes = [
+        scene(**{**size, what: value}) if what == "outlet" else scene({**NATURAL, what: value}, **size)
+        for what, value in wanted
+    ]
+    digests = [one.digest() for one in scenes]
+    different = dict(zip(digests, scenes, strict=True))
+    results = dict(zip(different, run(list(different.values()), progress), strict=True))
+    for result in results.values():
+        if not result.status.ok:
+            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    return [Bed(*one, results[digest]) for one, digest in zip(wanted, digests, strict=True)]
+
+
+def beverloo_fit(outlets: np.ndarray, rates: np.ndarray) -> tuple[float, float]:
+    """Return C and k of Beverloo's law for outlets (in diameters) and rates (kg/s), by least squares."""
+    slope, offset = np.polyfit(outlets * DIAMETER, rates**0.4, 1)
+    constant = slope**2.5 / (PACKED * DENSITY * np.sqrt(STANDARD_GRAVITY))
+    return float(constant), float(-offset / slope / DIAMETER)
+
+
+def bed_figure(found: Sequence[Bed]) -> Figure:
+    """Draw two heaps, what angle and rate depend on, and Beverloo's law."""
+    figure = empty(11.6, 7.2)
+    (first, second, angles), (third, rates, law) = figure.subplots(2, 3)
+    chosen = [
+        next(one for one in found if (one.what, one.value) == key)
+        for key in (("rolling_friction", 0.0), ("rolling_friction", 0.4), ("friction", 0.1))
+    ]
+    square = common([one.result.state for one in chosen], corners(None, None))
+    for axis, one in zip((first, second, third), chosen, strict=True):
+        panel(axis, one.result.state, square, corners(None, None), None)
+        axis.set_title(f"{one.what.replace('_', ' ')} {one.value:g}: {one.angle:.0f} degrees")
+    for k, what in enumerate(NATURAL):
+        group = [one for one in found if one.what == what]
+        values = [one.value for one in group]
+        for axis, numbers in ((angles, [one.angle for one in group]), (rates, [one.rate for one in group])):
+            axis.plot(values, numbers, "os^"[k] + "-", ms=5, color=COLOURS[k], label=what.replace("_", " "))
+            axis.set_xlabel("coefficient, the others as usual")
+            axis.legend(frameon=False, fontsize=8)
+    angles.set(ylabel="angle of repose (degrees)", title="angle of repose")
+    rates.set(ylabel="discharge rate (kg/s)", title="discharge rate")
+    beverloo(law, [one for one in found if one.what == "outlet"])
+    for axis in (angles, rates, law):
+        plain(axis)
+    letters((first, second, angles, third, rates, law))
+    return figure
+
+
+def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
+    """Draw the rate to the power 2/5 by the outlet, and the line of Beverloo's law."""
+    outlets, rates = np.array([one.value for one in found]), np.array([one.rate for one in found])
+    constant, empty_part = beverloo_fit(outlets, rates)
+    line = np.linspace(empty_part, outlets.max(), 50)
+    bulk = PACKED * DENSITY
+    free = np.maximum((line - empty_part) * DIAMETER, 0.0)
+    rate = constant * bulk * np.sqrt(STANDARD_GRAVITY) * free**2.5
+    label = f"Beverloo, C = {constant:.2f}, k = {empty_part:.2f}"
+    axis.plot(line, rate**0.4, color="0.2", lw=1.0, label=label)
+    axis.plot(outlets, rates**0.4, "o", ms=6, mfc="none", color=COLOURS[0], label="as run")
+    axis.set(xlabel="outlet (diameters of a grain)", ylabel=r"rate$^{2/5}$ ((kg/s)$^{2/5}$)",
+             title="Beverloo's law")  # fmt: skip
+    axis.legend(frameon=False, fontsize=8)
+
+
+def table(found: Sequence[Bed]) -> str:
+    """Return what was varied, the angle of repose and the discharge rate as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(
+        ["varied", "value", "angle_of_repose_degrees", "discharge_rate_kg_s", "grains_of_the_heap"]
+    )
+    for one in found:
+        writer.writerow([one.what, one.value, one.angle, one.rate, int(heap(one.result).sum())])
+    return text.getvalue()

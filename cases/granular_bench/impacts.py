@@ -1,0 +1,209 @@
+"""Impacts of a sphere with a rigid plane or with another sphere, as the eight tests of Chung and Ooi (2011).
+
+All are worlds of one structure: two materials, a sphere or two, and a plane, which is out of the way where
+spheres meet. Along z, the line of centres, they approach; the sphere that is looked at moves along x and
+spins about y. Steps are a part of the time that the elastic impact takes after Hertz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from cases.granular_bench.closed_forms import hertz_depth, hertz_duration, reduced
+from cases.granular_bench.substances import SUBSTANCES
+from tisim import Material, Particles, Result, RunError, Scene, Simulation
+from tisim.effects import Granular, HertzMaterial, MindlinForce, RestitutionDamping, Walls
+from tisim.geometry import Plane
+from tisim.steppers import FixedStep, Verlet
+
+HERTZ_MINDLIN = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
+STEPS = 800
+"""A step is this part of the time of an elastic impact."""
+LASTS = 4
+"""So many times that is simulated: a damped impact takes longer."""
+STIFFER = 1e9
+"""A rigid plane has so many times the Young's modulus of the sphere."""
+
+
+@dataclass(frozen=True)
+class ParticleImpact:
+    """An impact of a sphere of a substance and a radius (m), which approaches at a speed (m/s).
+
+    sideways : velocity along x, m/s. spin : about y, rad/s; the surface at the contact moves by -R spin along
+    x. partner : "plane", rigid; "twin", an equal sphere that approaches as fast, with the same spin; or
+    another at rest, five times as wide and a thousand times as dense, "large", or "large rigid".
+    """
+
+    substance: str
+    radius: float
+    speed: float
+    restitution: float = 1.0
+    friction: float = 0.0
+    sideways: float = 0.0
+    spin: float = 0.0
+    partner: str = "plane"
+
+    @property
+    def other_radius(self) -> float:
+        """Return the radius of what it meets, m; infinite for a plane."""
+        return {"plane": np.inf, "twin": self.radius}.get(self.partner, 5 * self.radius)
+
+    @property
+    def mass(self) -> float:
+        """Return the mass of the sphere, kg."""
+        return float(SUBSTANCES[self.substance].density * 4 / 3 * np.pi * self.radius**3)
+
+    @property
+    def mass_ratio(self) -> float:
+        """Return the mass of what it meets over its own; infinite for a plane."""
+        return {"plane": np.inf, "twin": 1.0}.get(self.partner, 1000.0 * 5**3)
+
+    @property
+    def share(self) -> float:
+        """Return m*/m."""
+        return reduced(1.0, self.mass_ratio)
+
+    @property
+    def approach(self) -> float:
+        """Return the speed at which the two approach, m/s."""
+        return self.speed * (2 if self.partner == "twin" else 1)
+
+    @property
+    def modulus(self) -> float:
+        """Return E*, Pa."""
+        own = SUBSTANCES[self.substance].rigid_modulus
+        return reduced(own, own * (STIFFER if self.partner in ("plane", "large rigid") else 1.0))
+
+    @property
+    def hertz(self) -> tuple[float, float, float, float]:
+        """Return the relative speed, R*, m* and E* that Hertz's impact depends on."""
+        return self.approach, reduced(self.radius, self.other_radius), self.mass * self.share, self.modulus
+
+    @property
+    def depth(self) -> float:
+        """Return the greatest overlap after Hertz, m."""
+        return float(hertz_depth(*self.hertz))
+
+    @property
+    def duration(self) -> float:
+        """Return the time of the elastic impact after Hertz, s."""
+        return float(hertz_duration(*self.hertz))
+
+    def scene(self) -> Scene:
+        """Return the impact as a scene, which begins where surfaces are about to touch."""
+        r, other = self.radius, self.other_radius
+        substance = SUBSTANCES[self.substance]
+        position, velocity, spin = [[0.0, 0.0, r]], [[self.sideways, 0.0, -self.speed]], [[0, self.spin, 0.0]]
+        radius, mass, floor = [r], [self.mass], 0.0
+        if self.partner != "plane":
+            twin = self.partner == "twin"
+            position.append([0.0, 0.0, -other])
+            velocity.append([0.0, 0.0, self.speed if twin else 0.0])
+            spin.append([0.0, self.spin if twin else 0.0, 0.0])
+            radius.append(other)
+            mass.append(self.mass * self.mass_ratio)
+            floor = -1e4 * other
+        rigid = self.partner in ("plane", "large rigid")
+        alike = {"poisson": substance.poisson, "restitution": self.restitution, "friction": self.friction}
+        return Scene(
+            name="granular_bench",
+            particles=Particles(
+                position=np.array(position), velocity=np.array(velocity), radius=radius, mass=mass,
+                material=[0, 1][: len(radius)], quantities={"spin": np.array(spin)},
+            ),
+            materials={
+                "sphere": Material(young=substance.young, **alike),
+                "partner": Material(young=substance.young * (STIFFER if rigid else 1.0), **alike),
+            },
+            effects=(HERTZ_MINDLIN, Walls(planes=(Plane(point=(0.0, 0.0, floor)),), material="partner")),
+            stepper=Verlet(control=FixedStep(dt=self.duration / STEPS)),
+            duration=LASTS * self.duration,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """What an impact has become: velocity (m/s) and spin (rad/s) of the sphere, and those of the other."""
+
+    impact: ParticleImpact
+    velocity: np.ndarray
+    spin: np.ndarray
+    other_velocity: np.ndarray
+
+    @property
+    def restitution(self) -> float:
+        """Return the speed at which the two part over that at which they approached."""
+        return float((self.velocity - self.other_velocity)[2] / self.impact.approach)
+
+    @property
+    def tangential_restitution(self) -> float:
+        """Return what is left of the velocity sideways, its part of what was."""
+        return float(self.velocity[0] / self.impact.sideways)
+
+    @property
+    def surface_speed(self) -> float:
+        """Return the velocity along x of the sphere's own surface at the contact, m/s."""
+        return float(self.velocity[0] - self.impact.radius * self.spin[1])
+
+
+def simulation_of(scenes: Sequence[Scene]) -> Simulation:
+    """Return a simulation with a world for each of some scenes of one structure, loaded."""
+    capacity = max(scene.capacity() for scene in scenes)
+    simulation = Simulation(scenes[0], len(scenes), capacity)
+    simulation.load(list(scenes))
+    return simulation
+
+
+def ended(results: Sequence[Result]) -> Sequence[Result]:
+    """Return results; raise RunError where one has failed."""
+    for result in results:
+        if not (result.status.ok or result.status.reason == "running"):
+            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    return results
+
+
+def by_id(result: Result) -> dict[str, np.ndarray]:
+    """Return the state of a result with its particles in the order of their ids."""
+    order = np.argsort(result.state["id"])
+    return {name: values[order] for name, values in result.state.items()}
+
+
+def rebound(impact: ParticleImpact, result: Result) -> Rebound:
+    """Return what has become of an impact."""
+    state = by_id(result)
+    other = state["velocity"][1] if impact.partner != "plane" else np.zeros(3)
+    return Rebound(impact, state["velocity"][0], state["spin"][0], other)
+
+
+@dataclass(frozen=True)
+class ForceCurve:
+    """A force curve has overlaps (m) and forces (N) of an impact at times (s), and how long it lasted, s."""
+
+    time: np.ndarray
+    overlap: np.ndarray
+    force: np.ndarray
+    lasted: float
+
+
+def force_curves(impacts: Sequence[ParticleImpact], every: int = 4) -> list[ForceCurve]:
+    """Return the force curves of some impacts, looked at after so many steps each."""
+    seen: list[list[tuple[float, float, float]]] = [[] for _ in impacts]
+    with closing(simulation_of([impact.scene() for impact in impacts])) as simulation:
+        for _ in range(int(1.5 * STEPS) // every):
+            simulation.run(steps=every)
+            for impact, rows, result in zip(impacts, seen, ended(simulation.results()), strict=True):
+                state = by_id(result)
+                other = state["position"][1, 2] + impact.other_radius if impact.partner != "plane" else 0.0
+                overlap = impact.radius + other - state["position"][0, 2]
+                rows.append((result.time, overlap, state["force"][0, 2]))
+    curves = []
+    for rows in seen:
+        time, overlap, force = np.array(rows).T
+        # They fly apart at a constant speed then.
+        since = overlap[-1] / ((overlap[-1] - overlap[-2]) / (time[-1] - time[-2]))
+        curves.append(ForceCurve(time, overlap, force, float(time[-1] - since)))
+    return curves

@@ -1,0 +1,80 @@
+"""Measured quantities with their uncertainties, which a calibration is to meet, as a file has them.
+
+The file is CSV with a heading, in any order, a line each:
+
+    quantity,value,uncertainty
+    angle_of_repose,24.5,1.0
+    discharge_rate,0.150,0.005
+
+An angle of repose is in degrees, a discharge rate in kg/s. The uncertainty is one standard deviation, of the
+measurement and of what a simulation of so few grains can resolve.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from tisim.errors import InputError, did_you_mean, must
+
+QUANTITY_UNITS = {"angle_of_repose": "degrees", "discharge_rate": "kg/s"}
+"""The quantities that may be measured, and their units."""
+HEADING = ["quantity", "value", "uncertainty"]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measurement is a value and its uncertainty, one standard deviation, in the unit of the quantity."""
+
+    value: float
+    uncertainty: float
+
+    def __post_init__(self) -> None:
+        must(math.isfinite(self.value) and self.value > 0, "value", "finite and above 0", self.value)
+        sound = math.isfinite(self.uncertainty) and self.uncertainty > 0
+        must(sound, "uncertainty", "finite and above 0", self.uncertainty)
+
+    def misfit(self, simulated: float) -> float:
+        """Return how far a simulated value is from it, squared, in uncertainties."""
+        return ((simulated - self.value) / self.uncertainty) ** 2
+
+
+Measured = Mapping[str, Measurement]
+"""Measurements by the name of their quantity."""
+
+
+def read(path: Path) -> dict[str, Measurement]:
+    """Return the measurements of a CSV file; InputError where it is none, or there is nothing in it."""
+    try:
+        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path} must be a CSV file that can be read; received {error}") from None
+    rows = [[cell.strip() for cell in row] for row in rows if any(cell.strip() for cell in row)]
+    must(
+        bool(rows) and rows[0] == HEADING,
+        f"heading of {path}",
+        ",".join(HEADING),
+        ",".join(*rows[:1] or [[]]),
+    )
+    measured: dict[str, Measurement] = {}
+    for row in rows[1:]:
+        must(len(row) == len(HEADING), f"a line of {path}", "of three cells", ",".join(row))
+        name, *numbers = row
+        if name not in QUANTITY_UNITS:
+            raise InputError(
+                f"quantity of {path} must be one of {', '.join(QUANTITY_UNITS)}; received {name}"
+                f"{did_you_mean(name, QUANTITY_UNITS)}"
+            )
+        must(name not in measured, f"quantity of {path}", "given once", name)
+        try:
+            value, uncertainty = map(float, numbers)
+        except ValueError:
+            raise InputError(
+                f"{name} of {path} must be a value and an uncertainty; received {','.join(numbers)}"
+            ) from None
+        measured[name] = Measurement(value, uncertainty)
+    must(bool(measured), f"quantities of {path}", "one or more", "none")
+    return measured

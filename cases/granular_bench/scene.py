@@ -1,0 +1,132 @@
+"""A draw-down test: grains flow out of a silo through an orifice, onto a disc, on which a heap remains.
+
+One test gives an angle of repose and a discharge rate, which neither alone tell sliding from rolling friction
+(T. Roessler, C. Richter, A. Katterfeld and F. Will, Powder Technol. 343 (2019) 803, for tests of this kind).
+Grains begin loose in the silo and fall on its flat bottom; the rate is taken once they are a bed. What falls
+off the disc is taken out. Grains are softer than they are, as is done: what that changes, ``tisim cost
+granular_bench`` tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cases.case import Size, size_named
+from tisim import Cloud, GrainClass, Material, RandomInCylinder, Scene
+from tisim.effects import (
+    Granular,
+    Gravity,
+    HertzMaterial,
+    MindlinForce,
+    RestitutionDamping,
+    RollingEPSD,
+    Walls,
+)
+from tisim.geometry import ConicalSurface, CylindricalSurface, Disc, Plane
+from tisim.operators import Outflow, Passage
+from tisim.packing import UniformSizes
+from tisim.steppers import FixedStep, Verlet
+
+TITLE = "Standard tests of contacts, a heap of grains from a silo, and their calibration"
+
+DIAMETER, SPREAD, DENSITY = 5e-3, 0.1, 2500.0
+"""The mean diameter of the grains, m, by which part radii differ from it, and their density, kg/m^3."""
+YOUNG, POISSON = 2e6, 0.25
+"""Pa; softened, as is usual: glass has 5e10."""
+DT = 3e-5
+"""The step, s."""
+LOOSE = 0.3
+"""The part of the space that grains fill at the start, before they fall."""
+STEADY_PART = (0.35, 0.75)
+"""Between these parts of the grains in the silo that have passed the orifice flow is taken as steady."""
+ORIGIN = (0.0, 0.0, 0.0)
+"""The middle of the silo's bottom, m."""
+NATURAL = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
+"""The design of a case that is run as it is."""
+
+LAW = Granular(
+    normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
+)
+
+SEARCH_SETTINGS = {
+    "generations": 8, "options": {"population": 12, "parents": 4},
+    "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1, "confirm": 4},
+}  # fmt: skip
+
+SIZES = {
+    "default": Size("a draw-down test of 1500 grains; a heap on a disc of 16 diameters", {}, SEARCH_SETTINGS),
+    "large": Size(
+        "the same of 8000 grains; a heap on a disc of 32 diameters",
+        {"number": 8000, "silo": 10.0, "outlet": 8.0, "disc": 16.0, "drop": 16.0, "duration": 3.0},
+    ),
+}
+
+
+def grain_material(design: Mapping[str, float], young: float = YOUNG) -> Material:
+    """Return the material of grains and walls of a design."""
+    return Material(young=young, poisson=POISSON, **{name: design[name] for name in NATURAL})
+
+
+def scene(
+    design: Mapping[str, float] = NATURAL,
+    seed: int = 0,
+    number: int = 1500,
+    silo: float = 6.0,
+    outlet: float = 6.0,
+    disc: float = 8.0,
+    drop: float = 8.0,
+    duration: float = 1.4,
+    young: float = YOUNG,
+    dt: float = DT,
+) -> Scene:
+    """Return a draw-down test.
+
+    design : friction, rolling_friction and restitution of all contacts. number : of grains. silo, disc :
+    their radii; outlet : its diameter; drop : from the silo's bottom to the disc, all in diameters of a
+    grain. duration : s. young : Pa. dt : s.
+    """
+    d = DIAMETER
+    hole, radius, floor = outlet * d / 2, silo * d, -drop * d
+    height = number * d / (6 * LOOSE * silo**2)
+    # The flat bottom is a cone that is all but flat.
+    below = (0.0, 0.0, -1e-3 * d)
+    total = number * DENSITY * np.pi / 6 * d**3
+    return Scene(
+        name="granular_bench",
+        particles=Cloud(
+            number=number,
+            grains=[
+                GrainClass(
+                    sizes=UniformSizes(
+                        by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2
+                    ),
+                    density=DENSITY,
+                )
+            ],
+            placement=RandomInCylinder(centre=(0.0, 0.0, height / 2), radius=radius, length=height),
+        ),
+        materials={"grain": grain_material(design, young)},
+        effects=(
+            LAW,
+            Walls(
+                cylinders=[CylindricalSurface(start=ORIGIN, end=(0.0, 0.0, 1.2 * height), radius=radius)],
+                cones=[ConicalSurface(start=below, end=ORIGIN, start_radius=hole, end_radius=radius)],
+                discs=[Disc(centre=(0.0, 0.0, floor), radius=disc * d)],
+            ),
+            Gravity(),
+            Passage(
+                planes=[Plane(point=(0.0, 0.0, -d))], begin=STEADY_PART[0] * total, end=STEADY_PART[1] * total
+            ),
+            Outflow(planes=[Plane(point=(0.0, 0.0, floor - 2 * d))]),
+        ),
+        stepper=Verlet(control=FixedStep(dt=dt)),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """Return the draw-down test of a size."""
+    return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -1,0 +1,94 @@
+"""What is made of draw-down tests: Beverloo's law, the heap, the table and the figure; and two runs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import tisim
+from cases.granular_bench.beds import PACKED, VALUES, Bed, bed_figure, beverloo_fit, table
+from cases.granular_bench.measures import discharge, floor, heap, repose
+from cases.granular_bench.problem import problem
+from cases.granular_bench.scene import DENSITY, DIAMETER, SEARCH_SETTINGS, scene
+from optimize.settings import Settings, proposed
+from tisim.analysis import beverloo_rate
+
+
+def cone(degrees, rate=0.1):
+    """A result with a heap of known slope on the disc of a scene, grains in the silo and one that falls."""
+    made = scene(number=10)
+    low, slope = -8 * DIAMETER, np.tan(np.radians(degrees))
+    side = np.arange(-8 * DIAMETER, 8 * DIAMETER, 0.4 * DIAMETER)
+    sites = np.stack(np.meshgrid(side, side, np.arange(0.0, 8 * DIAMETER, 0.4 * DIAMETER)), -1).reshape(-1, 3)
+    inside = sites[sites[:, 2] + slope * np.hypot(*sites[:, :2].T) < 7 * DIAMETER * slope]
+    # The first of them falls, high above the heap.
+    other = [
+        [0.0, 0.0, low + 6 * DIAMETER],
+        [0.0, 0.0, DIAMETER],
+        [0.0, 0.0, -DIAMETER],
+        [0.1, 0.0, low - DIAMETER],
+    ]
+    position = np.vstack([inside + np.array([0.0, 0.0, low + DIAMETER / 2]), other])
+    velocity = np.zeros_like(position)
+    velocity[-4] = [0.0, 0.0, -0.3]
+    state = {
+        "position": position,
+        "velocity": velocity,
+        "radius": np.full(len(position), DIAMETER / 2),
+    }
+    return SimpleNamespace(scene=made, state=state, measures={"passage_rate": rate})
+
+
+def test_the_heap_is_what_lies_on_the_disc_and_has_its_slope():
+    result = cone(25.0)
+    assert floor(result) == pytest.approx(-0.04)
+    assert heap(result).sum() == len(result.state["radius"]) - 4
+    for degrees in (20.0, 25.0, 30.0):
+        assert repose(cone(degrees)) == pytest.approx(degrees, abs=1.5)
+    nothing = SimpleNamespace(
+        scene=result.scene, state={name: values[-4:] for name, values in result.state.items()}
+    )
+    assert np.isnan(repose(nothing))
+
+
+def test_beverloos_law_is_found_again():
+    outlets = np.array([4.0, 6.0, 9.0])
+    rates = np.array([
+        beverloo_rate(d * DIAMETER, DIAMETER, PACKED * DENSITY, discharge=0.61, empty=1.3) for d in outlets
+    ])  # fmt: skip
+    assert beverloo_fit(outlets, rates) == pytest.approx((0.61, 1.3), rel=1e-9)
+
+
+def test_table_and_figure_have_each_bed():
+    found = [
+        Bed(what, value, cone(20.0 + 5 * k, 0.01 * (k + 1)))
+        for what, values in VALUES.items() for k, value in enumerate(values)
+    ]  # fmt: skip
+    rows = table(found).splitlines()
+    assert len(rows) == 1 + len(found)
+    assert rows[0].startswith("varied,value,angle_of_repose_degrees,discharge_rate_kg_s")
+    figure = bed_figure(found)
+    angles, law = figure.axes[2], figure.axes[5]
+    np.testing.assert_allclose(angles.lines[0].get_ydata(), [one.angle for one in found[:4]])
+    np.testing.assert_allclose(law.lines[1].get_ydata(), [one.rate**0.4 for one in found[-5:]])
+
+
+def test_settings_of_the_search_are_sound():
+    assert isinstance(Settings(**proposed(problem(), SEARCH_SETTINGS, None)), Settings)
+
+
+@pytest.mark.slow
+def test_rough_grains_make_a_steeper_heap_and_flow_more_slowly():
+    """Of two draw-down tests with other grains; what flows out is near Beverloo's law."""
+    smooth, rough = tisim.run([
+        scene({"friction": 0.1, "rolling_friction": 0.0, "restitution": 0.5}),
+        scene({"friction": 0.8, "rolling_friction": 0.4, "restitution": 0.5}),
+    ])  # fmt: skip
+    for result in (smooth, rough):
+        assert result.status.ok
+        law = beverloo_rate(6 * DIAMETER, DIAMETER, PACKED * DENSITY)
+        assert 0.5 * law < discharge(result) < 2 * law
+    assert discharge(rough) < 0.9 * discharge(smooth)
+    # Where nothing holds them back from rolling, hardly any stay on the disc.
+    assert repose(rough) > 8
+    assert heap(smooth).sum() < 0.3 * heap(rough).sum()

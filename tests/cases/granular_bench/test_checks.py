@@ -1,0 +1,35 @@
+"""The tests of single contacts: impacts of one structure in the suite, all of them with the slow tests."""
+
+import numpy as np
+import pytest
+
+from cases.granular_bench import particle_tests
+from cases.granular_bench.checks import BOUND, check, rebounds
+from cases.granular_bench.mindlin_impact import oblique_impacts
+
+
+@pytest.mark.long
+def test_impacts_are_those_of_the_law_in_numpy_and_of_rigid_spheres():
+    """One of each test of Chung and Ooi, as one batch."""
+    tests = particle_tests.TESTS
+    some = [tests[3][1], tests[4][4], tests[4][12], tests[5][16], tests[6][5], tests[7][20], tests[8][30]]
+    found = rebounds([*tests[1], *tests[2], *some])
+    for one in found:
+        assert one.restitution == pytest.approx(one.impact.restitution, abs=BOUND)
+    velocity, spin = oblique_impacts([one.impact for one in found], 2000)
+    for k, one in enumerate(found):
+        impact = one.impact
+        assert one.velocity[0] == pytest.approx(velocity[k], abs=BOUND * impact.approach)
+        assert one.spin[1] * impact.radius == pytest.approx(
+            spin[k] * impact.radius, abs=BOUND * impact.approach
+        )
+    sliding = found[6]
+    loss = sliding.impact.sideways - sliding.velocity[0]
+    assert loss == pytest.approx(0.092 * 1.98 * sliding.impact.speed, rel=1e-3)
+    assert np.abs(sliding.velocity[1]) == 0
+
+
+@pytest.mark.slow
+def test_all_checks_pass():
+    wrong = [(item.name, *item.cells) for item in check() if not item.ok]
+    assert not wrong

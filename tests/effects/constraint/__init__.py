@@ -1,0 +1,1 @@
+"""Groups that move as prescribed, and rigid clumps."""

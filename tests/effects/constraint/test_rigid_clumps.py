@@ -1,0 +1,352 @@
+"""Rigid clumps: tops, pendulums and dumbbells that hit a floor, beside NumPy twins and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation as Turn
+
+from tests.scenes import compiled, fixed, simulate
+from tisim import Box, Clump, GrainClass, InputError, Material, Particles, Scene
+from tisim.analysis import clump_bodies
+from tisim.effects import (
+    Granular,
+    Gravity,
+    HertzMaterial,
+    Impact,
+    MindlinForce,
+    RestitutionDamping,
+    RigidClumps,
+    StokesDrag,
+    Tether,
+    Walls,
+)
+from tisim.geometry import Plane
+from tisim.operators import AtRest, InsertionByFlux, Outflow
+from tisim.packing import EqualSizes
+from tisim.steppers import Boris
+
+R = 1e-3
+PEAR = Clump(
+    centres=np.array([(0, 0, 0), (1.6, 0, 0), (0.5, 1.3, 0), (0, 0, 0.9)]) * R,
+    radii=np.array([1, 0.8, 0.7, 0.5]) * R,
+    density=2500.0,
+)
+DUMBBELL = Clump(centres=[(-R, 0, 0), (R, 0, 0)], radii=[R], density=2500.0)
+BALL = Clump(centres=[(0, 0, 0)], radii=[R], density=2500.0)
+
+
+def clumps(shape, place, effects=(), dt=1e-5, steps=1, **more):
+    """A scene of clumps."""
+    names = ("velocity", "orientation", "angular_velocity", "spheres", "box", "quantities")
+    given = {name: more.pop(name) for name in names if name in more}
+    return Scene(
+        particles=Particles.of_clumps(shape, place, **given),
+        effects=(RigidClumps(), *effects),
+        stepper=more.pop("stepper", fixed(dt)),
+        duration=dt * steps,
+        **more,
+    )
+
+
+def twin(scene, stiffness, times, acceleration=0.0):
+    """One clump on springs, from its members to where they began, in NumPy: position, velocity, quaternion
+    and angular momentum at some times."""
+    start = scene.start()
+    body = clump_bodies(start)
+    offset, mass, inertia = start["clump_offset"], body.mass[0], body.inertia[0]
+
+    def rate(_t, y):
+        q = y[6:10] / np.linalg.norm(y[6:10])
+        turn = Turn.from_quat(np.roll(q, -1))
+        arm = turn.apply(offset)
+        force = -stiffness * (y[:3] + arm - start["position"])
+        spin = turn.apply(turn.inv().apply(y[10:]) / inertia)
+        w, u = q[0], q[1:]
+        turning = 0.5 * np.array([-spin @ u, *(w * spin + np.cross(spin, u))])
+        pull = force.sum(axis=0) / mass + acceleration
+        return np.concatenate([y[3:6], pull, turning, np.cross(arm, force).sum(axis=0)])
+
+    y = np.concatenate([body.position[0], body.velocity[0], body.orientation[0], body.angular_momentum[0]])
+    return solve_ivp(rate, (0, times[-1]), y, "DOP853", times, rtol=1e-12, atol=1e-14 * np.abs(y).max()).y.T
+
+
+def spun(dt, steps, spin=(100.0, 500.0, -300.0), effects=()):
+    return clumps(
+        PEAR, [(0, 0, 0)], effects, dt, steps, velocity=(0.1, 0.2, 0.3), angular_velocity=spin, name="top"
+    )
+
+
+def turned_apart(q, p):
+    """The angle (rad) between two orientations, for small ones."""
+    return 2 * np.linalg.norm(np.cross(q[1:], p[1:]) + p[0] * q[1:] - q[0] * p[1:])
+
+
+def test_a_free_top_turns_to_second_order_and_keeps_its_momentum():
+    errors, energies, time = [], [], 0.02
+    (expected,) = twin(spun(1e-4, 200), 0.0, [time])
+    for steps in (100, 200, 400):
+        made = spun(time / steps, steps)
+        (result,) = simulate([made], capacity=4)
+        start, end = clump_bodies(result.start), clump_bodies(result.state)
+        np.testing.assert_array_equal(end.angular_momentum, start.angular_momentum)
+        np.testing.assert_allclose(end.position, start.velocity * time, rtol=1e-13)
+        assert np.linalg.norm(end.orientation) == pytest.approx(1, abs=1e-15)
+        errors.append(turned_apart(end.orientation[0], expected[6:10]))
+        energies.append(abs(end.energy[0] / start.energy[0] - 1))
+        arms = Turn.from_quat(np.roll(end.orientation[0], -1)).apply(result.state["clump_offset"])
+        state = result.state
+        np.testing.assert_allclose(state["position"], end.position + arms, rtol=0, atol=1e-17)
+        spin = end.angular_velocity
+        np.testing.assert_allclose(state["spin"], np.tile(spin, (4, 1)), rtol=1e-12)
+        np.testing.assert_allclose(state["velocity"], end.velocity + np.cross(spin, arms), rtol=1e-12)
+    assert errors[0] < 0.01
+    orders = np.log2(np.array(errors)[:-1] / errors[1:])
+    np.testing.assert_allclose(orders, 2.0, atol=0.05)
+    assert energies[2] < 1e-5
+    assert np.log2(energies[0] / energies[2]) > 3.5
+
+
+def test_a_top_spun_about_its_intermediate_axis_flips():
+    """Energy stays within a bound over thousands of turns, and the axis goes over and back (Dzhanibekov)."""
+    axes = PEAR.body.axes
+    spin = axes @ np.array([1.0, 500.0, 1.0])
+    made = spun(2e-5, 20_000, tuple(spin))
+    simulation = compiled(made, 1, 4)
+    simulation.load(made)
+    along, energy = [], []
+    for _ in range(100):
+        simulation.run(steps=200)
+        body = clump_bodies(simulation.results()[0].state)
+        turn = Turn.from_quat(np.roll(body.orientation[0], -1))
+        along.append(turn.inv().apply(body.angular_velocity[0])[1] / 500)
+        energy.append(body.energy[0])
+    assert min(along) < -0.99
+    assert max(along) > 0.99
+    assert np.ptp(energy) < 2e-5 * np.mean(energy)
+    times = np.linspace(0, 0.4, 101)[1:]
+    expected = twin(made, 0.0, times)
+    turns = Turn.from_quat(np.roll(expected[:, 6:10], -1, axis=1)).inv().apply(expected[:, 10:])
+    np.testing.assert_allclose(along, turns[:, 1] / PEAR.body.moments[1] / 500, atol=0.02)
+
+
+def test_a_clump_on_springs_is_its_numpy_twin():
+    """Forces on the members make force and torque on the body: to second order."""
+    stiffness, time, errors = 0.2, 0.02, []
+    springs = (Tether(stiffness=(stiffness,) * 3), Gravity(acceleration=(0, 3, -9.81)))
+    (expected,) = twin(spun(1e-4, 1), stiffness, [time], np.array([0, 3, -9.81]))
+    for steps in (1000, 2000):
+        (result,) = simulate([spun(time / steps, steps, effects=springs)], capacity=4)
+        body = clump_bodies(result.state)
+        ends = [*body.position[0], *body.velocity[0]]
+        error = np.abs(ends - expected[:6]) / np.repeat([R, 0.1], 3)
+        errors.append(max(error.max(), turned_apart(body.orientation[0], expected[6:10])))
+    assert np.linalg.norm(expected[10:] - clump_bodies(result.start).angular_momentum[0]) > 1e-9
+    assert errors[1] < 2e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_weight_acts_at_the_centre_of_mass():
+    (result,) = simulate([clumps(PEAR, [(0, 0, 0)], (Gravity(acceleration=(0, 0, -9.81)),), 1e-3, 100)])
+    body = clump_bodies(result.state)
+    assert np.linalg.norm(body.angular_velocity) * 0.1 < 1e-5
+    np.testing.assert_allclose(body.position, [[0, 0, -9.81 * 0.1**2 / 2]], rtol=1e-9, atol=1e-12)
+
+
+LAW = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
+USUAL = {"young": 1e7, "poisson": 0.3, "restitution": 0.6, "friction": 0.4}
+WORLDS, CAPACITY = 4, 16
+
+
+def floored(shape, place, gravity=(0.0, 0.0, 0.0), floor=0.0, law=None, **more):
+    """Clumps above a floor; of one structure, compiled once."""
+    wall = Walls(planes=[Plane(point=(0, 0, floor), normal=(0, 0, 1))])
+    given = {"dt": 1e-6, "materials": {"grain": Material(**{**USUAL, **(law or {})})}, **more}
+    return clumps(shape, place, (LAW, wall, Gravity(acceleration=gravity)), **given)
+
+
+def run(scenes, **more):
+    results = simulate(scenes, worlds=WORLDS, capacity=CAPACITY, **more)
+    for result in results:
+        assert result.status.ok, result.status.reason
+    return results
+
+
+@pytest.mark.slow
+def test_a_clump_of_one_is_a_sphere():
+    """Two that meet each other and the floor, spinning; beside them the same as ordinary spheres."""
+    far, spin, place = np.array([0.1, 0, 0]), (10.0, 200.0, -30.0), [(0, 0, 1.05e-3), (1.98e-3, 1e-4, 1.2e-3)]
+    velocity = np.array([(0.3, 0, -0.4), (-0.2, 0, -0.1)])
+    spheres = Particles(
+        position=place + far, velocity=velocity, radius=R, density=2500.0, quantities={"spin": [spin] * 2}
+    )
+    more = {"velocity": velocity, "angular_velocity": spin, "spheres": spheres, "steps": 10_000}
+    (result,) = run([floored(BALL, place, (0, 0, -9.81), **more)])
+    state = result.state
+    np.testing.assert_allclose(state["position"][:2] + far, state["position"][2:], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(state["velocity"][:2], state["velocity"][2:], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(state["spin"][:2], state["spin"][2:], rtol=0, atol=1e-7)
+    assert np.abs(state["velocity"][:2] - velocity).max() > 0.3
+
+
+@pytest.mark.slow
+def test_a_dumbbell_hits_the_floor_as_the_impulse_says():
+    """Without friction and loss, J = 2 v / (1/M + (r x n)^2 / I) at the place of contact; on end, with loss,
+    v turns to -e v, as the mass of the contact is that of the body."""
+    body, speed, lean = DUMBBELL.body, 0.05, 0.6
+    stiff = {"young": 1e9, "restitution": 1.0, "friction": 0.0}
+    made = [
+        floored(
+            DUMBBELL,
+            [(0, 0, R * (1.001 + np.sin(angle)))],
+            velocity=(0, 0, -speed),
+            orientation=np.roll(Turn.from_rotvec([0, angle, 0]).as_quat(), 1),
+            dt=2e-8,
+            steps=10_000,
+            law=law,
+        )
+        for angle, law in ((lean, stiff), (np.pi / 2, {**stiff, "restitution": 0.6}))
+    ]
+    eccentric, upright = (clump_bodies(result.state) for result in run(made))
+    arm = R * np.cos(lean)
+    impulse = 2 * speed / (1 / body.mass + arm**2 / body.moments[1])
+    assert eccentric.velocity[0, 2] == pytest.approx(-speed + impulse / body.mass, rel=2e-3)
+    # With y turned by +lean the end at +x is below: what pushes it up turns the body the other way.
+    np.testing.assert_allclose(eccentric.angular_velocity[0, 1], -impulse * arm / body.moments[1], rtol=2e-3)
+    assert upright.velocity[0, 2] == pytest.approx(0.6 * speed, rel=5e-3)
+
+
+def tumbling(seed=1, steps=3000):
+    """Three clumps that run into each other, beside a sphere."""
+    rng = np.random.default_rng(seed)
+    place = [(0, 0, 0.02), (3.2e-3, 0, 0.02), (0, 3e-3, 0.02)]
+    velocity = [(0.5, 0.3, 0), (-0.5, 0, 0.1), (0.1, -0.6, 0)]
+    spheres = Particles(
+        position=[(2e-3, 3e-3, 0.02)], velocity=[(0, -1, 0)], radius=R, density=2500.0,
+        quantities={"spin": [(0, 0, 50.0)]},
+    )  # fmt: skip
+    return floored(
+        [PEAR, DUMBBELL, PEAR],
+        place,
+        velocity=velocity,
+        orientation=np.roll(Turn.random(3, rng).as_quat(), 1, axis=1),
+        angular_velocity=100 * rng.normal(size=(3, 3)),
+        spheres=spheres,
+        steps=steps,
+    )
+
+
+def momenta(state):
+    """Momentum and angular momentum of clumps and spheres."""
+    body, free = clump_bodies(state), state["clump"] < 0
+    mass, r, v = state["mass"][free, None], state["position"][free], state["velocity"][free]
+    spin = 0.4 * mass * state["radius"][free, None] ** 2 * state["spin"][free]
+    p = body.mass[:, None] * body.velocity
+    angular = body.angular_momentum + np.cross(body.position, p)
+    whole = angular.sum(axis=0) + (np.cross(r, mass * v) + spin).sum(axis=0)
+    return p.sum(axis=0) + (mass * v).sum(axis=0), whole
+
+
+@pytest.mark.long
+def test_clumps_that_collide_keep_momentum_and_shape():
+    (result,) = run([tumbling()])
+    start, end = clump_bodies(result.start), clump_bodies(result.state)
+    (p, spin), (q, turn) = momenta(result.start), momenta(result.state)
+    size = (start.mass[:, None] * np.abs(start.velocity)).sum()
+    np.testing.assert_allclose(q, p, rtol=0, atol=1e-12 * size)
+    np.testing.assert_allclose(turn, spin, rtol=0, atol=1e-12 * size * 0.02)
+    assert np.abs(end.velocity - start.velocity).max(axis=1).min() > 0.01
+    for w in range(3):
+        own = result.state["clump"] == w
+        before, after = (np.linalg.norm(a[own][:, None] - a[own], axis=2) for a in
+                         (result.start["position"], result.state["position"]))  # fmt: skip
+        np.testing.assert_allclose(after, before, rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(result.state["body_mass"][:4], PEAR.body.mass)
+
+
+@pytest.mark.slow
+def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(tmp_path):
+    made = tumbling(2, 1500)
+    (whole,) = run([made], schedule="world")
+    (other,) = run([made], schedule="particle")
+    _, batched = run([tumbling(1, 1500), made], schedule="world")
+    half = compiled(made, WORLDS, CAPACITY, "world")
+    half.load(made)
+    half.run(steps=700)
+    half.checkpoint(tmp_path / "half.h5")
+    half.load(made)
+    half.restore(tmp_path / "half.h5")
+    half.run()
+    for again in (other, batched, half.results()[0]):
+        for name, values in whole.state.items():
+            np.testing.assert_array_equal(again.state[name], values, err_msg=name)
+
+
+def test_clumps_go_through_the_faces_of_a_box():
+    """They may lie across one from the start."""
+    box, velocity = Box(low=(0, 0, 0), high=(0.01, 0.01, 0.01)), np.array([1.0, -0.73, 0.31])
+    made = clumps(
+        DUMBBELL, [(1e-4, 5e-3, 5e-3)], dt=1e-4, steps=500, velocity=velocity, angular_velocity=(0, 300, 0),
+        box=box, domain=box,
+    )  # fmt: skip
+    (result,) = simulate([made])
+    assert (result.start["position"][:, 0] > 0).all()
+    place = clump_bodies(result.state).position[0]
+    np.testing.assert_allclose(place, ([1e-4, 5e-3, 5e-3] + velocity * result.time) % 0.01, atol=1e-14)
+    assert (result.state["position"] >= 0).all()
+    assert (result.state["position"] < 0.01).all()
+    apart = np.diff(result.state["position"], axis=0)
+    assert np.linalg.norm(apart - 0.01 * np.round(apart / 0.01)) == pytest.approx(2 * R, rel=1e-12)
+
+
+def test_spheres_may_be_put_in_beside_clumps():
+    rain = InsertionByFlux(
+        grains=[GrainClass(sizes=EqualSizes(radius=5e-4), density=2500.0)], number=5, low=(0, 0, 0.05),
+        high=(0.02, 0.02, 0.07), flux=1e6,
+    )  # fmt: skip
+    made = clumps(PEAR, [(0, 0, 0)], (rain, Gravity(acceleration=(0, 0, -9.81))), 1e-4, 100)
+    (result,) = simulate([made])
+    assert len(result.state["mass"]) == 9
+    np.testing.assert_array_equal(result.state["clump"], [0] * 4 + [-1] * 5)
+    assert clump_bodies(result.state).position[0, 2] == pytest.approx(-9.81 * 1e-4 / 2, rel=1e-9)
+
+
+LOOSE = Particles(position=[(0, 0, 0)], velocity=[(0, 0, 0)], radius=R, density=2500.0)
+REFUSED = {
+    "impacts": ({"effects": (Impact(hardness=1.0),)}, "effects.rigid_clumps must be used without impact"),
+    "stepper": (
+        {"stepper": Boris(control=fixed(1e-5).control)},
+        "stepper must be one that follows constraints",
+    ),
+    "outflow": (
+        {"effects": (Outflow(planes=[Plane()]),)},
+        "effects.outflow must be used without rigid_clumps",
+    ),
+    "rest": (
+        {"effects": (Gravity(), AtRest(time=1.0))},
+        "effects.at_rest must be used without rigid_clumps",
+    ),
+}
+
+
+@pytest.mark.parametrize("why", REFUSED)
+def test_what_cannot_be_is_refused(why):
+    wrong, message = REFUSED[why]
+    with pytest.raises(InputError, match=message):
+        clumps(PEAR, [(0, 0, 0)], **wrong)
+
+
+def test_particles_that_are_no_clumps_are_refused():
+    made = clumps(PEAR, [(0, 0, 0)])
+    bare = made.model_copy(update={"particles": LOOSE})
+    with pytest.raises(InputError, match=r"particles must be made by Particles\.of_clumps with effects"):
+        simulate([bare])
+    cut = {name: values[1:] for name, values in made.start().items()}
+    core = {name: cut.pop(name) for name in ("position", "velocity", "radius", "mass")}
+    part = made.model_copy(update={"particles": Particles(**core, quantities=cut)})
+    with pytest.raises(InputError, match="particles must be those of whole clumps"):
+        simulate([part])
+
+
+def test_a_scene_file_holds_clumps():
+    made = clumps(PEAR, [(0, 0, 0), (0.01, 0, 0)], (StokesDrag(viscosity=1e-3),))
+    assert Scene.from_dict(made.to_dict()).digest() == made.digest()

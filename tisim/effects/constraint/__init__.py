@@ -1,0 +1,1 @@
+"""Constraints: groups that move as prescribed, and rigid bodies."""

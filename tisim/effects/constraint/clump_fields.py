@@ -1,0 +1,91 @@
+"""What the particles of clumps carry, and what a start must say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation as Turn
+
+from tisim.components.domain import Domain
+from tisim.effects.base import Field
+from tisim.effects.base.constraint import BODY_MASS
+from tisim.errors import must
+
+NO_CLUMP = -1
+"""What a particle that is of no clump has as its ``clump``."""
+MEMBERSHIP = (
+    Field("clump", "", 1, "keep", integer=True, default=NO_CLUMP),
+    Field("clump_member", "", 1, "keep", integer=True, default=NO_CLUMP),
+    Field("clump_first", "", 1, "keep", integer=True, default=NO_CLUMP),
+    Field("clump_size", "", 1, "keep", integer=True, default=0),
+    Field("clump_offset", "m", 3, "keep"),
+)
+"""A particle has the number of its clump, its own number among the members of all clumps, that of the first
+member of its clump, how many members this has, and its place in the body, along the principal axes."""
+BODY = (
+    Field("clump_position", "m", 3, "keep"),
+    Field("clump_velocity", "m/s", 3, "keep"),
+    Field("clump_orientation", "", 1, "keep", slots=4),
+    Field("clump_angular_momentum", "kg m^2/s", 3, "keep"),
+    Field("clump_inertia", "kg m^2", 3, "keep"),
+)
+"""The first member of a clump has these of the body: the centre of mass, its velocity, the orientation as a
+unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments."""
+APART = 1e-4
+"""Members are where and as fast as their bodies say to within this part of a radius and of the largest speed,
+and quaternions are of length 1 to within it; single precision rounds by less."""
+
+
+def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
+    """Raise InputError unless the particles of a start are whole clumps, which are where their bodies say,
+    and others."""
+    names = [field.name for field in (BODY_MASS, *MEMBERSHIP, *BODY)]
+    given = [name for name in names if name in start]
+    must(given == names, "particles", "made by Particles.of_clumps with effects.rigid_clumps", given)
+    held = np.flatnonzero(start["clump"] != NO_CLUMP)
+    held = held[np.argsort(start["clump_member"][held])]
+    clump, member, first, size = (start[field.name][held] for field in MEMBERSHIP[:4])
+    # Kernels index memory by these: all must follow from which are the first.
+    number = np.arange(len(held))
+    leads = np.flatnonzero(first == number)
+    sizes = np.diff([*leads, len(held)])
+    rows = ((member, number), (first, np.repeat(leads, sizes)), (size, np.repeat(sizes, sizes)))
+    whole = all(np.array_equal(values, right) for values, right in rows)
+    whole = whole and np.array_equal(clump, np.repeat(clump[leads], sizes))
+    whole = whole and len(np.unique(clump)) == len(leads)
+    must(whole, "particles", "those of whole clumps, as Particles.of_clumps makes them", "others")
+    if len(held):
+        _check_bodies(start, domain, held, np.repeat(held[leads], sizes))
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
+def _check_bodies(
+    start: Mapping[str, np.ndarray], domain: Domain, held: np.ndarray, leader: np.ndarray
+) -> None:
+    """Raise InputError unless members of clumps are where the bodies say, which their ``leader`` carries."""
+    position, velocity, quaternion, momentum, inertia = (start[field.name][leader] for field in BODY)
+    length = np.linalg.norm(quaternion, axis=1)
+    off = float(np.abs(length - 1).max())
+    must(off <= APART, "particles.clump_orientation", "of length 1", off)
+    must(bool((inertia > 0).all()), "particles.clump_inertia", "greater than 0", float(inertia.min()))
+    turn = Turn.from_quat(np.roll(quaternion, -1, axis=1))
+    arm = turn.apply(start["clump_offset"][held])
+    spin = turn.apply(turn.inv().apply(momentum) / inertia)
+    apart = start["position"][held] - position - arm
+    low, high = domain.bounds()
+    if low is not None and high is not None:
+        turns = np.round(apart / (high - low)) * (high - low)
+        apart = np.where(domain.joined(), apart - turns, apart)
+    rule = "where their clumps are, as Particles.of_clumps makes them"
+    near = np.linalg.norm(apart, axis=1) <= APART * start["radius"][held]
+    must(bool(near.all()), "particles.position", rule, "one elsewhere")
+    lag = start["velocity"][held] - velocity - np.cross(spin, arm)
+    fastest = np.linalg.norm(velocity, axis=1).max() + np.linalg.norm(np.cross(spin, arm), axis=1).max()
+    alike = np.linalg.norm(lag, axis=1) <= APART * fastest
+    must(
+        bool(alike.all()),
+        "particles.velocity",
+        "those of their clumps, as Particles.of_clumps makes them",
+        "others",
+    )

@@ -1,0 +1,94 @@
+"""Groups of particles that move as prescribed, or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Component
+from tisim.components.domain import Domain
+from tisim.effects.base import Constraint, Field, option
+from tisim.effects.motion.base import Fixed, Motion, MotionState
+from tisim.effects.motion.resultant import resultant
+from tisim.errors import must
+from tisim.worlds.state import HEAVY
+
+REFERENCE = Field("reference_position", "m", 3, "keep", default="position")
+"""Where a particle that moves as prescribed is at the time 0."""
+
+
+class PrescribedMotion(Constraint):
+    """Particles of a group move together as a motion says, whatever the forces on them, or are frozen.
+
+        r(t) = M(t) M(0)^-1 r(0),    v = velocity of M at r,    spin = angular velocity of M
+
+    M(t) takes the body to where the motion has it; frozen it stays. They are of the group whose number the
+    field ``group`` of the start has; 0 is that of particles that move freely. Their velocities and spins at
+    the start are those of the motion, whatever the start says. They act on others as ever, and in granular
+    contacts they count as so heavy as a wall; short-ranged laws do not act between them. The result tells the
+    sum of all forces (N) on the group, gravity among them, as ``measures["NAME_force_x"]`` and so on, and
+    that of their torques (N m), about the origin or the centre of its rotation, as ``NAME_torque_x``.
+
+    It is what LAMMPS has in fix freeze and fix move.
+    """
+
+    fields = (*Constraint.fields, "group", REFERENCE)
+    repeatable: ClassVar[bool] = True
+    mark: ClassVar = "group"
+
+    group: int = option("number of the group of particles", 1, gt=0)
+    motion: Motion = option("how the group moves", Fixed())
+
+    @model_validator(mode="after")
+    def _prescribed(self) -> PrescribedMotion:
+        rule = "one that is known ahead, such as fixed, translation, oscillation or rotation"
+        must(not self.motion.quantities, f"{self.label}.motion", rule, self.motion.kind())
+        return self
+
+    def members(self) -> dict[str, Component]:
+        return {"motion": self.motion}
+
+    def held(self, start: Mapping[str, np.ndarray], domain: Domain) -> np.ndarray:
+        held: np.ndarray = start.get("group", np.zeros(len(start["mass"]))) == self.group
+        rule = f"that of some particles in effects.{self.label}, group {self.group}"
+        must(bool(held.any()), "particles.group", rule, "that of none")
+        return held
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        return {"kept": MotionState({})}
+
+    def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
+        own, none = state["group"] == self.group, np.zeros_like(state["position"])
+        position, force, torque = (
+            state.get(name, none)[own].astype(float) for name in ("position", "force", "torque")
+        )
+        return resultant(self.label, position, force, torque, self.motion.centre_of_torque())
+
+    @ti.func
+    def holds(self, s, w, i):
+        return s.group[w, i] == self.group
+
+    @ti.func
+    def joined(self, s, w, i, j):
+        return s.group[w, i] == self.group and s.group[w, j] == self.group
+
+    @ti.func
+    def begin(self, s, w, i):
+        s.body_mass[w, i] = HEAVY * s.mass[w, i]
+        if s.time[w] == 0.0:
+            # The start may be the end of another run.
+            s.reference_position[w, i] = s.position[w, i]
+
+    @ti.func
+    def position(self, s, w, i, t):
+        place = self.motion.to_body(self.kept, w, s.reference_position[w, i], ti.cast(0.0, ti.f64))
+        return self.motion.from_body(self.kept, w, place, t)
+
+    @ti.func
+    def velocity(self, s, w, i, t):
+        place = self.position(s, w, i, t)
+        return self.motion.velocity_at(self.kept, w, place, t), self.motion.angular_velocity(w)

@@ -1,0 +1,110 @@
+"""Rigid clumps of spheres, which move as bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from tisim.backend.taichi import ti
+from tisim.components.domain import Domain
+from tisim.effects.base import Constraint, Field
+from tisim.effects.constraint.clump_fields import BODY, MEMBERSHIP, NO_CLUMP, check_clumps
+from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
+from tisim.numerics.quaternions import rotated
+
+INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True)
+"""The slot of a number has where in memory the member of that number is; it says nothing of the particle in
+the slot."""
+
+
+class RigidClumps(Constraint):
+    """Clumps of spheres move as rigid bodies: the forces on their spheres make up one force and one torque.
+
+        M dV/dt = sum_i f_i,    dL/dt = sum_i ((r_i - X) x f_i + t_i),    v_i = V + w x (r_i - X)
+
+    Spheres, which the start says are clumps (``Particles.of_clumps``), are ordinary particles otherwise: laws
+    act on each, but short-ranged ones not between those of one clump. In granular contacts the mass is that
+    of the body. The centre of mass is stepped by velocity Verlet. The rotation is stepped by five turns about
+    principal axes between half kicks of the angular momentum, which is symplectic and of second order. Sums
+    are in the order of the members. What removes single particles is refused.
+
+    ``tisim.analysis.clump_bodies`` tells of a Result where the bodies are and how they move.
+
+    Source: A. Dullweber, B. Leimkuhler, R. McLachlan, J. Chem. Phys. 107 (1997) 5840.
+    """
+
+    fields: ClassVar = (*Constraint.fields, *MEMBERSHIP, *BODY, INDEX)
+    mark: ClassVar = "clump"
+
+    def held(self, start: Mapping[str, np.ndarray], domain: Domain) -> np.ndarray:
+        check_clumps(start, domain)
+        held: np.ndarray = start["clump"] != NO_CLUMP
+        return held
+
+    @ti.func
+    def holds(self, s, w, i):
+        return s.clump[w, i] != NO_CLUMP
+
+    @ti.func
+    def joined(self, s, w, i, j):
+        return s.clump[w, i] != NO_CLUMP and s.clump[w, i] == s.clump[w, j]
+
+    @ti.func
+    def locate(self, s, w, i):
+        s.clump_index[w, s.clump_member[w, i]] = i
+
+    @ti.func
+    def leads(self, s, w, i):
+        """Return whether particle i is the first member of its clump, which has what is known of the body."""
+        return s.clump_member[w, i] == s.clump_first[w, i]
+
+    @ti.func
+    def orientation(self, s, w, i):
+        """Return the quaternion of the body that i leads."""
+        return ti.Vector([s.clump_orientation[w, i, k] for k in ti.static(range(4))])
+
+    @ti.func
+    def advance(self, s, w, i, dt):
+        if self.leads(s, w, i):
+            self.kick(s, w, i, dt)
+            place = s.clump_position[w, i] + dt * s.clump_velocity[w, i]
+            s.clump_position[w, i] = s.domain.wrap(w, place, s.time[w])
+            momentum, moments = s.clump_angular_momentum[w, i], s.clump_inertia[w, i]
+            turned = free_rotation(self.orientation(s, w, i), momentum, moments, dt)
+            for k in ti.static(range(4)):
+                s.clump_orientation[w, i, k] = turned[k]
+
+    @ti.func
+    def kick(self, s, w, i, dt):
+        if self.leads(s, w, i):
+            force, torque = self.load(s, w, i)
+            s.clump_velocity[w, i] = s.clump_velocity[w, i] + 0.5 * dt / s.body_mass[w, i] * force
+            s.clump_angular_momentum[w, i] = s.clump_angular_momentum[w, i] + 0.5 * dt * torque
+
+    @ti.func
+    def load(self, s, w, i):
+        """Return force (N) and torque (N m) on the body that i leads, about its centre of mass."""
+        force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
+        if ti.static(hasattr(s, "force")):
+            q, first = self.orientation(s, w, i), s.clump_first[w, i]
+            for member in range(first, first + s.clump_size[w, i]):
+                j = s.clump_index[w, member]
+                force += s.force[w, j]
+                torque += rotated(q, s.clump_offset[w, j]).cross(s.force[w, j])
+                if ti.static(hasattr(s, "torque")):
+                    torque += s.torque[w, j]
+        return force, torque
+
+    @ti.func
+    def position(self, s, w, i, t):
+        leader = s.clump_index[w, s.clump_first[w, i]]
+        return s.clump_position[w, leader] + rotated(self.orientation(s, w, leader), s.clump_offset[w, i])
+
+    @ti.func
+    def velocity(self, s, w, i, t):
+        leader = s.clump_index[w, s.clump_first[w, i]]
+        q = self.orientation(s, w, leader)
+        spin = angular_velocity(q, s.clump_angular_momentum[w, leader], s.clump_inertia[w, leader])
+        return s.clump_velocity[w, leader] + spin.cross(rotated(q, s.clump_offset[w, i])), spin

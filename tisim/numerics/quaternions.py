@@ -1,0 +1,26 @@
+"""Unit quaternions (w, x, y, z) of rotations, in kernels."""
+
+from tisim.backend.taichi import ti
+
+
+@ti.func
+def rotated(q, v):
+    """Return a vector turned by a unit quaternion: v + 2 w u x v + 2 u x (u x v), u = (x, y, z)."""
+    u = ti.Vector([q[1], q[2], q[3]])
+    twice = 2.0 * u.cross(v)
+    return v + q[0] * twice + u.cross(twice)
+
+
+@ti.func
+def conjugate(q):
+    """Return the quaternion of the rotation back."""
+    return ti.Vector([q[0], -q[1], -q[2], -q[3]])
+
+
+@ti.func
+def product(p, q):
+    """Return the quaternion of the rotation q, then p (W. R. Hamilton, 1844)."""
+    u, v = ti.Vector([p[1], p[2], p[3]]), ti.Vector([q[1], q[2], q[3]])
+    w = p[0] * q[0] - u.dot(v)
+    r = p[0] * v + q[0] * u + u.cross(v)
+    return ti.Vector([w, r[0], r[1], r[2]])

@@ -1,0 +1,127 @@
+"""The phases in which constraints move what they hold, and what a stepper asks of them for a particle."""
+
+from typing import Any
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Constraint
+from tisim.steppers.context import StepContext
+from tisim.worlds.bound import Bound
+from tisim.worlds.phases import PerParticle
+from tisim.worlds.state import State
+
+Constraints = tuple[Bound[Constraint], ...]
+
+
+@ti.func
+def put_held(s, domain: ti.template(), constraints: ti.template(), w, i, t):  # type: ignore[valid-type]
+    """Put a particle that a constraint holds where that says, at time t (s); return whether one does."""
+    held = 0
+    for constraint in ti.static(constraints):
+        if constraint.holds(s, w, i):
+            s.position[w, i] = domain.wrap(w, constraint.position(s, w, i, t), t)
+            s.velocity[w, i], s.spin[w, i] = constraint.velocity(s, w, i, t)
+            held = 1
+    return held
+
+
+@ti.func
+def steer_held(s, constraints: ti.template(), w, i, t):  # type: ignore[valid-type]
+    """Have a particle that a constraint holds move as that says, at time t (s); return whether one does."""
+    held = 0
+    for constraint in ti.static(constraints):
+        if constraint.holds(s, w, i):
+            s.velocity[w, i], s.spin[w, i] = constraint.velocity(s, w, i, t)
+            held = 1
+    return held
+
+
+class OfConstraints(PerParticle):
+    """This phase asks constraints about each particle."""
+
+    def __init__(self, s: State, constraints: Constraints) -> None:
+        super().__init__(s)
+        self.constraints = constraints
+
+
+class LocateHeld(OfConstraints):
+    """This phase lets constraints know where in memory the particles are that they hold."""
+
+    @ti.func
+    def run(self, w, i):
+        for constraint in ti.static(self.constraints):
+            if constraint.holds(self.s, w, i):
+                constraint.locate(self.s, w, i)
+
+
+class BeginConstraints(OfConstraints):
+    """This phase lets constraints set what they keep of each particle; one that none holds is its own
+    body."""
+
+    @ti.func
+    def run(self, w, i):
+        held = False
+        for constraint in ti.static(self.constraints):
+            if constraint.holds(self.s, w, i):
+                constraint.begin(self.s, w, i)
+                held = True
+        if not held:
+            self.s.body_mass[w, i] = self.s.mass[w, i]
+
+
+class PutHeld(OfConstraints):
+    """This phase has particles be and move where constraints say."""
+
+    @ti.func
+    def run(self, w, i):
+        put_held(self.s, self.s.domain, self.constraints, w, i, self.s.time[w])
+
+
+class AdvanceBodies(OfConstraints):
+    """This phase moves the bodies of constraints on by a step."""
+
+    @ti.func
+    def run(self, w, i):
+        for constraint in ti.static(self.constraints):
+            if constraint.holds(self.s, w, i):
+                constraint.advance(self.s, w, i, ti.cast(self.s.dt[w], self.s.real))
+
+
+class KickBodies(OfConstraints):
+    """This phase kicks the bodies of constraints by the forces at the end of the step."""
+
+    @ti.func
+    def run(self, w, i):
+        for constraint in ti.static(self.constraints):
+            if constraint.holds(self.s, w, i):
+                constraint.kick(self.s, w, i, ti.cast(self.s.dt[w], self.s.real))
+
+
+def offering(constraints: Constraints, hook: str) -> Constraints:
+    """Return those constraints that define a hook which their contract leaves empty."""
+    return tuple(constraint for constraint in constraints if constraint.data.offers(hook))
+
+
+def _asking(kind: Any, s: State, constraints: Constraints, hook: str) -> tuple[PerParticle, ...]:
+    """Return a phase that asks constraints, where one has something to say."""
+    asked = offering(constraints, hook)
+    return (kind(s, asked),) if asked else ()
+
+
+def begin_constraints(s: State, constraints: Constraints) -> tuple[PerParticle, ...]:
+    """Return the phases of constraints that come before the first step."""
+    if not constraints:
+        return ()
+    locate = _asking(LocateHeld, s, constraints, "locate")
+    return BeginConstraints(s, constraints), *locate, PutHeld(s, constraints)
+
+
+def advance_bodies(context: StepContext) -> tuple[PerParticle, ...]:
+    """Return the phases of constraints that come before particles move."""
+    s, constraints = context.s, context.constraints
+    locate = _asking(LocateHeld, s, constraints, "locate")
+    return *locate, *_asking(AdvanceBodies, s, constraints, "advance")
+
+
+def kick_bodies(context: StepContext) -> tuple[PerParticle, ...]:
+    """Return the phases of constraints that come when forces have been summed."""
+    return _asking(KickBodies, context.s, context.constraints, "kick")
