@@ -207,6 +207,11 @@ def joined(kinds):
     every = [extremes.scenes()[f"effects.{kind.kind()}"] for kind in kinds]
     effects = {name: values for data in every for name, values in data["effects"].items()}
     carried = {name: values for data in every for name, values in data["particles"]["quantities"].items()}
+    for insertion in (name for name in effects if name.startswith("insertion_by_")):
+        # A newcomer carries what the others carry.
+        quantities = {name: values[0] for name, values in carried.items()}
+        grains = [{**grain, "quantities": quantities} for grain in effects[insertion]["grains"]]
+        effects[insertion] = {**effects[insertion], "grains": grains}
     particles = {**every[0]["particles"], "quantities": carried}
     materials = {name: values for data in every for name, values in data.get("materials", {}).items()}
     return Scene.from_dict({**every[0], "effects": effects, "particles": particles, "materials": materials})
