@@ -26,8 +26,8 @@ from tisim.worlds.team import Teams
 from tisim.worlds.world_program import world_programs
 
 TEAM_FROM = 2000
-"""Worlds of so many particles are shared by threads, where there are more of these than worlds: of 8000 grains
-two threads are faster than one (docs/performance.md), of 500 slower."""
+"""Worlds of so many particles are shared by threads, where there are more of these than worlds. With 8000
+grains two threads are faster than one (docs/performance.md), with 500 slower."""
 
 
 class CompiledWorlds:
