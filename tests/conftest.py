@@ -35,9 +35,15 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_configure(config):
-    """A shell starts jobs in the background with Ctrl-C ignored, and what is ignored stays so in tisim."""
+    """A shell starts jobs in the background with Ctrl-C ignored, and what is ignored stays so in tisim.
+
+    Tests take two thirds of the time, nearly all of which is compiling, without the compiler's passes ahead
+    of LLVM. No bit depends on these: the process of ``elsewhere`` has them.
+    """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    for compiler in ("TI", "QD"):
+        os.environ.setdefault(f"{compiler}_ADVANCED_OPTIMIZATION", "0")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -108,10 +114,14 @@ np.savez(sys.argv[1], **kept)
 
 @pytest.fixture(scope="session")
 def elsewhere(tmp_path_factory):
-    """Results of test_schedules.crowd in another process: with one thread, and in single precision."""
+    """Results of test_schedules.crowd in another process, with all passes of the compiler: with one thread,
+    and in single precision."""
     file = tmp_path_factory.mktemp("elsewhere") / "results.npz"
     command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file)]
-    completed = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=False)
+    environment = os.environ | {"TI_ADVANCED_OPTIMIZATION": "1", "QD_ADVANCED_OPTIMIZATION": "1"}
+    completed = subprocess.run(
+        command, capture_output=True, text=True, timeout=3600, check=False, env=environment
+    )
     assert completed.returncode == 0, completed.stderr
     with np.load(file) as arrays:
         return dict(arrays)

@@ -16,6 +16,8 @@ from tisim.numerics.ieee import compensated_sum, finite, infinity, same
 from tisim.numerics.powers import power
 from tisim.sources import Cylinder, MagneticCylinders, sample
 
+pytestmark = pytest.mark.long
+
 CLOSE = 1e-12
 """Forces in fast arithmetic differ from those of their twins by less than this part of the largest."""
 

@@ -51,6 +51,7 @@ def test_it_is_what_a_result_would_have(simulation):
         _ = simulation.state
 
 
+@pytest.mark.long
 def test_a_world_written_to_goes_on_as_one_that_starts_so():
     """Same forces, lists and steps, to the bit, wherever the particles have been put; time has gone on."""
     simulation = compiled(crystal(), 2)
@@ -88,6 +89,7 @@ def test_forces_are_those_of_what_was_written():
     assert np.abs(simulation.state["force"] - force).max() > 0.1
 
 
+@pytest.mark.slow
 def test_lists_that_are_too_short_for_what_was_written_grow():
     """The next step begins with the forces of what was written, as from a start, not with those of before."""
     close = crystal(lattice=np.arange(4) * 0.55)

@@ -35,6 +35,7 @@ def test_head_on_beyond_the_speed_of_waves():
     assert v**2 - kinetic(damped) == pytest.approx(loss, rel=2e-2)
 
 
+@pytest.mark.long
 def test_grazing():
     """Past each other with 1e-3 radii of overlap: turned by the impulse along the straight path; with none,
     not at all."""

@@ -123,7 +123,7 @@ def test_a_trial_that_is_given_up_takes_no_memory_away():
     assert ends[1] == pytest.approx(ends[0], abs=1e-4)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_pair_that_meets_between_the_last_trial_and_the_end_of_a_step_is_remembered():
     """Pairs are pulled together from 40 distances, in steps of a single trial, which is far from their ends:
     with lists that are made anew whenever something moves as with those that hold more."""
@@ -168,6 +168,7 @@ class Grow(Operator):
         s.radius[w, i] += self.rate(w) * dt
 
 
+@pytest.mark.long
 def test_a_law_that_comes_to_reach_farther_acts_at_once():
     """Radii of 0.1 + 0.1 t reach over 1.3 m when 12 of them do, after 84 steps."""
     made = scene(

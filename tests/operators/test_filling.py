@@ -15,6 +15,8 @@ from tisim.operators import AtRest, InsertionByFlux, InsertionByFraction, Outflo
 from tisim.packing import EqualSizes, UniformSizes
 from tisim.worlds.fields import Field
 
+pytestmark = pytest.mark.long
+
 STIFFNESS, DAMPING, DT, G = 2e4, 60.0, 4e-4, 9.81
 """N/m, N s/m, s, m/s^2."""
 NEVER = 1e3

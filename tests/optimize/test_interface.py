@@ -102,7 +102,7 @@ def test_other_threads_wait_until_a_search_is_over(monkeypatch):
         assert other.submit(free).result()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_several_objectives_give_a_front(tmp_path):
     two = (
         optimize.Objective("R", distance, "m"),

@@ -26,7 +26,7 @@ def test_cylinder_lies_at_its_angle_and_is_saturated_along_the_field():
     )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_transverse_captures_more_and_pictures_show_it(tmp_path):
     settings = [{"angle": angle, "number": 40, "duration": 2.0} for angle in (0.0, 90.0)]
     along, across = statistics.results(settings, 16)

@@ -20,6 +20,8 @@ from tisim.neighbours.half_list import ListSizes
 from tisim.operators import Operator
 from tisim.worlds.team import Teams
 
+pytestmark = pytest.mark.long
+
 GRAINS, STEPS, DT = 200, 200, 2e-4
 CHUNK_SLOTS = 32
 """Small, so that most pairs are of two chunks."""

@@ -61,6 +61,7 @@ def test_an_impact_has_the_restitution_at_any_speed():
         assert np.ptp(found, axis=0).max() < 1e-9
 
 
+@pytest.mark.long
 def test_an_elastic_impact_is_as_deep_as_hertz_found_and_as_long():
     """At half its time it is at rest, with the overlap and the force of the formulas."""
     errors = []

@@ -96,6 +96,7 @@ def test_the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure
     np.testing.assert_allclose(force[1:, 1], 8 * G_STAR * np.sqrt(overlap[1:]) * 1e-6, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_viscous_friction_forgets():
     """x gamma u up to mu N, and nothing at rest."""
     moved = np.array([[0, 1e-7, 0], [0, 1, 0], [0, 0, 0]])
@@ -152,7 +153,7 @@ TWISTS = {
 }
 
 
-@pytest.mark.parametrize("name", TWISTS)
+@pytest.mark.parametrize("name", ["hooke", pytest.param("jkr", marks=pytest.mark.slow)])
 def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(name):
     first, spring, limit = TWISTS[name]
     turned = np.concatenate(

@@ -73,6 +73,7 @@ def check(results, breaks, rounding):
         assert result.state["reaction_heat"].sum() == pytest.approx(once, rel=rounding)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("load", LOADS)
 def test_a_bonded_pair_collides_once(load):
     results = run(load)

@@ -88,6 +88,7 @@ def test_torques_of_the_fields_on_the_moments_balance_those_of_the_forces(rng):
     balanced({**state, "torque": turning})
 
 
+@pytest.mark.slow
 def test_near_pairs_only(rng):
     """Up to so many radii; also over the pair list, where sizes are unlike."""
     few = [magnets(rng, TruncatedDipoleDipole(cutoff=float(rng.uniform(4, 7)))) for _ in range(WORLDS - 1)]
