@@ -64,6 +64,9 @@ class Insertion(FilledRegion, UsesMaterials, Operator):
         own = (f"{self.label}_number", f"{self.label}_mass") if what == "world_quantities" else ()
         return *super().keeps(what), *own
 
+    def measured(self) -> dict[str, str]:
+        return {f"{self.label}_number": "", f"{self.label}_mass": "kg"}
+
     def check_materials(self, materials: Materials) -> None:
         class_materials(self.grains, materials)
 

@@ -26,6 +26,9 @@ class Outflow(Operator):
 
     planes: tuple[Plane, ...] = option("planes behind which grains are taken out", min_length=1)
 
+    def measured(self) -> dict[str, str]:
+        return {"outflow_mass": "kg"}
+
     @ti.func
     def particle(self, s, w, i, t, dt):
         if self.is_behind(w, s.position[w, i]):

@@ -23,6 +23,9 @@ class PeakDisplacement(Operator):
     fields: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
     world_quantities: ClassVar = ("peak_displacement",)
 
+    def measured(self) -> dict[str, str]:
+        return {"peak_displacement": "m"}
+
     @ti.func
     def world(self, s, w):
         shift, mass = 0.0 * s.position[w, 0], 0.0 * s.mass[w, 0]

@@ -11,10 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from tisim.errors import must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import start_and_end
-from tisim.plotting.style import empty, legend_above, letters, plain, quantity, scale_of
-
-AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
-"""These are the colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
+from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity, scale_of
 
 
 @dataclass(frozen=True)

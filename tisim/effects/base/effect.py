@@ -97,6 +97,11 @@ class Effect(LawHints, Component):
         anyway."""
         return {}
 
+    def measured(self) -> dict[str, str]:
+        """Return the unit of all that a Result tells of it, by name: of its ``world_quantities``, and of what
+        ``measures`` returns. A trajectory has a column for each."""
+        return dict.fromkeys(self.keeps("world_quantities"), "")
+
     @ti.func
     def end_step(self, s, w):
         """Set its quantities of a world at the end of a step, and once before the first; serially, before
