@@ -32,7 +32,9 @@ class PeakDisplacement(Operator):
         for i in range(s.count[w]):
             shift += s.mass[w, i] * (s.position[w, i] - s.origin[w, i])
             mass += s.mass[w, i]
-        farthest = ti.cast(shift.norm() / mass, ti.f64)
+        farthest = ti.cast(0.0, ti.f64)
+        if mass > 0.0:
+            farthest = ti.cast(shift.norm() / mass, ti.f64)
         # The maximum would drop NaN.
         if not finite(farthest):
             s.fail_world_by_effect(w, self.index)

@@ -103,7 +103,8 @@ class Scene(Component):
         self._check_materials()
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
-        self.capacity()
+        rule = "at least one, or put in by an effect such as insertion_by_flux"
+        must(self.capacity() > 0, "particles", rule, "none")
         return self
 
     def _check_materials(self) -> None:

@@ -39,6 +39,8 @@ class RigidClumps(Constraint):
     mark: ClassVar = "clump"
 
     def held(self, start: Mapping[str, np.ndarray], domain: Domain) -> np.ndarray:
+        if not len(start["mass"]):
+            return np.zeros(0, bool)
         check_clumps(start, domain)
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
