@@ -72,7 +72,7 @@ def check_held(scene: Scene, start: Arrays) -> None:
     for constraint in constraints:
         by += constraint.held(start, scene.domain)
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
-        must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max()}")
+        must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max(initial=0)}")
         for effect in scene.effects:
             where = f"quantities of grains of effects.{effect.label}"
             rule = f"without {constraint.mark}, as effects.{constraint.label} holds no grains that are put in"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from tisim.backend.taichi import ti
+from tisim.errors import must
 from tisim.operators.base import option, parameter
 from tisim.operators.insertion import MOST_TRIES, Insertion
 
@@ -64,6 +67,12 @@ class InsertionByFraction(Insertion):
     fraction: float = parameter("", "part of the region's volume that is filled", gt=0, lt=1, examples=[0.2])
     interval: float = parameter("s", "time from one filling to the next", gt=0, examples=[1.0])
     tries: int = option("places that are tried for a grain", 1000, gt=0, le=MOST_TRIES)
+
+    @model_validator(mode="after")
+    def _spheres(self) -> Self:
+        rule = "spheres, whose volume in the region is known; clumps are put in by insertion_by_flux"
+        must(not self.has_clumps, f"{self.label}.grains", rule, "clumps")
+        return self
 
     @ti.func
     def acts(self, s, w):

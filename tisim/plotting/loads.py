@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from tisim.io.reader import Frames
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity
 
-FORCE = "_force_x"
+FORCE_SUFFIX = "_force_x"
 """Measures whose names end so are forces on bodies."""
 
 
 def bodies(frames: Frames) -> list[str]:
     """Return the names of the bodies whose forces a trajectory of 2 frames or more has, in the order of
     the alphabet."""
-    names = [name.removesuffix(FORCE) for name in frames.measures if name.endswith(FORCE)]
+    names = [name.removesuffix(FORCE_SUFFIX) for name in frames.measures if name.endswith(FORCE_SUFFIX)]
     return names if len(frames) > 1 else []
 
 

@@ -46,14 +46,17 @@ def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
     held = np.flatnonzero(start["clump"] != NO_CLUMP)
     held = held[np.argsort(start["clump_member"][held])]
     clump, member, first, size = (start[field.name][held] for field in MEMBERSHIP[:4])
-    # Kernels index memory by these: all must follow from which are the first.
-    number = np.arange(len(held))
-    leads = np.flatnonzero(first == number)
+    # Kernels index memory by these: all must follow from which are the first. Clumps that have left leave
+    # gaps, and members of others are below the number of all particles that there have been.
+    number, leads = np.arange(len(held)), np.flatnonzero(member == first)
     sizes = np.diff([*leads, len(held)])
-    rows = ((member, number), (first, np.repeat(leads, sizes)), (size, np.repeat(sizes, sizes)))
-    whole = all(np.array_equal(values, right) for values, right in rows)
-    whole = whole and np.array_equal(clump, np.repeat(clump[leads], sizes))
-    whole = whole and len(np.unique(clump)) == len(leads)
+    most = int(start["id"].max()) + 1 if "id" in start else len(start["mass"])
+    whole = sizes.sum() == len(held) and (not len(held) or 0 <= member[0] <= member[-1] < most)
+    if whole:
+        firsts, lead = np.repeat(member[leads], sizes), np.repeat(leads, sizes)
+        rows = ((first, firsts), (member, firsts + number - lead), (size, np.repeat(sizes, sizes)))
+        whole = all(np.array_equal(values, right) for values, right in rows)
+        whole = whole and np.array_equal(clump, clump[lead]) and len(np.unique(clump)) == len(leads)
     must(whole, "particles", "those of whole clumps, as Particles.of_clumps makes them", "others")
     if len(held):
         _check_bodies(start, domain, held, np.repeat(held[leads], sizes))
