@@ -32,23 +32,31 @@ GRAINS = (
 NUMBER = 150
 LOW, HIGH = np.array([0.0, 0.0, 1.0]), np.array([1.5, 1.5, 2.5])
 BED = [(0.0, 0.0, 0.12), (0.5, 0.1, 0.14), (1.0, -0.2, 0.13)]
+THERE = [(-4.5, 0.5, 1.5), (-4.8, 0.2, 1.2), (-4.2, 0.8, 1.8)]
 SMALL = Clump(centres=0.04 * PEAR.centres, radii=0.04 * PEAR.radii, density=RHO)
 
 
-def filling(begin=NEVER, gravity=G, bed=True, edge=50.0, velocity=0.0, duration=0.4, floor=DAMPING):
+def filling(
+    begin=NEVER, fill=NEVER, fraction=0.03, interval=0.1, flux=1e5, gravity=G, bed=BED, edge=50.0,
+    side=-1.0, velocity=0.0, duration=0.4, floor=DAMPING,
+):  # fmt: skip
     """Three clumps on the floor, and more that are put in above it."""
     more = {"velocity": (velocity, 0.0, 0.0), "angular_velocity": (0.0, 2.0, 1.0)}
     return Scene(
-        particles=Particles.of_clumps(SMALL, BED, **more) if bed else Particles.none(),
+        particles=Particles.of_clumps(SMALL, bed, **more) if bed else Particles.none(),
         effects=(
             RigidClumps(),
             Floor(damping=floor),
             Gravity(acceleration=(0.0, 0.0, -gravity)),
             InsertionByFlux(
-                name="pour", by="number", flux=1e5, begin=begin, number=NUMBER, grains=GRAINS, low=tuple(LOW),
-                high=tuple(HIGH), velocity=(0.0, 0.0, -1.0),
+                name="pour", by="number", flux=flux, begin=begin, number=NUMBER, grains=GRAINS,
+                low=tuple(LOW), high=tuple(HIGH), velocity=(0.0, 0.0, -1.0),
             ),
-            Outflow(planes=[Plane(point=(edge, 0, 0), normal=(-1, 0, 0))]),
+            InsertionByFraction(
+                name="fill", fraction=fraction, interval=interval, begin=fill, number=NUMBER,
+                grains=GRAINS[:1], low=(-5.0, 0.0, 1.0), high=(-4.0, 1.0, 2.0),
+            ),
+            Outflow(planes=[Plane(point=(edge, 0, 0), normal=(side, 0, 0))]),
             AtRest(time=0.05, energy=1e-4, unbalanced=2e-2),
         ),
         stepper=fixed(DT),
@@ -58,9 +66,11 @@ def filling(begin=NEVER, gravity=G, bed=True, edge=50.0, velocity=0.0, duration=
 
 
 SCENES = {
-    "pour": filling(begin=0.0, gravity=0.0, bed=False),
+    "pour": filling(begin=0.0, gravity=0.0, bed=()),
     "beside": filling(begin=0.1, gravity=0.0),
-    "rest": filling(begin=0.1, duration=12.0),
+    "rest": filling(begin=0.1, fill=0.0, fraction=1e-9, interval=1e3, duration=12.0),
+    "fill": filling(fill=0.0, bed=THERE, gravity=0.0, duration=0.15),
+    "both": filling(begin=0.0, flux=2500.0, gravity=0.0, edge=0.02, side=1.0, velocity=-3.0, floor=1e-3),
     "leaving": filling(gravity=0.0, edge=1.5, velocity=3.0, floor=1e-3),
     "staying": filling(gravity=0.0, velocity=3.0, floor=1e-3),
 }
@@ -68,7 +78,7 @@ SCENES = {
 
 @pytest.fixture(scope="module")
 def simulation():
-    return compiled(SCENES["pour"], worlds=len(SCENES), capacity=12 + 4 * NUMBER)
+    return compiled(SCENES["pour"], worlds=len(SCENES), capacity=12 + 8 * NUMBER)
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +166,28 @@ def test_clumps_of_the_start_do_not_notice_those_that_are_put_in(results):
     assert len(np.unique(held)) == len(held)
 
 
+def test_a_region_is_filled_up_to_a_fraction_of_clumps(outcome):
+    """Of their own volume, not that of their spheres, with those of the start that are there; nothing is
+    missing when it is time again."""
+    result, series = outcome[0]["fill"], outcome[1]["fill"]
+    bodies = clump_bodies(result.state)
+    volume = bodies.mass / RHO
+    np.testing.assert_allclose(result.state["clump_volume"][result.state["clump_volume"] > 0], volume)
+    assert volume[:-1].sum() < 0.03 <= volume.sum()
+    spheres = (4 / 3 * np.pi * result.state["radius"] ** 3).sum()
+    assert spheres > 1.05 * volume.sum()
+    assert len(volume) == 3 + series["fill_number"][-1]
+    assert series["fill_number"][0] == 0 < series["fill_number"][1] == series["fill_number"][-1] > 50
+
+
+def test_what_is_put_in_while_others_leave_stays(results):
+    """In the same step too: a clump is put in at each of those in which the three leave."""
+    result = results["both"]
+    assert result.work["outflow"] == 3
+    assert result.measures["pour_number"] == NUMBER
+    assert result.measures["outflow_mass"] == pytest.approx(3 * SMALL.body.mass, rel=1e-12)
+
+
 def test_clumps_at_rest_end_the_run(results):
     """By the kinetic energy of the bodies, and the force on each as a whole."""
     result = results["rest"]
@@ -217,21 +249,10 @@ def test_a_scene_file_holds_classes_of_clumps():
     assert Scene.from_dict(made.to_dict()).digest() == made.digest()
 
 
-WEIGHED = Clump(centres=[(0, 0, 0)], radii=[1.0], mass=1.0, inertia=np.eye(3))
 WRONG = {
-    "no volume": (
-        lambda: GrainClass(sizes=EqualSizes(radius=1.0), density=1.0, clump=WEIGHED),
-        "clump of a grain class must be given a density",
-    ),
     "no room": (
         lambda: InsertionByFlux(flux=1.0, number=1, grains=GRAINS[:1], low=(0, 0, 0), high=(1, 1, 0.1)),
         "insertion_by_flux.high must be at least 0.1",
-    ),
-    "by fraction": (
-        lambda: InsertionByFraction(
-            fraction=0.1, interval=1.0, number=1, grains=GRAINS, low=(0, 0, 0), high=(1, 1, 1)
-        ),
-        "insertion_by_fraction.grains must be spheres, .* received 'clumps'",
     ),
     "a cloud": (lambda: Cloud(number=3, grains=GRAINS), "cloud.grains must be spheres; received 'clumps'"),
     "loose spheres": (

@@ -94,6 +94,7 @@ class GrainShapes(Effect):
             for k in range(size):
                 i = lead + k
                 # Numbers of members are ids, which no member of the start has.
+                s.clump_index[w, first + k] = i
                 s.clump[w, i], s.clump_first[w, i], s.clump_member[w, i] = first, first, first + k
                 s.clump_size[w, i], s.body_mass[w, i] = size, mass
                 s.clump_offset[w, i] = self.offset(self.first_sphere(c) + k, radius)
@@ -102,3 +103,4 @@ class GrainShapes(Effect):
                 s.clump_orientation[w, lead, k] = q[k]
             unit = ti.Vector([self.bodies[c, 4], self.bodies[c, 5], self.bodies[c, 6]])
             s.clump_inertia[w, lead] = mass * radius * radius * unit
+            s.clump_volume[w, lead] = ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * radius**3

@@ -122,15 +122,15 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def insert(self, s, w):
-        """Put the next grain in, where it finds a place; return whether it did."""
+        """Put the next grain in, where it finds a place; return its radius (m), and 0 where it finds none."""
         k = ti.cast(self.inserted[w], ti.i32)
         of_grain = self.uniforms(s, w, k, 0)
         c = self.draw_class(w, of_grain[0])
         radius = ti.cast(self.draw_radius(c, of_grain[1]), s.real)
-        done = 0
+        placed = 0.0 * radius
         if s.room(w) >= self.end_sphere(c) - self.first_sphere(c):
             attempt = 0
-            while attempt < self.tries and done == 0:
+            while attempt < self.tries and placed == 0.0:
                 of_place = self.uniforms(s, w, k, 1 + attempt)
                 spot = ti.Vector([of_place[0], of_place[1], of_place[2]])
                 place = self.point(w, self.outer(c, radius), spot)
@@ -138,9 +138,9 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
                 if self.is_free(s, w, c, place, q, radius):
                     lambda_ = 2.0 * ti.Vector([of_grain[2], of_grain[3], of_grain[4]]) - 1.0
                     self.put(s, w, c, place, q, self.velocity(w) + self.deviation(w) * lambda_, radius)
-                    done = 1
+                    placed = radius
                 attempt += 1
-        return done
+        return placed
 
     @ti.func
     def uniforms(self, s, w, k, attempt):

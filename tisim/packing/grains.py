@@ -33,7 +33,7 @@ class GrainClass(Component):
         "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
     )
     clump: Clump | None = option(
-        "shape of its grains, a rigid clump of a density of any value; spheres unless given", None
+        "shape of its grains, a rigid clump, of which only the shape counts; spheres unless given", None
     )
     material: Text | None = option(
         "material of its grains; unless given, that of the cloud, or the first of the scene", None
@@ -55,8 +55,6 @@ class GrainClass(Component):
         radius, rule = self.sizes.nodes()[0][[0, -1]], f"from {LEAST:g} to {MOST:g} kg"
         for mass in (self.density * 4 / 3 * np.pi * radius**3).tolist():
             must(LEAST <= mass <= MOST, "mass of a grain", rule, mass)
-        given = self.clump is None or self.clump.density is not None
-        must(given, "clump of a grain class", "given a density, as its volume is needed", "mass and inertia")
         return self
 
     def spheres(self) -> np.ndarray:
@@ -81,8 +79,7 @@ class GrainClass(Component):
     def _clump_radius(self) -> float:
         """Return the radius (m) of a ball of the volume of the clump as it is given."""
         assert self.clump is not None
-        assert self.clump.density is not None
-        return float(np.cbrt(self.clump.body.mass / self.clump.density * 3 / (4 * np.pi)))
+        return float(np.cbrt(self.clump.body.volume * 3 / (4 * np.pi)))
 
     def number(self) -> float:
         """Return how many grains it has for each kg of share."""

@@ -66,6 +66,12 @@ class Constraint(Effect):
         return s.position[w, i]
 
     @ti.func
+    def volume(self, s, w, i):
+        """Return the volume (m^3) of the body that particle i, which it holds, ``leads``; by default that of
+        the particle."""
+        return ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * s.radius[w, i] ** 3
+
+    @ti.func
     def balance(self, s, w, i):
         """Return kinetic energy (J) and magnitude of the force (N) of the ``free`` body that particle i
         ``leads``."""

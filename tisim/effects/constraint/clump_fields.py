@@ -29,9 +29,11 @@ BODY = (
     Field("clump_orientation", "", 1, "keep", slots=4),
     Field("clump_angular_momentum", "kg m^2/s", 3, "keep"),
     Field("clump_inertia", "kg m^2", 3, "keep"),
+    Field("clump_volume", "m^3", 1, "keep"),
 )
 """The first member of a clump has these of the body: the centre of mass, its velocity, the orientation as a
-unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments."""
+unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments, the
+volume of the union of its members."""
 APART = 1e-4
 """Members are where and as fast as their bodies say to within this part of a radius and of the largest speed,
 and quaternions are of length 1 to within it; single precision rounds by less."""
@@ -67,7 +69,7 @@ def _check_bodies(
     start: Mapping[str, np.ndarray], domain: Domain, held: np.ndarray, leader: np.ndarray
 ) -> None:
     """Raise InputError unless members of clumps are where the bodies say, which their ``leader`` carries."""
-    position, velocity, quaternion, momentum, inertia = (start[field.name][leader] for field in BODY)
+    position, velocity, quaternion, momentum, inertia = (start[field.name][leader] for field in BODY[:5])
     length = np.linalg.norm(quaternion, axis=1)
     off = float(np.abs(length - 1).max())
     must(off <= APART, "particles.clump_orientation", "of length 1", off)

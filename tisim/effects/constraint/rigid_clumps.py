@@ -68,6 +68,10 @@ class RigidClumps(Constraint):
         return s.clump_position[w, s.clump_index[w, s.clump_first[w, i]]]
 
     @ti.func
+    def volume(self, s, w, i):
+        return s.clump_volume[w, i]
+
+    @ti.func
     def balance(self, s, w, i):
         force, _torque = self.load(s, w, i)
         momentum, v = s.clump_angular_momentum[w, i], s.clump_velocity[w, i]
