@@ -244,6 +244,19 @@ def test_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
         np.testing.assert_array_equal(again.state[field], values, err_msg=field)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["particle", "team"])
+def test_on_other_schedules_it_is_the_same_run(results, schedule):
+    names = ("both", "beside", "fill")
+    simulation = compiled(SCENES["pour"], worlds=3, capacity=12 + 8 * NUMBER, schedule=schedule)
+    simulation.load([SCENES[name] for name in names])
+    simulation.run()
+    for result, name in zip(simulation.results(), names, strict=True):
+        assert result.measures == results[name].measures
+        for field, values in results[name].state.items():
+            np.testing.assert_array_equal(result.state[field], values, err_msg=field)
+
+
 def test_a_scene_file_holds_classes_of_clumps():
     made = SCENES["pour"]
     assert Scene.from_dict(made.to_dict()).digest() == made.digest()
