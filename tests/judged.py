@@ -15,6 +15,7 @@ import numpy as np
 from tisim import Result, RunError, Scene
 from tisim.backend.runtime import Runtime
 from tisim.cli.main import main
+from tisim.engine.assembly import measured
 from tisim.engine.monitor import REASONS
 from tisim.worlds.status import WorldStatus
 
@@ -78,6 +79,8 @@ def check_result(result: Result) -> None:
     A start that fails is given back as it was: what should have followed from it, such as forces, may be what
     is not finite.
     """
+    if result.measures:
+        assert result.measures.keys() == measured(result.scene.effects).keys()
     begun = result.status.ok or result.time > 0
     reported = {name: values for name, values in result.state.items() if begun or name in result.start}
     for name, values in {**reported, **result.measures, "time": result.time}.items():

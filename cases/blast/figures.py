@@ -21,8 +21,7 @@ from tisim import Recording, RunError, run
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
-from tisim.plotting.style import empty, legend_above, letters, plain
-from tisim.plotting.time_series import AXIS_COLOURS
+from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
 from tisim.scene.initial_state import Arrays
 
 SEQUENCE_FRAMES = 6

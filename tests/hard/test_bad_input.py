@@ -84,10 +84,17 @@ BAD = {
         "cloud.radius must be a number; received '1 mm'",
     ),
     "two components": (lambda: Cloud(**CLOUD, deviation=(1, 2)), "cloud.deviation"),
-    "none at all": (lambda: particles(position=[], velocity=[]), "particles.position must be a list of 1"),
+    "none at all": (
+        lambda: Scene(particles=particles(position=[], velocity=[]), duration=1.0),
+        "particles must be at least one, or put in by an effect such as insertion_by_flux; received 'none'",
+    ),
     "empty array": (
-        lambda: particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3))),
-        "particles.position",
+        lambda: Scene(particles=particles(position=np.zeros((0, 3)), velocity=np.zeros((0, 3))), duration=1),
+        "particles must be at least one",
+    ),
+    "velocities of nobody": (
+        lambda: particles(position=[]),
+        "particles.velocity must be one value or 0 of them",
     ),
     "mass zero": (lambda: particles(mass=0.0), "particles.mass must be greater than 0"),
     "mass negative": (lambda: particles(mass=-1.0), "particles.mass must be greater than 0"),

@@ -6,13 +6,20 @@ import pytest
 from tests.judged import check_message
 from tests.numerics.test_philox import twin
 from tests.scenes import by_id, compiled, fixed, scene
-from tisim import GrainClass, InputError, Material, MeasureSeries, Particles, Scene, Simulation
+from tisim import GrainClass, InputError, Material, MeasureSeries, Particles, Recording, Scene, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity, PairForce, parameter
 from tisim.geometry import Plane
+from tisim.io import run_folder
+from tisim.io.export import export
+from tisim.io.reader import frames
+from tisim.io.run_folder import RunFolder
 from tisim.numerics.random_streams import INSERTION
 from tisim.operators import AtRest, InsertionByFlux, InsertionByFraction, Outflow
 from tisim.packing import EqualSizes, UniformSizes
+from tisim.plotting.cloud import start_and_end
+from tisim.plotting.movie import movie
+from tisim.plotting.time_series import clouds, history, quantities
 from tisim.worlds.fields import Field
 
 pytestmark = pytest.mark.long
@@ -83,12 +90,20 @@ class Tagged(Force):
 
 
 def filling(
-    flux=20.0, begin=0.0, fraction=0.05, fill=NEVER, seed=5, duration=0.3, velocity=0.0, floor=DAMPING
+    flux=20.0,
+    begin=0.0,
+    fraction=0.05,
+    fill=NEVER,
+    seed=5,
+    duration=0.3,
+    velocity=0.0,
+    floor=DAMPING,
+    bed=BED,
 ):
     region = {"low": tuple(LOW), "high": tuple(HIGH), "grains": GRAINS}
     return scene(
-        BED,
-        np.tile([velocity, 0.0, 0.0], (len(BED), 1)),
+        bed,
+        np.tile([velocity, 0.0, 0.0], (len(bed), 1)),
         (
             StickingSpring(),
             Floor(damping=floor),
@@ -124,13 +139,15 @@ SCENES = {
     "alone": filling(begin=NEVER, velocity=0.05),
     "below": filling(velocity=0.05, flux=100.0),
     "leaving": filling(begin=NEVER, velocity=8.0, floor=1e-3),
+    "empty": filling(flux=30.0, fill=0.3, duration=0.9, bed=np.zeros((0, 3))),
+    "lonely": filling(flux=30.0, fill=0.3, duration=0.9, bed=np.array([[-5.0, -5.0, 0.065]])),
     "finer": filling(begin=NEVER, velocity=0.05).replace({"stepper.control.dt": DT / 2}),
 }
 
 
 @pytest.fixture(scope="module")
 def simulation():
-    return compiled(SCENES["pour"], worlds=8, capacity=80)
+    return compiled(SCENES["pour"], worlds=9, capacity=80)
 
 
 @pytest.fixture(scope="module")
@@ -278,7 +295,55 @@ def test_what_leaves_is_counted(outcome):
     assert (np.diff(series["outflow"]) >= 0).all()
 
 
-@pytest.mark.parametrize("name", ["pour", "rest"])
+def test_a_start_without_particles_is_filled_as_one_with_a_grain_elsewhere(results):
+    """To the last bit: first by flux, then by fraction too."""
+    empty, lonely = (by_id(results[name]) for name in ("empty", "lonely"))
+    assert len(results["empty"].start["mass"]) == 0
+    poured, filled = (results["empty"].measures[f"{name}_number"] for name in ("pour", "fill"))
+    assert len(empty["mass"]) == poured + filled > filled > 0
+    assert np.abs(empty["sticking_spring_past"]).max() > 0
+    for field, values in empty.items():
+        expected = lonely[field][1:]
+        if field in ("id", "sticking_spring_partners"):
+            expected = expected - (expected >= 0)
+        np.testing.assert_array_equal(values, expected, err_msg=field)
+
+
+def test_a_start_without_particles_is_recorded_drawn_and_exported(simulation, results, tmp_path):
+    """Its first frame has none; the scene comes back from its file."""
+    made = SCENES["empty"]
+    simulation.load(made)
+    with Recording(tmp_path / "t.h5", frames=5).observer(simulation) as recorder:
+        simulation.run(observers=[recorder])
+    run_folder.write(simulation.results()[0], RunFolder(tmp_path))
+    assert Scene.from_toml(tmp_path / "scene.toml").digest() == made.digest()
+    with frames(tmp_path / "t.h5") as sequence:
+        numbers = [len(frame.arrays["mass"]) for frame in sequence]
+        assert numbers[0] == 0 < numbers[1] < numbers[-1] == len(results["empty"].state["mass"])
+        series = history(sequence)
+        assert np.isnan(series.drift[0]).all()
+        assert series.number.tolist() == numbers
+        assert (series.shift[1] == 0).all()
+        assert (series.shift[-1] != 0).all()
+        assert series.kinetic_energy[0] == 0 < series.kinetic_energy[-1]
+        start, _ = clouds(sequence).axes
+        assert start.get_title("left") == "(a) start, t = 0 s: 0 grains"
+        quantities(sequence).draw_without_rendering()
+        movie(sequence, tmp_path / "t.gif")
+    text = export(tmp_path / "t.h5", "xyz", tmp_path).read_text().splitlines()
+    assert text[0] == "0"
+    assert text[2] == str(numbers[1])
+    export(tmp_path / "t.h5", "vtk", tmp_path)
+    assert b'NumberOfPoints="0"' in (tmp_path / "t_00000.vtu").read_bytes()
+
+
+def test_a_world_that_is_empty_at_both_ends_has_a_picture():
+    nothing = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
+    figure = start_and_end((nothing, nothing), (0.0, 1.0), SCENES["empty"])
+    assert len(figure.axes) == 2
+
+
+@pytest.mark.parametrize("name", ["pour", "rest", "empty"])
 def test_alone_and_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
     simulation.load(SCENES[name])
     simulation.run(until=0.21)
@@ -294,11 +359,13 @@ def test_alone_and_restarted_it_is_the_same_run(simulation, results, tmp_path, n
 
 
 @pytest.mark.slow
-def test_on_the_other_schedule_it_is_the_same_run(results):
-    simulation = compiled(SCENES["pour"], worlds=2, capacity=80, schedule="particle")
-    simulation.load([SCENES["rest"], SCENES["leaving"]])
+@pytest.mark.parametrize("schedule", ["particle", "team"])
+def test_on_other_schedules_it_is_the_same_run(results, schedule):
+    names = ("rest", "leaving", "empty")
+    simulation = compiled(SCENES["pour"], worlds=3, capacity=80, schedule=schedule)
+    simulation.load([SCENES[name] for name in names])
     simulation.run()
-    for result, name in zip(simulation.results(), ("rest", "leaving"), strict=True):
+    for result, name in zip(simulation.results(), names, strict=True):
         assert result.measures == results[name].measures
         for field, values in results[name].state.items():
             np.testing.assert_array_equal(result.state[field], values, err_msg=field)
@@ -342,6 +409,10 @@ WRONG = {
     "unknown material": (
         lambda: Scene.from_dict({**SCENES["pour"].to_dict(), "materials": {"sand": {}}}),
         r"^grains.1.material must be one of the materials of the scene \(sand\); received 'ore'",
+    ),
+    "nothing ever": (
+        lambda: Scene(particles=Particles.none(), effects=(Gravity(),), duration=1.0),
+        "particles must be at least one, or put in by an effect such as insertion_by_flux; received 'none'",
     ),
     "rest without weight": (
         lambda: Scene(

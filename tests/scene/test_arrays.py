@@ -138,7 +138,7 @@ def test_arrays_are_copies_that_cannot_be_written_to():
     ("changes", "message"),
     [
         ({"position": np.zeros((3, 2))}, "particles.position.0.2 must be given; received nothing"),
-        ({"position": np.zeros((0, 3))}, "particles.position must be a list of 1"),
+        ({"position": np.zeros((0, 3))}, "particles.velocity must be one value or 0 of them"),
         (
             {"position": np.full((3, 3), np.nan)},
             "particles.position.0.0 must be a finite number",

@@ -59,10 +59,11 @@ def plot(
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
-    """Draw the cloud, energy, centre of gravity and number of particles in time, and what its case shows."""
+    """Draw the cloud, energy, centre of gravity and number of particles in time, forces on walls and driven
+    groups, and what its case shows."""
     from cases.case import every
     from tisim.io.reader import frames
-    from tisim.plotting import time_series
+    from tisim.plotting import loads, time_series
 
     file = _trajectory_file(file)
     out_folder = folder or file.parent
@@ -71,6 +72,8 @@ def plot(
             "cloud.png": time_series.clouds(trajectory),
             "time_series.png": time_series.quantities(trajectory),
         }
+        if loads.bodies(trajectory):
+            pictures["loads.png"] = loads.loads(trajectory)
         case = every().get(trajectory.scene.name)
         if case and case.pictures:
             pictures |= case.pictures(trajectory)

@@ -40,7 +40,8 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
                     return array
             # What is wrong with it, or how it can be read, is found out as of a list.
             value = value.tolist()
-        return frozen(as_list((value,) if isinstance(value, float | int) else value), float)
+        array = np.array(as_list((value,) if isinstance(value, float | int) else value), float)
+        return frozen(array.reshape(-1, *columns))
 
     def plain(array: np.ndarray, info: Any) -> Any:
         return array.tolist() if info.mode_is_json() else array
@@ -54,5 +55,7 @@ def _schema(listed: Any, columns: tuple[int, ...]) -> GetPydanticSchema:
 
 Rows = Annotated[np.ndarray, _schema(Annotated[tuple[Vector, ...], Field(min_length=1)], (3,))]
 """Rows are an array of shape (n, 3), with at least one row."""
+RowsOrNone = Annotated[np.ndarray, _schema(tuple[Vector, ...], (3,))]
+"""These are an array of shape (n, 3), of any number of rows."""
 Numbers = Annotated[np.ndarray, _schema(tuple[float, ...], ())]
 """Numbers are an array of shape (n,); a single number is one of one."""

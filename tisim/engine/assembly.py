@@ -73,6 +73,11 @@ def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[st
     return tuple(dict.fromkeys(kept))
 
 
+def measured(effects: Sequence[Effect]) -> dict[str, str]:
+    """Return the units of all that effects of a scene measure, by name."""
+    return {name: unit for effect in effects for name, unit in effect.measured().items()}
+
+
 def picks_pairs(effects: Sequence[Effect], stepper: Stepper) -> bool:
     """Return whether all sums over pairs are over listed ones."""
     pairwise = [effect for effect in effects if isinstance(effect, PairForce | SelfConsistentQuantity)]

@@ -40,13 +40,13 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
             f"a field of the scene ({', '.join(sorted(field_names))})",
             name,
         )
-    missing = [f.name for f in fields if f.default is None and f.name not in start]
+    n = len(start["mass"])
+    missing = [f.name for f in fields if f.default is None and f.name not in start and n]
     if missing:
         names = ", ".join(sorted(missing))
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
-    if any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
+    if n and any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
         scene.stepper.control.suits_start(start["radius"], start["velocity"])
-    n = len(start["mass"])
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
         must(rest, "particles.velocity", "0 where particles are fixed", "one that moves")
@@ -72,7 +72,7 @@ def check_held(scene: Scene, start: Arrays) -> None:
     for constraint in constraints:
         by += constraint.held(start, scene.domain)
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
-        must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max()}")
+        must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max(initial=0)}")
         for effect in scene.effects:
             where = f"quantities of grains of effects.{effect.label}"
             rule = f"without {constraint.mark}, as effects.{constraint.label} holds no grains that are put in"
@@ -165,7 +165,7 @@ def check_field(f: Field, values: np.ndarray, n: int, where: str = "particles") 
         rule = f"within the range of {runtime.current().precision}"
         must(False, label, rule, float(values[unrepresentable][0]))
     if f.minimum is not None:
-        least = float(values.min())
+        least = float(values.min(initial=np.inf))
         must(least >= f.minimum, label, f"at least {f.minimum:g} {f.unit}", least)
 
 
@@ -190,7 +190,10 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
     ended."""
     empty = worlds - len(scenes)
     counts = np.array([len(start["mass"]) for start in starts] + [0] * empty)
-    frames = [np.average(start["velocity"], axis=0, weights=start["mass"]) for start in starts]
+    frames = [
+        np.average(start["velocity"], axis=0, weights=start["mass"]) if len(start["mass"]) else np.zeros(3)
+        for start in starts
+    ]
     volumes = [volume(scene, start) for scene, start in zip(scenes, starts, strict=True)]
     return {
         "frame": np.array(frames + [np.zeros(3)] * empty),
@@ -211,9 +214,12 @@ def world_columns(scenes: Sequence[Scene], starts: Sequence[Arrays], worlds: int
 
 def volume(scene: Scene, start: Arrays) -> float:
     """Return the volume (m^3) of the domain; along axes without joined faces, of the box around the
-    particles."""
-    reach = start["radius"].max()
-    extent = (start["position"].max(axis=0) + reach) - (start["position"].min(axis=0) - reach)
+    particles; where there are none, around one of the largest that may be put in."""
+    place, radius = start["position"], start["radius"]
+    if not len(place):
+        place, radius = np.zeros((1, 3)), np.append(radii(scene, start), 1.0)[:1]
+    reach = radius.max()
+    extent = (place.max(axis=0) + reach) - (place.min(axis=0) - reach)
     low, high = scene.domain.bounds()
     if low is not None and high is not None:
         extent = np.where(scene.domain.joined(), high - low, extent)

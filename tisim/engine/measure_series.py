@@ -18,7 +18,7 @@ class MeasureSeries(Observer):
     """A time series holds what each world counts and measures, at the first step in each interval.
 
     ``series[w]`` are arrays by name for world w: ``time`` (s), ``particles``, each counter of a result's
-    ``work``, such as ``outflow``, and each of its ``measures``, such as ``outflow_mass``.
+    ``work``, such as ``outflow``, and each of its ``measures``, such as ``outflow_mass`` or ``lid_force_z``.
     """
 
     def __init__(self, interval: float) -> None:
@@ -33,14 +33,16 @@ class MeasureSeries(Observer):
     def observe(self, simulation: Simulation) -> None:
         s = simulation.s
         self._rows = self._rows or [[] for _ in simulation.scenes]
-        now = s.snapshot(("time", "status", "count", *s.counters, *simulation.measured()))
+        now = s.snapshot(("time", "status", "count", *s.counters))
+        new = []
         for w, rows in enumerate(self._rows):
-            time = float(now["time"][w])
-            waits = time < self._due(rows) and now["status"][w] == WorldStatus.RUNNING
-            if waits or (rows and time <= rows[-1]["time"]):
-                continue
-            numbers = {name: float(now[name][w]) for name in (*s.counters, *simulation.measured())}
-            rows.append({"time": time, "particles": float(now["count"][w]), **numbers})
+            waits = now["time"][w] < self._due(rows) and now["status"][w] == WorldStatus.RUNNING
+            if not waits and (not rows or now["time"][w] > rows[-1]["time"]):
+                new.append(w)
+        for w, measures in zip(new, simulation.measures(new), strict=True):
+            counts = {name: float(now[name][w]) for name in s.counters}
+            row = {"time": float(now["time"][w]), "particles": float(now["count"][w]), **counts, **measures}
+            self._rows[w].append(row)
 
     def __getitem__(self, w: int) -> dict[str, np.ndarray]:
         rows = self._rows[w]

@@ -208,15 +208,12 @@ class Simulation(CompiledWorlds):
         self._check_loaded()
         now, good = self.s.snapshot(self.s.columns), self.monitor.last_good
         counts = {name: now[name] for name in self.s.counters}
-        quantities = {name: now[name] for name in self.measured()}
         status = now["status"]
         results = []
-        for w in range(len(self.scenes)) if worlds is None else worlds:
+        asked = range(len(self.scenes)) if worlds is None else worlds
+        for w, measures in zip(asked, self.measures(asked), strict=True):
             order = self.in_order(w, good)
             state = {f.name: good[f.name][w, order] for f in self.s.reported}
-            measures = {name: float(values[w]) for name, values in quantities.items()}
-            for effect in self.scenes[w].effects:
-                measures |= effect.measures(state)
             results.append(
                 Result(
                     scene=self.scenes[w],
@@ -232,10 +229,23 @@ class Simulation(CompiledWorlds):
             )
         return results
 
-    def measured(self) -> list[str]:
-        """Return the names of the quantities of worlds that effects keep."""
-        effects = self.scenes[0].effects
-        return [name for effect in effects for name in effect.keeps("world_quantities")]
+    def measures(self, worlds: Sequence[int]) -> list[dict[str, float]]:
+        """Return what effects measure in each of these loaded worlds, by name, where it has come to."""
+        quantities = [name for effect in self.scenes[0].effects for name in effect.keeps("world_quantities")]
+        now, measures = self.s.snapshot(quantities), []
+        for w in worlds:
+            of_world = {name: float(now[name][w]) for name in quantities}
+            makers = [effect for effect in self.scenes[w].effects if effect.offers("measures")]
+            if makers:
+                good, count = self.monitor.last_good, slice(int(self.monitor.last_good["count"][w]))
+                state = {f.name: good[f.name][w, count] for f in self.s.reported}
+                for effect in makers:
+                    made, named = effect.measures(state), tuple(effect.measured())
+                    unnamed = [name for name in made if name not in named]
+                    must(not unnamed, f"measures of effects.{effect.label}", "named by measured", unnamed)
+                    of_world |= made
+            measures.append(of_world)
+        return measures
 
     def _check_loaded(self) -> None:
         """Raise InputError before the first ``load``."""

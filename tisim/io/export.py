@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -182,7 +183,7 @@ def _columns(arrays: Arrays) -> tuple[list[list[float]], str]:
     columns: list[list[float]] = []
     properties = ["species:S:1"]
     for name in _column_order(arrays):
-        values = arrays[name].reshape(len(arrays[name]), -1)
+        values = arrays[name].reshape(len(arrays[name]), math.prod(arrays[name].shape[1:]))
         kind = "I" if values.dtype.kind in "iu" else "R"
         properties.append(f"{_OVITO_NAMES.get(name, name)}:{kind}:{values.shape[1]}")
         columns += [column.tolist() for column in values.T]

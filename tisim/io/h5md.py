@@ -1,8 +1,8 @@
 """Trajectories are laid out as H5MD 1.1 (P. de Buyl, P. H. Colberg and F. Hoefling, Comput. Phys. Commun. 185
 (2014) 1546, and nongnu.org/h5md).
 
-The parts of the specification in use are the metadata, the units module, and groups of particles whose
-number varies: entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``,
+The parts of the specification in use are the metadata, the units module, observables, and groups of particles
+whose number varies: entries whose id is the fill value are placeholders. Beyond it, the group ``parameters``,
 which is for what programs add, has the scenes as TOML and checksums of all that frames hold: HDF5 1.10 and
 later check the structure of a file but not the data in it.
 """
@@ -13,6 +13,7 @@ import getpass
 import re
 import struct
 import zlib
+from collections.abc import Mapping
 from typing import Any
 
 import h5py
@@ -33,6 +34,8 @@ CHUNK = 1 << 16
 CHUNK_ROWS = 1024
 """Times and checksums of this many frames are stored together."""
 SCENES, CHECKSUMS = "parameters/scenes", "parameters/checksums"
+OBSERVABLES = "observables"
+"""This group has what effects measure of each world, such as forces on walls, under its group's name."""
 
 
 def group_names(worlds: int) -> list[str]:
@@ -125,6 +128,19 @@ def create_edges(group: h5py.Group) -> None:
     _with_unit(value, "m")
 
 
+def create_observables(file: h5py.File, name: str, unit_of: Mapping[str, str]) -> None:
+    """Create an empty observable for each measure of the world of a group of particles, given their units, on
+    the ``step`` and ``time`` of its positions."""
+    position = file[f"particles/{name}/position"]
+    for measure, unit in unit_of.items():
+        observable = file.create_group(f"{OBSERVABLES}/{name}/{measure}")
+        observable["step"], observable["time"] = position["step"], position["time"]
+        value = observable.create_dataset(
+            "value", (0,), float, maxshape=(None,), chunks=(CHUNK_ROWS,), fillvalue=np.nan
+        )
+        _with_unit(value, unit)
+
+
 def write_scene(file: h5py.File, name: str, text: str) -> None:
     """Write the scene of a group of particles, as TOML."""
     data = text.encode()
@@ -149,9 +165,10 @@ def create_checksums(file: h5py.File, name: str) -> h5py.Dataset:
     )
 
 
-def clock_checksum(step: int, time: float) -> int:
-    """Return the CRC-32 of a frame's step and time (s)."""
-    return zlib.crc32(struct.pack("<qd", step, time))
+def clock_checksum(step: int, time: float, measures: Mapping[str, float]) -> int:
+    """Return the CRC-32 of a frame's step and time (s), and of its measures, by name."""
+    numbers = (measures[name] for name in sorted(measures))
+    return zlib.crc32(struct.pack(f"<qd{len(measures)}d", step, time, *numbers))
 
 
 def frame_checksum(clock: int, arrays: Arrays) -> int:

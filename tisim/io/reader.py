@@ -6,9 +6,9 @@ import contextlib
 import io
 import time
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -32,8 +32,8 @@ RESULT = "tisim run 1"
 FILE_READ_ATTEMPTS, RETRY_PAUSE = 5, 0.01
 """A file is read at most so many times while it looks damaged, as it may be half written, with so much time,
 in s, between them."""
-Clock = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""A clock holds steps, times (s) and checksums of the frames of a trajectory."""
+Clock = tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, np.ndarray]]
+"""A clock holds steps, times (s) and checksums of the frames of a trajectory, and their measures by name."""
 T = TypeVar("T")
 
 
@@ -42,11 +42,14 @@ class Frame:
     """A frame holds the particles at a time.
 
     time : s. step : number of steps that the run has taken. arrays : by field name, shape (n,) or (n, 3), SI.
+    measures : what effects measure of the world at that time, by name, such as ``floor_force_z``, SI; none in
+    a result.h5.
     """
 
     time: float
     step: int
     arrays: Arrays
+    measures: Mapping[str, float] = field(default_factory=dict)
 
 
 class Frames:
@@ -75,6 +78,12 @@ class Frames:
         return self._clock[1]
 
     @cached_property
+    def measures(self) -> dict[str, np.ndarray]:
+        """Return what effects have measured of the world in each frame, by name, such as ``floor_force_z``,
+        shape (frames,), SI; nothing of a result.h5."""
+        return {} if self._world is None else self._clock[3]
+
+    @cached_property
     def _clock(self) -> Clock:
         return self._file.read(self._read_clock)
 
@@ -84,10 +93,18 @@ class Frames:
         # A killed run may have left a last row that has no step yet.
         count = len(steps) - int(len(steps) > 0 and steps[-1] == h5md.ABSENT)
         times, checksums = position["time"][:count], file[f"{h5md.CHECKSUMS}/{self._world}"][:count]
+        observables = file.get(f"{h5md.OBSERVABLES}/{self._world}", {})
+        series = {name: observable["value"][:count] for name, observable in observables.items()}
         for k in range(count):
-            intact = h5md.clock_checksum(int(steps[k]), float(times[k])) == checksums[k, 0]
-            must(intact, "file", "undamaged", f"frame {k}, the checksum of whose time does not fit")
-        return steps[:count], times, checksums
+            measures = {name: values[k] for name, values in series.items()}
+            intact = h5md.clock_checksum(int(steps[k]), float(times[k]), measures) == checksums[k, 0]
+            must(
+                intact,
+                "file",
+                "undamaged",
+                f"frame {k}, the checksum of whose time and measures does not fit",
+            )
+        return steps[:count], times, checksums, series
 
     @property
     def missing(self) -> str:
@@ -111,7 +128,7 @@ class Frames:
 
     def _read_row(self, file: h5py.File, k: int) -> Frame:
         """Return frame k of a trajectory."""
-        steps, times, checksums = self._clock
+        steps, times, checksums, series = self._clock
         group = file[f"particles/{self._world}"]
         present = group["id/value"][k] != h5md.ABSENT
         arrays = {
@@ -119,7 +136,8 @@ class Frames:
         }
         intact = h5md.frame_checksum(int(checksums[k, 0]), arrays) == checksums[k, 1]
         must(intact, "file", "undamaged", f"frame {k}, whose checksum does not fit")
-        return Frame(float(times[k]), int(steps[k]), arrays)
+        measures = {name: float(values[k]) for name, values in series.items()}
+        return Frame(float(times[k]), int(steps[k]), arrays, measures)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))

@@ -45,6 +45,13 @@ class RecordedWorld(Sequence[Frame]):
         with self._frames() as sequence:
             return sequence.times
 
+    @property
+    def measures(self) -> dict[str, np.ndarray]:
+        """Return what effects have measured of the world in each frame, by name, such as ``floor_force_z``,
+        shape (frames,), SI."""
+        with self._frames() as sequence:
+            return sequence.measures
+
     def __len__(self) -> int:
         with self._frames() as sequence:
             return len(sequence)

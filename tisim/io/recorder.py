@@ -57,7 +57,8 @@ class Recorder(Observer):
             if time > self.last[w]:
                 count = int(good["count"][w])
                 arrays = {f.name: good[f.name][w, :count] for f in self.trajectory.fields[self.indices[w]]}
-                self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays))
+                (measures,) = simulation.measures([w])
+                self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays, measures))
                 self.last[w] = time
 
 

@@ -3,6 +3,7 @@
 A frame is the state at the end of the first step at or after each wanted time; the steps are those of a run
 without a trajectory. The file has a group of particles for each scene: ``all``, or ``world_0`` and so on.
 Particles are in the order of their ids; a frame with fewer particles than another is filled up (see h5md.py).
+The observables of the group are what effects measure of its world, such as the forces on walls.
 
 The file can be read after every single write, by any reader, so also after the run was killed (see
 growing_hdf5.py); one that comes in the midst of a write must come again, as reader.py does. ``step`` grows
@@ -25,7 +26,7 @@ import h5py
 import numpy as np
 
 from tisim import version
-from tisim.engine.assembly import needed_fields
+from tisim.engine.assembly import measured, needed_fields
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
@@ -77,6 +78,10 @@ class Trajectory:
         names = h5md.group_names(len(self.scenes))
         self.groups = [self.file[f"particles/{name}"] for name in names]
         self.checksums = [self.file[f"{h5md.CHECKSUMS}/{name}"] for name in names]
+        self.observables = [
+            {one: self.file[f"{h5md.OBSERVABLES}/{name}/{one}/value"] for one in measured(scene.effects)}
+            for name, scene in zip(names, self.scenes, strict=True)
+        ]
 
     def _empty_image(self, real: Any) -> bytes:
         """Return the bytes of the file without frames."""
@@ -90,6 +95,7 @@ class Trajectory:
                 h5md.create_elements(group, fields, scene.capacity(), real)
                 if scene.domain.shears():
                     h5md.create_edges(group)
+                h5md.create_observables(file, name, measured(scene.effects))
                 h5md.write_scene(file, name, scene.to_toml())
                 h5md.create_checksums(file, name)
         return image.getvalue()
@@ -137,7 +143,12 @@ class Trajectory:
             edges.resize(row + 1, axis=0)
             edges[row] = domain.edges(frame.time)
             self._flush(edges)
-        clock = h5md.clock_checksum(frame.step, frame.time)
+        measures = {name: frame.measures.get(name, np.nan) for name in self.observables[index]}
+        for name, observable in self.observables[index].items():
+            observable.resize(row + 1, axis=0)
+            observable[row] = measures[name]
+            self._flush(observable)
+        clock = h5md.clock_checksum(frame.step, frame.time, measures)
         # The step comes last: it says that the row is whole.
         for column, entry in (
             (self.checksums[index], (clock, h5md.frame_checksum(clock, arrays))),

@@ -1,6 +1,7 @@
 """Unit quaternions (w, x, y, z) of rotations, in kernels."""
 
 from tisim.backend.taichi import ti
+from tisim.numerics import elementary
 
 
 @ti.func
@@ -24,3 +25,14 @@ def product(p, q):
     w = p[0] * q[0] - u.dot(v)
     r = p[0] * v + q[0] * u + u.cross(v)
     return ti.Vector([w, r[0], r[1], r[2]])
+
+
+@ti.func
+def random_orientation(u, v, w):
+    """Return a rotation drawn evenly from all, by three numbers in 0..1.
+
+    Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992) 124.
+    """
+    a, b, p, q = 2.0 * ti.math.pi * v, 2.0 * ti.math.pi * w, ti.sqrt(1.0 - u), ti.sqrt(u)
+    x, y, z = p * elementary.sin(a), p * elementary.cos(a), q * elementary.sin(b)
+    return ti.Vector([q * elementary.cos(b), x, y, z])

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint
-from tisim.effects.constraint.rigid_clumps import RigidClumps
 from tisim.effects.external.gravity import Gravity
 from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator, parameter
@@ -27,8 +26,9 @@ class AtRest(Operator):
     radius. The second is the unbalanced force, the resultant of all on a grain, over the weight. (YADE and
     PFC have the mean contact force in place of the weight, which is larger in a deep bed; here a grain on top
     counts as one below.) Either alone can be deceived: by grains that are let go, and by those that fall at a
-    steady speed. Grains are looked at ten times in ``time``, and must be at rest each time. Grains that are
-    fixed, or held by a constraint, do not count, and without others nothing is at rest; nor is it while
+    steady speed. Rigid clumps have the kinetic energy of bodies, and the resultant on the body. Grains are
+    looked at ten times in ``time``, and must be at rest each time. Grains that are fixed, or move as
+    prescribed, do not count, and without others nothing is at rest; nor is it while
     insertions are not done (by fraction: not begun). The ratios at the last look are ``measures``:
     ``kinetic_ratio`` and ``unbalanced_ratio``.
 
@@ -39,7 +39,6 @@ class AtRest(Operator):
     flags: ClassVar = ("looks_at_rest",)
     any_order: ClassVar[bool] = True
     requires: ClassVar = (Gravity,)
-    excludes: ClassVar = (RigidClumps,)
     ends: ClassVar = "grains are at rest"
 
     energy: float = parameter("", "kinetic energy at rest, over that of a fall by a radius", 1e-5, gt=0)
@@ -66,12 +65,11 @@ class AtRest(Operator):
             g += gravity.acceleration(w)
         kinetic, unbalanced, weight, depth = 0.0 * g[0], 0.0 * g[0], 0.0 * g[0], 0.0 * g[0]
         for i in range(s.count[w]):
-            if not self.is_fixed(s, w, i):
+            if self.is_free(s, w, i):
                 m, radius = s.mass[w, i], s.radius[w, i]
-                kinetic += 0.5 * m * s.velocity[w, i].norm_sqr()
-                if ti.static(hasattr(s, "spin")):
-                    kinetic += 0.2 * m * radius * radius * s.spin[w, i].norm_sqr()
-                unbalanced += s.force[w, i].norm()
+                energy, force = self.balance(s, w, i)
+                kinetic += energy
+                unbalanced += force
                 weight += m * g.norm()
                 depth += m * g.norm() * radius
         calm = weight > 0.0 and kinetic <= self.energy(w) * depth
@@ -88,10 +86,26 @@ class AtRest(Operator):
             s.finish(w, self.index)
 
     @ti.func
-    def is_fixed(self, s, w, i):
-        fixed = False
-        if ti.static(hasattr(s, "fixed")):
-            fixed = s.fixed[w, i] > 0
+    def balance(self, s, w, i):
+        """Return kinetic energy (J) and magnitude of the force (N) of a grain, or of the body that it stands
+        for; of others of a body none."""
+        m, radius = s.mass[w, i], s.radius[w, i]
+        energy, force = 0.5 * m * s.velocity[w, i].norm_sqr(), s.force[w, i].norm()
+        if ti.static(hasattr(s, "spin")):
+            energy += 0.2 * m * radius * radius * s.spin[w, i].norm_sqr()
         for constraint in ti.static(self.constraints):
-            fixed = fixed or constraint.holds(s, w, i)
-        return fixed
+            if constraint.holds(s, w, i):
+                energy, force = 0.0 * m, 0.0 * m
+                if constraint.leads(s, w, i):
+                    energy, force = constraint.balance(s, w, i)
+        return energy, force
+
+    @ti.func
+    def is_free(self, s, w, i):
+        free = True
+        if ti.static(hasattr(s, "fixed")):
+            free = s.fixed[w, i] == 0
+        for constraint in ti.static(self.constraints):
+            if ti.static(not constraint.data.free):
+                free = free and not constraint.holds(s, w, i)
+        return free

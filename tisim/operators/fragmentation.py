@@ -10,6 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.impact.heating import Heating
 from tisim.effects.impact.impact import Impact
 from tisim.effects.impact.law import ImpactLaw
+from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.operators.base import Operator, parameter
 from tisim.worlds.bound import Peers
@@ -61,6 +62,8 @@ class Fragmentation(ImpactLaw, Operator):
         return int(np.maximum(masses / self._grain(masses), 1.0).sum() * (1 + 1e-9))
 
     def _grain(self, masses: np.ndarray) -> float:
+        known = self.grain_mass is not None or len(masses) > 0
+        must(known, f"{self.label}.grain_mass", "given where a scene starts without particles", None)
         return float(masses.min()) if self.grain_mass is None else self.grain_mass
 
     def connect(self, peers: Peers) -> dict[str, Any]:

@@ -13,23 +13,25 @@ from tisim.components.component import Vector
 from tisim.components.material_law import UsesMaterials
 from tisim.components.materials import Materials
 from tisim.numerics import philox
+from tisim.numerics.quaternions import random_orientation
 from tisim.numerics.random_streams import INSERTION
 from tisim.operators.base import Operator, option, parameter
 from tisim.operators.filled_region import FilledRegion
-from tisim.packing.grains import GrainClass, check_quantities, class_materials, quantity
+from tisim.operators.grain_shapes import GrainShapes
+from tisim.packing.grains import check_quantities, class_materials, quantity
 
 MOST_TRIES = 20_000
 """A draw of Philox has room for so many tries of a grain in a step."""
 
 
-class Insertion(FilledRegion, UsesMaterials, Operator):
+class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
     """An insertion puts grains at random places of a region, where they overlap none that are there.
 
     Grains come one after another, each drawn from the classes, with v = velocity + deviation * lambda, lambda
-    uniform in -1..1 along each axis. One that finds no place within ``tries`` is tried again in the next
-    step, and those after it wait, so that sizes come as they are drawn however full it is. They depend on the
-    seed of the scene alone; where they lie also on what is there. They do not turn, and have what
-    their class gives them besides.
+    uniform in -1..1 along each axis; clumps are turned evenly at random. One that finds no place within
+    ``tries`` is tried again in the next step, and those after it wait, so that sizes come as they are drawn
+    however full it is. They depend on the seed of the scene alone; where they lie also on what is there. They
+    do not spin, and have what their class gives them besides.
 
     ``measures`` have the number and the mass (kg) that have been put in so far, under its name: NAME_number
     and NAME_mass.
@@ -40,7 +42,6 @@ class Insertion(FilledRegion, UsesMaterials, Operator):
     fields = ("radius",)
     any_order: ClassVar[bool] = True
 
-    grains: tuple[GrainClass, ...] = option("classes of the grains that are put in", min_length=1)
     number: int = option("grains that are put in, at most", gt=0, le=10**8, examples=[1000])
     velocity: Vector = parameter("m/s", "mean velocity of the grains", (0.0, 0.0, 0.0))
     deviation: Vector = parameter(
@@ -52,17 +53,23 @@ class Insertion(FilledRegion, UsesMaterials, Operator):
     @model_validator(mode="after")
     def _sound(self) -> Self:
         check_quantities(self.grains, ("position", "velocity", "mass", "radius", "id", "material"))
-        self.check_room(self.newcomer_radii()[0])
+        self.check_room(self.farthest())
         return self
 
     def structure(self) -> tuple[Any, ...]:
         """Return what is compiled in: sizes, materials and further quantities too."""
-        classes = ((one.sizes, one.material, *sorted(one.quantities.items())) for one in self.grains)
+        classes = (
+            (one.sizes, one.material, one.spheres().tobytes(), *sorted(one.quantities.items()))
+            for one in self.grains
+        )
         return (*super().structure(), *classes)
 
     def keeps(self, what: str) -> tuple[str, ...]:
         own = (f"{self.label}_number", f"{self.label}_mass") if what == "world_quantities" else ()
         return *super().keeps(what), *own
+
+    def measured(self) -> dict[str, str]:
+        return {f"{self.label}_number": "", f"{self.label}_mass": "kg"}
 
     def check_materials(self, materials: Materials) -> None:
         class_materials(self.grains, materials)
@@ -77,21 +84,21 @@ class Insertion(FilledRegion, UsesMaterials, Operator):
         return [{**one, "material": index} for one, index in zip(given, indices, strict=True)]
 
     def newcomer_radii(self) -> tuple[float, ...]:
-        largest = max(float(one.sizes.nodes()[0][-1]) for one in self.grains)
-        return (largest,) * min(self.number, 2)
+        return (self.largest_sphere(),) * min(self.number, 2)
 
     def newcomers(self) -> Mapping[str, np.ndarray]:
         every = np.arange(len(self.grains))
         return {name: quantity(self.grains, name, every) for name in self.grains[0].quantities}
 
     def capacity(self, masses: np.ndarray) -> int:
-        return len(masses) + self.number
+        return len(masses) + self.number * self.most_spheres()
 
     def lookups(self) -> dict[str, np.ndarray]:
         tables = [one.sizes.table() for one in self.grains]
         lengths = np.array([len(table) for table in tables])
         ends, by_number = np.cumsum(lengths), [one.sizes.by == "number" for one in self.grains]
         return {
+            **super().lookups(),
             "nodes": np.concatenate(tables),
             "spans": np.column_stack([ends - lengths, ends - 1, by_number]).astype(float),
             # A column more, as there may be nothing given.
@@ -115,23 +122,25 @@ class Insertion(FilledRegion, UsesMaterials, Operator):
 
     @ti.func
     def insert(self, s, w):
-        """Put the next grain in, where it finds a place; return whether it did."""
+        """Put the next grain in, where it finds a place; return its radius (m), and 0 where it finds none."""
         k = ti.cast(self.inserted[w], ti.i32)
         of_grain = self.uniforms(s, w, k, 0)
         c = self.draw_class(w, of_grain[0])
         radius = ti.cast(self.draw_radius(c, of_grain[1]), s.real)
-        done = 0
-        if s.room(w) > 0:
+        placed = 0.0 * radius
+        if s.room(w) >= self.end_sphere(c) - self.first_sphere(c):
             attempt = 0
-            while attempt < self.tries and done == 0:
+            while attempt < self.tries and placed == 0.0:
                 of_place = self.uniforms(s, w, k, 1 + attempt)
-                place = self.point(w, radius, ti.Vector([of_place[0], of_place[1], of_place[2]]))
-                if self.is_free(s, w, place, radius):
+                spot = ti.Vector([of_place[0], of_place[1], of_place[2]])
+                place = self.point(w, self.outer(c, radius), spot)
+                q = random_orientation(of_place[3], of_place[4], of_place[5])
+                if self.is_free(s, w, c, place, q, radius):
                     lambda_ = 2.0 * ti.Vector([of_grain[2], of_grain[3], of_grain[4]]) - 1.0
-                    self.put(s, w, c, place, self.velocity(w) + self.deviation(w) * lambda_, radius)
-                    done = 1
+                    self.put(s, w, c, place, q, self.velocity(w) + self.deviation(w) * lambda_, radius)
+                    placed = radius
                 attempt += 1
-        return done
+        return placed
 
     @ti.func
     def uniforms(self, s, w, k, attempt):
@@ -146,21 +155,41 @@ class Insertion(FilledRegion, UsesMaterials, Operator):
         return numbers
 
     @ti.func
-    def put(self, s, w, c, place, velocity, radius):
-        """Put a grain of class c at a place (m)."""
+    def put(self, s, w, c, place, q, velocity, radius):
+        """Put a grain of class c at a place (m), turned by q."""
         mass = self.grains.density(w, c) * ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * radius**3
-        i = s.insert(w, place, velocity, radius, mass)
+        lead, first = s.count[w], s.next_id[w]
+        for m in range(self.first_sphere(c), self.end_sphere(c)):
+            at, size = place + self.arm(m, q, radius), self.sphere_radius(m, radius)
+            i = s.insert(w, at, velocity, size, self.sphere_mass(m, mass))
+            self.give(s, w, c, i)
+        if ti.static(self.has_clumps):
+            self.join(s, w, c, lead, first, place, q, velocity, mass, radius)
+        self.inserted[w] += 1.0
+        self.inserted_mass[w] += ti.cast(mass, ti.f64)
+
+    @ti.func
+    def give(self, s, w, c, i):
+        """Give a particle what its class gives it besides."""
         for given in ti.static(self.given_fields):
             if ti.static(given[2] == 3):
                 given[0][w, i] = ti.Vector([self.given[c, given[1] + m] for m in range(3)])
             else:
                 given[0][w, i] = ti.cast(self.given[c, given[1]], given[0].dtype)
-        self.inserted[w] += 1.0
-        self.inserted_mass[w] += ti.cast(mass, ti.f64)
 
     @ti.func
-    def is_free(self, s, w, place, radius):
-        """Return whether a grain overlaps none of those that are there."""
+    def is_free(self, s, w, c, place, q, radius):
+        """Return whether a grain of class c, turned by q, overlaps none of those that are there."""
+        m, free = self.first_sphere(c), 1
+        while m < self.end_sphere(c) and free == 1:
+            at, size = place + self.arm(m, q, radius), self.sphere_radius(m, radius)
+            free = self.is_sphere_free(s, w, at, size)
+            m += 1
+        return free
+
+    @ti.func
+    def is_sphere_free(self, s, w, place, radius):
+        """Return whether a sphere overlaps none of those that are there."""
         j, free = 0, 1
         while j < s.count[w] and free == 1:
             apart = s.domain.nearest(w, place, s.position[w, j], s.time[w])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from tisim.backend.taichi import ti
+from tisim.effects.base import Constraint
 from tisim.operators.base import option, parameter
 from tisim.operators.insertion import MOST_TRIES, Insertion
+from tisim.worlds.bound import Peers
 
 
 class InsertionByFlux(Insertion):
@@ -46,9 +48,9 @@ class InsertionByFlux(Insertion):
 
     @ti.func
     def world(self, s, w):
-        placed = 1
-        while placed == 1 and self.is_due(s, w):
-            placed = self.insert(s, w)
+        placed = True
+        while placed and self.is_due(s, w):
+            placed = self.insert(s, w) > 0.0
 
 
 class InsertionByFraction(Insertion):
@@ -64,6 +66,9 @@ class InsertionByFraction(Insertion):
     fraction: float = parameter("", "part of the region's volume that is filled", gt=0, lt=1, examples=[0.2])
     interval: float = parameter("s", "time from one filling to the next", gt=0, examples=[1.0])
     tries: int = option("places that are tried for a grain", 1000, gt=0, le=MOST_TRIES)
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {"constraints": peers.of(Constraint)}
 
     @ti.func
     def acts(self, s, w):
@@ -82,11 +87,24 @@ class InsertionByFraction(Insertion):
     def world(self, s, w):
         filled = 0.0 * s.radius[w, 0]
         for i in range(s.count[w]):
-            if self.contains(w, s.position[w, i]):
-                filled += s.radius[w, i] ** 3
+            filled += self.cube(s, w, i)
         most = self.fraction(w) * self.volume(w) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
-        placed = 1
-        while placed == 1 and filled < most and self.inserted[w] < self.number:
-            placed = self.insert(s, w)
-            if placed == 1:
-                filled += s.radius[w, s.count[w] - 1] ** 3
+        placed = True
+        while placed and filled < most and self.inserted[w] < self.number:
+            radius = self.insert(s, w)
+            filled += radius**3
+            placed = radius > 0.0
+
+    @ti.func
+    def cube(self, s, w, i):
+        """Return the cube of the radius (m^3) of a ball of the volume of the grain that particle i stands
+        for, where its centre is in the region; else 0."""
+        place, cube = s.position[w, i], s.radius[w, i] ** 3
+        for constraint in ti.static(self.constraints):
+            if constraint.holds(s, w, i):
+                place, cube = constraint.home(s, w, i), 0.0 * cube
+                if constraint.leads(s, w, i):
+                    cube = constraint.volume(s, w, i) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
+        if not self.contains(w, place):
+            cube = 0.0 * cube
+        return cube

@@ -34,6 +34,9 @@ class Passage(Operator):
     begin: float = parameter("kg", "mass that has passed from which on the rate is taken", 0.0, ge=0)
     end: float = parameter("kg", "mass that has passed up to which the rate is taken", 1e30, gt=0)
 
+    def measured(self) -> dict[str, str]:
+        return dict(zip(self.world_quantities, ("kg", "kg/s", "s", "kg"), strict=True))
+
     @ti.func
     def particle(self, s, w, i, t, dt):
         if s.passed[w, i] == 0 and self.is_behind(w, s.position[w, i]):

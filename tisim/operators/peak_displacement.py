@@ -23,13 +23,18 @@ class PeakDisplacement(Operator):
     fields: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
     world_quantities: ClassVar = ("peak_displacement",)
 
+    def measured(self) -> dict[str, str]:
+        return {"peak_displacement": "m"}
+
     @ti.func
     def world(self, s, w):
         shift, mass = 0.0 * s.position[w, 0], 0.0 * s.mass[w, 0]
         for i in range(s.count[w]):
             shift += s.mass[w, i] * (s.position[w, i] - s.origin[w, i])
             mass += s.mass[w, i]
-        farthest = ti.cast(shift.norm() / mass, ti.f64)
+        farthest = ti.cast(0.0, ti.f64)
+        if mass > 0.0:
+            farthest = ti.cast(shift.norm() / mass, ti.f64)
         # The maximum would drop NaN.
         if not finite(farthest):
             s.fail_world_by_effect(w, self.index)

@@ -26,12 +26,13 @@ second, and a sphere on its own is where its centre is off by less than that of 
 class ClumpBody(NamedTuple):
     """A clump body is what a clump is in motion.
 
-    mass : kg. moments : principal moments of inertia (kg m^2), shape (3,). axes : the principal axes in the
-    template, as columns, shape (3, 3). places : of its spheres from the centre of mass, along these axes (m),
-    shape (n, 3). masses : of the spheres (kg), shape (n,).
+    mass : kg. volume : of the union of its spheres (m^3). moments : principal moments of inertia (kg m^2),
+    shape (3,). axes : the principal axes in the template, as columns, shape (3, 3). places : of its spheres
+    from the centre of mass, along these axes (m), shape (n, 3). masses : of the spheres (kg), shape (n,).
     """
 
     mass: float
+    volume: float
     moments: np.ndarray
     axes: np.ndarray
     places: np.ndarray
@@ -94,8 +95,8 @@ class Clump(Component):
     @cached_property
     def body(self) -> ClumpBody:
         """Return its mass, its inertia, and where its spheres are in it."""
+        solid = sphere_union(self.centres, self.radius)
         if self.density is not None:
-            solid = sphere_union(self.centres, self.radius)
             mass, inertia = self.density * solid.volume, self.density * solid.inertia
             places = self.centres - solid.centre
         else:
@@ -103,7 +104,7 @@ class Clump(Component):
             mass, inertia, places = self.mass, np.asarray(self.inertia), self.centres
         moments, axes = _principal(inertia)
         places = places @ axes
-        return ClumpBody(mass, moments, axes, places, mass * _shares(places, self.radius))
+        return ClumpBody(mass, solid.volume, moments, axes, places, mass * _shares(places, self.radius))
 
 
 def _principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -186,6 +187,8 @@ def clump_columns(
         "clump_size": sizes[whose],
         "clump_offset": offset,
     }
+    columns["clump_volume"] = np.zeros(len(whose))
+    columns["clump_volume"][first] = [body.volume for body in bodies]
     for name, values in (
         ("position", place), ("velocity", going), ("orientation", np.roll(turn.as_quat(), 1, axis=1)),
         ("angular_momentum", momentum), ("inertia", moments),
@@ -204,6 +207,7 @@ def sphere_columns(mass: np.ndarray) -> dict[str, np.ndarray]:
     return {
         **none,
         "clump_size": np.zeros(n),
+        "clump_volume": np.zeros(n),
         "body_mass": mass,
         "spin": np.zeros((n, 3)),
         **{f"clump_{name}": np.zeros((n, 3)) for name in vectors},

@@ -13,6 +13,7 @@ from tisim.components.materials import Materials
 from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
 from tisim.numerics.random_streams import GRAIN_SIZES
+from tisim.packing.clump import Clump
 from tisim.packing.size_laws import EqualSizes
 from tisim.packing.sizes import SizeDistribution
 
@@ -21,13 +22,18 @@ class GrainClass(Component):
     """A class of grains is one of those that a mixture is made of.
 
     A class with a share x of the mass, density rho and sizes with the mean <r^3> over their number has
-    x / (rho <r^3>) of the number of grains, up to a factor that is the same for all classes.
+    x / (rho <r^3>) of the number of grains, up to a factor that is the same for all classes. Where it has a
+    shape, its grains are rigid clumps like that, of any size: the radius of one is that of a ball of the same
+    volume.
     """
 
     sizes: SizeDistribution = option("sizes of its grains", examples=[EqualSizes(radius=1e-3)])
     density: float = parameter("kg/m^3", "density of its grains", examples=[2500.0], gt=0)
     share: float = parameter(
         "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
+    )
+    clump: Clump | None = option(
+        "shape of its grains, a rigid clump, of which only the shape counts; spheres unless given", None
     )
     material: Text | None = option(
         "material of its grains; unless given, that of the cloud, or the first of the scene", None
@@ -50,6 +56,30 @@ class GrainClass(Component):
         for mass in (self.density * 4 / 3 * np.pi * radius**3).tolist():
             must(LEAST <= mass <= MOST, "mass of a grain", rule, mass)
         return self
+
+    def spheres(self) -> np.ndarray:
+        """Return the spheres of a grain of the radius 1: place from the centre of mass along the principal
+        axes, radius, and part of the mass; shape (n, 5)."""
+        if self.clump is None:
+            return np.array([[0.0, 0.0, 0.0, 1.0, 1.0]])
+        body, size = self.clump.body, self._clump_radius()
+        return np.column_stack([body.places / size, self.clump.radius / size, body.masses / body.mass])
+
+    def inertia(self) -> np.ndarray:
+        """Return the principal moments of inertia of a grain of radius 1 and mass 1, shape (3,)."""
+        if self.clump is None:
+            return np.full(3, 0.4)
+        return self.clump.body.moments / (self.clump.body.mass * self._clump_radius() ** 2)
+
+    def outer_radius(self) -> float:
+        """Return how far a grain of radius 1 reaches from its centre of mass."""
+        spheres = self.spheres()
+        return float((np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]).max())
+
+    def _clump_radius(self) -> float:
+        """Return the radius (m) of a ball of the volume of the clump as it is given."""
+        assert self.clump is not None
+        return float(np.cbrt(self.clump.body.volume * 3 / (4 * np.pi)))
 
     def number(self) -> float:
         """Return how many grains it has for each kg of share."""

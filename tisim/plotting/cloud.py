@@ -78,8 +78,9 @@ def start_and_end(
 
 def caption(state: Arrays, time: float) -> str:
     """Return time (s), number and mean radius of the grains."""
-    n, mean = len(state["radius"]), float(state["radius"].mean())
-    return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}, mean radius {si(mean, 'm')}"
+    n = len(state["radius"])
+    size = f", mean radius {si(float(state['radius'].mean()), 'm')}" if n else ""
+    return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}{size}"
 
 
 def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = None) -> None:
@@ -93,9 +94,10 @@ def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = Non
 def temperatures(states: Sequence[Arrays]) -> Normalize | None:
     """Return the scale of temperature over all states; logarithmic when it spans much; None where one has
     none."""
-    if any("temperature" not in state for state in states):
+    some = [state for state in states if len(state["radius"])]
+    if not some or any("temperature" not in state for state in some):
         return None
-    values = np.concatenate([state["temperature"] for state in states])
+    values = np.concatenate([state["temperature"] for state in some])
     low, high = float(values.min()), float(values.max())
     if low > 0 and high > 20 * low:
         return LogNorm(low, high)
@@ -134,7 +136,10 @@ def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, flo
 
 
 def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
-    """Return left, bottom and side of a square that holds all grains and the box. m."""
+    """Return left, bottom and side of a square that holds all grains and the box; one of 1 m where there is
+    nothing. m."""
+    if not len(state["radius"]) and not len(box):
+        return -0.5, -0.5, 1.0
     projected, radius = _project(state["position"]), state["radius"][:, None]
     low = np.vstack([projected - radius, box]).min(axis=0)[:2]
     high = np.vstack([projected + radius, box]).max(axis=0)[:2]
@@ -151,7 +156,7 @@ def panel(
     with lines of ``walls_at``."""
     left, bottom, side = square
     colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
-    if norm is not None:
+    if norm is not None and len(colour):
         colour = HEAT(norm(state["temperature"]))[:, :3]
     image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
     axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)

@@ -82,11 +82,13 @@ def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:
     position, radius, heat = [], [], []
     for frame in frames:
         arrays = frame.arrays
+        if not len(arrays["radius"]):
+            continue
         for extreme in (np.argmin, np.argmax):
             for k in {int(i) for i in extreme(arrays["position"] @ cloud.PROJECTION, axis=0)}:
                 position.append(arrays["position"][k])
                 radius.append(arrays["radius"].max())
         if "temperature" in arrays:
-            heat.append({"temperature": arrays["temperature"]})
-    norm = cloud.temperatures(heat) if heat else None
-    return norm, {"position": np.array(position), "radius": np.array(radius)}
+            heat.append({name: arrays[name] for name in ("temperature", "radius")})
+    norm = cloud.temperatures(heat)
+    return norm, {"position": np.array(position).reshape(-1, 3), "radius": np.array(radius)}

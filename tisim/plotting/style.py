@@ -18,6 +18,8 @@ from matplotlib.ticker import FuncFormatter
 
 TIME = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
 """These colours of time are even to the eye, and without the end that is lost on white."""
+AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
+"""These are the colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 """These are the prefixes of a unit by power of ten."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

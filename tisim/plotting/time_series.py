@@ -11,20 +11,18 @@ from matplotlib.ticker import MaxNLocator
 from tisim.errors import must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import start_and_end
-from tisim.plotting.style import empty, legend_above, letters, plain, quantity, scale_of
-
-AXIS_COLOURS = ("#4477aa", "#cc6677", "#228833")
-"""These are the colours of x, y and z; everybody can tell them apart (P. Tol's bright set)."""
+from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity, scale_of
 
 
 @dataclass(frozen=True)
 class TimeSeries:
-    """A time series is what is drawn against time, with a value for each frame.
+    """A time series is what is drawn against time, with a value for each frame. Of no particles the centre of
+    gravity is not-a-number, and its shift is from where it was first.
 
     In a sheared box velocities, also those of the kinetic energy, are relative to the flow of its images.
 
     time : s. kinetic_energy : J. number : of particles.
-    shift : of the centre of gravity from where it was at the start, m, shape (frames, 3).
+    shift : of the centre of gravity from where it began, m, shape (frames, 3).
     drift : velocity of the centre of gravity, m/s, shape (frames, 3).
     """
 
@@ -42,11 +40,18 @@ def history(frames: Frames) -> TimeSeries:
         mass, velocity = frame.arrays["mass"].astype(float), frame.arrays["velocity"].astype(float)
         velocity -= frames.scene.domain.streaming_velocity(frame.arrays["position"].astype(float))
         energy.append(0.5 * float((mass * (velocity**2).sum(axis=1)).sum()))
-        centre.append(np.average(frame.arrays["position"], axis=0, weights=mass))
-        drift.append(np.average(velocity, axis=0, weights=mass))
+        centre.append(_mean(frame.arrays["position"], mass))
+        drift.append(_mean(velocity, mass))
         number.append(len(mass))
-    shift = np.array(centre) - centre[0]
+    # From the first frame that has particles on.
+    begun = int(np.argmax(np.array(number) > 0))
+    shift = np.array(centre) - centre[begun]
     return TimeSeries(frames.times, np.array(energy), shift, np.array(drift), np.array(number))
+
+
+def _mean(values: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Return the mean of vectors by mass; not-a-number of none."""
+    return np.average(values, axis=0, weights=mass) if len(mass) else np.full(3, np.nan)
 
 
 def clouds(frames: Frames) -> Figure:

@@ -72,6 +72,7 @@ class Cloud(Start):
         given = [name for name in ("radius", "density", "grains") if getattr(self, name)]
         rule = "given radius and density, or grains"
         must(given in (["radius", "density"], ["grains"]), "cloud", rule, " and ".join(given) or "none")
+        must(all(one.clump is None for one in self.grains), "cloud.grains", "spheres", "clumps")
         own = {"position", "velocity", "radius", "mass", "temperature", "id", "material"}
         own |= {"charge"} if self.specific_charge is not None else set()
         for name, value in self.quantities.items():

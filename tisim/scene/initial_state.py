@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import ConfigDict, field_serializer, field_validator, model_validator
 
-from tisim.components.arrays import Numbers, Rows, equal, frozen
+from tisim.components.arrays import Numbers, RowsOrNone, equal, frozen
 from tisim.components.component import Component, Text, option, parameter
 from tisim.components.domain import Box, Domain, Open
 from tisim.components.materials import Materials
@@ -44,12 +44,12 @@ class Particles(Start):
 
     Positions and velocities are of shape (n, 3). Of any other quantity one number stands for all particles,
     or n of them are given. Give mass or density, not both. Arrays are copied, and kept as arrays that are not
-    writeable.
+    writeable. There may be none, ``Particles.none()``, where an effect puts some in later.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    position: Rows = parameter("m", "positions", examples=[((0.0, 0.0, 0.0),)])
-    velocity: Rows = parameter("m/s", "velocities", examples=[((1.0, 0.0, 0.0),)])
+    position: RowsOrNone = parameter("m", "positions", examples=[((0.0, 0.0, 0.0),)])
+    velocity: RowsOrNone = parameter("m/s", "velocities", examples=[((1.0, 0.0, 0.0),)])
     radius: Numbers = parameter("m", "radii, greater than 0", examples=[(1e-3,)])
     mass: Numbers | None = parameter("kg", "masses, greater than 0", None)
     density: float | None = parameter(
@@ -63,6 +63,11 @@ class Particles(Start):
     quantities: Mapping[Text, Any] = option(
         "further fields by name, in SI, such as temperature", default_factory=dict
     )
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return no particles, for a scene in which all are put in later."""
+        return cls(position=(), velocity=(), radius=(), mass=())
 
     @classmethod
     def of_clumps(
@@ -189,7 +194,7 @@ class Particles(Start):
         }
         received = "both" if self.mass is not None else "neither"
         must((self.mass is None) != (self.density is None), "particles", "given mass or density", received)
-        farthest = float(np.abs(arrays["position"]).max())
+        farthest = float(np.abs(arrays["position"]).max(initial=0.0))
         must(farthest <= MOST, "particles.position", f"at most {MOST:g} m from the origin", farthest)
         check_sizes("radius", "m", arrays["radius"])
         if self.density is not None:
@@ -237,7 +242,7 @@ def worst(column: np.ndarray) -> float:
 def check_sizes(name: str, unit: str, column: np.ndarray) -> None:
     """Raise InputError unless all are above 0 and within the limits of their unit."""
     least, most = limits(unit)
-    must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min()))
+    must(bool((column > 0).all()), f"particles.{name}", "greater than 0", float(column.min(initial=np.inf)))
     outside = column[(column < least) | (column > most)]
     first = float(outside[0]) if len(outside) else 0.0
     must(not len(outside), f"particles.{name}", f"from {least:g} to {most:g} {unit}", first)

@@ -71,11 +71,11 @@ class Scene(Component):
     def _complete(self) -> Self:
         present = [type(effect) for effect in self.effects]
         labels = [effect.label for effect in self.effects]
-        for kind, label in zip(present, labels, strict=True):
+        for effect, kind, label in zip(self.effects, present, labels, strict=True):
             must(labels.count(label) == 1, f"effects.{label}", "given once", labels.count(label))
             allowed = (kind.repeatable and not kind.world_quantities) or present.count(kind) == 1
             must(allowed, f"effects of kind {kind.kind()}", "one in a scene", present.count(kind))
-            for required_kinds in kind.requires:
+            for required_kinds in effect.required_effects():
                 must(
                     any(issubclass(other, required_kinds) for other in present),
                     f"effects.{label}",
@@ -103,7 +103,8 @@ class Scene(Component):
         self._check_materials()
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
-        self.capacity()
+        rule = "at least one, or put in by an effect such as insertion_by_flux"
+        must(self.capacity() > 0, "particles", rule, "none")
         return self
 
     def _check_materials(self) -> None:

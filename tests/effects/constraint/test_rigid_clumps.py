@@ -21,7 +21,7 @@ from tisim.effects import (
     Walls,
 )
 from tisim.geometry import Plane
-from tisim.operators import AtRest, InsertionByFlux, Outflow
+from tisim.operators import InsertionByFlux
 from tisim.packing import EqualSizes
 from tisim.steppers import Boris
 
@@ -316,14 +316,6 @@ REFUSED = {
     "stepper": (
         {"stepper": Boris(control=fixed(1e-5).control)},
         "stepper must be one that follows constraints",
-    ),
-    "outflow": (
-        {"effects": (Outflow(planes=[Plane()]),)},
-        "effects.outflow must be used without rigid_clumps",
-    ),
-    "rest": (
-        {"effects": (Gravity(), AtRest(time=1.0))},
-        "effects.at_rest must be used without rigid_clumps",
     ),
 }
 

@@ -6,7 +6,7 @@ import pytest
 from tests.effects.contact.grains import HERTZ_MINDLIN
 from tests.effects.contact.surfaces import AWAY, POISSON, RADIUS, YOUNG, moving
 from tests.scenes import by_id, compiled, scene, simulate
-from tisim import InputError, Material, Simulation
+from tisim import InputError, Material, MeasureSeries, Recording, Simulation
 from tisim.effects import (
     Gravity,
     Oscillation,
@@ -16,6 +16,7 @@ from tisim.effects import (
     Walls,
 )
 from tisim.geometry import CylindricalSurface, Plane
+from tisim.io.reader import frames
 
 WORLDS, CAPACITY = 8, 4
 E_STAR = YOUNG / (2 * (1 - POISSON**2))
@@ -127,20 +128,32 @@ def pressed():
 
 
 @pytest.mark.long
-def test_a_servo_presses_with_the_wanted_force(pressed):
+def test_a_servo_presses_with_the_wanted_force(pressed, tmp_path):
     made, gap, speed = pressed
     simulation = compiled(made, WORLDS, CAPACITY)
     simulation.load([made])
-    simulation.run(until=0.5 * gap / speed)
-    (free,) = simulation.results()
+    series = MeasureSeries(0.1)
+    with Recording(tmp_path / "t.h5", frames=6).observer(simulation) as recorder:
+        observers = [series, recorder]
+        simulation.run(until=0.5 * gap / speed, observers=observers)
+        (free,) = simulation.results()
+        simulation.run(observers=observers)
     assert free.measures["lid_travel"] == pytest.approx(speed * free.time, rel=1e-9)
     assert free.measures["lid_speed"] == speed
-    simulation.run()
     (result,) = simulation.results()
     assert result.measures["lid_force_z"] == pytest.approx(100.0, rel=1e-5)
     assert result.measures["floor_force_z"] == pytest.approx(-100.0 - G, rel=1e-5)
     deeper = sunk(100.0) + sunk(100.0 + G) - sunk(G)
     assert result.measures["lid_travel"] == pytest.approx(gap + deeper, rel=1e-5)
+    # As series: while the lid is on its way the floor bears the weight alone, then the servo's force too.
+    with frames(tmp_path / "t.h5") as recorded:
+        for name, values in recorded.measures.items():
+            np.testing.assert_array_equal(values, series[0][name], err_msg=name)
+            assert values[-1] == result.measures[name]
+        assert recorded.measures.keys() == result.measures.keys()
+        assert recorded.measures["lid_force_z"][0] == 0
+        assert recorded.measures["floor_force_z"][0] == pytest.approx(-G, rel=1e-9)
+        np.testing.assert_allclose(recorded.measures["floor_force_z"][3:], -100.0 - G, rtol=1e-3)
 
 
 @pytest.mark.long

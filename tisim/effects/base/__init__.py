@@ -22,7 +22,7 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    back. Of several effects of one kind they are summed, as all write the same. What is summed over particles
    in a step, in any order, is a whole number, of ``totals``. Where the options decide, ``keeps`` returns the
    names. ``end_step`` sets quantities of a world by what the forces of a step come to; ``measures`` makes
-   more of the particles of a Result.
+   more of the particles of a Result, and ``measured`` names all of both, with units.
 5. A ``Force`` or ``PairForce`` is a pure function of the trial state; it writes nothing. Forces and torques
    are summed in scene order. The velocity of j relative to i is ``s.relative_velocity(w, i, j, separation)``:
    that of an image that moves past the box is not the difference of the two. What near pairs remember of

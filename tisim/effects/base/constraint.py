@@ -27,7 +27,8 @@ class Constraint(Effect):
     the first step, and after a world has been written to, ``begin``, ``locate``, ``position`` and
     ``velocity``.
 
-    mark : the field by which it knows what it holds; particles that are put in later are never held.
+    mark : the field by which it knows what it holds. free : whether bodies that it holds move by the forces
+    on them, and so come to rest as particles do.
     """
 
     contract: ClassVar[bool] = True
@@ -36,6 +37,7 @@ class Constraint(Effect):
     excludes: ClassVar = (PairEvent,)
     fields: ClassVar[tuple[str | Field, ...]] = ("velocity", "spin", BODY_MASS)
     mark: ClassVar[str]
+    free: ClassVar[bool] = False
 
     def held(self, start: Mapping[str, np.ndarray], domain: Domain) -> np.ndarray:
         """Return which particles of a start in a domain it holds, shape (n,); raise InputError unless it
@@ -51,6 +53,29 @@ class Constraint(Effect):
     def joined(self, s, w, i, j):
         """Return whether i and j are parts of one rigid body: short-ranged laws do not act between them."""
         return False
+
+    @ti.func
+    def leads(self, s, w, i):
+        """Return whether particle i, which it holds, stands for its body, as one particle of each does; by
+        default each is a body."""
+        return True
+
+    @ti.func
+    def home(self, s, w, i):
+        """Return the place (m) of the body of particle i, which it holds: where that is, all of it is."""
+        return s.position[w, i]
+
+    @ti.func
+    def volume(self, s, w, i):
+        """Return the volume (m^3) of the body that particle i, which it holds, ``leads``; by default that of
+        the particle."""
+        return ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * s.radius[w, i] ** 3
+
+    @ti.func
+    def balance(self, s, w, i):
+        """Return kinetic energy (J) and magnitude of the force (N) of the ``free`` body that particle i
+        ``leads``."""
+        return 0.0 * s.mass[w, i], 0.0 * s.mass[w, i]
 
     @ti.func
     def begin(self, s, w, i):

@@ -59,6 +59,10 @@ class Effect(LawHints, Component):
         """Return the particle fields that it needs, given its options; by default all of ``fields``."""
         return self.fields
 
+    def required_effects(self) -> tuple[type[Component], ...]:
+        """Return the effects without which it means nothing, given its options; by default ``requires``."""
+        return self.requires
+
     def keeps(self, what: str) -> tuple[str, ...]:
         """Return the names of the ``counters``, ``world_quantities`` or ``totals`` that it keeps of a world,
         given its options; by default those of its class. Names that begin with its own are of it alone, where
@@ -96,6 +100,11 @@ class Effect(LawHints, Component):
         """Return what a Result tells of it, by name, given the particles; ``world_quantities`` are told
         anyway."""
         return {}
+
+    def measured(self) -> dict[str, str]:
+        """Return the unit of all that a Result tells of it, by name: of its ``world_quantities``, and of what
+        ``measures`` returns. A trajectory has a column for each."""
+        return dict.fromkeys(self.keeps("world_quantities"), "")
 
     @ti.func
     def end_step(self, s, w):

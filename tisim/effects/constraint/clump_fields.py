@@ -29,9 +29,11 @@ BODY = (
     Field("clump_orientation", "", 1, "keep", slots=4),
     Field("clump_angular_momentum", "kg m^2/s", 3, "keep"),
     Field("clump_inertia", "kg m^2", 3, "keep"),
+    Field("clump_volume", "m^3", 1, "keep"),
 )
 """The first member of a clump has these of the body: the centre of mass, its velocity, the orientation as a
-unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments."""
+unit quaternion w, x, y, z from the principal axes to space, angular momentum in space, principal moments, the
+volume of the union of its members."""
 APART = 1e-4
 """Members are where and as fast as their bodies say to within this part of a radius and of the largest speed,
 and quaternions are of length 1 to within it; single precision rounds by less."""
@@ -46,14 +48,17 @@ def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
     held = np.flatnonzero(start["clump"] != NO_CLUMP)
     held = held[np.argsort(start["clump_member"][held])]
     clump, member, first, size = (start[field.name][held] for field in MEMBERSHIP[:4])
-    # Kernels index memory by these: all must follow from which are the first.
-    number = np.arange(len(held))
-    leads = np.flatnonzero(first == number)
+    # Kernels index memory by these: all must follow from which are the first. Clumps that have left leave
+    # gaps, and members of others are below the number of all particles that there have been.
+    number, leads = np.arange(len(held)), np.flatnonzero(member == first)
     sizes = np.diff([*leads, len(held)])
-    rows = ((member, number), (first, np.repeat(leads, sizes)), (size, np.repeat(sizes, sizes)))
-    whole = all(np.array_equal(values, right) for values, right in rows)
-    whole = whole and np.array_equal(clump, np.repeat(clump[leads], sizes))
-    whole = whole and len(np.unique(clump)) == len(leads)
+    most = int(start["id"].max()) + 1 if "id" in start else len(start["mass"])
+    whole = sizes.sum() == len(held) and (not len(held) or 0 <= member[0] <= member[-1] < most)
+    if whole:
+        firsts, lead = np.repeat(member[leads], sizes), np.repeat(leads, sizes)
+        rows = ((first, firsts), (member, firsts + number - lead), (size, np.repeat(sizes, sizes)))
+        whole = all(np.array_equal(values, right) for values, right in rows)
+        whole = whole and np.array_equal(clump, clump[lead]) and len(np.unique(clump)) == len(leads)
     must(whole, "particles", "those of whole clumps, as Particles.of_clumps makes them", "others")
     if len(held):
         _check_bodies(start, domain, held, np.repeat(held[leads], sizes))
@@ -64,7 +69,7 @@ def _check_bodies(
     start: Mapping[str, np.ndarray], domain: Domain, held: np.ndarray, leader: np.ndarray
 ) -> None:
     """Raise InputError unless members of clumps are where the bodies say, which their ``leader`` carries."""
-    position, velocity, quaternion, momentum, inertia = (start[field.name][leader] for field in BODY)
+    position, velocity, quaternion, momentum, inertia = (start[field.name][leader] for field in BODY[:5])
     length = np.linalg.norm(quaternion, axis=1)
     off = float(np.abs(length - 1).max())
     must(off <= APART, "particles.clump_orientation", "of length 1", off)

@@ -13,7 +13,7 @@ from tisim.components.component import Component
 from tisim.components.domain import Domain
 from tisim.effects.base import Constraint, Field, option
 from tisim.effects.motion.base import Fixed, Motion, MotionState
-from tisim.effects.motion.resultant import resultant
+from tisim.effects.motion.resultant import resultant, resultant_units
 from tisim.errors import must
 from tisim.worlds.state import HEAVY
 
@@ -67,6 +67,9 @@ class PrescribedMotion(Constraint):
             state.get(name, none)[own].astype(float) for name in ("position", "force", "torque")
         )
         return resultant(self.label, position, force, torque, self.motion.centre_of_torque())
+
+    def measured(self) -> dict[str, str]:
+        return resultant_units(self.label)
 
     @ti.func
     def holds(self, s, w, i):

@@ -28,7 +28,7 @@ class RigidClumps(Constraint):
     act on each, but short-ranged ones not between those of one clump. In granular contacts the mass is that
     of the body. The centre of mass is stepped by velocity Verlet. The rotation is stepped by five turns about
     principal axes between half kicks of the angular momentum, which is symplectic and of second order. Sums
-    are in the order of the members. What removes single particles is refused.
+    are in the order of the members.
 
     ``tisim.analysis.clump_bodies`` tells of a Result where the bodies are and how they move.
 
@@ -37,8 +37,11 @@ class RigidClumps(Constraint):
 
     fields: ClassVar = (*Constraint.fields, *MEMBERSHIP, *BODY, INDEX)
     mark: ClassVar = "clump"
+    free: ClassVar = True
 
     def held(self, start: Mapping[str, np.ndarray], domain: Domain) -> np.ndarray:
+        if not len(start["mass"]):
+            return np.zeros(0, bool)
         check_clumps(start, domain)
         held: np.ndarray = start["clump"] != NO_CLUMP
         return held
@@ -57,8 +60,23 @@ class RigidClumps(Constraint):
 
     @ti.func
     def leads(self, s, w, i):
-        """Return whether particle i is the first member of its clump, which has what is known of the body."""
+        # The first member of a clump has what is known of the body.
         return s.clump_member[w, i] == s.clump_first[w, i]
+
+    @ti.func
+    def home(self, s, w, i):
+        return s.clump_position[w, s.clump_index[w, s.clump_first[w, i]]]
+
+    @ti.func
+    def volume(self, s, w, i):
+        return s.clump_volume[w, i]
+
+    @ti.func
+    def balance(self, s, w, i):
+        force, _torque = self.load(s, w, i)
+        momentum, v = s.clump_angular_momentum[w, i], s.clump_velocity[w, i]
+        spin = angular_velocity(self.orientation(s, w, i), momentum, s.clump_inertia[w, i])
+        return 0.5 * (s.body_mass[w, i] * v.norm_sqr() + spin.dot(momentum)), force.norm()
 
     @ti.func
     def orientation(self, s, w, i):

@@ -16,7 +16,7 @@ from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.wall_contacts import WallContacts
 from tisim.effects.contact.wall_search import CONTACTS
 from tisim.effects.motion.base import Fixed, Motion, MotionState
-from tisim.effects.motion.resultant import resultant
+from tisim.effects.motion.resultant import resultant, resultant_units
 from tisim.errors import must
 from tisim.geometry.box import BoxSurface
 from tisim.geometry.cone import ConicalSurface
@@ -91,7 +91,7 @@ class Walls(WallContacts, UsesMaterials, Force):
         return self.surface is not None or any(self.kinds_of_surface())
 
     def keeps(self, what: str) -> tuple[str, ...]:
-        kept = self.motion.quantities
+        kept = tuple(self.motion.quantities)
         names = {"world_quantities": kept, "totals": ("resistance",) if kept else ()}
         return tuple(f"{self.label}_{name}" for name in names.get(what, ()))
 
@@ -138,3 +138,7 @@ class Walls(WallContacts, UsesMaterials, Force):
         loads = state[f"{self.label}_loads"]
         centre = self.motion.centre_of_torque()
         return resultant(self.label, state["position"], -loads[:, :3], -loads[:, 3:], centre)
+
+    def measured(self) -> dict[str, str]:
+        kept = {f"{self.label}_{name}": unit for name, unit in self.motion.quantities.items()}
+        return {**resultant_units(self.label), **kept}

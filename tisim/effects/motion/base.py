@@ -20,15 +20,15 @@ class Motion(Component):
 
     At the time 0 the body is where its shapes say, unless the motion says otherwise. Most motions are
     functions of the time alone. One that follows from the forces on the body keeps what it needs in
-    quantities of the world: it names them in ``quantities``, ``kept`` has them in kernels, by name, and
-    ``end_step`` sets them, with ``force_on_body``.
+    quantities of the world: it names them in ``quantities``, with their units, ``kept`` has them in kernels,
+    by name, and ``end_step`` sets them, with ``resistance``.
 
     moves : whether the body is ever elsewhere than its shapes say, or moves at all.
     """
 
     contract: ClassVar[bool] = True
     moves: ClassVar[bool] = True
-    quantities: ClassVar[tuple[str, ...]] = ()
+    quantities: ClassVar[Mapping[str, str]] = {}
 
     def centre_of_torque(self) -> Vector:
         """Return the place (m) about which the torque on the body is told; by default the origin."""

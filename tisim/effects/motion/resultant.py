@@ -7,6 +7,12 @@ import math
 import numpy as np
 
 
+def resultant_units(label: str) -> dict[str, str]:
+    """Return the unit of each of the sums that ``resultant`` returns, by name."""
+    what = (("force", "N"), ("torque", "N m"))
+    return {f"{label}_{name}_{axis}": unit for name, unit in what for axis in "xyz"}
+
+
 def resultant(
     label: str, position: np.ndarray, force: np.ndarray, torque: np.ndarray, centre: tuple[float, ...]
 ) -> dict[str, float]:
@@ -15,5 +21,4 @@ def resultant(
     moments = np.cross(position - np.array(centre), force) + torque
     # Exactly rounded sums, so the same in any order.
     sums = (math.fsum(column) for column in np.concatenate([force, moments], axis=1).T)
-    names = (f"{label}_{what}_{axis}" for what in ("force", "torque") for axis in "xyz")
-    return dict(zip(names, sums, strict=True))
+    return dict(zip(resultant_units(label), sums, strict=True))

@@ -23,12 +23,12 @@ class Servo(Motion):
         v = v_max (1 - P / F), within -v_max and v_max
 
     P is the force of the particles on it, against the direction. The velocity of a step is that of the force
-    at its beginning. It settles where F / (v_max dt) is above half of the stiffness with which particles
-    resist it. For a pressure give F as pressure times area. The result tells its ``travel`` (m) along the
-    direction, and its ``speed`` (m/s).
+    at its beginning. It settles where F / (v_max dt) is above half of the stiffness (N/m) with which
+    particles resist it, and F / v_max above their damping (N s/m). For a pressure give F as pressure times
+    area. The result tells its ``travel`` (m) along the direction, and its ``speed`` (m/s).
     """
 
-    quantities: ClassVar = ("travel", "speed", "moved_at")
+    quantities: ClassVar = {"travel": "m", "speed": "m/s", "moved_at": "s"}
 
     force: float = parameter("N", "wanted force F", examples=[10.0], gt=0)
     direction: Vector = parameter("", "direction in which it pushes", (0.0, 0.0, -1.0))

@@ -1,0 +1,281 @@
+"""Rigid clumps that are put in, come to rest and leave: one scene over a soft floor, compiled once."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation as Turn
+from scipy.stats import kstest
+
+from tests.operators.test_filling import DAMPING, DT, NEVER, Floor, uniforms
+from tests.scenes import by_id, compiled, fixed
+from tisim import Cloud, Clump, GrainClass, InputError, MeasureSeries, Particles, Scene
+from tisim.analysis import clump_bodies
+from tisim.effects import Gravity, RigidClumps
+from tisim.geometry import Plane
+from tisim.numerics.random_streams import INSERTION
+from tisim.operators import AtRest, InsertionByFlux, InsertionByFraction, Outflow
+from tisim.packing import EqualSizes, UniformSizes
+
+G, RHO = 9.81, 1000.0
+PEAR = Clump(
+    centres=np.array([(0, 0, 0), (1.6, 0, 0), (0.5, 1.3, 0), (0, 0, 0.9)]),
+    radii=np.array([1, 0.8, 0.7, 0.5]),
+    density=3.0,
+)
+SIZE = float(np.cbrt(PEAR.body.mass / 3.0 * 3 / (4 * np.pi)))
+"""The radius (m) of a ball of its volume."""
+GRAINS = (
+    GrainClass(
+        sizes=UniformSizes(by="number", smallest=0.03, largest=0.05), density=RHO, clump=PEAR, share=3.0
+    ),
+    GrainClass(sizes=EqualSizes(radius=0.04), density=1200.0),
+)
+NUMBER = 150
+LOW, HIGH = np.array([0.0, 0.0, 1.0]), np.array([1.5, 1.5, 2.5])
+BED = [(0.0, 0.0, 0.12), (0.5, 0.1, 0.14), (1.0, -0.2, 0.13)]
+THERE = [(-4.5, 0.5, 1.5), (-4.8, 0.2, 1.2), (-4.2, 0.8, 1.8)]
+SMALL = Clump(centres=0.04 * PEAR.centres, radii=0.04 * PEAR.radii, density=RHO)
+
+
+def filling(
+    begin=NEVER, fill=NEVER, fraction=0.03, interval=0.1, flux=1e5, gravity=G, bed=BED, edge=50.0,
+    side=-1.0, velocity=0.0, duration=0.4, floor=DAMPING,
+):  # fmt: skip
+    """Three clumps on the floor, and more that are put in above it."""
+    more = {"velocity": (velocity, 0.0, 0.0), "angular_velocity": (0.0, 2.0, 1.0)}
+    return Scene(
+        particles=Particles.of_clumps(SMALL, bed, **more) if bed else Particles.none(),
+        effects=(
+            RigidClumps(),
+            Floor(damping=floor),
+            Gravity(acceleration=(0.0, 0.0, -gravity)),
+            InsertionByFlux(
+                name="pour", by="number", flux=flux, begin=begin, number=NUMBER, grains=GRAINS,
+                low=tuple(LOW), high=tuple(HIGH), velocity=(0.0, 0.0, -1.0),
+            ),
+            InsertionByFraction(
+                name="fill", fraction=fraction, interval=interval, begin=fill, number=NUMBER,
+                grains=GRAINS[:1], low=(-5.0, 0.0, 1.0), high=(-4.0, 1.0, 2.0),
+            ),
+            Outflow(planes=[Plane(point=(edge, 0, 0), normal=(side, 0, 0))]),
+            AtRest(time=0.05, energy=1e-4, unbalanced=2e-2),
+        ),
+        stepper=fixed(DT),
+        duration=duration,
+        seed=3,
+    )  # fmt: skip
+
+
+SCENES = {
+    "pour": filling(begin=0.0, gravity=0.0, bed=()),
+    "beside": filling(begin=0.1, gravity=0.0),
+    "rest": filling(begin=0.1, fill=0.0, fraction=1e-9, interval=1e3, duration=12.0),
+    "fill": filling(fill=0.0, bed=THERE, gravity=0.0, duration=0.15),
+    "both": filling(begin=0.0, flux=2500.0, gravity=0.0, edge=0.02, side=1.0, velocity=-3.0, floor=1e-3),
+    "leaving": filling(gravity=0.0, edge=1.5, velocity=3.0, floor=1e-3),
+    "staying": filling(gravity=0.0, velocity=3.0, floor=1e-3),
+}
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    return compiled(SCENES["pour"], worlds=len(SCENES), capacity=12 + 8 * NUMBER)
+
+
+@pytest.fixture(scope="module")
+def outcome(simulation):
+    """All scenes side by side, with what they counted on the way."""
+    simulation.load(list(SCENES.values()))
+    series = MeasureSeries(0.02)
+    simulation.run(observers=[series])
+    return dict(zip(SCENES, simulation.results(), strict=True)), dict(zip(SCENES, series, strict=True))
+
+
+@pytest.fixture(scope="module")
+def results(outcome):
+    return outcome[0]
+
+
+def test_clumps_are_put_in_as_they_are_drawn(results):
+    """Of the size, mass and inertia of a template scaled in NumPy; each of its spheres where the body is."""
+    state = by_id(results["pour"])
+    u = np.array([uniforms(3, INSERTION + 3, k) for k in range(NUMBER)])
+    number = np.array([one.number() for one in GRAINS])
+    which = (u[:, 0] * number.sum() >= number[0]).astype(int)
+    radius = np.where(which == 0, 0.03 + 0.02 * u[:, 1], 0.04)
+    assert results["pour"].measures["pour_number"] == NUMBER
+    assert len(state["mass"]) == np.where(which == 0, 4, 1).sum()
+    mass = np.where(which == 0, RHO, 1200.0) * 4 / 3 * np.pi * radius**3
+    assert results["pour"].measures["pour_mass"] == pytest.approx(mass.sum(), rel=1e-12)
+    first = np.cumsum(np.where(which == 0, 4, 1)) - np.where(which == 0, 4, 1)
+    np.testing.assert_array_equal(state["clump"][first[which == 1]], -1)
+    np.testing.assert_array_equal(state["clump"][first[which == 0]], first[which == 0])
+    bodies, grown = clump_bodies(results["pour"].state), radius[which == 0] / SIZE
+    np.testing.assert_allclose(bodies.mass, mass[which == 0], rtol=1e-12)
+    scaled = Clump(centres=grown[0] * PEAR.centres, radii=grown[0] * PEAR.radii, density=RHO).body
+    np.testing.assert_allclose(bodies.mass[0], scaled.mass, rtol=1e-9)
+    np.testing.assert_allclose(bodies.inertia[0], scaled.moments, rtol=1e-7)
+    for k, (n, factor) in enumerate(zip(first[which == 0], grown, strict=True)):
+        members = slice(n, n + 4)
+        arm = Turn.from_quat(np.roll(bodies.orientation[k], -1)).apply(factor * PEAR.body.places)
+        np.testing.assert_allclose(state["position"][members], bodies.position[k] + arm, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(state["radius"][members], factor * PEAR.radii, rtol=1e-12)
+        shares = PEAR.body.masses / PEAR.body.mass
+        np.testing.assert_allclose(state["mass"][members], bodies.mass[k] * shares, rtol=1e-12)
+    np.testing.assert_allclose(bodies.velocity, np.tile([0, 0, -1.0], (len(grown), 1)), atol=1e-12)
+
+
+def test_orientations_are_even(results):
+    """The angle t of a turn drawn evenly has (t - sin t) / pi below it, and its axis lies anywhere."""
+    turns = Turn.from_quat(np.roll(clump_bodies(results["pour"].state).orientation, -1, axis=1))
+    angle = turns.magnitude()
+    assert kstest((angle - np.sin(angle)) / np.pi, "uniform").pvalue > 0.01
+    for axis in np.eye(3):
+        for component in turns.apply(axis).T:
+            assert kstest((component + 1) / 2, "uniform").pvalue > 0.01
+
+
+def test_no_clump_is_put_where_another_grain_is(simulation):
+    """Looked at after each step, before they have moved: only spheres of one clump overlap."""
+    simulation.load(SCENES["pour"])
+    known, waited = 0, 0
+    for _ in range(40):
+        simulation.run(steps=1)
+        now = simulation.state
+        order = np.argsort(now["id"])
+        r, radius, clump = (now[name][order] for name in ("position", "radius", "clump"))
+        outside = np.minimum(r - LOW, HIGH - r).min(axis=1) - radius
+        assert (outside[known:] >= -1e-12).all()
+        for k in range(known, len(r)):
+            others = (clump[:k] != clump[k]) | (clump[:k] < 0)
+            gaps = np.linalg.norm(r[:k] - r[k], axis=1) - radius[:k] - radius[k]
+            assert (gaps[others] >= -1e-12).all()
+        waited += 0 < known == len(r)
+        known = len(r)
+    assert known > 4 * 20
+
+
+def test_clumps_of_the_start_do_not_notice_those_that_are_put_in(results):
+    """They turn and go on freely; numbers of members are of one clump each."""
+    state = by_id(results["beside"])
+    assert len(state["mass"]) > 12 + 4 * 20
+    alone = by_id(results["staying"])
+    bodies, others = clump_bodies(state), clump_bodies(alone)
+    np.testing.assert_array_equal(bodies.angular_momentum[:3], others.angular_momentum)
+    np.testing.assert_allclose(bodies.orientation[:3], others.orientation, rtol=0, atol=1e-9)
+    held = state["clump_member"][state["clump"] >= 0]
+    assert len(np.unique(held)) == len(held)
+
+
+def test_a_region_is_filled_up_to_a_fraction_of_clumps(outcome):
+    """Of their own volume, not that of their spheres, with those of the start that are there; nothing is
+    missing when it is time again."""
+    result, series = outcome[0]["fill"], outcome[1]["fill"]
+    bodies = clump_bodies(result.state)
+    volume = bodies.mass / RHO
+    np.testing.assert_allclose(result.state["clump_volume"][result.state["clump_volume"] > 0], volume)
+    assert volume[:-1].sum() < 0.03 <= volume.sum()
+    spheres = (4 / 3 * np.pi * result.state["radius"] ** 3).sum()
+    assert spheres > 1.05 * volume.sum()
+    assert len(volume) == 3 + series["fill_number"][-1]
+    assert series["fill_number"][0] == 0 < series["fill_number"][1] == series["fill_number"][-1] > 50
+
+
+def test_what_is_put_in_while_others_leave_stays(results):
+    """In the same step too: a clump is put in at each of those in which the three leave."""
+    result = results["both"]
+    assert result.work["outflow"] == 3
+    assert result.measures["pour_number"] == NUMBER
+    assert result.measures["outflow_mass"] == pytest.approx(3 * SMALL.body.mass, rel=1e-12)
+
+
+def test_clumps_at_rest_end_the_run(results):
+    """By the kinetic energy of the bodies, and the force on each as a whole."""
+    result = results["rest"]
+    assert result.status.reason == "grains are at rest, by effects.at_rest"
+    bodies, state = clump_bodies(result.state), result.state
+    depth = G * (state["mass"] * state["radius"]).sum()
+    free, spin = state["clump"] < 0, 0.4 * state["radius"] ** 2 * (state["spin"] ** 2).sum(axis=1)
+    of_spheres = 0.5 * state["mass"] * ((state["velocity"] ** 2).sum(axis=1) + spin)
+    kinetic = bodies.energy.sum() + of_spheres[free].sum()
+    assert result.measures["kinetic_ratio"] == pytest.approx(kinetic / depth, rel=1e-9)
+    grains = np.where(state["clump"] >= 0, state["clump"], -1 - np.arange(len(state["mass"])))
+    force = [np.linalg.norm(state["force"][grains == k].sum(axis=0)) for k in np.unique(grains)]
+    weight = G * state["mass"].sum()
+    assert result.measures["unbalanced_ratio"] == pytest.approx(sum(force) / weight, rel=1e-9)
+    # The forces on single spheres are those of the floor and of the weight, and never balance.
+    assert np.linalg.norm(state["force"], axis=1).sum() > 0.1 * weight
+    assert result.measures["pour_number"] == NUMBER
+    np.testing.assert_array_less(bodies.position[:, 2], 0.12)
+
+
+def test_a_clump_leaves_as_a_whole(outcome):
+    """When its centre of mass has got there, and others go on to the same bits as where none leaves."""
+    results, series = outcome
+    leaving, staying = results["leaving"], by_id(results["staying"])
+    mass = SMALL.body.mass
+    where = clump_bodies(staying).position[:, 0]
+    gone = where > 1.5
+    assert gone.tolist() == [False, True, True]
+    assert leaving.work["outflow"] == 2
+    assert leaving.measures["outflow_mass"] == pytest.approx(2 * mass, rel=1e-12)
+    assert set(series["leaving"]["particles"]) == {12, 8, 4}
+    time = series["leaving"]["time"]
+    for number, clump in ((8, 2), (4, 1)):
+        first = time[series["leaving"]["particles"] <= number][0]
+        assert first == pytest.approx((1.5 - BED[clump][0]) / 3.0, abs=0.021)
+    left = by_id(leaving)
+    for name, values in left.items():
+        np.testing.assert_array_equal(values, staying[name][:4], err_msg=name)
+
+
+@pytest.mark.parametrize("name", ["beside", "leaving"])
+def test_restarted_it_is_the_same_run(simulation, results, tmp_path, name):
+    """Also where the state is written to when clumps have come or gone, with what it is."""
+    simulation.load(SCENES[name])
+    simulation.run(until=0.3)
+    simulation.checkpoint(tmp_path / "half")
+    simulation.load(SCENES[name])
+    simulation.restore(tmp_path / "half")
+    simulation.state["clump_velocity"] = simulation.state["clump_velocity"]
+    simulation.run()
+    (again,) = simulation.results()
+    assert again.measures == results[name].measures
+    for field, values in results[name].state.items():
+        np.testing.assert_array_equal(again.state[field], values, err_msg=field)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("schedule", ["particle", "team"])
+def test_on_other_schedules_it_is_the_same_run(results, schedule):
+    names = ("both", "beside", "fill")
+    simulation = compiled(SCENES["pour"], worlds=3, capacity=12 + 8 * NUMBER, schedule=schedule)
+    simulation.load([SCENES[name] for name in names])
+    simulation.run()
+    for result, name in zip(simulation.results(), names, strict=True):
+        assert result.measures == results[name].measures
+        for field, values in results[name].state.items():
+            np.testing.assert_array_equal(result.state[field], values, err_msg=field)
+
+
+def test_a_scene_file_holds_classes_of_clumps():
+    made = SCENES["pour"]
+    assert Scene.from_dict(made.to_dict()).digest() == made.digest()
+
+
+WRONG = {
+    "no room": (
+        lambda: InsertionByFlux(flux=1.0, number=1, grains=GRAINS[:1], low=(0, 0, 0), high=(1, 1, 0.1)),
+        "insertion_by_flux.high must be at least 0.1",
+    ),
+    "a cloud": (lambda: Cloud(number=3, grains=GRAINS), "cloud.grains must be spheres; received 'clumps'"),
+    "loose spheres": (
+        lambda: Scene(particles=Particles.none(), effects=(SCENES["pour"].effects[3],), duration=1.0),
+        r"effects.pour must be used together with effects.rigid_clumps",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), WRONG.values(), ids=WRONG)
+def test_what_cannot_be_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()

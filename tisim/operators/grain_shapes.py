@@ -1,0 +1,106 @@
+"""The shapes of grains that an insertion puts in: spheres, and rigid clumps of them, as kernels see them."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Component
+from tisim.effects.base import Effect, option
+from tisim.effects.constraint.rigid_clumps import RigidClumps
+from tisim.numerics.quaternions import rotated
+from tisim.packing.grains import GrainClass
+
+
+class GrainShapes(Effect):
+    """Grains of some classes are spheres, those of others rigid clumps."""
+
+    contract: ClassVar[bool] = True
+
+    grains: tuple[GrainClass, ...] = option("classes of the grains that are put in", min_length=1)
+
+    @property
+    def has_clumps(self) -> bool:
+        """Return whether grains of a class are rigid clumps."""
+        return any(one.clump is not None for one in self.grains)
+
+    def required_effects(self) -> tuple[type[Component], ...]:
+        return (*self.requires, RigidClumps) if self.has_clumps else self.requires
+
+    def most_spheres(self) -> int:
+        """Return the number of spheres of the grain that has most of them."""
+        return max(len(one.spheres()) for one in self.grains)
+
+    def largest_sphere(self) -> float:
+        """Return the radius (m) of the largest sphere that a grain may have."""
+        return max(float(one.sizes.nodes()[0][-1] * one.spheres()[:, 3].max()) for one in self.grains)
+
+    def farthest(self) -> float:
+        """Return how far (m) the largest grain reaches from its centre."""
+        return max(float(one.sizes.nodes()[0][-1]) * one.outer_radius() for one in self.grains)
+
+    def lookups(self) -> dict[str, np.ndarray]:
+        spheres = [one.spheres() for one in self.grains]
+        ends = np.cumsum([len(rows) for rows in spheres])
+        bodies = [
+            (end - len(rows), end, one.clump is not None, one.outer_radius(), *one.inertia())
+            for one, rows, end in zip(self.grains, spheres, ends, strict=True)
+        ]
+        return {"spheres": np.concatenate(spheres), "bodies": np.array(bodies, float)}
+
+    @ti.func
+    def first_sphere(self, c):
+        """Return the number of the first sphere of a grain of class c, among those of all classes."""
+        return ti.cast(self.bodies[c, 0], ti.i32)
+
+    @ti.func
+    def end_sphere(self, c):
+        """Return the number after that of its last sphere."""
+        return ti.cast(self.bodies[c, 1], ti.i32)
+
+    @ti.func
+    def outer(self, c, radius):
+        """Return how far (m) a grain of class c and this radius (m) reaches from its centre."""
+        return radius * ti.cast(self.bodies[c, 3], float)
+
+    @ti.func
+    def sphere_radius(self, m, radius):
+        """Return the radius (m) of sphere m of a grain of this radius (m)."""
+        return radius * ti.cast(self.spheres[m, 3], float)
+
+    @ti.func
+    def sphere_mass(self, m, mass):
+        """Return the part of sphere m of the mass (kg) of a grain."""
+        return mass * ti.cast(self.spheres[m, 4], float)
+
+    @ti.func
+    def offset(self, m, radius):
+        """Return the place (m) of sphere m from the centre of a grain, along the axes of this."""
+        return radius * ti.Vector([self.spheres[m, 0], self.spheres[m, 1], self.spheres[m, 2]])
+
+    @ti.func
+    def arm(self, m, q, radius):
+        """Return the same in space, where the grain is turned by q."""
+        return rotated(q, self.offset(m, radius))
+
+    @ti.func
+    def join(self, s, w, c, lead, first, place, q, velocity, mass, radius):
+        """Make a clump of the spheres of a grain of class c, the last that have been put in: from slot
+        ``lead`` and id ``first`` on."""
+        size = self.end_sphere(c) - self.first_sphere(c)
+        if self.bodies[c, 2] > 0.0:
+            for k in range(size):
+                i = lead + k
+                # Numbers of members are ids, which no member of the start has.
+                s.clump_index[w, first + k] = i
+                s.clump[w, i], s.clump_first[w, i], s.clump_member[w, i] = first, first, first + k
+                s.clump_size[w, i], s.body_mass[w, i] = size, mass
+                s.clump_offset[w, i] = self.offset(self.first_sphere(c) + k, radius)
+            s.clump_position[w, lead], s.clump_velocity[w, lead] = place, velocity
+            for k in ti.static(range(4)):
+                s.clump_orientation[w, lead, k] = q[k]
+            unit = ti.Vector([self.bodies[c, 4], self.bodies[c, 5], self.bodies[c, 6]])
+            s.clump_inertia[w, lead] = mass * radius * radius * unit
+            s.clump_volume[w, lead] = ti.cast(4.0 / 3.0 * ti.math.pi, s.real) * radius**3
