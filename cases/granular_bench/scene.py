@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.case import Size, size_named
+from cases.case import Size
 from tisim import Cloud, GrainClass, Material, RandomInCylinder, Scene
 from tisim.effects import (
     Granular,
@@ -55,18 +55,32 @@ SEARCH_SETTINGS = {
     "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1, "confirm": 4},
 }  # fmt: skip
 
+BED = "bed"
+"""The size of the case that is no draw-down test, but a bed of stiff grains in a cup (``bed.py``)."""
 SIZES = {
     "default": Size("a draw-down test of 1500 grains; a heap on a disc of 16 diameters", {}, SEARCH_SETTINGS),
     "large": Size(
         "the same of 8000 grains; a heap on a disc of 32 diameters",
         {"number": 8000, "silo": 10.0, "outlet": 8.0, "disc": 16.0, "drop": 16.0, "duration": 3.0},
     ),
+    BED: Size("a bed of 120 stiff grains that have fallen into a cup, for tisim cost", {}),
 }
 
 
 def grain_material(design: Mapping[str, float], young: float = YOUNG) -> Material:
     """Return the material of grains and walls of a design."""
     return Material(young=young, poisson=POISSON, **{name: design[name] for name in NATURAL})
+
+
+def grains(number: int, radius: float, length: float) -> Cloud:
+    """Return so many grains at random places in an upright cylinder on the origin; lengths in m."""
+    d = DIAMETER
+    sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
+    return Cloud(
+        number=number,
+        grains=[GrainClass(sizes=sizes, density=DENSITY)],
+        placement=RandomInCylinder(centre=(0.0, 0.0, length / 2), radius=radius, length=length),
+    )
 
 
 def scene(
@@ -95,18 +109,7 @@ def scene(
     total = number * DENSITY * np.pi / 6 * d**3
     return Scene(
         name="granular_bench",
-        particles=Cloud(
-            number=number,
-            grains=[
-                GrainClass(
-                    sizes=UniformSizes(
-                        by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2
-                    ),
-                    density=DENSITY,
-                )
-            ],
-            placement=RandomInCylinder(centre=(0.0, 0.0, height / 2), radius=radius, length=height),
-        ),
+        particles=grains(number, radius, height),
         materials={"grain": grain_material(design, young)},
         effects=(
             LAW,
@@ -125,8 +128,3 @@ def scene(
         duration=duration,
         seed=seed,
     )
-
-
-def scene_for(size: str, seed: int) -> Scene:
-    """Return the draw-down test of a size."""
-    return scene(seed=seed, **size_named(size, SIZES).scene)
