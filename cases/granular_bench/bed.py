@@ -14,7 +14,6 @@ from cases.granular_bench.scene import (
     DENSITY,
     DIAMETER,
     LAW,
-    NATURAL,
     ORIGIN,
     POISSON,
     grain_material,
@@ -29,6 +28,8 @@ from tisim.steppers import FixedStep, Verlet
 
 STIFF = 2e8
 """Pa; glass has 5e10."""
+GRAINS = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
+"""What else its grains have."""
 IMPACT = 0.5
 """The speed of an impact, m/s, whose duration steps are parts of: that of a fall from 13 mm."""
 LOOSE = 0.2
@@ -64,7 +65,7 @@ def bed(
     time of an impact that a step is one of.
     """
     radius, height = cup * DIAMETER, number * DIAMETER / (6 * LOOSE * cup**2)
-    material = grain_material(NATURAL, young)
+    material = grain_material(GRAINS, young)
     return Scene(
         name="granular_bench",
         particles=grains(number, radius, height),
