@@ -32,9 +32,9 @@ GRAINS = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
 """What else its grains have."""
 IMPACT = 0.5
 """The speed of an impact, m/s, whose duration steps are parts of: that of a fall from 13 mm."""
-LOOSE = 0.2
+SPARSE = 0.2
 """The part of the space that grains fill at the start, before they fall."""
-PARTS = 20.0
+STEPS_OF_IMPACT = 20.0
 """A step is one of so many parts of that duration."""
 MASS = DENSITY * np.pi / 6 * DIAMETER**3
 """Of a mean grain, kg."""
@@ -57,14 +57,14 @@ def bed(
     cup: float = 2.5,
     duration: float = 0.2,
     young: float = STIFF,
-    parts: float = PARTS,
+    parts: float = STEPS_OF_IMPACT,
 ) -> Scene:
     """Return the scene of a bed.
 
     number : of grains. cup : its radius, in diameters of a grain. duration : s. young : Pa. parts : of the
     time of an impact that a step is one of.
     """
-    radius, height = cup * DIAMETER, number * DIAMETER / (6 * LOOSE * cup**2)
+    radius, height = cup * DIAMETER, number * DIAMETER / (6 * SPARSE * cup**2)
     material = grain_material(GRAINS, young)
     return Scene(
         name="granular_bench",

@@ -33,7 +33,7 @@ from tisim.steppers import FixedStep, Verlet
 SHEARED_LAW = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
 SHEARED = Material(young=1e7, poisson=POISSON, restitution=0.5, friction=0.5)
 """What grains and walls are made of: pressures are below a thousandth of Young's modulus."""
-LONG, WIDE = 8, 5
+CELL_LENGTH, CELL_WIDTH = 8, 5
 """Sides of the cell along and across the flow, in diameters."""
 LOOSE_FRACTION = 0.26
 """The part of the space between the walls that grains fill before the gap is closed."""
@@ -105,16 +105,16 @@ class ShearedBed:
 def gap_of(number: int, fraction: float) -> float:
     """Return the distance (m) of the centres of the walls in which grains fill a fraction of what their own
     halves leave."""
-    area, volume = LONG * WIDE * DIAMETER**2, number * np.pi / 6 * DIAMETER**3 * (1 + SPREAD**2)
+    area, volume = CELL_LENGTH * CELL_WIDTH * DIAMETER**2, number * np.pi / 6 * DIAMETER**3 * (1 + SPREAD**2)
     return float(volume / (fraction * area) + DIAMETER)
 
 
 def rough_wall(height: float) -> np.ndarray:
     """Return centres (m) of the grains of a wall around a height, in rows, up and down by a quarter of a
     diameter."""
-    x, y = np.meshgrid(np.arange(LONG) + 0.5, np.arange(WIDE) + 0.5, indexing="ij")
+    x, y = np.meshgrid(np.arange(CELL_LENGTH) + 0.5, np.arange(CELL_WIDTH) + 0.5, indexing="ij")
     # Parts of the golden ratio: no two neighbours are at the same height, and no row is like another.
-    up = (np.arange(LONG * WIDE) * (np.sqrt(5) - 1) / 2) % 1 - 0.5
+    up = (np.arange(CELL_LENGTH * CELL_WIDTH) * (np.sqrt(5) - 1) / 2) % 1 - 0.5
     return np.column_stack([x.ravel() * DIAMETER, y.ravel() * DIAMETER, height + 0.5 * DIAMETER * up])
 
 
@@ -123,7 +123,11 @@ def loose(number: int, gap: float, seed: int) -> Arrays:
     d, clear = DIAMETER, 0.75 * DIAMETER
     sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
     cloud = Cloud(number=number, grains=[GrainClass(sizes=sizes, density=DENSITY)])
-    room = Box(low=(0.0, 0.0, clear), high=(LONG * d, WIDE * d, gap - clear), periodic=(True, True, False))
+    room = Box(
+        low=(0.0, 0.0, clear),
+        high=(CELL_LENGTH * d, CELL_WIDTH * d, gap - clear),
+        periodic=(True, True, False),
+    )
     free = cloud.arrays(room, seed)
     walls = np.vstack([rough_wall(0.0), rough_wall(gap)])
     n, mass = len(walls), DENSITY * np.pi / 6 * d**3
@@ -154,7 +158,7 @@ def cell(
         materials={"grain": SHEARED},
         domain=Box(
             low=(0.0, 0.0, -DIAMETER),
-            high=(LONG * DIAMETER, WIDE * DIAMETER, top),
+            high=(CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER, top),
             periodic=(True, True, False),
         ),
         effects=(
@@ -207,7 +211,7 @@ def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
     dragging = measures["lower_force_x"] - measures["upper_force_x"]
     free = state["group"] == 0
     height, edges = state["position"][free, 2], np.linspace(0.0, gap, BINS + 1)
-    area = LONG * WIDE * DIAMETER**2
+    area = CELL_LENGTH * CELL_WIDTH * DIAMETER**2
     (fraction,) = solid_fraction(state["position"], state["radius"], np.array(MIDDLE) * gap, area)
     sums = np.histogram(height, edges, weights=state["velocity"][free, 0])[0]
     numbers = np.histogram(height, edges)[0]
@@ -218,7 +222,7 @@ def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]]) -> ShearedBed:
     """Return the means over some looks at a cell with a gap (m)."""
     scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
     pressing, dragging, fraction = scalars.mean(axis=0)
-    edges, area = np.linspace(0.0, gap, BINS + 1), LONG * WIDE * DIAMETER**2
+    edges, area = np.linspace(0.0, gap, BINS + 1), CELL_LENGTH * CELL_WIDTH * DIAMETER**2
     count = numbers.sum(axis=0)
     # No grain comes to the middle of a wall.
     velocity = np.where(count > 0, sums.sum(axis=0) / np.maximum(count, 1), np.nan)

@@ -7,9 +7,9 @@ import pytest
 
 from cases.granular_bench.scene import DENSITY, DIAMETER
 from cases.granular_bench.shear_cell import (
-    LONG,
+    CELL_LENGTH,
+    CELL_WIDTH,
     SHEAR_RATE,
-    WIDE,
     ShearedBed,
     expected_ratio,
     gap_of,
@@ -45,7 +45,7 @@ def test_inertial_number_goes_by_the_middle_of_the_gap():
 
 def test_stresses_are_means_over_both_walls_and_over_time():
     """Two looks at three grains; the walls are pushed apart, and dragged along and back."""
-    gap, area = 10 * DIAMETER, LONG * WIDE * DIAMETER**2
+    gap, area = 10 * DIAMETER, CELL_LENGTH * CELL_WIDTH * DIAMETER**2
     state = {
         "group": np.array([0, 0, 1]), "radius": np.full(3, DIAMETER / 2),
         "position": np.array([[0.0, 0.0, 0.3 * gap], [0.0, 0.0, 0.31 * gap], [0.0, 0.0, 0.0]]),
@@ -69,8 +69,10 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
     state = loose(100, gap, 3)
     free = state["group"] == 0
     assert free.sum() == 100
-    assert [(state["group"] == k).sum() for k in (1, 2)] == [LONG * WIDE] * 2
-    pairs = contacts(state["position"], state["radius"], sides=(LONG * DIAMETER, WIDE * DIAMETER, 0.0))
+    assert [(state["group"] == k).sum() for k in (1, 2)] == [CELL_LENGTH * CELL_WIDTH] * 2
+    pairs = contacts(
+        state["position"], state["radius"], sides=(CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER, 0.0)
+    )
     assert not free[pairs].any()
     np.testing.assert_allclose(state["velocity"][:, 0], SHEAR_RATE * state["position"][:, 2])
     # Walls are as rough as half a diameter, and no two neighbours of a row are level.
@@ -79,7 +81,9 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
     assert np.abs(np.diff(height)).min() > 0.1 * DIAMETER
     # Grains fill what the walls leave them.
     volume = np.pi / 6 * (state["radius"][free] * 2) ** 3
-    assert volume.sum() / ((gap - DIAMETER) * LONG * WIDE * DIAMETER**2) == pytest.approx(0.26, rel=0.03)
+    assert volume.sum() / ((gap - DIAMETER) * CELL_LENGTH * CELL_WIDTH * DIAMETER**2) == pytest.approx(
+        0.26, rel=0.03
+    )
 
 
 def test_figure_and_table_have_each_bed():
