@@ -35,6 +35,9 @@ SHEARED = Material(young=1e7, poisson=POISSON, restitution=0.5, friction=0.5)
 """What grains and walls are made of: pressures are below a thousandth of Young's modulus."""
 CELL_LENGTH, CELL_WIDTH = 8, 5
 """Sides of the cell along and across the flow, in diameters."""
+CELL_SIDES = (CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER)
+CELL_AREA = CELL_SIDES[0] * CELL_SIDES[1]
+"""m, m^2."""
 LOOSE_FRACTION = 0.26
 """The part of the space between the walls that grains fill before the gap is closed."""
 SHEAR_RATE = 10.0
@@ -105,8 +108,8 @@ class ShearedBed:
 def gap_of(number: int, fraction: float) -> float:
     """Return the distance (m) of the centres of the walls in which grains fill a fraction of what their own
     halves leave."""
-    area, volume = CELL_LENGTH * CELL_WIDTH * DIAMETER**2, number * np.pi / 6 * DIAMETER**3 * (1 + SPREAD**2)
-    return float(volume / (fraction * area) + DIAMETER)
+    volume = number * np.pi / 6 * DIAMETER**3 * (1 + SPREAD**2)
+    return float(volume / (fraction * CELL_AREA) + DIAMETER)
 
 
 def rough_wall(height: float) -> np.ndarray:
@@ -125,7 +128,7 @@ def loose(number: int, gap: float, seed: int) -> Arrays:
     cloud = Cloud(number=number, grains=[GrainClass(sizes=sizes, density=DENSITY)])
     room = Box(
         low=(0.0, 0.0, clear),
-        high=(CELL_LENGTH * d, CELL_WIDTH * d, gap - clear),
+        high=(*CELL_SIDES, gap - clear),
         periodic=(True, True, False),
     )
     free = cloud.arrays(room, seed)
@@ -158,7 +161,7 @@ def cell(
         materials={"grain": SHEARED},
         domain=Box(
             low=(0.0, 0.0, -DIAMETER),
-            high=(CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER, top),
+            high=(*CELL_SIDES, top),
             periodic=(True, True, False),
         ),
         effects=(
@@ -211,8 +214,7 @@ def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
     dragging = measures["lower_force_x"] - measures["upper_force_x"]
     free = state["group"] == 0
     height, edges = state["position"][free, 2], np.linspace(0.0, gap, BINS + 1)
-    area = CELL_LENGTH * CELL_WIDTH * DIAMETER**2
-    (fraction,) = solid_fraction(state["position"], state["radius"], np.array(MIDDLE) * gap, area)
+    (fraction,) = solid_fraction(state["position"], state["radius"], np.array(MIDDLE) * gap, CELL_AREA)
     sums = np.histogram(height, edges, weights=state["velocity"][free, 0])[0]
     numbers = np.histogram(height, edges)[0]
     return np.array([pressing, dragging, fraction]), sums, numbers
@@ -222,15 +224,15 @@ def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]]) -> ShearedBed:
     """Return the means over some looks at a cell with a gap (m)."""
     scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
     pressing, dragging, fraction = scalars.mean(axis=0)
-    edges, area = np.linspace(0.0, gap, BINS + 1), CELL_LENGTH * CELL_WIDTH * DIAMETER**2
+    edges = np.linspace(0.0, gap, BINS + 1)
     count = numbers.sum(axis=0)
     # No grain comes to the middle of a wall.
     velocity = np.where(count > 0, sums.sum(axis=0) / np.maximum(count, 1), np.nan)
     # Each stress is the mean of those on both walls.
     return ShearedBed(
         gap=gap,
-        pressure=pressing / (2 * area),
-        shear_stress=dragging / (2 * area),
+        pressure=pressing / (2 * CELL_AREA),
+        shear_stress=dragging / (2 * CELL_AREA),
         fraction=float(fraction),
         height=(edges[1:] + edges[:-1]) / 2,
         velocity=velocity,

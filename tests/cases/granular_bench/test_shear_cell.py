@@ -7,7 +7,9 @@ import pytest
 
 from cases.granular_bench.scene import DENSITY, DIAMETER
 from cases.granular_bench.shear_cell import (
+    CELL_AREA,
     CELL_LENGTH,
+    CELL_SIDES,
     CELL_WIDTH,
     SHEAR_RATE,
     ShearedBed,
@@ -45,7 +47,7 @@ def test_inertial_number_goes_by_the_middle_of_the_gap():
 
 def test_stresses_are_means_over_both_walls_and_over_time():
     """Two looks at three grains; the walls are pushed apart, and dragged along and back."""
-    gap, area = 10 * DIAMETER, CELL_LENGTH * CELL_WIDTH * DIAMETER**2
+    gap = 10 * DIAMETER
     state = {
         "group": np.array([0, 0, 1]), "radius": np.full(3, DIAMETER / 2),
         "position": np.array([[0.0, 0.0, 0.3 * gap], [0.0, 0.0, 0.31 * gap], [0.0, 0.0, 0.0]]),
@@ -57,9 +59,9 @@ def test_stresses_are_means_over_both_walls_and_over_time():
         for forces in ((3.0, -1.0, -0.5, 0.7), (5.0, -3.0, -1.5, 1.3))
     ]
     found = mean_of(gap, looks)
-    assert found.pressure == pytest.approx(3.0 / area)
-    assert found.shear_stress == pytest.approx(1.0 / area)
-    assert found.fraction == pytest.approx(2 * np.pi / 6 * DIAMETER**3 / (area * gap / 2))
+    assert found.pressure == pytest.approx(3.0 / CELL_AREA)
+    assert found.shear_stress == pytest.approx(1.0 / CELL_AREA)
+    assert found.fraction == pytest.approx(2 * np.pi / 6 * DIAMETER**3 / (CELL_AREA * gap / 2))
     assert found.velocity[3] == pytest.approx(2.0)
     assert found.filled.sum() == 1
 
@@ -70,9 +72,7 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
     free = state["group"] == 0
     assert free.sum() == 100
     assert [(state["group"] == k).sum() for k in (1, 2)] == [CELL_LENGTH * CELL_WIDTH] * 2
-    pairs = contacts(
-        state["position"], state["radius"], sides=(CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER, 0.0)
-    )
+    pairs = contacts(state["position"], state["radius"], sides=(*CELL_SIDES, 0.0))
     assert not free[pairs].any()
     np.testing.assert_allclose(state["velocity"][:, 0], SHEAR_RATE * state["position"][:, 2])
     # Walls are as rough as half a diameter, and no two neighbours of a row are level.
@@ -81,9 +81,7 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
     assert np.abs(np.diff(height)).min() > 0.1 * DIAMETER
     # Grains fill what the walls leave them.
     volume = np.pi / 6 * (state["radius"][free] * 2) ** 3
-    assert volume.sum() / ((gap - DIAMETER) * CELL_LENGTH * CELL_WIDTH * DIAMETER**2) == pytest.approx(
-        0.26, rel=0.03
-    )
+    assert volume.sum() / ((gap - DIAMETER) * CELL_AREA) == pytest.approx(0.26, rel=0.03)
 
 
 def test_figure_and_table_have_each_bed():
