@@ -72,11 +72,11 @@ class Granular(GranularContact):
         return self
 
     def approximations(self, extent: float) -> tuple[Self, ...]:
-        spring = {} if self.tangential is None else {"tangential": LinearSpring()}
-        drawn = {} if self.tangential is None else {"tangential": MindlinDisplacement()}
-        changes: list[dict[str, Component | None]] = [{"rolling": None}, {"normal": Hooke(), **spring}]
+        spring: dict[str, Component | None] = {"tangential": self.tangential and LinearSpring()}
+        drawn: dict[str, Component | None] = {"tangential": self.tangential and MindlinDisplacement()}
+        changes = ({"rolling": None}, {"normal": Hooke(), **spring}, spring, drawn)
         tried: list[Self] = []
-        for change in (*changes, spring, drawn):
+        for change in changes:
             law = self.model_copy(update=change)
             if law not in (self, *tried):
                 tried.append(law)
