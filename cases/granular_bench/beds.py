@@ -29,7 +29,7 @@ VALUES = {
     "rolling_friction": (0.0, 0.1, 0.2, 0.4),
     "restitution": (0.3, 0.5, 0.8),
     "seed": (0, 1, 2),
-    "outlet": (4.5, 5.0, 6.0, 7.0, 8.0),
+    "outlet": (5.0, 6.0, 7.0, 8.0, 9.0),
 }
 """What is varied alone: of NATURAL, the random start, and the outlet of the silo in diameters of a grain."""
 SHOWN = (("rolling_friction", 0.0), ("rolling_friction", 0.2), ("rolling_friction", 0.4))
@@ -110,7 +110,9 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
 def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
     """Draw the rate to the power 2/5 by the outlet, and the line of Beverloo's law."""
     outlets, rates = np.array([one.value for one in found]), np.array([one.rate for one in found])
-    constant, empty_part = beverloo_fit(outlets, rates)
+    # An arch has closed those that nothing flows through.
+    flows = rates > 0
+    constant, empty_part = beverloo_fit(outlets[flows], rates[flows])
     line = np.linspace(empty_part, outlets.max(), 50)
     bulk = PACKED * DENSITY
     free = np.maximum((line - empty_part) * DIAMETER, 0.0)

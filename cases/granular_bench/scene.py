@@ -88,7 +88,7 @@ def scene(
     seed: int = 0,
     number: int = 1500,
     silo: float = 6.0,
-    outlet: float = 6.0,
+    outlet: float = 7.0,
     disc: float = 8.0,
     drop: float = 8.0,
     duration: float = 1.4,

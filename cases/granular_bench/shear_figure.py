@@ -18,7 +18,7 @@ FRACTIONS = (0.45, 0.49, 0.52, 0.54, 0.56, 0.57, 0.58)
 
 def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
     """Draw what sheared beds have: velocity by height, mu by the inertial number beside what is published,
-    and the solid fraction."""
+    and the solid fraction, which da Cruz and others (2005) found to fall as the inertial number grows."""
     figure = empty(11.6, 3.8)
     profile, ratio, fraction = figure.subplots(1, 3)
     inertial = np.array([bed.inertial_number for bed in beds])
@@ -34,10 +34,14 @@ def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
     line = np.geomspace(inertial.min() / 2, inertial.max() * 1.5, 200)
     ratio.plot(line, expected_ratio(line), color="0.2", lw=1.0, label="Jop, Forterre, Pouliquen (2006)")
     ratio.scatter(inertial, [bed.ratio for bed in beds], c=colours, s=36, zorder=3, label="as run")
-    ratio.set(xscale="log", xlabel="inertial number I", ylabel="stress ratio mu", title="mu(I)")
-    fraction.scatter(inertial, [bed.fraction for bed in beds], c=colours, s=36, zorder=3)
-    fraction.set(xscale="log", xlabel="inertial number I", ylabel="solid fraction", title="solid fraction")
-    for axis in (profile, ratio):
+    ratio.set(xscale="log", xlabel="inertial number I", ylabel="stress ratio μ", title="μ(I)")
+    filled = np.array([bed.fraction for bed in beds])
+    slope, densest = np.polyfit(inertial, filled, 1)
+    label = f"{densest:.3f} \N{MINUS SIGN} {-slope:.2f} I"
+    fraction.plot(inertial, densest + slope * inertial, color="0.2", lw=1.0, label=label)
+    fraction.scatter(inertial, filled, c=colours, s=36, zorder=3)
+    fraction.set(xlabel="inertial number I", ylabel="solid fraction", title="solid fraction")
+    for axis in (profile, ratio, fraction):
         axis.legend(frameon=False, fontsize=8)
     for axis in (profile, ratio, fraction):
         plain(axis)
