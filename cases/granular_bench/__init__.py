@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from cases.case import Case, Late
 from cases.granular_bench.accuracy import quantities
-from cases.granular_bench.scene import SIZES, TITLE, scene_for
+from cases.granular_bench.scene import SIZES, TITLE
+from cases.granular_bench.sizes import scene_for
 
 CASE = Case(
     name="granular_bench",

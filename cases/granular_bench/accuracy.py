@@ -1,15 +1,24 @@
-"""What accuracy is of in a draw-down test: the angle of repose and the discharge rate, over random starts."""
+"""What accuracy is of in a draw-down test and in a bed, over random starts."""
 
 from __future__ import annotations
 
+from cases.granular_bench.bed import centre_height, largest_overlap, side_load
 from cases.granular_bench.measures import discharge, repose
 from tisim import Scene
 from tisim.accuracy import Quantity
+from tisim.operators import Passage
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Paths of grains are chaotic; what counts is what a laboratory would measure."""
+    """Paths of grains are chaotic; what counts is what a laboratory would measure, and how deep they press
+    into each other."""
+    if any(isinstance(effect, Passage) for effect in scene.effects):
+        return (
+            Quantity("discharge rate", discharge, random=True),
+            Quantity("angle of repose", repose, random=True),
+        )
     return (
-        Quantity("discharge rate", discharge, random=True),
-        Quantity("angle of repose", repose, random=True),
+        Quantity("height of the bed", centre_height, random=True),
+        Quantity("load on the side", side_load, random=True),
+        Quantity("largest overlap", largest_overlap, random=True),
     )

@@ -28,9 +28,12 @@ VALUES = {
     "friction": (0.1, 0.3, 0.5, 0.8),
     "rolling_friction": (0.0, 0.1, 0.2, 0.4),
     "restitution": (0.3, 0.5, 0.8),
-    "outlet": (4.5, 5.0, 6.0, 7.0, 8.0),
+    "seed": (0, 1, 2),
+    "outlet": (5.0, 6.0, 7.0, 8.0, 9.0),
 }
-"""What is varied alone, of NATURAL and of the silo, whose outlet is in diameters of a grain."""
+"""What is varied alone: of NATURAL, the random start, and the outlet of the silo in diameters of a grain."""
+SHOWN = (("rolling_friction", 0.0), ("rolling_friction", 0.2), ("rolling_friction", 0.4))
+"""These are drawn as they lie."""
 PACKED = 0.6
 """The part of the space that grains in the silo fill, for the bulk density in Beverloo's law."""
 COLOURS = ("#4477aa", "#cc6677", "#228833")
@@ -59,7 +62,7 @@ def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
     """Run the beds of VALUES as one batch, those that are alike once."""
     wanted = [(what, value) for what, values in VALUES.items() for value in values]
     scenes = [
-        scene(**{**size, what: value}) if what == "outlet" else scene({**NATURAL, what: value}, **size)
+        scene({**NATURAL, what: value}, **size) if what in NATURAL else scene(**{**size, what: value})
         for what, value in wanted
     ]
     digests = [one.digest() for one in scenes]
@@ -79,17 +82,15 @@ def beverloo_fit(outlets: np.ndarray, rates: np.ndarray) -> tuple[float, float]:
 
 
 def bed_figure(found: Sequence[Bed]) -> Figure:
-    """Draw two heaps, what angle and rate depend on, and Beverloo's law."""
+    """Draw three heaps, what angle and rate depend on, and Beverloo's law."""
     figure = empty(11.6, 7.2)
     (first, second, angles), (third, rates, law) = figure.subplots(2, 3)
-    chosen = [
-        next(one for one in found if (one.what, one.value) == key)
-        for key in (("rolling_friction", 0.0), ("rolling_friction", 0.4), ("friction", 0.1))
-    ]
+    chosen = [next(one for one in found if (one.what, one.value) == key) for key in SHOWN]
     square = common([one.result.state for one in chosen], corners(None, None))
     for axis, one in zip((first, second, third), chosen, strict=True):
         panel(axis, one.result.state, square, corners(None, None), None)
-        axis.set_title(f"{one.what.replace('_', ' ')} {one.value:g}: {one.angle:.0f} degrees")
+        angle = "no heap" if np.isnan(one.angle) else f"{one.angle:.0f} degrees"
+        axis.set_title(f"{one.what.replace('_', ' ')} {one.value:g}: {angle}")
     for k, what in enumerate(NATURAL):
         group = [one for one in found if one.what == what]
         values = [one.value for one in group]
@@ -109,7 +110,9 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
 def beverloo(axis: Axes, found: Sequence[Bed]) -> None:
     """Draw the rate to the power 2/5 by the outlet, and the line of Beverloo's law."""
     outlets, rates = np.array([one.value for one in found]), np.array([one.rate for one in found])
-    constant, empty_part = beverloo_fit(outlets, rates)
+    # An arch has closed those that nothing flows through.
+    flows = rates > 0
+    constant, empty_part = beverloo_fit(outlets[flows], rates[flows])
     line = np.linspace(empty_part, outlets.max(), 50)
     bulk = PACKED * DENSITY
     free = np.maximum((line - empty_part) * DIAMETER, 0.0)

@@ -23,12 +23,15 @@ from cases.granular_bench.closed_forms import (
 )
 from cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, ended, force_curves, rebound
 from cases.granular_bench.mindlin_impact import oblique_impacts
+from cases.granular_bench.shear_cell import expected_ratio, sheared_beds
 from tisim import Scene, run
 
 BOUND = 1e-3
 """How far an impact in 800 steps may be off, over the speed at which two approach."""
 HALVES = (0.25, 0.5)
 """Twice at which the speed of what is let go is looked at, s: what springs have taken up by then is over."""
+SHEARED_FRACTIONS, RATIO_BOUND = (0.52, 0.56, 0.58), 0.07
+"""Of the cells that are sheared, and how far mu may be from that of glass beads."""
 COARSE = 4000
 """Steps of an impact in NumPy that a run is held against."""
 
@@ -40,7 +43,7 @@ def rebounds(impacts: Sequence[ParticleImpact]) -> list[Rebound]:
 
 
 def check() -> Iterator[Check]:
-    """Yield the tests of Chung and Ooi (2011), then friction, rolling and rest, adhesion, and a beam."""
+    """Yield the tests of Chung and Ooi (2011), friction, rolling and rest, adhesion, a beam, a shear cell."""
     everything = [impact for test in particle_tests.TESTS.values() for impact in test]
     found = dict(zip(everything, rebounds(everything), strict=True))
     yield from normal_impacts(found)
@@ -48,6 +51,7 @@ def check() -> Iterator[Check]:
     yield from friction_and_rest()
     yield from pull_offs()
     yield from beam_checks()
+    yield from shear_checks()
 
 
 def normal_impacts(found: dict[ParticleImpact, Rebound]) -> Iterator[Check]:
@@ -232,3 +236,10 @@ def beam_checks() -> Iterator[Check]:
     for part, state, bonds in ((0.97, whole, beams.SPHERES), (1.03, broken, beams.SPHERES - 1)):
         count = (state["parallel_bond_past"] != 0).any(axis=1).sum()
         yield Check(f"the same at {part:g} of its breaking load: bonds", float(count), bonds, 0.0)
+
+
+def shear_checks() -> Iterator[Check]:
+    """Yield the stress ratio of cells that are sheared, beside that of glass beads."""
+    for bed in sheared_beds(SHEARED_FRACTIONS):
+        name = f"plane shear: mu at I = {bed.inertial_number:.2f}, Jop et al."
+        yield Check(name, bed.ratio, float(expected_ratio(bed.inertial_number)), RATIO_BOUND)

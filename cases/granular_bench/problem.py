@@ -33,8 +33,8 @@ GENES = (
 SIMULATED = {"angle_of_repose": repose, "discharge_rate": discharge}
 """How each quantity is had of a run."""
 EXAMPLE: Measured = {
-    "angle_of_repose": Measurement(9.7, 1.0),
-    "discharge_rate": Measurement(0.166, 0.003),
+    "angle_of_repose": Measurement(24.0, 1.5),
+    "discharge_rate": Measurement(0.241, 0.006),
 }
 """What is to be met where no file is given: what a run of NATURAL has from one start."""
 MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}

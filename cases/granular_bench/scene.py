@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.case import Size, size_named
+from cases.case import Size
 from tisim import Cloud, GrainClass, Material, RandomInCylinder, Scene
 from tisim.effects import (
     Granular,
@@ -43,8 +43,8 @@ STEADY_PART = (0.35, 0.75)
 """Between these parts of the grains in the silo that have passed the orifice flow is taken as steady."""
 ORIGIN = (0.0, 0.0, 0.0)
 """The middle of the silo's bottom, m."""
-NATURAL = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
-"""The design of a case that is run as it is."""
+NATURAL = {"friction": 0.5, "rolling_friction": 0.2, "restitution": 0.5}
+"""The design of a case that is run as it is: its heap is as steep as those of glass beads and smooth sand."""
 
 LAW = Granular(
     normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
@@ -55,12 +55,15 @@ SEARCH_SETTINGS = {
     "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1, "confirm": 4},
 }  # fmt: skip
 
+BED = "bed"
+"""The size of the case that is no draw-down test, but a bed of stiff grains in a cup (``bed.py``)."""
 SIZES = {
     "default": Size("a draw-down test of 1500 grains; a heap on a disc of 16 diameters", {}, SEARCH_SETTINGS),
     "large": Size(
         "the same of 8000 grains; a heap on a disc of 32 diameters",
         {"number": 8000, "silo": 10.0, "outlet": 8.0, "disc": 16.0, "drop": 16.0, "duration": 3.0},
     ),
+    BED: Size("a bed of 120 stiff grains that have fallen into a cup, for tisim cost", {}),
 }
 
 
@@ -69,12 +72,23 @@ def grain_material(design: Mapping[str, float], young: float = YOUNG) -> Materia
     return Material(young=young, poisson=POISSON, **{name: design[name] for name in NATURAL})
 
 
+def grains(number: int, radius: float, length: float) -> Cloud:
+    """Return so many grains at random places in an upright cylinder on the origin; lengths in m."""
+    d = DIAMETER
+    sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
+    return Cloud(
+        number=number,
+        grains=[GrainClass(sizes=sizes, density=DENSITY)],
+        placement=RandomInCylinder(centre=(0.0, 0.0, length / 2), radius=radius, length=length),
+    )
+
+
 def scene(
     design: Mapping[str, float] = NATURAL,
     seed: int = 0,
     number: int = 1500,
     silo: float = 6.0,
-    outlet: float = 6.0,
+    outlet: float = 7.0,
     disc: float = 8.0,
     drop: float = 8.0,
     duration: float = 1.4,
@@ -95,18 +109,7 @@ def scene(
     total = number * DENSITY * np.pi / 6 * d**3
     return Scene(
         name="granular_bench",
-        particles=Cloud(
-            number=number,
-            grains=[
-                GrainClass(
-                    sizes=UniformSizes(
-                        by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2
-                    ),
-                    density=DENSITY,
-                )
-            ],
-            placement=RandomInCylinder(centre=(0.0, 0.0, height / 2), radius=radius, length=height),
-        ),
+        particles=grains(number, radius, height),
         materials={"grain": grain_material(design, young)},
         effects=(
             LAW,
@@ -125,8 +128,3 @@ def scene(
         duration=duration,
         seed=seed,
     )
-
-
-def scene_for(size: str, seed: int) -> Scene:
-    """Return the draw-down test of a size."""
-    return scene(seed=seed, **size_named(size, SIZES).scene)

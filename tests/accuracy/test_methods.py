@@ -9,20 +9,37 @@ import pytest
 from rich.console import Console
 
 from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
+from tests.scenes import scene
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
-from tisim import InputError, RunError
+from tisim import InputError, Material, RunError
 from tisim.accuracy import Quantity, Row, Study
 from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import decades, tied
 from tisim.accuracy.scene_parts import exchanged, finest, parts
+from tisim.accuracy.softening import softened
 from tisim.accuracy.sweep import methods, rivals
 from tisim.accuracy.table import notes
+from tisim.cli.scene_arguments import assignments
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
-from tisim.effects import InducedMoment, MutualInducedMoment, NearField, Tether, TruncatedNearField
+from tisim.effects import (
+    Granular,
+    HertzMaterial,
+    Hooke,
+    InducedMoment,
+    MindlinForce,
+    MutualInducedMoment,
+    NearField,
+    RestitutionDamping,
+    RollingEPSD,
+    Tether,
+    TruncatedNearField,
+    Walls,
+)
+from tisim.geometry import Plane
 from tisim.sources import MagneticField
 from tisim.steppers import Brownian, DriftLimit, FixedStep, Stepper, Verlet
 
@@ -166,6 +183,55 @@ def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():
     arguments = options(scene, alone.scene)
     assert arguments[:2] == ["--without", "mutual_induced_moment"]
     assert arguments[2:] == ["--set", "effects.induced_moment={susceptibility = 2.0}"]
+
+
+def grains(**properties):
+    """A grain above a floor, of Hertz and Mindlin's law with all that it may have."""
+    law = Granular(
+        normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()
+    )
+    glass = Material(young=5e10, poisson=0.2, restitution=0.5, friction=0.5, rolling_friction=0.1)
+    return scene(
+        [[0.0, 0.0, 1.0]], [[0.0, 0.0, 0.0]], (law, Walls(planes=[Plane()])), mass=1.0, radius=0.1,
+        materials={"glass": glass.model_copy(update=properties)}, duration=1.0,
+        stepper=Verlet(control=FixedStep(dt=1e-6)),
+    )  # fmt: skip
+
+
+def test_grains_are_softened_and_steps_are_longer_by_as_much_as_impacts_are():
+    line = methods_of(grains(stiffness=1e6))["softer, in longer steps: young"]
+    materials = [setting.scene.materials["glass"] for setting in line.settings]
+    assert [material.young for material in materials] == [5e7, 5e8, 5e9]
+    # Of Hooke's stiffness, which the law does not go by, nothing is taken.
+    assert {material.stiffness for material in materials} == {1e6}
+    steps = [setting.scene.stepper.control.dt for setting in line.settings]
+    assert steps == pytest.approx([1e-6 * factor**0.4 for factor in (1e3, 1e2, 10)], rel=5e-3)
+    assert next(s.description for s in line.settings) == "by 1000, dt=1.58e-05"
+    changes = assignments(options(grains(), softened(grains(), {"young": 0.4}, 10.0))[1::2])
+    assert grains().replace(changes) == softened(grains(), {"young": 0.4}, 10.0)
+    linear = exchanged(grains(stiffness=1e6), "effects.granular.normal", Hooke())
+    springs = methods_of(linear)["softer, in longer steps: stiffness"].settings[1].scene
+    assert springs.materials["glass"].stiffness == 1e4
+    assert springs.stepper.control.dt == pytest.approx(1e-5)
+    assert not any(name.startswith("softer") for name in methods_of(oscillator()))
+
+
+def test_grains_are_tried_with_laws_that_their_materials_have_all_for():
+    """Hooke's needs a stiffness. No implicit stepper is tried: contacts begin, slip and end."""
+    plain = methods_of(grains())
+    assert {method.base.stepper.kind() for method in plain.values()} == {"verlet"}
+    tried = [setting.description for setting in plain["Granular"].settings]
+    assert tried == ["rolling=None", "tangential=LinearSpring()", "tangential=MindlinDisplacement()"]
+    rich = methods_of(grains(stiffness=1e6))["Granular"].settings
+    assert rich[1].description == "normal=Hooke(), tangential=LinearSpring()"
+    for setting in rich:
+        law = setting.scene.effects[0]
+        assert law.damping == RestitutionDamping()
+        arguments = options(grains(), setting.scene)
+        changed = grains(stiffness=1e6).replace(assignments(arguments[1::2]))
+        assert changed.effects == setting.scene.effects
+    # What is left out is said by the whole law, as a file has no word for nothing.
+    assert "rolling" not in options(grains(stiffness=1e6), rich[0].scene)[1]
 
 
 def test_a_part_is_exchanged_in_its_place():

@@ -22,11 +22,13 @@ def non_default_settings(part: Component) -> dict[str, Any]:
 
 def expression(part: Component) -> str:
     """Return a part as Python, without what is at its default: Boris(control=FixedStep(dt=1e-05))."""
-    arguments = (
-        f"{name}={expression(value) if isinstance(value, Component) else repr(value)}"
-        for name, value in non_default_settings(part).items()
-    )
+    arguments = (f"{name}={text_of_setting(value)}" for name, value in non_default_settings(part).items())
     return f"{type(part).__name__}({', '.join(arguments)})"
+
+
+def text_of_setting(value: Any) -> str:
+    """Return the value of a setting as Python."""
+    return expression(value) if isinstance(value, Component) else repr(value)
 
 
 def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: str = "strict") -> list[str]:
@@ -36,6 +38,8 @@ def options(scene: Scene, changed: Scene, precision: str = "f64", arithmetic: st
     settings = list(_differences(scene.stepper, changed.stepper, "stepper"))
     for name, effect in new.items():
         settings += _differences(old.get(name), effect, f"effects.{name}")
+    for name, material in changed.materials.items():
+        settings += _differences(scene.materials.get(name), material, f"materials.{name}")
     for key, value in settings:
         arguments += ["--set", f"{key}={value}"]
     arguments += ["--precision", precision] if precision != "f64" else []
@@ -48,11 +52,15 @@ def shell_line(arguments: list[str]) -> str:
 
 
 def _differences(old: Component | None, new: Component, path: str) -> Iterator[tuple[str, str]]:
-    """Yield dotted key and TOML of each setting that differs; a part of another kind as a whole."""
-    if type(old) is not type(new):
+    """Yield dotted key and TOML of each setting that differs; as a whole a part that is of another kind, or
+    that lacks what was there, as TOML has no word for nothing."""
+    names = type(new).model_fields
+    if type(old) is not type(new) or any(
+        getattr(new, n) is None for n in names if getattr(old, n) is not None
+    ):
         yield path, serialization.inline(_table(new, named=path != f"effects.{new.kind()}"))
         return
-    for name in type(new).model_fields:
+    for name in names:
         before, value = getattr(old, name), getattr(new, name)
         if before != value and isinstance(value, Component):
             yield from _differences(before, value, f"{path}.{name}")

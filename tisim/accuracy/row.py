@@ -27,8 +27,9 @@ class Row:
     """A row of a study says what a setting costs and how accurate it is.
 
     method : the name of its sweep, a line in the picture. setting : its description.
-    python : stepper, and laws that were exchanged, as Python. options : those of ``tisim run`` that make the
-    setting, as a shell takes them. starts : the number of random starts that all that follows is of.
+    python : stepper, and laws and materials that were exchanged, as Python. options : those of ``tisim run``
+    that make the setting, as a shell takes them. starts : the number of random starts that all that follows
+    is of.
     seconds : wall seconds of each repeat. steps, sums, rejections : steps, sums of forces and rejected steps
     of a particle, the mean over particles and starts.
     errors : for each quantity the error, and how far that may be off; both relative.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from tisim.components.accuracy_parameter import AccuracyParameter
@@ -48,12 +48,17 @@ def turned(scene: Scene, path: str, accuracy_parameter: AccuracyParameter, decad
     return exchanged(scene, path, accuracy_parameter.turned(dict(parts(scene))[path], decades))
 
 
-def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
-    """Return a copy whose steps are at most this long (s): settings of a control in s are such lengths."""
+def in_steps(scene: Scene, length: Callable[[float], float]) -> Scene:
+    """Return a copy with other lengths of steps: settings of a control in s are such lengths (s)."""
     control = scene.stepper.control
     lengths = [name for name, info in type(control).model_fields.items() if unit_of(info) == "s"]
-    shorter = {name: min(getattr(control, name), longest) for name in lengths}
-    return exchanged(scene, "stepper.control", control.model_copy(update=shorter))
+    changed = {name: length(getattr(control, name)) for name in lengths}
+    return exchanged(scene, "stepper.control", control.model_copy(update=changed))
+
+
+def in_steps_of_at_most(scene: Scene, longest: float) -> Scene:
+    """Return a copy whose steps are at most this long (s)."""
+    return in_steps(scene, lambda length: min(length, longest))
 
 
 def finest(scene: Scene, decades: float) -> Scene:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tisim import steppers
-from tisim.accuracy.formatting import non_default_settings
+from tisim.accuracy.formatting import non_default_settings, text_of_setting
 from tisim.accuracy.scene_parts import exchanged, parts, turned, within
+from tisim.accuracy.softening import SOFTER, softened, softening
 from tisim.components import serialization
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.effects.base import Effect
@@ -101,6 +102,8 @@ def methods(
             accurate = sweeps[0].settings[-1] if sweeps else Setting(scene, "")
             exact = (sweeps[0].name, accurate.description) if sweeps else None
             sweeps.append(_laws(accurate.scene, effect, laws, starts, exact))
+    if properties := softening(scene):
+        sweeps.append(_softer(scene, properties, starts))
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in within("stepper", stepper):
@@ -181,16 +184,38 @@ def _laws(
 ) -> SettingSweep:
     settings = []
     for law in laws:
+        named = law.model_copy(update={"name": own.name})
+        changed = exchanged(scene, f"effects.{own.label}", named)
+        if not _stands(changed):
+            continue  # The materials lack what this law needs of them.
         differ = [
-            f"{name}={getattr(law, name)}"
+            f"{name}={text_of_setting(getattr(law, name))}"
             for name in type(law).model_fields
             if getattr(own, name, None) != getattr(law, name)
         ]
-        description = ", ".join(differ) or type(law).__name__
-        named = law.model_copy(update={"name": own.name})
-        settings.append(Setting(exchanged(scene, f"effects.{own.label}", named), description, starts=starts))
+        settings.append(Setting(changed, ", ".join(differ) or type(law).__name__, starts=starts))
     name = type(laws[0]).__name__
-    return SettingSweep(name, tuple(settings), (1.0,) * len(laws), scene, exact=exact)
+    return SettingSweep(name, tuple(settings), (1.0,) * len(settings), scene, exact=exact)
+
+
+def _stands(scene: Scene) -> bool:
+    """Return whether a scene, of which a part was exchanged, can be run."""
+    try:
+        Scene(**dict(scene))
+    except InputError:
+        return False
+    return True
+
+
+def _softer(scene: Scene, properties: Mapping[str, float], starts: int) -> SettingSweep:
+    settings = []
+    for factor in SOFTER:
+        softer = softened(scene, properties, factor)
+        control = softer.stepper.control
+        steps = (f"{name}={value:.3g}" for name, value in non_default_settings(control).items())
+        settings.append(Setting(softer, f"by {factor:g}, {', '.join(steps)}", starts=starts))
+    weights = tuple(factor ** -min(properties.values()) for factor in SOFTER)
+    return SettingSweep(f"softer, in longer steps: {', '.join(properties)}", tuple(settings), weights, scene)
 
 
 def _title(scene: Scene, path: str) -> str:

@@ -51,10 +51,11 @@ class Trial:
                 for q, truth in zip(study.quantities, study.truths, strict=True)
             )
         laws = [effect for effect in setting.scene.effects if effect not in study.scene.effects]
+        softer = [m for name, m in setting.scene.materials.items() if m != study.scene.materials[name]]
         return Row(
             method=self.method.name,
             setting=setting.description,
-            python="; ".join(expression(part) for part in (setting.scene.stepper, *laws)),
+            python="; ".join(expression(part) for part in (setting.scene.stepper, *laws, *softer)),
             options=shell_line(options(study.scene, setting.scene, setting.precision, setting.arithmetic)),
             precision=setting.precision,
             arithmetic=setting.arithmetic,

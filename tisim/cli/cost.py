@@ -156,7 +156,7 @@ def answer(
     pairs = list(zip(tokens[::2], tokens[1::2], strict=True))
     absent, settings = ([value for key, value in pairs if key == name] for name in ("--without", "--set"))
     measured_scene = scene.without(*absent).replace(scene_arguments.assignments(settings))
-    # Stepper and effects as they have become, whoever has changed them; all else as it was given.
+    # Stepper, effects and materials as they have become, whoever has changed them; all else as it was given.
     _, base = scene_arguments.load_scene(target, size, seed)
     arguments = [target, *_run_options(size, seed, changes, device, threads, plugins)]
     arguments += options(base, measured_scene, row.precision, row.arithmetic)
@@ -167,7 +167,8 @@ def _run_options(
     size: str | None, seed: int | None, changes: Sequence[str] | None,
     device: str, threads: int, plugins: Sequence[str] | None,
 ) -> Iterator[str]:  # fmt: skip
-    """Yield the options of this command that ``tisim run`` needs too, but those of stepper and effects."""
+    """Yield the options of this command that ``tisim run`` needs too, but those of stepper, effects and
+    materials."""
     for name, value, default in (
         ("--size", size, None), ("--seed", seed, None),
         ("--device", device, "cpu"), ("--threads", threads, 0),
@@ -175,7 +176,7 @@ def _run_options(
         if value != default:
             yield from (name, str(value))
     for change in changes or ():
-        if change.partition("=")[0].strip().partition(".")[0] not in ("stepper", "effects"):
+        if change.partition("=")[0].strip().partition(".")[0] not in ("stepper", "effects", "materials"):
             yield from ("--set", change)
     for plugin in plugins or ():
         yield from ("--plugin", plugin)

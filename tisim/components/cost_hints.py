@@ -17,13 +17,22 @@ class AccuracyHints(BaseModel):
     """These are the hints that any part of a scene gives.
 
     accuracy_parameters : its settings that trade accuracy for time.
+    softening : properties of materials that may be lowered for longer steps, each with the power of it that
+        the time of an impact goes by; as {"young": 0.4}, where that is as E^-0.4.
     """
 
     accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = ()
+    softening: ClassVar[Mapping[str, float]] = {}
 
 
 class LawHints(AccuracyHints):
-    """These are the hints that an effect gives."""
+    """These are the hints that an effect gives.
+
+    smooth : whether its forces have derivatives of all orders on the way, without which steppers of high
+        order, and steps that follow the error, gain nothing.
+    """
+
+    smooth: ClassVar[bool] = True
 
     def approximations(self, extent: float) -> tuple[Any, ...]:
         """Return cheaper laws to try in its place, the coarsest first, for particles that are up to

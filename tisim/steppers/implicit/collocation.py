@@ -68,7 +68,8 @@ class Collocation(Stepper):
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
         forced = any(isinstance(effect, Force | PairForce) for effect in effects)
         shortest = min(1e-12, three_digits(1e-3 * dt))
-        return (cls(control=StageControl(first=dt, shortest=shortest)),) if forced else ()
+        smooth = all(effect.smooth for effect in effects)
+        return (cls(control=StageControl(first=dt, shortest=shortest)),) if forced and smooth else ()
 
     def evaluations(self, work: Mapping[str, int], particles: int, independent: bool) -> float:
         return work["force_evaluations"]

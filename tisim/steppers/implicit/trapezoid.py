@@ -77,7 +77,8 @@ class Trapezoid(Stepper):
 
     @classmethod
     def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
-        if not any(isinstance(effect, Force | PairForce) for effect in effects):
+        forced = any(isinstance(effect, Force | PairForce) for effect in effects)
+        if not forced or not all(effect.smooth for effect in effects):
             return ()
         limits = {"first": dt, "longest": dt, "shortest": min(1e-12, three_digits(1e-3 * dt))}
         papers = IterationControl(tolerance=1e-6, **limits)

@@ -23,6 +23,8 @@ class GranularContact(MaterialLaw, PairForce):
     short_ranged: ClassVar[bool] = True
     fields = ("radius", "velocity", "spin")
     depends_on_velocity: ClassVar[bool] = True
+    # Contacts begin, slip and end.
+    smooth: ClassVar[bool] = False
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
 

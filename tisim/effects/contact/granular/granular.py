@@ -10,6 +10,8 @@ from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.granular.hertz import HertzMaterial
+from tisim.effects.contact.granular.hooke import Hooke
+from tisim.effects.contact.granular.mindlin import LinearSpring, MindlinDisplacement
 from tisim.effects.contact.granular.parts import (
     Cohesion,
     Damping,
@@ -68,6 +70,17 @@ class Granular(GranularContact):
         rule = f"left out, as {self.normal.kind()} is adhesive itself"
         must(not double, f"{label}.cohesion", rule, self.cohesion and self.cohesion.kind())
         return self
+
+    def approximations(self, extent: float) -> tuple[Self, ...]:
+        spring: dict[str, Component | None] = {"tangential": self.tangential and LinearSpring()}
+        drawn: dict[str, Component | None] = {"tangential": self.tangential and MindlinDisplacement()}
+        changes = ({"rolling": None}, {"normal": Hooke(), **spring}, spring, drawn)
+        tried: list[Self] = []
+        for change in changes:
+            law = self.model_copy(update=change)
+            if law not in (self, *tried):
+                tried.append(law)
+        return tuple(tried)
 
     def members(self) -> dict[str, Component]:
         names = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")

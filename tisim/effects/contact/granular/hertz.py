@@ -19,6 +19,7 @@ class HertzMaterial(NormalForce):
     """
 
     uses: ClassVar = ("young", "poisson")
+    softening: ClassVar = {"young": 0.4}
     restitution_factor: ClassVar[float] = math.sqrt(5 / 6)
 
     def mix(self, pair: Touching) -> dict[str, float]:

@@ -20,6 +20,7 @@ class Hooke(NormalForce):
     """
 
     uses: ClassVar = ("stiffness",)
+    softening: ClassVar = {"stiffness": 0.5}
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"constant": pair.mixed("stiffness")}

@@ -1,0 +1,107 @@
+"""A bed: stiff grains fall into a cup and come to rest, for ``tisim cost``, which softens them.
+
+What is asked of it is what a bed is asked for: how dense it is, how hard it pushes on the side of the cup,
+which goes by how friction is taken, and how deep grains press into each other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.constants import g as STANDARD_GRAVITY
+
+from cases.granular_bench.closed_forms import hertz_duration, reduced
+from cases.granular_bench.scene import (
+    DENSITY,
+    DIAMETER,
+    LAW,
+    ORIGIN,
+    POISSON,
+    grain_material,
+    grains,
+)
+from tisim import Result, Scene
+from tisim.analysis import contacts
+from tisim.components.accuracy_parameter import three_digits
+from tisim.effects import Gravity, Walls
+from tisim.geometry import CylindricalSurface, Plane
+from tisim.steppers import FixedStep, Verlet
+
+STIFF = 2e8
+"""Pa; glass has 5e10."""
+GRAINS = {"friction": 0.5, "rolling_friction": 0.1, "restitution": 0.5}
+"""What else its grains have."""
+IMPACT = 0.5
+"""The speed of an impact, m/s, whose duration steps are parts of: that of a fall from 13 mm."""
+SPARSE = 0.2
+"""The part of the space that grains fill at the start, before they fall."""
+STEPS_OF_IMPACT = 20.0
+"""A step is one of so many parts of that duration."""
+MASS = DENSITY * np.pi / 6 * DIAMETER**3
+"""Of a mean grain, kg."""
+
+
+def impact_time(young: float) -> float:
+    """Return how long an elastic impact of two mean grains of a Young's modulus (Pa) lasts at IMPACT, s."""
+    modulus = young / (2 * (1 - POISSON**2))
+    return float(hertz_duration(IMPACT, DIAMETER / 4, reduced(MASS, MASS), modulus))
+
+
+def linear_stiffness(young: float) -> float:
+    """Return the stiffness (N/m) of Hooke's spring whose impacts last as long as that one."""
+    return reduced(MASS, MASS) * (np.pi / impact_time(young)) ** 2
+
+
+def bed(
+    seed: int = 0,
+    number: int = 120,
+    cup: float = 2.5,
+    duration: float = 0.2,
+    young: float = STIFF,
+    parts: float = STEPS_OF_IMPACT,
+) -> Scene:
+    """Return the scene of a bed.
+
+    number : of grains. cup : its radius, in diameters of a grain. duration : s. young : Pa. parts : of the
+    time of an impact that a step is one of.
+    """
+    radius, height = cup * DIAMETER, number * DIAMETER / (6 * SPARSE * cup**2)
+    material = grain_material(GRAINS, young)
+    return Scene(
+        name="granular_bench",
+        particles=grains(number, radius, height),
+        # With a stiffness too, so that Hooke's law can be tried beside Hertz's.
+        materials={"grain": material.model_copy(update={"stiffness": three_digits(linear_stiffness(young))})},
+        effects=(
+            LAW,
+            Walls(name="floor", planes=[Plane(point=ORIGIN, normal=(0.0, 0.0, 1.0))]),
+            Walls(
+                name="side",
+                cylinders=[CylindricalSurface(start=ORIGIN, end=(0.0, 0.0, 1.2 * height), radius=radius)],
+            ),
+            Gravity(),
+        ),
+        stepper=Verlet(control=FixedStep(dt=three_digits(impact_time(young) / parts))),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def largest_overlap(result: Result) -> float:
+    """Return the largest overlap of two grains at the end, over the mean radius."""
+    position, radius = result.state["position"], result.state["radius"]
+    i, j = contacts(position, radius).T
+    apart = np.linalg.norm(position[i] - position[j], axis=1)
+    return float((radius[i] + radius[j] - apart).max(initial=0.0) / radius.mean())
+
+
+def side_load(result: Result) -> float:
+    """Return how hard the grains push on the side of the cup at the end, over their weight."""
+    state = result.state
+    outward = state["position"][:, :2] / np.linalg.norm(state["position"][:, :2], axis=1, keepdims=True)
+    push = -float((state["side_loads"][:, :2] * outward).sum())
+    return push / (float(state["mass"].sum()) * STANDARD_GRAVITY)
+
+
+def centre_height(result: Result) -> float:
+    """Return the height of the centre of gravity at the end, m: how dense the bed is."""
+    return float(np.average(result.state["position"][:, 2], weights=result.state["mass"]))

@@ -1,0 +1,239 @@
+"""A shear cell: grains between two rough walls, one of which moves along, without gravity; its mu(I).
+
+Walls are grains that are glued at unlike heights; along and across the flow the cell is periodic. The gap is
+fixed once it is closed, so that each cell has its solid fraction; pressure and shear stress are those on the
+walls, means over time. The flow is told by one number, the inertial number I = gamma d sqrt(rho / P), of
+which stress ratio mu = tau / P and solid fraction are functions: GDR MiDi, Eur. Phys. J. E 14 (2004) 341;
+F. da Cruz, S. Emam, M. Prochnow, J.-N. Roux and F. Chevoir, Phys. Rev. E 72 (2005) 021309. The shear rate is
+that of the middle of the gap: slip at the walls does not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
+from tisim import Box, Cloud, GrainClass, Material, Particles, Result, Scene, Simulation
+from tisim.analysis import solid_fraction
+from tisim.effects import (
+    Granular,
+    HertzMaterial,
+    MindlinForce,
+    PrescribedMotion,
+    RestitutionDamping,
+    Translation,
+)
+from tisim.packing import UniformSizes
+from tisim.scene.initial_state import Arrays
+from tisim.steppers import FixedStep, Verlet
+
+SHEARED_LAW = Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce())
+SHEARED = Material(young=1e7, poisson=POISSON, restitution=0.5, friction=0.5)
+"""What grains and walls are made of: pressures are below a thousandth of Young's modulus."""
+CELL_LENGTH, CELL_WIDTH = 8, 5
+"""Sides of the cell along and across the flow, in diameters."""
+CELL_SIDES = (CELL_LENGTH * DIAMETER, CELL_WIDTH * DIAMETER)
+CELL_AREA = CELL_SIDES[0] * CELL_SIDES[1]
+"""m, m^2."""
+LOOSE_FRACTION = 0.26
+"""The part of the space between the walls that grains fill before the gap is closed."""
+SHEAR_RATE = 10.0
+"""The speed of the upper wall over the gap, 1/s."""
+CLOSING, STRAIN_BEFORE, STRAIN = 1.0, 2.0, 4.0
+"""Strains while the gap is closed, before measuring, and of the mean."""
+SAMPLES = 80
+"""The mean is one of so many looks."""
+SHEAR_DT = 2.4e-5
+"""s."""
+MIDDLE = (0.25, 0.75)
+"""Between these parts of the gap the shear rate and the solid fraction are taken."""
+BINS = 12
+"""Of the profile across the gap."""
+FRICTION_LIMITS, CROSSOVER = (0.38, 0.64), 0.279
+"""mu_s, mu_2 and I_0 of glass beads."""
+
+
+def expected_ratio(inertial: np.ndarray | float) -> np.ndarray:
+    """Return mu(I) = mu_s + (mu_2 - mu_s) / (I_0 / I + 1) of glass beads.
+
+    Source: P. Jop, Y. Forterre and O. Pouliquen, Nature 441 (2006) 727.
+    """
+    low, high = FRICTION_LIMITS
+    return np.asarray(low + (high - low) / (CROSSOVER / np.asarray(inertial) + 1))
+
+
+@dataclass(frozen=True)
+class ShearedBed:
+    """A sheared bed has means over time: the gap (m), pressure and shear stress (Pa), and profiles of the
+    velocity (m/s) over the height (m)."""
+
+    gap: float
+    pressure: float
+    shear_stress: float
+    fraction: float
+    height: np.ndarray
+    velocity: np.ndarray
+
+    @property
+    def wall_speed(self) -> float:
+        """Return the speed of the upper wall, m/s."""
+        return SHEAR_RATE * self.gap
+
+    @property
+    def filled(self) -> np.ndarray:
+        """Return which bins of the profile grains are in."""
+        return np.isfinite(self.velocity)
+
+    @property
+    def ratio(self) -> float:
+        """Return mu, shear stress over pressure."""
+        return self.shear_stress / self.pressure
+
+    @property
+    def shear_rate(self) -> float:
+        """Return the slope of the velocity in the middle of the gap, 1/s."""
+        part = self.height / self.gap
+        middle = (part > MIDDLE[0]) & (part < MIDDLE[1])
+        return float(np.polyfit(self.height[middle], self.velocity[middle], 1)[0])
+
+    @property
+    def inertial_number(self) -> float:
+        """Return I = gamma d sqrt(rho / P)."""
+        return self.shear_rate * DIAMETER * float(np.sqrt(DENSITY / self.pressure))
+
+
+def gap_of(number: int, fraction: float) -> float:
+    """Return the distance (m) of the centres of the walls in which grains fill a fraction of what their own
+    halves leave."""
+    volume = number * np.pi / 6 * DIAMETER**3 * (1 + SPREAD**2)
+    return float(volume / (fraction * CELL_AREA) + DIAMETER)
+
+
+def rough_wall(height: float) -> np.ndarray:
+    """Return centres (m) of the grains of a wall around a height, in rows, up and down by a quarter of a
+    diameter."""
+    x, y = np.meshgrid(np.arange(CELL_LENGTH) + 0.5, np.arange(CELL_WIDTH) + 0.5, indexing="ij")
+    # Parts of the golden ratio: no two neighbours are at the same height, and no row is like another.
+    up = (np.arange(CELL_LENGTH * CELL_WIDTH) * (np.sqrt(5) - 1) / 2) % 1 - 0.5
+    return np.column_stack([x.ravel() * DIAMETER, y.ravel() * DIAMETER, height + 0.5 * DIAMETER * up])
+
+
+def loose(number: int, gap: float, seed: int) -> Arrays:
+    """Return the state of grains at random places between two walls that are far apart."""
+    d, clear = DIAMETER, 0.75 * DIAMETER
+    sizes = UniformSizes(by="number", smallest=(1 - SPREAD) * d / 2, largest=(1 + SPREAD) * d / 2)
+    cloud = Cloud(number=number, grains=[GrainClass(sizes=sizes, density=DENSITY)])
+    room = Box(
+        low=(0.0, 0.0, clear),
+        high=(*CELL_SIDES, gap - clear),
+        periodic=(True, True, False),
+    )
+    free = cloud.arrays(room, seed)
+    walls = np.vstack([rough_wall(0.0), rough_wall(gap)])
+    n, mass = len(walls), DENSITY * np.pi / 6 * d**3
+    position = np.vstack([free["position"], walls])
+    velocity = np.zeros_like(position)
+    velocity[:, 0] = SHEAR_RATE * position[:, 2]
+    return {
+        "position": position,
+        "velocity": velocity,
+        "radius": np.append(free["radius"], np.full(n, d / 2)),
+        "mass": np.append(free["mass"], np.full(n, mass)),
+        "group": np.append(np.zeros(number), np.repeat([1.0, 2.0], n // 2)),
+        "spin": np.zeros_like(position),
+    }
+
+
+def cell(
+    state: Arrays, velocity: tuple[float, float, float], duration: float, law: Granular = SHEARED_LAW
+) -> Scene:
+    """Return the scene of a cell from a state on; the upper wall moves at a velocity (m/s)."""
+    order = np.argsort(state["id"]) if "id" in state else slice(None)
+    core = {name: state[name][order] for name in ("position", "velocity", "radius", "mass")}
+    more = {name: state[name][order] for name in ("group", "spin")}
+    top = float(core["position"][:, 2].max()) + DIAMETER
+    return Scene(
+        name="granular_bench",
+        particles=Particles(**core, quantities=more),
+        materials={"grain": SHEARED},
+        domain=Box(
+            low=(0.0, 0.0, -DIAMETER),
+            high=(*CELL_SIDES, top),
+            periodic=(True, True, False),
+        ),
+        effects=(
+            PrescribedMotion(name="lower", group=1),
+            PrescribedMotion(name="upper", group=2, motion=Translation(velocity=velocity)),
+            law,
+        ),
+        stepper=Verlet(control=FixedStep(dt=SHEAR_DT)),
+        duration=duration,
+    )
+
+
+def sheared_beds(
+    fractions: Sequence[float],
+    number: int = 400,
+    seed: int = 0,
+    law: Granular = SHEARED_LAW,
+    progress: Callable[[float], object] = lambda part: None,
+) -> list[ShearedBed]:
+    """Shear a cell for each of some solid fractions, all as one batch; return what is measured of them.
+
+    number : of grains that move freely. progress : is told the part that is done, 0..1.
+    """
+    wide, gaps = gap_of(number, LOOSE_FRACTION), [gap_of(number, part) for part in fractions]
+    start, closing = loose(number, wide, seed), CLOSING / SHEAR_RATE
+    drives = [(SHEAR_RATE * gap, 0.0, (gap - wide) / closing) for gap in gaps]
+    simulation = Simulation(cell(start, drives[0], closing, law), len(gaps))
+    simulation.load([cell(start, drive, closing, law) for drive in drives])
+    simulation.run()
+    closed = [result.state for result in simulation.results()]
+    before, lasts = STRAIN_BEFORE / SHEAR_RATE, (STRAIN_BEFORE + STRAIN) / SHEAR_RATE
+    simulation.load(
+        [cell(state, (drive[0], 0.0, 0.0), lasts, law) for state, drive in zip(closed, drives, strict=True)]
+    )
+    looks: list[list[tuple[np.ndarray, ...]]] = [[] for _ in gaps]
+    for time in np.linspace(before, lasts, SAMPLES):
+        simulation.run(until=time)
+        progress(float(time / lasts))
+        for gap, look, result in zip(gaps, looks, simulation.results(), strict=True):
+            look.append(seen(result, gap))
+    simulation.close()
+    return [mean_of(gap, look) for gap, look in zip(gaps, looks, strict=True)]
+
+
+def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
+    """Return forces on the walls (N), the solid fraction in the middle, and sums and numbers of velocities in
+    the bins."""
+    state, measures = result.state, result.measures
+    pressing = measures["upper_force_z"] - measures["lower_force_z"]
+    dragging = measures["lower_force_x"] - measures["upper_force_x"]
+    free = state["group"] == 0
+    height, edges = state["position"][free, 2], np.linspace(0.0, gap, BINS + 1)
+    (fraction,) = solid_fraction(state["position"], state["radius"], np.array(MIDDLE) * gap, CELL_AREA)
+    sums = np.histogram(height, edges, weights=state["velocity"][free, 0])[0]
+    numbers = np.histogram(height, edges)[0]
+    return np.array([pressing, dragging, fraction]), sums, numbers
+
+
+def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]]) -> ShearedBed:
+    """Return the means over some looks at a cell with a gap (m)."""
+    scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
+    pressing, dragging, fraction = scalars.mean(axis=0)
+    edges = np.linspace(0.0, gap, BINS + 1)
+    count = numbers.sum(axis=0)
+    # No grain comes to the middle of a wall.
+    velocity = np.where(count > 0, sums.sum(axis=0) / np.maximum(count, 1), np.nan)
+    # Each stress is the mean of those on both walls.
+    return ShearedBed(
+        gap=gap,
+        pressure=pressing / (2 * CELL_AREA),
+        shear_stress=dragging / (2 * CELL_AREA),
+        fraction=float(fraction),
+        height=(edges[1:] + edges[:-1]) / 2,
+        velocity=velocity,
+    )

@@ -1,0 +1,64 @@
+"""The figure of the shear cell: profiles of the velocity, mu(I), and the solid fraction; and its table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cases.granular_bench.shear_cell import ShearedBed, expected_ratio
+from tisim.plotting.style import TIME, empty, letters, plain
+
+FRACTIONS = (0.45, 0.49, 0.52, 0.54, 0.56, 0.57, 0.58)
+"""Solid fractions between the walls of the cells that are drawn."""
+
+
+def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
+    """Draw what sheared beds have: velocity by height, mu by the inertial number beside what is published,
+    and the solid fraction, which da Cruz and others (2005) found to fall as the inertial number grows."""
+    figure = empty(11.6, 3.8)
+    profile, ratio, fraction = figure.subplots(1, 3)
+    inertial = np.array([bed.inertial_number for bed in beds])
+    colours = TIME(np.linspace(0.0, 1.0, len(beds)))
+    for bed, number, colour in zip(beds, inertial, colours, strict=True):
+        inside = bed.filled
+        profile.plot(
+            bed.velocity[inside] / bed.wall_speed, bed.height[inside] / bed.gap, "o-", ms=4, lw=1.0,
+            color=colour, label=f"I = {number:.2g}",
+        )  # fmt: skip
+    profile.plot([0.0, 1.0], [0.0, 1.0], color="0.6", lw=0.9, ls="--", label="no slip")
+    profile.set(xlabel="velocity over that of the wall", ylabel="height over the gap", title="velocity")
+    line = np.geomspace(inertial.min() / 2, inertial.max() * 1.5, 200)
+    ratio.plot(line, expected_ratio(line), color="0.2", lw=1.0, label="Jop, Forterre, Pouliquen (2006)")
+    ratio.scatter(inertial, [bed.ratio for bed in beds], c=colours, s=36, zorder=3, label="as run")
+    ratio.set(xscale="log", xlabel="inertial number I", ylabel="stress ratio μ", title="μ(I)")
+    filled = np.array([bed.fraction for bed in beds])
+    slope, densest = np.polyfit(inertial, filled, 1)
+    label = f"{densest:.3f} \N{MINUS SIGN} {-slope:.2f} I"
+    fraction.plot(inertial, densest + slope * inertial, color="0.2", lw=1.0, label=label)
+    fraction.scatter(inertial, filled, c=colours, s=36, zorder=3)
+    fraction.set(xlabel="inertial number I", ylabel="solid fraction", title="solid fraction")
+    for axis in (profile, ratio, fraction):
+        axis.legend(frameon=False, fontsize=8)
+    for axis in (profile, ratio, fraction):
+        plain(axis)
+    letters((profile, ratio, fraction))
+    return figure
+
+
+def shear_table(beds: Sequence[ShearedBed]) -> str:
+    """Return the inertial number, the stress ratio as run and as published, the solid fraction, the pressure
+    and the shear rate of each bed as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(
+        ["inertial_number", "stress_ratio", "published", "solid_fraction", "pressure_Pa", "shear_rate_per_s"]
+    )
+    for bed in beds:
+        number = bed.inertial_number
+        expected = float(expected_ratio(number))
+        writer.writerow([number, bed.ratio, expected, bed.fraction, bed.pressure, bed.shear_rate])
+    return text.getvalue()

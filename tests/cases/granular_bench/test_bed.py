@@ -1,0 +1,62 @@
+"""The bed that ``tisim cost`` softens: what is asked of it, in places that are known; what softening does."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import tisim
+from cases.granular_bench.accuracy import quantities
+from cases.granular_bench.bed import (
+    bed,
+    centre_height,
+    impact_time,
+    largest_overlap,
+    linear_stiffness,
+    side_load,
+)
+from cases.granular_bench.sizes import scene_for
+
+
+def test_quantities_of_a_bed():
+    position = np.array([[3e-3, 0.0, 1e-3], [0.0, -3e-3, 3e-3], [0.0, 3e-3, 3e-3], [2.5e-3, 2.8e-3, 3e-3]])
+    loads = np.zeros((4, 6))
+    # Pushed inwards by 2 N and 3 N; what acts along the side does not count.
+    loads[0, :3], loads[1, :3], loads[3, 2] = [-2.0, 7.0, 1.0], [0.0, 3.0, 0.0], 9.0
+    state = {
+        "position": position, "radius": np.full(4, 1.3e-3), "mass": np.array([1.0, 1.0, 1.0, 2.0]),
+        "side_loads": loads,
+    }  # fmt: skip
+    result = SimpleNamespace(state=state)
+    assert centre_height(result) == pytest.approx(2.6e-3)
+    assert side_load(result) == pytest.approx(5.0 / (5.0 * 9.80665))
+    apart = np.hypot(2.5e-3, 0.2e-3)
+    assert largest_overlap(result) == pytest.approx((2.6e-3 - apart) / 1.3e-3)
+
+
+def test_the_bed_is_stiff_and_its_steps_are_parts_of_an_impact():
+    scene = scene_for("bed", 3)
+    assert scene.digest() == bed(seed=3).digest()
+    assert scene.stepper.control.dt == pytest.approx(impact_time(2e8) / 20, rel=5e-3)
+    assert impact_time(2e8 / 1000) == pytest.approx(1000**0.4 * impact_time(2e8), rel=1e-12)
+    # Hooke's spring of this stiffness and half a grain's mass swings for as long.
+    mass = 2500 * np.pi / 6 * 5e-3**3
+    assert np.pi * np.sqrt(mass / 2 / linear_stiffness(2e8)) == pytest.approx(impact_time(2e8))
+    assert [one.name for one in quantities(scene)] == [
+        "height of the bed",
+        "load on the side",
+        "largest overlap",
+    ]
+    assert [one.name for one in quantities(scene_for("default", 0))] == ["discharge rate", "angle of repose"]
+
+
+@pytest.mark.slow
+def test_a_bed_softened_a_hundredfold_is_pressed_deeper_as_hertz_has_it():
+    """By 100^(2/3) where loads are the same; over six starts, and a bed is no closed form."""
+    results = tisim.run([bed(seed=seed, young=young) for young in (2e8, 2e6) for seed in range(6)])
+    assert all(result.status.ok for result in results)
+    overlaps = np.array([largest_overlap(result) for result in results]).reshape(2, 6).mean(axis=1)
+    assert overlaps[1] / overlaps[0] == pytest.approx(100 ** (2 / 3), rel=0.4)
+    loads = np.array([side_load(result) for result in results]).reshape(2, 6).mean(axis=1)
+    assert (loads > 0.3).all()
+    assert loads[1] == pytest.approx(loads[0], rel=0.4)

@@ -1,0 +1,112 @@
+"""The shear cell: its walls, what is taken of a series, and mu(I) beside that of glass beads."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cases.granular_bench.scene import DENSITY, DIAMETER
+from cases.granular_bench.shear_cell import (
+    CELL_AREA,
+    CELL_LENGTH,
+    CELL_SIDES,
+    CELL_WIDTH,
+    SHEAR_RATE,
+    ShearedBed,
+    expected_ratio,
+    gap_of,
+    loose,
+    mean_of,
+    rough_wall,
+    seen,
+    sheared_beds,
+)
+from cases.granular_bench.shear_figure import shear_figure, shear_table
+from tisim.analysis import contacts
+
+
+def bed(pressure=300.0, gap=10 * DIAMETER):
+    """A bed whose velocity grows by 8 1/s in the middle, and slips at both walls."""
+    height = (np.arange(12) + 0.5) / 12 * gap
+    velocity = SHEAR_RATE * gap / 2 + 8.0 * (height - gap / 2)
+    velocity[0], velocity[-1] = np.nan, np.nan
+    return ShearedBed(gap, pressure, 0.4 * pressure, 0.57, height, velocity)
+
+
+def test_mu_of_glass_beads():
+    assert expected_ratio(0.0001) == pytest.approx(np.tan(np.radians(20.9)), abs=3e-3)
+    assert expected_ratio(1e4) == pytest.approx(np.tan(np.radians(32.76)), abs=5e-3)
+    assert expected_ratio(0.279) == pytest.approx(0.51)
+
+
+def test_inertial_number_goes_by_the_middle_of_the_gap():
+    assert bed().shear_rate == pytest.approx(8.0)
+    assert bed().inertial_number == pytest.approx(8.0 * DIAMETER * np.sqrt(DENSITY / 300.0))
+    assert bed().ratio == pytest.approx(0.4)
+
+
+def test_stresses_are_means_over_both_walls_and_over_time():
+    """Two looks at three grains; the walls are pushed apart, and dragged along and back."""
+    gap = 10 * DIAMETER
+    state = {
+        "group": np.array([0, 0, 1]), "radius": np.full(3, DIAMETER / 2),
+        "position": np.array([[0.0, 0.0, 0.3 * gap], [0.0, 0.0, 0.31 * gap], [0.0, 0.0, 0.0]]),
+        "velocity": np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [9.0, 0.0, 0.0]]),
+    }  # fmt: skip
+    names = ("upper_force_z", "lower_force_z", "upper_force_x", "lower_force_x")
+    looks = [
+        seen(SimpleNamespace(state=state, measures=dict(zip(names, forces, strict=True))), gap)
+        for forces in ((3.0, -1.0, -0.5, 0.7), (5.0, -3.0, -1.5, 1.3))
+    ]
+    found = mean_of(gap, looks)
+    assert found.pressure == pytest.approx(3.0 / CELL_AREA)
+    assert found.shear_stress == pytest.approx(1.0 / CELL_AREA)
+    assert found.fraction == pytest.approx(2 * np.pi / 6 * DIAMETER**3 / (CELL_AREA * gap / 2))
+    assert found.velocity[3] == pytest.approx(2.0)
+    assert found.filled.sum() == 1
+
+
+def test_the_cell_begins_without_overlaps_of_what_moves():
+    gap = gap_of(100, 0.26)
+    state = loose(100, gap, 3)
+    free = state["group"] == 0
+    assert free.sum() == 100
+    assert [(state["group"] == k).sum() for k in (1, 2)] == [CELL_LENGTH * CELL_WIDTH] * 2
+    pairs = contacts(state["position"], state["radius"], sides=(*CELL_SIDES, 0.0))
+    assert not free[pairs].any()
+    np.testing.assert_allclose(state["velocity"][:, 0], SHEAR_RATE * state["position"][:, 2])
+    # Walls are as rough as half a diameter, and no two neighbours of a row are level.
+    height = rough_wall(0.0)[:, 2]
+    assert np.ptp(height) == pytest.approx(0.5 * DIAMETER, rel=0.1)
+    assert np.abs(np.diff(height)).min() > 0.1 * DIAMETER
+    # Grains fill what the walls leave them.
+    volume = np.pi / 6 * (state["radius"][free] * 2) ** 3
+    assert volume.sum() / ((gap - DIAMETER) * CELL_AREA) == pytest.approx(0.26, rel=0.03)
+
+
+def test_figure_and_table_have_each_bed():
+    beds = [bed(pressure) for pressure in (30.0, 300.0, 3000.0)]
+    _, ratio, fraction = shear_figure(beds).axes
+    numbers = [one.inertial_number for one in beds]
+    np.testing.assert_allclose(ratio.collections[0].get_offsets()[:, 0], numbers)
+    np.testing.assert_allclose(fraction.collections[0].get_offsets()[:, 1], 0.57)
+    rows = shear_table(beds).splitlines()
+    assert rows[0].startswith("inertial_number,stress_ratio,published")
+    assert len(rows) == 4
+
+
+@pytest.mark.slow
+def test_grains_that_are_sheared_have_the_friction_of_glass_beads():
+    """mu grows with the inertial number, as published; the denser of two is slower than its pressure."""
+    dilute, dense = sheared_beds((0.50, 0.55), number=200)
+    assert dense.inertial_number < 0.5 * dilute.inertial_number
+    assert dense.fraction > dilute.fraction + 0.02
+    assert dense.ratio < dilute.ratio - 0.03
+    for one in (dilute, dense):
+        assert one.ratio == pytest.approx(float(expected_ratio(one.inertial_number)), abs=0.09)
+        middle = one.filled & (np.abs(one.height / one.gap - 0.5) < 0.3)
+        # Sheared throughout, and not in a band: layers near the walls move as one, a grain thick.
+        height, velocity = one.height[middle], one.velocity[middle]
+        line = np.polyval(np.polyfit(height, velocity, 1), height)
+        assert np.abs(velocity - line).max() < 0.06 * one.wall_speed
+        assert 0.6 * SHEAR_RATE < one.shear_rate < 1.1 * SHEAR_RATE
