@@ -234,7 +234,7 @@ def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
     velocity, spin = 0.3 * rng.normal(size=(2 * n, 3)), 0.5 * rng.normal(size=(2 * n, 3))
     cement = {"gap": 0.1, "young": young, "stiffness_ratio": kappa, "radius_ratio": wide,
               "tensile_strength": 1e9, "shear_strength": 1e9}  # fmt: skip
-    weak = {"tensile_strength": 8.0, "shear_strength": 8.0}
+    weak = {"tensile_strength": 60.0, "shear_strength": 60.0}
     kinds = ({}, {"damping_ratio": 0.1}, weak)
     made = [grains("mindlin", place.reshape(-1, 3), velocity, spin, cement={**cement, **kind}, dt=2e-4,
                    steps=5000, first={"young": 1e3}) for kind in kinds]  # fmt: skip
@@ -252,7 +252,7 @@ def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
 
     simulation = loaded(made)
     series = [[energy(by_id(result)) for result in simulation.results()]]
-    while simulation.is_running():
+    for _ in range(100):
         simulation.run(steps=50)
         series.append([energy(by_id(result)) for result in simulation.results()])
     kept, damped, broken = (np.array([look[w][0] for look in series]) for w in range(3))
@@ -260,7 +260,7 @@ def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
     assert np.abs(kept / kept[0] - 1).max() < 0.02
     assert (np.diff(damped, axis=0) < 1e-3 * damped[0]).all()
     assert (damped[-1] < 0.97 * damped[0]).all()
-    assert 0 < held[-1].sum() < n or not held[-1].any()
     assert held[0].all()
+    assert 3 < held[-1].sum() < n - 3
     assert (broken < 1.02 * broken[0]).all()
-    assert (broken[-1] < 0.97 * broken[0]).sum() > n / 2
+    assert (broken[-1] < 0.97 * broken[0])[~held[-1]].all()
