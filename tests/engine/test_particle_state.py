@@ -191,3 +191,14 @@ def test_a_write_that_cannot_be_gone_on_from_is_a_failure_in_words():
     assert not bad.status.ok
     assert "not finite" in bad.status.reason
     assert (good.status.reason, good.work["steps"]) == ("running", 2)
+
+
+def test_a_world_begins_anew_with_its_forces_also_after_a_run_of_no_steps():
+    made = crystal()
+    simulation = compiled(made, 1, 64)
+    simulation.load([made])
+    forces = simulation.s.read("force")
+    assert np.abs(forces).max() > 0
+    simulation.run(steps=0)
+    simulation.begin()
+    np.testing.assert_array_equal(simulation.s.read("force"), forces)

@@ -147,6 +147,28 @@ def distances(worlds, points):
     return out
 
 
+def beside_cones():
+    """Distances of some places from closed cones with an apex at the end, and at the start."""
+    cone = {"start": (0.0, 0.0, 0.0), "end": (0.0, 0.0, 1.0), "closed": True}
+    radii = ({"start_radius": 1.0, "end_radius": 0.0}, {"start_radius": 0.0, "end_radius": 1.0})
+    worlds = [
+        some(0).model_copy(update={"cones": (geometry.ConicalSurface(**cone, **each),)}) for each in radii
+    ]
+    points = np.array([[[0, 0, 2.0], [0, 0, -1.0], [0, 0, 0.5], [2.0, 0, 1.0], [0, 3.0, 0]]] * 2)
+    return distances(worlds, points)[:, :, LISTS.index("cones")].tolist()
+
+
+@pytest.mark.parametrize("arithmetic", ["strict", pytest.param("fast", marks=pytest.mark.slow)])
+def test_a_closed_cone_with_an_apex_has_a_distance_everywhere(arithmetic, request):
+    """On the axis beyond the apex and beyond the base, within, and aside."""
+    found = beside_cones()
+    if arithmetic == "fast":
+        found = request.getfixturevalue("in_fast_arithmetic")("geometry.test_shapes", "beside_cones")
+    half = 0.5**0.5
+    expected = [[1, 1, 0.5 * half, 2 * half, 2], [1, 1, 0.5 * half, 1, 5**0.5]]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
 @pytest.fixture(scope="module")
 def measured():
     worlds = [some(seed) for seed in range(3)]

@@ -68,3 +68,11 @@ def test_many_are_the_same_turned_and_what_points_at_random_find(rng):
     within = (((points[:, None] - centre) ** 2).sum(axis=2) < radius**2).any(axis=1)
     assert within.mean() * np.prod(high - low) == pytest.approx(solid.volume, rel=0.01)
     np.testing.assert_allclose(points[within].mean(axis=0), solid.centre, rtol=0, atol=0.01)
+
+
+def test_a_sphere_that_is_there_twice_counts_once(rng):
+    centre, radius = 0.6 * rng.normal(size=(4, 3)), rng.uniform(0.5, 1.0, 4)
+    once = sphere_union(centre, radius)
+    twice = sphere_union(np.vstack([centre, centre[[2, 0, 2]]]), np.append(radius, radius[[2, 0, 2]]))
+    for one, other in zip(once, twice, strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-12)

@@ -1,5 +1,7 @@
 """Outlines of walls in pictures: on their shapes, where their motions have them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from tests.scenes import scene
 from tisim import Material, geometry
 from tisim.effects import Fixed, Granular, Oscillation, Rotation, Servo, Translation, Walls
 from tisim.plotting.cloud import start_and_end
+from tisim.plotting.movie import walls_of_all
 from tisim.plotting.walls import outline, outlines, placed
 
 TOWARDS = np.array([0.0, -0.8, 0.6])
@@ -98,3 +101,13 @@ def test_a_picture_has_walls_where_they_are():
     heights = [axis.lines[0].get_ydata().mean() for axis in figure.axes[:2]]
     assert len(figure.axes[0].lines) == len(start_and_end((start, start), (0, 1), among()).axes[0].lines) + 1
     assert heights[1] > heights[0]
+
+
+def test_a_movie_sees_walls_where_they_are_between_its_first_and_last_frame():
+    disc = geometry.Disc(centre=(0.5, 0.5, 0), radius=0.5)
+    shakes = Oscillation(amplitude=(0, 0, 0.4), frequency=1.0)
+    made = among(Walls(discs=[disc], motion=shakes))
+    frames = SimpleNamespace(scene=made, times=np.array([0.0, 0.25, 0.5, 1.0]))
+    heights = [line[:, 1].mean() for line in walls_of_all(frames, made.start())]
+    assert len(heights) == 4
+    assert heights[1] > max(heights[0], heights[2], heights[3]) + 0.1

@@ -131,7 +131,8 @@ class CompiledWorlds:
     def _assemble(self, sizes: ListSizes) -> None:
         with collected() as trees:
             self.allocation.assemble(sizes)
-        self.trees += trees
+        # Those of the lists before have been destroyed.
+        self.trees = [tree for tree in self.trees if tree.alive] + trees
         self._compile()
 
     def _choose(self, capacity: int) -> str:

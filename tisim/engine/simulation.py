@@ -73,7 +73,7 @@ class Simulation(CompiledWorlds):
         self.table.write([parts(scene) for scene in scenes])
         self.scenes, self.starts, self.wall_s = list(scenes), starts, 0.0
         self.edits = [[] for _ in scenes]
-        self.s.fill({"pause_time": np.inf, "goal": NEVER, "listed_above": near_list.SMALL_WORLD})
+        self.s.fill({"pause_time": np.inf, "listed_above": near_list.SMALL_WORLD})
         self.begin()
         try:
             check_reach(self.scenes, self.starts, self.assembly.pairs)
@@ -108,10 +108,11 @@ class Simulation(CompiledWorlds):
 
     def _begin(self) -> None:
         self.s.fill({f.name: laid_out(f, self.starts, self.worlds, self.s.capacity) for f in self.s.fields})
-        # What worlds wait for, and how they look for pairs, is asked of them by others, and stays.
-        asked = ("pause_time", "goal", "listed_above")
+        # What worlds wait for, and how they look for pairs, is asked of them by others, and stays; a goal in
+        # steps is that of the run before, and would keep them from their first forces.
+        asked = ("pause_time", "listed_above")
         cleared = dict.fromkeys((name for name in self.s.columns if name not in asked), 0)
-        self.s.fill({**cleared, **world_columns(self.scenes, self.starts, self.worlds)})
+        self.s.fill({**cleared, "goal": NEVER, **world_columns(self.scenes, self.starts, self.worlds)})
         self.forget_lists()
         if self.first.items:
             self.first.advance(1)

@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
-from tisim.errors import must
+from tisim.components.ranges import check_direction
 from tisim.geometry.shape import Shape
 
 
@@ -29,10 +29,7 @@ class Plane(Shape):
 
     @model_validator(mode="after")
     def _directed(self) -> Plane:
-        length = math.hypot(*self.normal)
-        must(
-            length > 0 and math.isfinite(length), "plane.normal", "a direction, not of length 0", self.normal
-        )
+        check_direction(f"{self.label}.normal", self.normal)
         return self
 
     @classmethod

@@ -55,7 +55,9 @@ class RevolvedSurface(Surface):
         begin, end = ti.select(c == 2, length, 0.0), ti.select(c == 1, 0.0, length)
         near, far = ti.select(c == 0, low, 0.0), ti.select(c == 1, low, high)
         wide, tall = far - near, end - begin
-        u = ((rho - near) * wide + (z - begin) * tall) / (wide * wide + tall * tall)
+        # At the apex of a cone the disc is a place.
+        square = wide * wide + tall * tall
+        u = ((rho - near) * wide + (z - begin) * tall) / ti.select(square > 0.0, square, 1.0)
         u = ti.min(ti.max(u, 0.0), 1.0)
         return self.origin(w, k) + (begin + u * tall) * axis + (near + u * wide) * away
 

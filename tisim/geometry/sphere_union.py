@@ -31,7 +31,9 @@ class Solid(NamedTuple):
 def sphere_union(centre: np.ndarray, radius: np.ndarray) -> Solid:
     """Return the solid that is the union of spheres at ``centre`` (m), shape (n, 3), of ``radius`` (m), shape
     (n,)."""
-    middle = centre.mean(axis=0)
+    # One that is there twice would have all of its surface counted twice.
+    centre, radius = np.split(np.unique(np.column_stack([centre, radius]), axis=0), [3], axis=1)
+    radius, middle = radius[:, 0], centre.mean(axis=0)
     place = centre - middle
     volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for i in range(len(place)):

@@ -37,8 +37,7 @@ def movie(
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
     box = cloud.corners(*frames.scene.domain.bounds())
-    ends = [cloud.walls_at(frames.scene, [ranges], float(time)) for time in frames.times[[0, -1]]]
-    square = cloud.view(ranges, np.vstack([box, *ends[0], *ends[1]]))
+    square = cloud.view(ranges, np.vstack([box, *walls_of_all(frames, ranges)]))
     if coloured is not None:
         side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
         cloud.scale(figure, None, coloured, side)
@@ -75,6 +74,12 @@ def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
         return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
     must(path.suffix == ".gif", "movie", "a .gif or .mp4 file", path.name)
     return PillowWriter(fps=rate)
+
+
+def walls_of_all(frames: Frames, ranges: Arrays) -> list[np.ndarray]:
+    """Return the outlines of walls as seen at the times of all frames, m: what shakes may be farther out
+    between the first and the last."""
+    return [line for t in frames.times for line in cloud.walls_at(frames.scene, [ranges], float(t))]
 
 
 def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:

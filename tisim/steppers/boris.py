@@ -108,4 +108,5 @@ class BorisRotation(PerParticle):
         else:
             s.velocity[w, i] = s.velocity[w, i] + 2.0 * half * s.force[w, i]
         if ti.static(self.turning):
-            s.spin[w, i] = s.spin[w, i] + dt / (0.4 * m * s.radius[w, i] ** 2) * s.torque[w, i]
+            turn = dt / (0.4 * m * s.radius[w, i]) * (s.torque[w, i] / s.radius[w, i])
+            s.spin[w, i] = s.spin[w, i] + turn

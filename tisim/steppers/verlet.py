@@ -55,7 +55,9 @@ def half_kick(s, w, i, turning: ti.template()):  # type: ignore[valid-type]
     half = 0.5 * ti.cast(s.dt[w], s.real)
     s.velocity[w, i] = s.velocity[w, i] + half / s.mass[w, i] * s.force[w, i]
     if ti.static(turning):
-        s.spin[w, i] = s.spin[w, i] + half / (0.4 * s.mass[w, i] * s.radius[w, i] ** 2) * s.torque[w, i]
+        # Of grains of nanometres m R^2 is below f32.
+        turn = half / (0.4 * s.mass[w, i] * s.radius[w, i]) * (s.torque[w, i] / s.radius[w, i])
+        s.spin[w, i] = s.spin[w, i] + turn
 
 
 class Move(PerParticle):

@@ -185,3 +185,4 @@ def test_no_room_for_longer_lists_is_no_fault_of_what_follows(simulation, monkey
     monkeypatch.undo()
     assert simulation.assembly.pairs.half_list.row == row
     assert len(ends(simulation, [bed(1)])) == 1
+    assert all(tree.alive for tree in simulation.trees)

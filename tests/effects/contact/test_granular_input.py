@@ -30,9 +30,8 @@ WRONG = {
     "material.friction must be at least 0.0; received -0.1": lambda: material(friction=-0.1),
     "material.friction must be a finite number; received nan": lambda: material(friction=float("nan")),
     "walls must be given a plane or a surface; received 'none'": lambda: Walls(planes=()),
-    "plane.normal must be a direction, not of length 0; received (0.0, 0.0, 0.0)": lambda: Plane(
-        normal=(0, 0, 0)
-    ),
+    "plane.normal must be a direction; received (0.0, 0.0, 0.0)": lambda: Plane(normal=(0, 0, 0)),
+    "plane.normal must be a direction; received (0.0, 0.0, 1e-200)": lambda: Plane(normal=(0, 0, 1e-200)),
     f"{ALONE}; received 'walls'": lambda: one(Walls(planes=[Plane()])),
     f"{ALONE}; received 'hertz, walls'": lambda: one(Hertz(young=1, poisson=0), Walls(planes=[Plane()])),
     "stepper.control must be one that suits granular, such as fixed_step or that of an implicit "

@@ -164,8 +164,8 @@ def test_a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once(nam
     np.testing.assert_allclose(couple, expected[:, None] * X, rtol=1e-9, atol=1e-9 * limit)
 
 
-def test_a_contact_that_is_pressed_turned_eased_and_turned_back_yields_no_work():
-    """Rolled and twisted: half of what the spring has lost times the square of the angle is lost."""
+def test_a_contact_that_is_pressed_twisted_eased_and_twisted_back_yields_no_work():
+    """Twisted: half of what the spring has lost times the square of the angle is lost."""
     n, angle = 500, 1e-4
     still, down = np.zeros(n), np.linspace(PRESSED, 0.005, n)
     overlap = np.concatenate([still + PRESSED, down, still + 0.005, down[::-1]])

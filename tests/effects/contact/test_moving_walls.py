@@ -15,6 +15,7 @@ from tisim.effects import (
     Translation,
     Walls,
 )
+from tisim.effects.motion.servo import MOST_RESISTANCE, QUANTA
 from tisim.geometry import CylindricalSurface, Plane
 from tisim.io.reader import frames
 
@@ -235,6 +236,11 @@ def test_a_wall_as_fast_as_sound_throws_grains_ahead():
     assert (np.diff(v) > -1e-9 * fast).all()
     assert fast < v.min() <= v.max() < 3 * fast
     np.testing.assert_array_equal(result.state["velocity"][:, 1:], 0)
+
+
+def test_what_a_servo_adds_up_is_a_number_however_many_grains_resist():
+    """Four million grains at the most that is counted of each, as of a tiny wanted force."""
+    assert 2**22 * QUANTA * MOST_RESISTANCE < 2**63
 
 
 def test_what_is_wrong_is_named():

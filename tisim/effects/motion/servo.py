@@ -13,8 +13,9 @@ from tisim.effects.motion.base import Motion
 
 QUANTA = 2.0**32
 """A resistance is counted in so many parts of the wanted one."""
-MOST_RESISTANCE = 2.0**20
-"""The resistance of one particle is counted up to so many times the wanted one."""
+MOST_RESISTANCE = 2.0**8
+"""The resistance of one particle is counted up to so many times the wanted one: the sum of 2^22 is below
+2^63."""
 
 
 class Servo(Motion):

@@ -16,7 +16,8 @@ class SJKR(Cohesion):
         F = k_c A,    A = 2 pi R* delta
 
     A is the area of the lens that two spheres share, to first order in delta / R*. Coulomb's limit is that of
-    the normal force without cohesion.
+    the normal force without cohesion. Where 2 pi k_c R* is above the stiffness of ``hooke`` nothing holds
+    grains apart: they fall into each other.
 
     Source: L21 section 2.2.1; C. Kloss, C. Goniva, A. Hager, S. Amberger and S. Pirker, Prog. Comput. Fluid
     Dyn. 12 (2012) 140, for its use.

@@ -57,10 +57,10 @@ class GranularContact(MaterialLaw, PairForce):
         turn = arm * s.spin[w, i] + (distance - arm) * s.spin[w, j]
         slip = s.relative_velocity(w, i, j, separation) - turn.cross(normal)
         m, n = s.masses_behind(w, i, j)
-        # R* and m*, by one division.
+        # R* and m*, by one division, and by no product of masses, which of small grains is below f32.
         sizes, masses = a + b, m + n
         inverse = 1.0 / (sizes * masses)
-        radius, mass = a * b * (masses * inverse), m * n * (sizes * inverse)
+        radius, mass = a * (b * (masses * inverse)), m * (n * (sizes * inverse))
         pair, spinning = self.material_pair(s, w, i, j), s.spin[w, j] - s.spin[w, i]
         # Chosen afterwards, not by a branch: several pairs are computed at once.
         force, couple, known = self.contact(w, pair, normal, overlap, radius, mass, slip, spinning, past, dt)
