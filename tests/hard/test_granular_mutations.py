@@ -60,7 +60,7 @@ MUTATIONS = {
     ),
     "rolling_epsd": (
         f"{LAW}/rolling.py", "2.25 * friction", "2.0 * friction",
-        f"{PARTS}a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once",
+        "tests/effects/contact/test_compositions.py::test_one_step_and_some_hundred_are_those_of_the_twin[jkr]",
     ),
     "rolling_sds": (
         f"{LAW}/rolling.py", "return grip, known / spring", "return grip, drawn",
