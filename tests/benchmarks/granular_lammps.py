@@ -36,6 +36,7 @@ from tests.effects.contact.granular_twin import Grains, TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
     from tisim import Scene
+    from tisim.effects import Granular
 
 SIDE, STEP = 8, 5e-4
 """Grains along an edge, which are also m; s."""
@@ -118,19 +119,25 @@ def end_of(scene: Scene, steps: int, schedule: str | None = None) -> dict[str, n
     return end
 
 
+def composed(law: TwinLaw) -> Granular:
+    """The law of the package."""
+    from tisim.components import serialization
+    from tisim.effects import Granular
+    from tisim.scene import plugins
+
+    parts = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
+    plugins.load_parts()
+    given = {part: getattr(law, part) for part in parts if getattr(law, part)}
+    return serialization.from_dict(Granular, {"kind": "granular", **given}, "law")
+
+
 def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
     """Where the package is."""
     from tisim import Material, Particles, Scene
-    from tisim.components import serialization
-    from tisim.effects import Granular, Walls
+    from tisim.effects import Walls
     from tisim.geometry import Plane
-    from tisim.scene import plugins
     from tisim.steppers import FixedStep, Verlet
 
-    parts = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
-    given = {part: getattr(law, part) for part in parts if getattr(law, part)}
-    plugins.load_parts()
-    composed = serialization.from_dict(Granular, {"kind": "granular", **given}, "law")
     bounds = tuple(Plane(point=point, normal=normal) for point, normal in planes(walls))
     quantities = {"spin": at["spin"]}
     scene = Scene(
@@ -138,7 +145,7 @@ def by_package(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int)
             **{name: value for name, value in at.items() if name != "spin"}, quantities=quantities
         ),
         materials={"grain": Material(**law.materials[0])},
-        effects=(composed, *((Walls(planes=bounds),) if walls else ())),
+        effects=(composed(law), *((Walls(planes=bounds),) if walls else ())),
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=1.0,
     )
