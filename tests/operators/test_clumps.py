@@ -12,7 +12,7 @@ from tisim.analysis import clump_bodies
 from tisim.effects import Gravity, RigidClumps
 from tisim.geometry import Plane
 from tisim.numerics.random_streams import INSERTION
-from tisim.operators import AtRest, InsertionByFlux, InsertionByFraction, Outflow
+from tisim.operators import AtRest, InsertionByFlux, InsertionByFraction, Outflow, Passage
 from tisim.packing import EqualSizes, UniformSizes
 
 G, RHO = 9.81, 1000.0
@@ -56,6 +56,7 @@ def filling(
                 name="fill", fraction=fraction, interval=interval, begin=fill, number=NUMBER,
                 grains=GRAINS[:1], low=(-5.0, 0.0, 1.0), high=(-4.0, 1.0, 2.0),
             ),
+            Passage(planes=[Plane(point=(edge, 0, 0), normal=(side, 0, 0))]),
             Outflow(planes=[Plane(point=(edge, 0, 0), normal=(side, 0, 0))]),
             AtRest(time=0.05, energy=1e-4, unbalanced=2e-2),
         ),
@@ -70,7 +71,7 @@ SCENES = {
     "beside": filling(begin=0.1, gravity=0.0),
     "rest": filling(begin=0.1, fill=0.0, fraction=1e-9, interval=1e3, duration=12.0),
     "fill": filling(fill=0.0, bed=THERE, gravity=0.0, duration=0.15),
-    "both": filling(begin=0.0, flux=2500.0, gravity=0.0, edge=0.02, side=1.0, velocity=-3.0, floor=1e-3),
+    "both": filling(begin=0.0, flux=450.0, gravity=0.0, edge=0.02, side=1.0, velocity=-3.0, floor=1e-3),
     "leaving": filling(gravity=0.0, edge=1.5, velocity=3.0, floor=1e-3),
     "staying": filling(gravity=0.0, velocity=3.0, floor=1e-3),
 }
@@ -180,12 +181,30 @@ def test_a_region_is_filled_up_to_a_fraction_of_clumps(outcome):
     assert series["fill_number"][0] == 0 < series["fill_number"][1] == series["fill_number"][-1] > 50
 
 
-def test_what_is_put_in_while_others_leave_stays(results):
-    """In the same step too: a clump is put in at each of those in which the three leave."""
-    result = results["both"]
+def test_what_is_put_in_while_others_leave_stays(outcome):
+    """Where numbers of members have gaps, and slots of those that have left are taken by others."""
+    (results, series), name = outcome, "both"
+    result, poured, gone = results[name], series[name]["pour_number"], series[name]["outflow"]
+    leaving = np.flatnonzero(np.diff(gone)) + 1
+    assert len(leaving) == 3
+    assert (poured[leaving - 1] < poured[leaving]).all()
     assert result.work["outflow"] == 3
     assert result.measures["pour_number"] == NUMBER
     assert result.measures["outflow_mass"] == pytest.approx(3 * SMALL.body.mass, rel=1e-12)
+
+
+def test_members_are_found_where_others_have_left(simulation):
+    """Those that are put in take slots whose numbers are those of other members."""
+    simulation.load(SCENES["both"])
+    simulation.run(until=0.2)
+    (before,) = simulation.measures([0])
+    for _ in range(20):
+        simulation.run(steps=1)
+        member = simulation.s.read("clump_member")[0][: simulation.s.read("count")[0]]
+        held = np.flatnonzero(member >= 0)
+        assert (member[held] != held).any()
+        np.testing.assert_array_equal(simulation.s.read("clump_index")[0][member[held]], held)
+    assert simulation.measures([0])[0]["pour_number"] >= before["pour_number"] + 3
 
 
 def test_clumps_at_rest_end_the_run(results):
@@ -218,6 +237,7 @@ def test_a_clump_leaves_as_a_whole(outcome):
     assert gone.tolist() == [False, True, True]
     assert leaving.work["outflow"] == 2
     assert leaving.measures["outflow_mass"] == pytest.approx(2 * mass, rel=1e-12)
+    assert leaving.measures["passed_mass"] == leaving.measures["outflow_mass"]
     assert set(series["leaving"]["particles"]) == {12, 8, 4}
     time = series["leaving"]["time"]
     for number, clump in ((8, 2), (4, 1)):

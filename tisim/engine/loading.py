@@ -70,7 +70,10 @@ def check_held(scene: Scene, start: Arrays) -> None:
     constraints = [effect for effect in scene.effects if isinstance(effect, Constraint)]
     by = np.zeros(len(start["mass"]), int)
     for constraint in constraints:
-        by += constraint.held(start, scene.domain)
+        # What an effect puts in may be all that there is of a kind.
+        awaited = any(type(constraint) in effect.required_effects() for effect in scene.effects)
+        if constraint.mark in start or not awaited:
+            by += constraint.held(start, scene.domain)
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
         must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max(initial=0)}")
         for effect in scene.effects:
@@ -165,7 +168,7 @@ def check_field(f: Field, values: np.ndarray, n: int, where: str = "particles") 
         rule = f"within the range of {runtime.current().precision}"
         must(False, label, rule, float(values[unrepresentable][0]))
     if f.minimum is not None:
-        least = float(values.min(initial=np.inf))
+        least = float(values.min()) if values.size else np.inf
         must(least >= f.minimum, label, f"at least {f.minimum:g} {f.unit}", least)
 
 

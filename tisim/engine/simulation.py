@@ -84,6 +84,8 @@ class Simulation(CompiledWorlds):
         self.monitor = Monitor(self)
         # A start can fail already: more contacts than there is room for, an infinite force.
         self.monitor.check_worlds()
+        # An effect that does not name its measures is found out now, not at the end.
+        self.measures([0])
 
     @property
     def state(self) -> ParticleState:
@@ -238,8 +240,9 @@ class Simulation(CompiledWorlds):
             of_world = {name: float(now[name][w]) for name in quantities}
             makers = [effect for effect in self.scenes[w].effects if effect.offers("measures")]
             if makers:
-                good, count = self.monitor.last_good, slice(int(self.monitor.last_good["count"][w]))
-                state = {f.name: good[f.name][w, count] for f in self.s.reported}
+                good = self.monitor.last_good
+                order = self.in_order(w, good)
+                state = {f.name: good[f.name][w, order] for f in self.s.reported}
                 for effect in makers:
                     made, named = effect.measures(state), tuple(effect.measured())
                     unnamed = [name for name in made if name not in named]

@@ -75,7 +75,7 @@ class SpatialSort:
         self.least, self.every = SORTED_FROM, SORT_EVERY
         singles: list[tuple[Any, Any]] = []
         for field in s.fields:
-            if not field.slots:
+            if not (field.slots or field.lookup):
                 column = getattr(s, field.name)
                 parts = [column.get_scalar_field(k) for k in range(3)] if field.components == 3 else [column]
                 singles += [(part, part.dtype) for part in parts]

@@ -48,18 +48,19 @@ class Recorder(Observer):
     def observe(self, simulation: Simulation) -> None:
         s, good = simulation.s, simulation.monitor.last_good
         running = s.read("status") == WorldStatus.RUNNING
-        steps = s.read("steps")
+        steps, new = s.read("steps"), []
         for w, interval in enumerate(self.interval):
             time = float(good["time"][w])
             if time < self.due[w] and running[w]:
                 continue
             self.due[w] = self._next_due(time, interval)
             if time > self.last[w]:
-                count = int(good["count"][w])
-                arrays = {f.name: good[f.name][w, :count] for f in self.trajectory.fields[self.indices[w]]}
-                (measures,) = simulation.measures([w])
-                self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays, measures))
-                self.last[w] = time
+                new.append(w)
+        for w, measures in zip(new, simulation.measures(new), strict=True):
+            time, count = float(good["time"][w]), int(good["count"][w])
+            arrays = {f.name: good[f.name][w, :count] for f in self.trajectory.fields[self.indices[w]]}
+            self.trajectory.write(self.indices[w], Frame(time, int(steps[w]), arrays, measures))
+            self.last[w] = time
 
 
 def _last_time(group: h5py.Group) -> float:

@@ -102,9 +102,10 @@ class AtRest(Operator):
 
     @ti.func
     def is_free(self, s, w, i):
-        free = True
+        # What has been taken out in this step has no mass.
+        free = s.mass[w, i] > 0.0
         if ti.static(hasattr(s, "fixed")):
-            free = s.fixed[w, i] == 0
+            free = free and s.fixed[w, i] == 0
         for constraint in ti.static(self.constraints):
             if ti.static(not constraint.data.free):
                 free = free and not constraint.holds(s, w, i)

@@ -58,11 +58,9 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
 
     def structure(self) -> tuple[Any, ...]:
         """Return what is compiled in: sizes, materials and further quantities too."""
-        classes = (
-            (one.sizes, one.material, one.spheres().tobytes(), *sorted(one.quantities.items()))
-            for one in self.grains
-        )
-        return (*super().structure(), *classes)
+        classes = ((one.sizes, one.material, *sorted(one.quantities.items())) for one in self.grains)
+        shapes = (table.tobytes() for table in GrainShapes.lookups(self).values())
+        return (*super().structure(), *classes, *shapes)
 
     def keeps(self, what: str) -> tuple[str, ...]:
         own = (f"{self.label}_number", f"{self.label}_mass") if what == "world_quantities" else ()
@@ -128,7 +126,10 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         c = self.draw_class(w, of_grain[0])
         radius = ti.cast(self.draw_radius(c, of_grain[1]), s.real)
         placed = 0.0 * radius
-        if s.room(w) >= self.end_sphere(c) - self.first_sphere(c):
+        size = self.end_sphere(c) - self.first_sphere(c)
+        # Members of clumps are found by their ids, in memory of as many entries as there is room.
+        numbered = s.next_id[w] + size <= s.most[w]
+        if s.room(w) >= size and (numbered or ti.static(not self.has_clumps)):
             attempt = 0
             while attempt < self.tries and placed == 0.0:
                 of_place = self.uniforms(s, w, k, 1 + attempt)

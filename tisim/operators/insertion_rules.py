@@ -105,6 +105,6 @@ class InsertionByFraction(Insertion):
                 place, cube = constraint.home(s, w, i), 0.0 * cube
                 if constraint.leads(s, w, i):
                     cube = constraint.volume(s, w, i) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
-        if not self.contains(w, place):
+        if s.mass[w, i] == 0.0 or not self.contains(w, place):
             cube = 0.0 * cube
         return cube

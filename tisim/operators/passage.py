@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.geometry.plane import Plane
-from tisim.operators.base import Operator, option, parameter
+from tisim.operators.base import parameter
+from tisim.operators.behind_planes import BehindPlanes
 from tisim.operators.outflow import Outflow
 from tisim.worlds.fields import Field
 
 
-class Passage(Operator):
+class Passage(BehindPlanes):
     """Grains whose centres get behind a plane, the side that its normal points away from, are weighed once;
-    nothing is changed.
+    nothing is changed. A rigid clump passes as a whole, when its centre of mass does.
 
         passage_rate = (m_2 - m_1) / (t_2 - t_1)
 
@@ -25,12 +25,10 @@ class Passage(Operator):
 
     fields: ClassVar = (Field("passed", "", 1, "keep", integer=True, default=0),)
     world_quantities: ClassVar = ("passed_mass", "passage_rate", "passage_begin_time", "passage_begin_mass")
-    any_order: ClassVar[bool] = True
     flags: ClassVar = ("passage_due",)
     # What has been taken out weighs nothing.
     precedes: ClassVar = (Outflow,)
 
-    planes: tuple[Plane, ...] = option("planes behind which grains have passed", min_length=1)
     begin: float = parameter("kg", "mass that has passed from which on the rate is taken", 0.0, ge=0)
     end: float = parameter("kg", "mass that has passed up to which the rate is taken", 1e30, gt=0)
 
@@ -39,7 +37,7 @@ class Passage(Operator):
 
     @ti.func
     def particle(self, s, w, i, t, dt):
-        if s.passed[w, i] == 0 and self.is_behind(w, s.position[w, i]):
+        if s.passed[w, i] == 0 and self.is_behind(s, w, i):
             ti.atomic_max(s.passage_due[w], 1)
 
     @ti.func
@@ -50,7 +48,7 @@ class Passage(Operator):
     def world(self, s, w):
         s.passage_due[w] = 0
         for i in range(s.count[w]):
-            if s.passed[w, i] == 0 and self.is_behind(w, s.position[w, i]):
+            if s.passed[w, i] == 0 and self.is_behind(s, w, i):
                 s.passed[w, i] = 1
                 s.passed_mass[w] += ti.cast(s.mass[w, i], ti.f64)
         mass, began = s.passed_mass[w], s.passage_begin_mass[w]
@@ -58,11 +56,3 @@ class Passage(Operator):
             s.passage_begin_mass[w], s.passage_begin_time[w] = mass, s.time[w]
         if began > 0.0 and mass <= self.end(w) and s.time[w] > s.passage_begin_time[w]:
             s.passage_rate[w] = (mass - began) / (s.time[w] - s.passage_begin_time[w])
-
-    @ti.func
-    def is_behind(self, w, r):
-        """Return whether a point (m) is behind one of the planes."""
-        behind = False
-        for k in range(self.planes.size(w)):
-            behind = behind | (self.planes.distance(w, k, r) < 0.0)
-        return behind

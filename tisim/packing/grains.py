@@ -33,7 +33,7 @@ class GrainClass(Component):
         "", "its share of the mass of the mixture; shares are divided by their sum", 1.0, gt=0
     )
     clump: Clump | None = option(
-        "shape of its grains, a rigid clump, of which only the shape counts; spheres unless given", None
+        "shape of its grains, a rigid clump, whose size and mass do not count; spheres unless given", None
     )
     material: Text | None = option(
         "material of its grains; unless given, that of the cloud, or the first of the scene", None

@@ -8,18 +8,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tisim.effects.motion.resultant import resultant_units
 from tisim.io.reader import Frames
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity
 
 FORCE_SUFFIX = "_force_x"
-"""Measures whose names end so are forces on bodies."""
+"""Measures of bodies have names of which one ends so."""
 
 
 def bodies(frames: Frames) -> list[str]:
     """Return the names of the bodies whose forces a trajectory of 2 frames or more has, in the order of
     the alphabet."""
-    names = [name.removesuffix(FORCE_SUFFIX) for name in frames.measures if name.endswith(FORCE_SUFFIX)]
-    return names if len(frames) > 1 else []
+    measures = frames.measures
+    names = [name.removesuffix(FORCE_SUFFIX) for name in measures if name.endswith(FORCE_SUFFIX)]
+    return [name for name in names if len(frames) > 1 and resultant_units(name).keys() <= measures.keys()]
 
 
 def loads(frames: Frames) -> Figure:

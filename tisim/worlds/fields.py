@@ -22,6 +22,7 @@ class Field:
         which it is a copy then, such as "position"; None where the start must say.
     minimum : the least value that a start may give.
     scratch : of use to a stepper only: results do not have it. double : in f64 also in single precision.
+    lookup : of memory, not of the particle in a slot: it stays when particles are moved, put in or taken out.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Field:
     minimum: float | None = None
     scratch: bool = False
     double: bool = False
+    lookup: bool = False
 
     def __post_init__(self) -> None:
         if self.slots and (self.merge != "keep" or self.components != 1):

@@ -98,15 +98,16 @@ class StateMemory:
         self.domain: Any = None
         self.before_reading: list[Callable[[], None]] = []
         self.columns = (*quantities, *integers, *WORLD_VECTORS, *whole, *WORLD_SETTINGS)
-        self.singles = tuple(getattr(self, field.name) for field in fields if not field.slots)
+        carried = [field for field in fields if not (field.slots or field.lookup)]
+        self.singles = tuple(getattr(self, field.name) for field in carried)
         self.slotted = tuple(
             (getattr(self, field.name), field.slots, _number(field)) for field in fields if field.slots
         )
         # What a particle that is put in has besides: a number, or the value of another field.
         self.defaults = tuple(
             (getattr(self, field.name), _number(field), field.components)
-            for field in fields
-            if not field.slots and not isinstance(field.default, str)
+            for field in carried
+            if not isinstance(field.default, str)
         )
         self.copied = tuple(
             (getattr(self, field.name), getattr(self, field.default))

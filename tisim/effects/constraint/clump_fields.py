@@ -53,7 +53,8 @@ def check_clumps(start: Mapping[str, np.ndarray], domain: Domain) -> None:
     number, leads = np.arange(len(held)), np.flatnonzero(member == first)
     sizes = np.diff([*leads, len(held)])
     most = int(start["id"].max()) + 1 if "id" in start else len(start["mass"])
-    whole = sizes.sum() == len(held) and (not len(held) or 0 <= member[0] <= member[-1] < most)
+    whole = sizes.sum() == len(held) and bool((np.diff(member) > 0).all())
+    whole = whole and all(not len(held) or 0 <= x.min() <= x.max() < most for x in (member, clump))
     if whole:
         firsts, lead = np.repeat(member[leads], sizes), np.repeat(leads, sizes)
         rows = ((first, firsts), (member, firsts + number - lead), (size, np.repeat(sizes, sizes)))

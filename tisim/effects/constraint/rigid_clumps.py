@@ -14,7 +14,7 @@ from tisim.effects.constraint.clump_fields import BODY, MEMBERSHIP, NO_CLUMP, ch
 from tisim.effects.constraint.rigid_rotation import angular_velocity, free_rotation
 from tisim.numerics.quaternions import rotated
 
-INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True)
+INDEX = Field("clump_index", "", 1, "keep", integer=True, scratch=True, lookup=True)
 """The slot of a number has where in memory the member of that number is; it says nothing of the particle in
 the slot."""
 
