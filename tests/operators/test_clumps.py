@@ -207,6 +207,25 @@ def test_members_are_found_where_others_have_left(simulation):
     assert simulation.measures([0])[0]["pour_number"] >= before["pour_number"] + 3
 
 
+def test_they_may_be_put_in_where_there_are_only_spheres(simulation):
+    start = Particles(position=[(0.0, 0.0, 0.04)], velocity=[(0.0, 0.0, 0.0)], radius=0.04, density=RHO)
+    simulation.load(SCENES["pour"].model_copy(update={"particles": start}))
+    simulation.run(until=0.002)
+    (result,) = simulation.results()
+    clump = by_id(result.state)["clump"]
+    assert clump[0] == -1
+    assert clump.max() > 0
+
+
+def test_bodies_of_other_inertia_are_another_structure():
+    def of(moment):
+        shape = Clump(centres=PEAR.centres, radii=PEAR.radii, mass=1.0, inertia=np.diag([moment, 2.0, 2.5]))
+        grains = GrainClass(sizes=EqualSizes(radius=0.04), density=RHO, clump=shape)
+        return InsertionByFlux(flux=1.0, number=1, grains=[grains], low=tuple(LOW), high=tuple(HIGH))
+
+    assert of(1.0).structure() == of(1.0).structure() != of(1.5).structure()
+
+
 def test_clumps_at_rest_end_the_run(results):
     """By the kinetic energy of the bodies, and the force on each as a whole."""
     result = results["rest"]
