@@ -212,7 +212,7 @@ def test_they_may_be_put_in_where_there_are_only_spheres(simulation):
     simulation.load(SCENES["pour"].model_copy(update={"particles": start}))
     simulation.run(until=0.002)
     (result,) = simulation.results()
-    clump = by_id(result.state)["clump"]
+    clump = by_id(result)["clump"]
     assert clump[0] == -1
     assert clump.max() > 0
 
