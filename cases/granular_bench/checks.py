@@ -32,6 +32,10 @@ HALVES = (0.25, 0.5)
 """Twice at which the speed of what is let go is looked at, s: what springs have taken up by then is over."""
 SHEARED_FRACTIONS, RATIO_BOUND = (0.52, 0.56, 0.58), 0.07
 """Of the cells that are sheared, and how far mu may be from that of glass beads."""
+RISE_BOUND = 0.5
+"""How far the rise of mu from the slowest to the fastest of the cells may be short of that of glass beads, in
+parts of the latter: one mu for all cells has none. Of three starts it was 1.4, 1.6 and 2.0 times as large, so
+nothing is asked of how far it is above."""
 COARSE = 4000
 """Steps of an impact in NumPy that a run is held against."""
 
@@ -239,7 +243,11 @@ def beam_checks() -> Iterator[Check]:
 
 
 def shear_checks() -> Iterator[Check]:
-    """Yield the stress ratio of cells that are sheared, beside that of glass beads."""
-    for bed in sheared_beds(SHEARED_FRACTIONS):
+    """Yield the stress ratio of cells that are sheared, and its rise with I, beside those of glass beads."""
+    beds = sheared_beds(SHEARED_FRACTIONS)
+    expected = expected_ratio(np.array([bed.inertial_number for bed in beds]))
+    for bed, ratio in zip(beds, expected, strict=True):
         name = f"plane shear: mu at I = {bed.inertial_number:.2f}, Jop et al."
-        yield Check(name, bed.ratio, float(expected_ratio(bed.inertial_number)), RATIO_BOUND)
+        yield Check(name, bed.ratio, float(ratio), RATIO_BOUND)
+    rise, line = beds[0].ratio - beds[-1].ratio, float(expected[0] - expected[-1])
+    yield Check("the same: its rise is short of theirs by", max(0.0, line - rise), 0.0, RISE_BOUND * line)

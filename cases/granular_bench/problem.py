@@ -17,7 +17,7 @@ from pathlib import Path
 from cases.case import size_named
 from cases.granular_bench.measured import QUANTITY_UNITS, Measured, Measurement, read
 from cases.granular_bench.measures import discharge, repose
-from cases.granular_bench.scene import SIZES, TITLE, scene
+from cases.granular_bench.scene import BED, SIZES, TITLE, scene
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.problem import Problem
 from tisim import Result
@@ -58,6 +58,7 @@ def calibration(size: str, variant: str, path: Path) -> Problem:
 
 def _problem(size: str, variant: str, measured: Measured) -> Problem:
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
+    must(size != BED, "size", "that of a draw-down test", size)
     settings = size_named(size, SIZES).scene
     plain = {name: [one.value, one.uncertainty] for name, one in sorted(measured.items())}
     wanted = ", ".join(

@@ -44,7 +44,7 @@ STEADY_PART = (0.35, 0.75)
 ORIGIN = (0.0, 0.0, 0.0)
 """The middle of the silo's bottom, m."""
 NATURAL = {"friction": 0.5, "rolling_friction": 0.2, "restitution": 0.5}
-"""The design of a case that is run as it is: its heap is as steep as those of glass beads and smooth sand."""
+"""The design of a case that is run as it is."""
 
 LAW = Granular(
     normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce(), rolling=RollingEPSD()

@@ -11,12 +11,13 @@ that of the middle of the gap: slip at the walls does not count.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 
 import numpy as np
 
 from cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
-from tisim import Box, Cloud, GrainClass, Material, Particles, Result, Scene, Simulation
+from tisim import Box, Cloud, GrainClass, Material, Particles, Result, RunError, Scene, Simulation
 from tisim.analysis import solid_fraction
 from tisim.effects import (
     Granular,
@@ -183,27 +184,36 @@ def sheared_beds(
 ) -> list[ShearedBed]:
     """Shear a cell for each of some solid fractions, all as one batch; return what is measured of them.
 
-    number : of grains that move freely. progress : is told the part that is done, 0..1.
+    number : of grains that move freely. progress : is told the part that is done, 0..1. RunError where a cell
+    fails.
     """
     wide, gaps = gap_of(number, LOOSE_FRACTION), [gap_of(number, part) for part in fractions]
-    start, closing = loose(number, wide, seed), CLOSING / SHEAR_RATE
-    drives = [(SHEAR_RATE * gap, 0.0, (gap - wide) / closing) for gap in gaps]
-    simulation = Simulation(cell(start, drives[0], closing, law), len(gaps))
-    simulation.load([cell(start, drive, closing, law) for drive in drives])
-    simulation.run()
-    closed = [result.state for result in simulation.results()]
+    start, closes = loose(number, wide, seed), CLOSING / SHEAR_RATE
+    drives = [(SHEAR_RATE * gap, 0.0, (gap - wide) / closes) for gap in gaps]
     before, lasts = STRAIN_BEFORE / SHEAR_RATE, (STRAIN_BEFORE + STRAIN) / SHEAR_RATE
-    simulation.load(
-        [cell(state, (drive[0], 0.0, 0.0), lasts, law) for state, drive in zip(closed, drives, strict=True)]
-    )
     looks: list[list[tuple[np.ndarray, ...]]] = [[] for _ in gaps]
-    for time in np.linspace(before, lasts, SAMPLES):
-        simulation.run(until=time)
-        progress(float(time / lasts))
-        for gap, look, result in zip(gaps, looks, simulation.results(), strict=True):
-            look.append(seen(result, gap))
-    simulation.close()
+    with closing(Simulation(cell(start, drives[0], closes, law), len(gaps))) as simulation:
+        simulation.load([cell(start, drive, closes, law) for drive in drives])
+        simulation.run()
+        closed = [result.state for result in unbroken(simulation)]
+        drawn = [(drive[0], 0.0, 0.0) for drive in drives]
+        simulation.load([cell(state, drive, lasts, law) for state, drive in zip(closed, drawn, strict=True)])
+        for time in np.linspace(before, lasts, SAMPLES):
+            simulation.run(until=time)
+            progress(float(time / lasts))
+            for gap, look, result in zip(gaps, looks, unbroken(simulation), strict=True):
+                look.append(seen(result, gap))
     return [mean_of(gap, look) for gap, look in zip(gaps, looks, strict=True)]
+
+
+def unbroken(simulation: Simulation) -> list[Result]:
+    """Return the results of worlds that are at their end or on the way to it; RunError where one has failed:
+    the state of its last good step would be taken for that of the others."""
+    results = simulation.results()
+    for result in results:
+        if not result.status.ok and result.status.reason != "running":
+            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    return results
 
 
 def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:

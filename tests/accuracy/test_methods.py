@@ -12,20 +12,24 @@ from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
 from tests.scenes import scene
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
-from tisim import InputError, Material, RunError
+from tisim import InputError, Material, MaterialPair, RunError
 from tisim.accuracy import Quantity, Row, Study
 from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
 from tisim.accuracy.reference import attempts, compared
 from tisim.accuracy.row import decades, tied
 from tisim.accuracy.scene_parts import exchanged, finest, parts
-from tisim.accuracy.softening import softened
+from tisim.accuracy.softening import softened, softening
 from tisim.accuracy.sweep import methods, rivals
 from tisim.accuracy.table import notes
 from tisim.cli.scene_arguments import assignments
 from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects import (
+    DMT,
+    JKR,
+    SJKR,
+    ConstantDamping,
     Granular,
     HertzMaterial,
     Hooke,
@@ -33,10 +37,14 @@ from tisim.effects import (
     MindlinForce,
     MutualInducedMoment,
     NearField,
+    ParallelBond,
     RestitutionDamping,
     RollingEPSD,
+    RollingSDS,
     Tether,
     TruncatedNearField,
+    TwistingSDS,
+    ViscoelasticDamping,
     Walls,
 )
 from tisim.geometry import Plane
@@ -232,6 +240,40 @@ def test_grains_are_tried_with_laws_that_their_materials_have_all_for():
         assert changed.effects == setting.scene.effects
     # What is left out is said by the whole law, as a file has no word for nothing.
     assert "rolling" not in options(grains(stiffness=1e6), rich[0].scene)[1]
+
+
+def test_what_would_not_go_with_softer_materials_is_not_softened():
+    """Constants of other parts, and what is given of a pair, stay as they are: steps would be too long."""
+    own = {"damping": 1.0, "viscous_time": 1e-6, "rolling_stiffness": 1e6, "rolling_damping": 1.0,
+           "twisting_friction": 0.1, "twisting_stiffness": 1e6, "twisting_damping": 1.0,
+           "cohesion_energy_density": 1e3, "stiffness": 1e6}  # fmt: skip
+    parts_of_law = {
+        "damping": (ConstantDamping(), ViscoelasticDamping()),
+        "rolling": (RollingSDS(),),
+        "twisting": (TwistingSDS(),),
+        "cohesion": (SJKR(),),
+    }
+    assert softening(grains(**own)) == {"young": 0.4}
+    for place, others in parts_of_law.items():
+        for other in others:
+            assert softening(exchanged(grains(**own), f"effects.granular.{place}", other)) == {}, other
+    bond = ParallelBond(young=1e9, tensile_strength=1e6, shear_strength=1e6)
+    bonded = grains().model_copy(update={"effects": (*grains().effects, bond)})
+    assert not any(name.startswith("softer") for name in methods_of(bonded))
+    linear = exchanged(grains(**own), "effects.granular.normal", Hooke())
+    for given, powers in (({"stiffness": 1e5}, {}), ({"friction": 0.1}, {"stiffness": 0.5})):
+        pairs = {"glass-glass": MaterialPair(**given)}
+        assert softening(linear.model_copy(update={"material_pairs": pairs})) == powers
+
+
+def test_hookes_spring_does_not_stand_for_what_pulls_by_the_overlap():
+    for law, offered in (
+        (Granular(), True),
+        (Granular(normal=JKR()), False),
+        (Granular(cohesion=SJKR()), False),
+        (Granular(cohesion=DMT()), True),
+    ):
+        assert any(other.normal == Hooke() for other in law.approximations(1.0)) == offered, law
 
 
 def test_a_part_is_exchanged_in_its_place():

@@ -218,10 +218,11 @@ def test_a_light_grain_meets_a_heavy_one_as_it_meets_a_wall(name):
     for ratio, one, state in zip(ratios, made, ends(made), strict=True):
         parting = np.diff(state["velocity"][:, 0])[0]
         assert parting == pytest.approx(e * (1 + 1 / ratio) ** 0.5, rel=5e-3)
-        rounding = 1e-12 + 1e2 * roundoff()
-        np.testing.assert_allclose(
-            momenta(state), momenta(one.start()), rtol=0, atol=1e2 * rounding * (ratio + 1 / ratio) ** 0.5
-        )
+        start = one.start()
+        scale = (start["mass"] * np.linalg.norm(start["velocity"], axis=1)).sum()
+        # That of a thousand steps of contact, 9 m off the origin.
+        rounding = 9 * 1e2 * roundoff()
+        np.testing.assert_allclose(momenta(state), momenta(start), rtol=0, atol=rounding * scale)
 
 
 def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
@@ -257,10 +258,12 @@ def test_a_bond_that_swings_keeps_its_energy_and_one_that_breaks_gives_none():
         series.append([energy(by_id(result)) for result in simulation.results()])
     kept, damped, broken = (np.array([look[w][0] for look in series]) for w in range(3))
     held = np.array([look[2][1] for look in series])
-    assert np.abs(kept / kept[0] - 1).max() < 0.02
-    assert (np.diff(damped, axis=0) < 1e-3 * damped[0]).all()
+    # That of places at 150 m, of which the stretch of a bond is a small part.
+    rounding = 5e4 * roundoff()
+    assert np.abs(kept / kept[0] - 1).max() < 5e-4 + rounding
+    assert (np.diff(damped, axis=0) < (1e-6 + rounding) * damped[0]).all()
     assert (damped[-1] < 0.97 * damped[0]).all()
     assert held[0].all()
     assert 3 < held[-1].sum() < n - 3
-    assert (broken < 1.02 * broken[0]).all()
+    assert (broken < (1 + 5e-4 + rounding) * broken[0]).all()
     assert (broken[-1] < 0.97 * broken[0])[~held[-1]].all()

@@ -48,7 +48,7 @@ def test_a_mixture_keeps_its_momentum_and_gains_no_energy(name, rng):
 
 def test_a_mixture_comes_to_rest_and_bears_its_weight(rng):
     """Two large grains fall on small ones on a floor, of both materials: at the end forces balance on each,
-    the floor bears the weight, and energy has never been above that of the start."""
+    floor and sides bear the weight, and energy has never been above that of the start."""
     g, side = 1.0, 0.25
     spots = np.stack(np.meshgrid(*[0.03 * np.arange(8) + 0.02] * 2), axis=-1).reshape(-1, 2)[:62]
     small = np.column_stack([spots + 0.004 * rng.uniform(-1, 1, spots.shape), np.full(62, 0.0051)])

@@ -1,11 +1,14 @@
 """The tests of single contacts: impacts of one structure in the suite, all of them with the slow tests."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from cases.granular_bench import particle_tests
+from cases.granular_bench import checks, particle_tests
 from cases.granular_bench.checks import BOUND, check, rebounds
 from cases.granular_bench.mindlin_impact import oblique_impacts
+from cases.granular_bench.shear_cell import expected_ratio
 
 
 @pytest.mark.long
@@ -27,6 +30,16 @@ def test_impacts_are_those_of_the_law_in_numpy_and_of_rigid_spheres():
     loss = sliding.impact.sideways - sliding.velocity[0]
     assert loss == pytest.approx(0.092 * 1.98 * sliding.impact.speed, rel=1e-3)
     assert np.abs(sliding.velocity[1]) == 0
+
+
+@pytest.mark.parametrize(("law", "right"), [(expected_ratio, True), (lambda number: 0.465, False)])
+def test_one_stress_ratio_for_all_flows_is_not_that_of_glass_beads(monkeypatch, law, right):
+    """Though it is near enough to each of theirs."""
+    beds = [SimpleNamespace(inertial_number=n, ratio=float(law(n))) for n in (0.28, 0.11, 0.05)]
+    monkeypatch.setattr(checks, "sheared_beds", lambda fractions: beds)
+    *each, rise = checks.shear_checks()
+    assert all(item.ok for item in each)
+    assert rise.ok == right
 
 
 @pytest.mark.slow

@@ -52,6 +52,14 @@ def test_misfit_counts_in_uncertainties(monkeypatch):
     assert misfit(result, {"discharge_rate": both["discharge_rate"]}) == pytest.approx(4)
 
 
+def test_a_bed_in_a_cup_is_not_calibrated():
+    """It is no draw-down test: it has neither an angle of repose nor a discharge rate."""
+    with pytest.raises(InputError, match="size must be that of a draw-down test; received 'bed'"):
+        problem("bed")
+    with pytest.raises(InputError, match="size must be one of default for the inverse problem"):
+        every()["granular_bench"].inverse("bed", "calibrate")
+
+
 def test_other_measurements_are_another_problem(tmp_path):
     """Runs that were judged by others are not used again; the scenes are the same."""
     path = tmp_path / "measured.csv"

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cases.granular_bench import shear_cell
 from cases.granular_bench.scene import DENSITY, DIAMETER
 from cases.granular_bench.shear_cell import (
     CELL_AREA,
@@ -22,7 +23,9 @@ from cases.granular_bench.shear_cell import (
     sheared_beds,
 )
 from cases.granular_bench.shear_figure import shear_figure, shear_table
+from tisim import RunError
 from tisim.analysis import contacts
+from tisim.engine.result import Status
 
 
 def bed(pressure=300.0, gap=10 * DIAMETER):
@@ -64,6 +67,52 @@ def test_stresses_are_means_over_both_walls_and_over_time():
     assert found.fraction == pytest.approx(2 * np.pi / 6 * DIAMETER**3 / (CELL_AREA * gap / 2))
     assert found.velocity[3] == pytest.approx(2.0)
     assert found.filled.sum() == 1
+
+
+class Failing:
+    """It runs scenes as a simulation does, of which the second fails after a number of runs."""
+
+    def __init__(self, scene, worlds, runs):
+        self.left, self.closed = runs, False
+
+    def load(self, scenes):
+        self.scenes = scenes
+
+    def run(self, until=None):
+        self.left -= 1
+        self.until = until
+
+    def results(self):
+        going = Status(self.until is None, "done" if self.until is None else "running")
+        states = [going, Status(False, "a force is not a number") if self.left < 0 else going]
+        measures = {f"{wall}_force_{axis}": 1.0 for wall in ("upper", "lower") for axis in "xz"}
+        return [
+            SimpleNamespace(
+                scene=scene, status=status, measures=measures,
+                state={"position": np.ones((1, 3)), "velocity": np.ones((1, 3)), "radius": np.ones(1),
+                       "mass": np.ones(1), "spin": np.ones((1, 3)), "group": np.zeros(1)},
+            )
+            for scene, status in zip(self.scenes, states, strict=True)
+        ]  # fmt: skip
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.mark.parametrize("runs", [0, 1, 5])
+def test_a_cell_that_fails_has_no_mu(monkeypatch, runs):
+    """While it is closed and at any look after; what others have is not given for it."""
+    made = []
+
+    def simulation(scene, worlds):
+        made.append(Failing(scene, worlds, runs))
+        return made[-1]
+
+    monkeypatch.setattr(shear_cell, "Simulation", simulation)
+    with pytest.raises(RunError, match="granular_bench: a force is not a number"):
+        sheared_beds((0.50, 0.55), number=100)
+    assert made[0].closed
+    assert made[0].left == -1
 
 
 def test_the_cell_begins_without_overlaps_of_what_moves():

@@ -18,6 +18,7 @@ class ConstantDamping(Damping):
     """
 
     uses: ClassVar = ("damping",)
+    softens: ClassVar[bool] = False
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"constant": pair.mixed("damping")}

@@ -74,7 +74,10 @@ class Granular(GranularContact):
     def approximations(self, extent: float) -> tuple[Self, ...]:
         spring: dict[str, Component | None] = {"tangential": self.tangential and LinearSpring()}
         drawn: dict[str, Component | None] = {"tangential": self.tangential and MindlinDisplacement()}
-        changes = ({"rolling": None}, {"normal": Hooke(), **spring}, spring, drawn)
+        # A spring would not pull, and is not to be held against what pulls by the overlap.
+        held = self.normal.adhesive or (self.cohesion is not None and self.cohesion.by_overlap)
+        linear = () if held else ({"normal": Hooke(), **spring},)
+        changes = ({"rolling": None}, *linear, spring, drawn)
         tried: list[Self] = []
         for change in changes:
             law = self.model_copy(update=change)

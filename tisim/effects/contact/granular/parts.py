@@ -144,11 +144,13 @@ class TwistingResistance(ContactPart):
 class Cohesion(ContactPart):
     """Cohesion pulls two that touch towards each other.
 
-    adhesive : whether Coulomb's limit knows of it, as of the force that parts the two.
+    adhesive : whether Coulomb's limit knows of it, as of the force that parts the two. by_overlap : whether
+    it grows with the overlap, so that what two that touch do goes by which normal force is beside it.
     """
 
     contract: ClassVar[bool] = True
     adhesive: ClassVar[bool] = False
+    by_overlap: ClassVar[bool] = False
 
     @ti.func
     def pull(self, w, pair, radius, overlap):
