@@ -37,7 +37,7 @@ SPARSE = 0.2
 STEPS_OF_IMPACT = 20.0
 """A step is one of so many parts of that duration."""
 MASS = DENSITY * np.pi / 6 * DIAMETER**3
-"""Of a mean grain, kg."""
+"""A grain of the mean size has this mass, kg."""
 
 
 def impact_time(young: float) -> float:

@@ -31,7 +31,8 @@ BOUND = 1e-3
 HALVES = (0.25, 0.5)
 """Twice at which the speed of what is let go is looked at, s: what springs have taken up by then is over."""
 SHEARED_FRACTIONS, RATIO_BOUND = (0.52, 0.56, 0.58), 0.07
-"""Of the cells that are sheared, and how far mu may be from that of glass beads."""
+"""The cells that are sheared have these solid fractions, and mu of each may be so far from that of glass
+beads."""
 RISE_BOUND = 0.5
 """How far the rise of mu from the slowest to the fastest of the cells may be short of that of glass beads, in
 parts of the latter: one mu for all cells has none. Of three starts it was 1.4, 1.6 and 2.0 times as large, so

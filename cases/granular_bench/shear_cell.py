@@ -48,11 +48,11 @@ CLOSING, STRAIN_BEFORE, STRAIN = 1.0, 2.0, 4.0
 SAMPLES = 80
 """The mean is one of so many looks."""
 SHEAR_DT = 2.4e-5
-"""s."""
+"""A step of the sheared cells takes so long, s."""
 MIDDLE = (0.25, 0.75)
 """Between these parts of the gap the shear rate and the solid fraction are taken."""
 BINS = 12
-"""Of the profile across the gap."""
+"""The profile across the gap is of so many bins."""
 FRICTION_LIMITS, CROSSOVER = (0.38, 0.64), 0.279
 """mu_s, mu_2 and I_0 of glass beads."""
 

@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation as Turn
 from scipy.stats import kstest
 
-from tests.operators.test_filling import DAMPING, DT, NEVER, Floor, uniforms
+from tests.operators.test_filling import DAMPING, DT, NEVER, Floor, side_by_side, uniforms
 from tests.scenes import by_id, compiled, fixed
-from tisim import Cloud, Clump, GrainClass, InputError, MeasureSeries, Particles, Scene
+from tisim import Cloud, Clump, GrainClass, InputError, Particles, Scene
 from tisim.analysis import clump_bodies
 from tisim.effects import Gravity, RigidClumps
 from tisim.geometry import Plane
@@ -84,11 +84,7 @@ def simulation():
 
 @pytest.fixture(scope="module")
 def outcome(simulation):
-    """All scenes side by side, with what they counted on the way."""
-    simulation.load(list(SCENES.values()))
-    series = MeasureSeries(0.02)
-    simulation.run(observers=[series])
-    return dict(zip(SCENES, simulation.results(), strict=True)), dict(zip(SCENES, series, strict=True))
+    return side_by_side(simulation, SCENES)
 
 
 @pytest.fixture(scope="module")

@@ -150,13 +150,17 @@ def simulation():
     return compiled(SCENES["pour"], worlds=9, capacity=80)
 
 
-@pytest.fixture(scope="module")
-def outcome(simulation):
-    """All scenes side by side, with what they counted on the way."""
-    simulation.load(list(SCENES.values()))
+def side_by_side(simulation, scenes):
+    """Results of all scenes in one batch, and what they counted on the way, both by name."""
+    simulation.load(list(scenes.values()))
     series = MeasureSeries(0.02)
     simulation.run(observers=[series])
-    return dict(zip(SCENES, simulation.results(), strict=True)), dict(zip(SCENES, series, strict=True))
+    return dict(zip(scenes, simulation.results(), strict=True)), dict(zip(scenes, series, strict=True))
+
+
+@pytest.fixture(scope="module")
+def outcome(simulation):
+    return side_by_side(simulation, SCENES)
 
 
 @pytest.fixture(scope="module")
