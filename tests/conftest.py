@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tisim.backend import runtime
+from tests import scenes
+from tisim.backend import memory, runtime
 from tisim.errors import InputError
 from tisim.files import python_file
 
@@ -57,6 +58,17 @@ def the_runtime():
         )
     except InputError as absent:
         pytest.skip(str(absent))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def room_for_the_next_module():
+    """Taichi is started anew after a module where it has grown: with what all slow tests have compiled in one
+    process, there is no room for more, and compiling takes longer and longer."""
+    yield
+    if memory.needs_restart():
+        scenes.close_compiled()
+        memory.reclaim()
+        memory.renew()
 
 
 @pytest.fixture

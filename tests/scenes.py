@@ -30,6 +30,12 @@ def compiled(scene, worlds=1, capacity=64, schedule=None):
     return _compiled[key]
 
 
+def close_compiled():
+    """Close all simulations that ``compiled`` has made."""
+    while _compiled:
+        _compiled.popitem()[1].close()
+
+
 def simulate(scenes, worlds=1, capacity=64, steps=None, schedule=None):
     """Results of scenes of one structure, run side by side."""
     simulation = compiled(scenes[0], worlds, capacity, schedule)
