@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from textwrap import fill
 
@@ -38,7 +39,8 @@ def save(study: Study, path: Path) -> Path:
 def picture(study: Study) -> Figure:
     """Draw a panel for each quantity: wall seconds across, error up, both logarithmic.
 
-    A method in another precision or arithmetic has its colour and a broken line.
+    A method in another precision or arithmetic has its colour and a broken line. Laws that differ in one part
+    or another are not joined.
 
     An error includes what it may be off by; a hollow mark is one of which no more is known than that it is no
     larger. Rings are the cheapest setting for each power of ten of the error, dotted ones others that timings
@@ -71,10 +73,11 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
         one = study.line(method)[0]
         colour = METHOD_COLOURS[methods.index(_usual_method(one)) % len(METHOD_COLOURS)]
         marker, style = MARKERS[at % len(MARKERS)], STYLES.get((one.precision, one.arithmetic), "--")
+        line = style if len({_parameters(row) for row in study.line(method)}) == 1 else ""
         times, errors = [row.median for row in rows], [row.at_most(k) for row in rows]
-        axis.plot(times, errors, style, color=colour, lw=1.3, zorder=2)
+        axis.plot(times, errors, ls=line, color=colour, lw=1.3, zorder=2)
         label = fill(_label(study, method), LEGEND_WIDTH)
-        axis.plot([], [], style, color=colour, marker=marker, ms=5, lw=1.3, label=label)
+        axis.plot([], [], ls=line, color=colour, marker=marker, ms=5, lw=1.3, label=label)
         for row in rows:
             _mark(axis, row, k, colour, marker)
     cheapest = list(decades(study.rows, k).values())
@@ -105,6 +108,12 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel(f"wall time{' of all starts' if study.random else ''}")
     plain(axis)
+
+
+def _parameters(row: Row) -> str:
+    """Return what a setting sets, without its values: a line joins values of the same parameters, not laws
+    that differ in one part or another."""
+    return re.sub(r"(?<==)[^,]*|[0-9.]+", "", row.setting)
 
 
 def _usual_method(row: Row) -> str:

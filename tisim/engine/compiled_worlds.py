@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -35,12 +36,14 @@ class CompiledWorlds:
     of particles. They know neither scenes nor results."""
 
     def __init__(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> None:
+        began = time.perf_counter()
         self.runtime, self.worlds = runtime.current(), worlds
         self.structure = scene.structure()
         awake = schedule != "team" or self.runtime.device == "cpu"
         must(awake, "schedule", "another than team, whose threads wait awake, but on a CPU", schedule)
         self.trees: list[Tree] = []
         self._make(scene, worlds, capacity, schedule)
+        self.setup_s = time.perf_counter() - began
 
     @in_taichi_thread
     def _make(self, scene: Scene, worlds: int, capacity: int, schedule: str | None) -> None:
@@ -111,7 +114,7 @@ class CompiledWorlds:
 
         Raise RunError where there is no room for them; lists are then as they were.
         """
-        image, before = self.s.image(), self.assembly.sizes
+        began, image, before = time.perf_counter(), self.s.image(), self.assembly.sizes
         self.s.write("status", WorldStatus.ENDED)
         try:
             try:
@@ -127,6 +130,7 @@ class CompiledWorlds:
             raise RunError(f"{rows}, are needed, and there is no room for them: {full}") from None
         finally:
             self.put(image)
+            self.setup_s += time.perf_counter() - began
 
     def _assemble(self, sizes: ListSizes) -> None:
         with collected() as trees:

@@ -78,6 +78,8 @@ class SumForces(PairSum):
             laws.append((law, self.pair_values))
             self.pair_values += law.data.memory if self.commits else 0
         self.laws = tuple(laws)
+        # Values have no room for memory where the sum may not advance it.
+        self.remembering = tuple((law, begin) for law, begin in laws if self.commits and law.data.memory)
         self.remembers = any(
             effect.data.offers("load" if isinstance(effect.data, Force) else "interaction")
             for effect in (*self.forces, *self.pair_forces)
@@ -169,9 +171,8 @@ class SumForces(PairSum):
     @ti.func
     def write_memory(self, w, m, values):
         if self.updates_memory(w):
-            for law, begin in ti.static(self.laws):
-                if ti.static(law.memory > 0):
-                    law.past.write(w, m, piece(values, begin, law.memory))
+            for law, begin in ti.static(self.remembering):
+                law.past.write(w, m, piece(values, begin, law.memory))
 
     @ti.func
     def elapsed_time(self, w):
