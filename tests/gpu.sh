@@ -17,5 +17,5 @@ else
 fi
 timeout 270 python -m pytest -q -rs -n 0 -m "gpu and not slow" "${tests[@]}"
 tested=$?
-TISIM_DEVICE= python tests/benchmarks/scaling.py --device "$device" "${limits[@]}" || exit
+TISIM_DEVICE= timeout 200 python tests/benchmarks/scaling.py --device "$device" "${limits[@]}" || exit
 exit $tested

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.benchmarks import granular_lammps as bench
-from tests.benchmarks import sheared_lammps
+from tests.benchmarks import settled_lammps, sheared_lammps
 
 pytestmark = [
     pytest.mark.slow,
@@ -17,6 +17,15 @@ LIKE_LAMMPS = replace(bench.LAW, levers="radius")
 
 REMEMBERS_OTHERWISE = ("hooke, linear, rolling, twisting", "jkr, marshall")
 """In these LAMMPS turns a couple round where its limit falls below it, or remembers the angle of it."""
+
+
+NARROW = {
+    "height of the centre of mass, m": 0.02,
+    "contacts of a grain": 0.1,
+    "upright part of the contacts": 0.1,
+    "mean overlap, mm": 0.2,
+}
+"""Half of an interval over the mean of what is narrow."""
 
 
 def rough(friction):
@@ -81,3 +90,21 @@ def test_the_levers_are_what_makes_the_difference():
     )
     assert ours["torque"] == pytest.approx(twin["torque"], rel=1e-6)
     assert 0.05 < ours["torque"] < 0.5
+
+
+@pytest.mark.parametrize("name", bench.LAWS)
+def test_a_bed_that_settles_has_the_bulk_statistics_of_lammps(name):
+    """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
+    thousand tests fails by chance, and narrow beside the mean itself."""
+    law, starts = settled_lammps.bulk_law(name), [settled_lammps.random_start(100 + k) for k in range(6)]
+    ours, theirs = (
+        settled_lammps.table(starts, by(law, starts))
+        for by in (settled_lammps.by_package, settled_lammps.by_lammps)
+    )
+    confidence = 1 - 1e-3 / len(ours)
+    for what, values in ours.items():
+        apart = values - theirs[what]
+        half = settled_lammps.half_interval(apart, confidence)
+        assert abs(apart.mean()) < half, what
+        if what in NARROW:
+            assert half < NARROW[what] * theirs[what].mean(), what

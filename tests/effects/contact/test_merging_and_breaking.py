@@ -1,0 +1,86 @@
+"""What grains remember of each other survives that others among them merge and break; beside NumPy."""
+
+import numpy as np
+import pytest
+
+from tests.effects.contact.grains import heap, twin
+from tests.scenes import by_id, simulate
+from tisim.backend.taichi import ti
+from tisim.effects import parameter
+from tisim.operators import Operator
+
+pytestmark = pytest.mark.long
+
+GRAINS, BEFORE, AFTER, DT = 60, 100, 100, 2e-4
+PIECE = 0.15
+"""m; how far from a grain the piece is that breaks off it."""
+
+
+class MergeAndBreak(Operator):
+    """After a time one grain is taken up by another, and half of a third breaks off, once."""
+
+    when: float = parameter("s", "time", ge=0)
+    taken: float = parameter("", "id of the grain that is taken up", ge=0)
+    taker: float = parameter("", "id of the grain that takes it up", ge=0)
+    broken: float = parameter("", "id of the grain that breaks", ge=0)
+
+    def capacity(self, masses):
+        return len(masses) + 1
+
+    @ti.func
+    def acts(self, s, w):
+        return ti.cast(s.time[w] >= self.when(w) and s.time[w] - s.dt[w] < self.when(w), ti.i32)
+
+    @ti.func
+    def world(self, s, w):
+        gone, kept, half = 0, 0, 0
+        for i in range(s.count[w]):
+            gone = ti.select(s.id[w, i] == ti.cast(self.taken(w), ti.i32), i, gone)
+            kept = ti.select(s.id[w, i] == ti.cast(self.taker(w), ti.i32), i, kept)
+            half = ti.select(s.id[w, i] == ti.cast(self.broken(w), ti.i32), i, half)
+        s.mass[w, kept] = s.mass[w, kept] + s.mass[w, gone]
+        s.remove(w, gone)
+        s.mass[w, half] = 0.5 * s.mass[w, half]
+        piece = s.append(w, half)
+        s.position[w, piece][0] = s.position[w, piece][0] + PIECE
+
+
+def bed(seed, **which):
+    made = heap(np.random.default_rng(seed), GRAINS, dt=DT, steps=BEFORE + AFTER)
+    event = MergeAndBreak(when=(BEFORE - 0.5) * DT, **which)
+    return made.model_copy(update={"effects": (*made.effects, event)})
+
+
+def grow(known, i):
+    """The piece of grain i, the last grain of the twin, which remembers nothing yet."""
+    for name in ("x", "v", "w", "radius", "mass", "held", "material"):
+        values = getattr(known, name)
+        setattr(known, name, np.concatenate([values, values[i : i + 1]]))
+    n = len(known.x)
+    known.x[-1, 0] += PIECE
+    known.held[-1] = 0.0
+    past = np.zeros((n, n, *known.past.shape[2:]))
+    past[:-1, :-1] = known.past
+    known.past = past
+
+
+@pytest.mark.parametrize("which", [(0, 30, 59), (59, 0, 30), (30, 59, 0)])
+def test_the_others_go_on_as_they_are(which):
+    """Indices move, one that is new has a slot of one that is gone, and lists are made anew."""
+    taken, taker, broken = which
+    made = bed(5, taken=taken, taker=taker, broken=broken)
+    (result,) = simulate([made], capacity=GRAINS + 4)
+    assert result.status.ok, result.status.reason
+    found, known = by_id(result), twin(made)
+    known.run(BEFORE, DT)
+    slid = np.abs(known.past).reshape(GRAINS, GRAINS, -1).max(axis=2)
+    assert (np.delete(np.delete(slid, which, axis=0), which, axis=1) > 0).sum() > 50
+    known.mass[taker] += known.mass[taken]
+    known.mass[broken] *= 0.5
+    grow(known, broken)
+    known.remove(taken)
+    known.run(AFTER, DT)
+    assert len(found["mass"]) == GRAINS
+    np.testing.assert_array_equal(found["mass"], known.mass)
+    np.testing.assert_allclose(found["velocity"], known.v, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found["spin"], known.w, rtol=0, atol=1e-8)
