@@ -1,6 +1,7 @@
 from .at_rest import AtRest as AtRest
 from .base import Operator as Operator
 from .capture import Capture as Capture
+from .compacted import Compacted as Compacted
 from .cooling import Cooling as Cooling
 from .fragmentation import Fragmentation as Fragmentation
 from .insertion import Insertion as Insertion

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Constraint
 from tisim.operators.base import option, parameter
+from tisim.operators.filled_part import FilledPart
 from tisim.operators.insertion import MOST_TRIES, Insertion
-from tisim.worlds.bound import Peers
 
 
 class InsertionByFlux(Insertion):
@@ -53,7 +52,7 @@ class InsertionByFlux(Insertion):
             placed = self.insert(s, w) > 0.0
 
 
-class InsertionByFraction(Insertion):
+class InsertionByFraction(FilledPart, Insertion):
     """Grains are put into a region until they fill a given part of its volume, now and again.
 
     At ``begin``, and whenever an ``interval`` has passed, grains are put in until those whose centres are in
@@ -63,12 +62,8 @@ class InsertionByFraction(Insertion):
     will be room for more, nobody knows.
     """
 
-    fraction: float = parameter("", "part of the region's volume that is filled", gt=0, lt=1, examples=[0.2])
     interval: float = parameter("s", "time from one filling to the next", gt=0, examples=[1.0])
     tries: int = option("places that are tried for a grain", 1000, gt=0, le=MOST_TRIES)
-
-    def connect(self, peers: Peers) -> dict[str, Any]:
-        return {"constraints": peers.of(Constraint)}
 
     @ti.func
     def acts(self, s, w):
@@ -85,26 +80,9 @@ class InsertionByFraction(Insertion):
 
     @ti.func
     def world(self, s, w):
-        filled = 0.0 * s.radius[w, 0]
-        for i in range(s.count[w]):
-            filled += self.cube(s, w, i)
-        most = self.fraction(w) * self.volume(w) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
+        filled, most = self.cubes(s, w), self.enough(s, w)
         placed = True
         while placed and filled < most and self.inserted[w] < self.number:
             radius = self.insert(s, w)
             filled += radius**3
             placed = radius > 0.0
-
-    @ti.func
-    def cube(self, s, w, i):
-        """Return the cube of the radius (m^3) of a ball of the volume of the grain that particle i stands
-        for, where its centre is in the region; else 0."""
-        place, cube = s.position[w, i], s.radius[w, i] ** 3
-        for constraint in ti.static(self.constraints):
-            if constraint.holds(s, w, i):
-                place, cube = constraint.home(s, w, i), 0.0 * cube
-                if constraint.leads(s, w, i):
-                    cube = constraint.volume(s, w, i) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
-        if s.mass[w, i] == 0.0 or not self.contains(w, place):
-            cube = 0.0 * cube
-        return cube

@@ -1,0 +1,92 @@
+"""A servo wall compacts a bed to a wanted pressure, or until it fills a region to a wanted part."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import compiled, fixed
+from tisim import Box, Cloud, InputError, Material, MeasureSeries, Scene
+from tisim.analysis import solid_fraction
+from tisim.effects import Granular, MindlinForce, RestitutionDamping, Servo, Walls
+from tisim.geometry import Plane
+from tisim.operators import Compacted
+from tisim.packing import RandomInBox
+
+SIDE, HEIGHT, PRESSURE, GRAINS, RADIUS = 0.05, 0.18, 5000.0, 400, 4e-3
+"""m, m, Pa, number, m."""
+LOW, HIGH = (0.0, 0.0, 0.01), (SIDE, SIDE, 0.04)
+"""Corners of the region that is looked at, m."""
+INTERVAL = 5e-3
+"""s."""
+
+
+def bed(fraction):
+    """Loose grains between a floor and a lid that comes down; a periodic box on all other sides."""
+    return Scene(
+        particles=Cloud(
+            number=GRAINS,
+            radius=RADIUS,
+            density=2500.0,
+            placement=RandomInBox(low=(0, 0, 0), high=(SIDE, SIDE, HEIGHT)),
+        ),
+        materials={"glass": Material(young=1e7, poisson=0.25, restitution=0.3, friction=0.2)},
+        effects=(
+            Granular(damping=RestitutionDamping(), tangential=MindlinForce()),
+            Walls(name="floor", planes=[Plane()]),
+            Walls(
+                name="lid",
+                planes=[Plane(point=(0, 0, HEIGHT), normal=(0, 0, -1))],
+                motion=Servo(force=PRESSURE * SIDE**2, direction=(0, 0, -1), limit=0.1),
+            ),
+            Compacted(fraction=fraction, low=LOW, high=HIGH, interval=INTERVAL),
+        ),
+        domain=Box(low=(0, 0, -1), high=(SIDE, SIDE, 1), periodic=(True, True, False)),
+        stepper=fixed(2e-5),
+        duration=1.6,
+        seed=3,
+    )
+
+
+def filled(state):
+    """The part of the region that grains fill whose centres are in it."""
+    inside = ((state["position"] >= LOW) & (state["position"] <= HIGH)).all(axis=1)
+    return 4 / 3 * np.pi * (state["radius"][inside] ** 3).sum() / np.prod(np.subtract(HIGH, LOW))
+
+
+@pytest.mark.slow
+def test_to_a_wanted_pressure_or_a_wanted_part_of_a_region():
+    """Pressure on lid and floor, to a hundredth; the part against NumPy, at the first look that has it."""
+    scenes = [bed(fraction) for fraction in (0.99, 0.5)]
+    simulation = compiled(scenes[0], 2, GRAINS)
+    simulation.load(scenes)
+    series = MeasureSeries(INTERVAL)
+    simulation.run(observers=[series])
+    pressed, dense = simulation.results()
+    assert pressed.status.ok
+    assert pressed.time == pytest.approx(1.6)
+    for name, sign in (("lid", 1), ("floor", -1)):
+        assert pressed.measures[f"{name}_force_z"] / SIDE**2 == pytest.approx(sign * PRESSURE, rel=0.01)
+    (fraction,) = solid_fraction(
+        pressed.state["position"], pressed.state["radius"], [LOW[2], HIGH[2]], SIDE**2
+    )
+    assert 0.55 < fraction < 0.65
+    assert dense.status.ok
+    assert dense.status.reason == "grains fill the region, by effects.compacted"
+    assert dense.time < 0.9 * pressed.time
+    assert filled(dense.state) >= 0.5
+    assert dense.measures["filled_fraction"] == pytest.approx(filled(dense.state), rel=1e-12)
+    on_the_way = series[1]["filled_fraction"]
+    assert (on_the_way[:-1] < 0.5).all()
+    assert on_the_way[1] == pytest.approx(filled(dense.start), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"fraction": 1.0}, "fraction must be less than 1"),
+        ({"high": (SIDE, SIDE, 0.0)}, "high must be above low"),
+        ({"interval": 0.0}, "interval must be greater than 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        Compacted(**{"fraction": 0.5, "low": LOW, "high": HIGH, "interval": INTERVAL, **given})

@@ -1,0 +1,42 @@
+"""Compacted: a run ends when its grains fill a region to a given part, rather than after a time."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.operators.base import Operator, parameter
+from tisim.operators.filled_part import FilledPart
+
+
+class Compacted(FilledPart, Operator):
+    """A world ends when its grains fill a region to a given part of its volume, such as under a servo wall.
+
+        4/3 pi sum_i R_i^3  >=  fraction * V
+
+    The sum is over the grains whose centres are in the region, at every ``interval``; the ``duration`` of the
+    scene is the latest. Keep the region a few grains away from walls, next to which there is less room for
+    centres. ``measures`` have the part that was filled at the last look as ``filled_fraction``.
+    """
+
+    world_quantities = ("filled_fraction",)
+    any_order: ClassVar[bool] = True
+    fields = ("radius",)
+    ends: ClassVar = "grains fill the region"
+
+    interval: float = parameter("s", "time from one look at the region to the next", gt=0, examples=[1e-3])
+
+    def measured(self) -> dict[str, str]:
+        return {"filled_fraction": ""}
+
+    @ti.func
+    def acts(self, s, w):
+        interval = ti.cast(self.interval(w), ti.f64)
+        return ti.cast(ti.floor(s.time[w] / interval) > ti.floor((s.time[w] - s.dt[w]) / interval), ti.i32)
+
+    @ti.func
+    def world(self, s, w):
+        filled, enough = self.cubes(s, w), self.enough(s, w)
+        s.filled_fraction[w] = ti.cast(self.fraction(w) * (filled / enough), ti.f64)
+        if filled >= enough:
+            s.finish(w, self.index)
