@@ -12,6 +12,7 @@ from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_direction, check_resolved
 from tisim.errors import must
+from tisim.geometry.directions import along_axis
 from tisim.packing import region
 from tisim.packing.random_sequential import place
 
@@ -87,7 +88,7 @@ class RandomInCylinder(Placement):
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
         cylinder = region.inside_cylinder(self.radius, self.length, float(radii.max()))
         check_resolved("places in the cylinder", np.abs(self.centre) + cylinder.high, float(radii.min()))
-        return np.asarray(self.centre) + region.along_axis(place(radii, cylinder, seed), self.axis)
+        return np.asarray(self.centre) + along_axis(place(radii, cylinder, seed), self.axis)
 
 
 class Lattice(Placement):

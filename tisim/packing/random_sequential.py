@@ -14,6 +14,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.ranges import check_resolved
 from tisim.errors import InputError, must
+from tisim.geometry import round_box
 from tisim.numerics import philox
 from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
@@ -57,6 +58,7 @@ def _add(
         widest_low, widest_side = _row(walls, 2), _row(walls, 3)
         periodic, rounded, walled = _row(axes, 0), _row(axes, 1), _row(axes, 2)
         attempt = ti.cast(0, ti.u64)
+        half = ti.Vector([0.5, 0.5, 0.5])
         stuck = False
         for i in range(radii.shape[0]):
             radius, level = radii[i], levels[i]
@@ -68,7 +70,7 @@ def _add(
                 b = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 1))
                 u = ti.Vector([a[0], a[1], b[0]])
                 attempt += ti.cast(1, ti.u64)
-                if (rounded * (u - 0.5)).norm_sqr() <= 0.25:
+                if round_box.contains(rounded, half, u - 0.5):
                     tries += 1
                     x = low - wider + u * (side + 2.0 * wider)
                     place = (x - widest_low) / widest_side
@@ -153,6 +155,6 @@ def _everywhere(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
     heads = np.full(ends[-1], -1, dtype=np.int32)
     centres, follow = np.zeros((len(radii), 3)), np.full(len(radii), -1, dtype=np.int32)
     walls = np.stack([region.low, region.side, widest.low, widest.side])
-    axes = np.array([region.periodic, region.round, region.walled], float)
+    axes = np.array([region.periodic, round_box.ROUND[region.shape], region.walled], float)
     placed = _add(centres, heads, follow, radii, levels, cells, walls, axes, seed, MAX_CONSECUTIVE_FAILURES)
     return centres[:placed]

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tisim.geometry import round_box
 from tisim.packing.region import Region
 
 FIRST_VOXEL_SIDE = 0.5
@@ -49,7 +50,7 @@ class _Voids:
         dims = np.maximum(np.ceil(region.side / (FIRST_VOXEL_SIDE * diameter)), 1).astype(int)
         self.step = region.side / dims
         self.index = np.concatenate([
-            self._outside(self._in_round(np.stack(np.unravel_index(block, dims), axis=1)), self.tree)
+            self._outside(self._within(np.stack(np.unravel_index(block, dims), axis=1)), self.tree)
             for block in _blocks(np.arange(np.prod(dims)))
         ])  # fmt: skip
 
@@ -76,9 +77,7 @@ class _Voids:
         """Return the places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
         voxel = self.index[generator.integers(len(self.index), size=tries)]
         places = (voxel + generator.random((tries, 3))) * self.step
-        if any(self.region.round):
-            away = ((places - self.region.side / 2) ** 2 * self.region.round).sum(axis=1)
-            places = places[away <= self.region.reach**2]
+        places = places[self._contains(places - self.region.side / 2)]
         distance, _ = self.tree.query(places, distance_upper_bound=self.diameter)
         places = places[np.isinf(distance)]
         return places[self._first_come(places)]
@@ -115,7 +114,7 @@ class _Voids:
             for k in range(NEAREST_CENTRES):
                 there = near[:, k] < len(self.places)
                 uncovered[there] &= ~self._is_covered(middle[there], self.places[near[there, k], None, :])
-            children.append(self._in_round(index[uncovered]))
+            children.append(self._within(index[uncovered]))
         self.index = np.concatenate(children)
 
     def _outside(self, index: np.ndarray, tree: cKDTree) -> np.ndarray:
@@ -132,12 +131,15 @@ class _Voids:
         apart = np.minimum(apart, np.abs(self.box - apart))
         return np.asarray(((apart + self.step / 2) ** 2).sum(axis=-1) < self.diameter**2)
 
-    def _in_round(self, index: np.ndarray) -> np.ndarray:
-        """Return the voxels that reach into the region, where it is round."""
-        if not any(self.region.round):
-            return index
+    def _within(self, index: np.ndarray) -> np.ndarray:
+        """Return the voxels that reach into the region."""
         gap = np.maximum(np.abs((index + 0.5) * self.step - self.region.side / 2) - self.step / 2, 0.0)
-        return index[(gap**2 * self.region.round).sum(axis=1) <= self.region.reach**2]
+        return index[self._contains(gap)]
+
+    def _contains(self, away: np.ndarray) -> np.ndarray:
+        """Return whether places so far from the centre of the region (m), shape (n, 3), are in it."""
+        rounded = round_box.ROUND[self.region.shape]
+        return np.asarray(round_box.contains(rounded, self.region.side / 2, away.T))
 
 
 def _blocks(items: np.ndarray) -> Iterator[np.ndarray]:
