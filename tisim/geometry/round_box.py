@@ -7,12 +7,8 @@ from tisim.backend.taichi import ti
 from tisim.numerics import elementary
 
 BoxShape = Literal["box", "cylinder", "ball"]
-ROUND: dict[BoxShape, tuple[bool, bool, bool]] = {
-    "box": (False, False, False),
-    "cylinder": (True, True, False),
-    "ball": (True, True, True),
-}
-"""These are the axes along which each shape is round."""
+ROUND: dict[BoxShape, tuple[int, int, int]] = {"box": (0, 0, 0), "cylinder": (1, 1, 0), "ball": (1, 1, 1)}
+"""These are, of each shape, 1 for the axes along which it is round, and 0 for the others."""
 PART: dict[BoxShape, float] = {"box": 1.0, "cylinder": math.pi / 4, "ball": math.pi / 6}
 """A shape has this part of the volume of the box whose faces it touches."""
 
@@ -27,8 +23,8 @@ def volume(shape: ti.template(), side):  # type: ignore[valid-type]
 def contains(rounded, half, away):
     """Return whether a place is in a shape or on its surface, in kernels and of NumPy arrays in Python.
 
-    rounded : for each axis whether the shape is round along it, as 0 or 1. half : m, half the sides of its
-    box. away : m, from its centre, first by component.
+    rounded : as in ``ROUND``. half : m, half the sides of its box. away : m, from its centre, first by
+    component.
     """
     square, inside = 0.0 * away[0], True
     for axis in ti.static(range(3)):

@@ -11,7 +11,6 @@ from tisim.components.component import Vector
 from tisim.effects.base import Effect, option, parameter
 from tisim.errors import must
 from tisim.geometry import round_box
-from tisim.geometry.round_box import BoxShape
 
 
 class FilledRegion(Effect):
@@ -22,7 +21,7 @@ class FilledRegion(Effect):
 
     low: Vector = parameter("m", "lower corner of the box", examples=[(0.0, 0.0, 0.0)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.1, 0.1, 0.1)])
-    shape: BoxShape = option(
+    shape: round_box.BoxShape = option(
         "what of the box is filled: all, or what is round in it: the cylinder along z, the ball", "box"
     )
 

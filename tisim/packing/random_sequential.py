@@ -58,7 +58,6 @@ def _add(
         widest_low, widest_side = _row(walls, 2), _row(walls, 3)
         periodic, rounded, walled = _row(axes, 0), _row(axes, 1), _row(axes, 2)
         attempt = ti.cast(0, ti.u64)
-        half = ti.Vector([0.5, 0.5, 0.5])
         stuck = False
         for i in range(radii.shape[0]):
             radius, level = radii[i], levels[i]
@@ -70,7 +69,7 @@ def _add(
                 b = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 1))
                 u = ti.Vector([a[0], a[1], b[0]])
                 attempt += ti.cast(1, ti.u64)
-                if round_box.contains(rounded, half, u - 0.5):
+                if round_box.contains(rounded, ti.Vector([0.5, 0.5, 0.5]), u - 0.5):
                     tries += 1
                     x = low - wider + u * (side + 2.0 * wider)
                     place = (x - widest_low) / widest_side

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tisim.components.component import Vector
 from tisim.components.domain import NO_AXIS, Axes, Domain
 from tisim.errors import InputError, must
 from tisim.geometry import round_box
-from tisim.geometry.round_box import BoxShape
 
 ALL_AXES: Axes = (True, True, True)
 
@@ -28,7 +28,7 @@ class Region:
     high: np.ndarray
     volume: float
     periodic: Axes = NO_AXIS
-    shape: BoxShape = "box"
+    shape: round_box.BoxShape = "box"
     walled: Axes = NO_AXIS
 
     @property
@@ -81,20 +81,11 @@ def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
     return Region(low + radius, high - radius, float(np.prod(high - low)), walled=ALL_AXES)
 
 
-def inside_ball(centre: np.ndarray, size: float, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) wholly inside a ball of radius ``size`` (m)."""
-    must(size > radius, "ball", f"larger than a sphere, of radius {radius:g} m", size)
-    centre = np.asarray(centre, float)
-    reach = size - radius
-    volume = round_box.volume("ball", [2 * size] * 3)
-    return Region(centre - reach, centre + reach, volume, shape="ball", walled=ALL_AXES)
-
-
-def inside_cylinder(size: float, length: float, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) wholly inside a cylinder of radius ``size`` (m) along z,
-    about the origin."""
-    room = size > radius and length > 2 * radius
-    must(room, "cylinder", f"wider and longer than a sphere, of radius {radius:g} m", (size, length))
-    half = np.array([size, size, length / 2]) - radius
-    volume = round_box.volume("cylinder", (2 * size, 2 * size, length))
-    return Region(-half, half, volume, shape="cylinder", walled=ALL_AXES)
+def inside_round(shape: round_box.BoxShape, centre: Vector, half: Vector, radius: float) -> Region:
+    """Return the region of spheres of ``radius`` (m) wholly inside a cylinder or ball about ``centre`` (m);
+    half : m, half the sides of its box."""
+    sizes = half[0] if shape == "ball" else (half[0], 2 * half[2])
+    must(min(half) > radius, shape, f"larger than a sphere, of radius {radius:g} m", sizes)
+    middle, inner = np.array(centre), np.array(half) - radius
+    volume = round_box.volume(shape, 2 * np.array(half))
+    return Region(middle - inner, middle + inner, float(volume), shape=shape, walled=ALL_AXES)

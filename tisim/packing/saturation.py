@@ -43,6 +43,7 @@ class _Voids:
 
     def __init__(self, centres: np.ndarray, diameter: float, region: Region) -> None:
         self.diameter, self.region = diameter, region
+        self.half, self.rounded = region.side / 2, round_box.ROUND[region.shape]
         # A side of 0 is, for a tree, that of an axis along which nothing is periodic.
         self.box = np.where(region.periodic, region.side, 0.0)
         self.places = centres - region.low
@@ -77,7 +78,7 @@ class _Voids:
         """Return the places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
         voxel = self.index[generator.integers(len(self.index), size=tries)]
         places = (voxel + generator.random((tries, 3))) * self.step
-        places = places[self._contains(places - self.region.side / 2)]
+        places = places[round_box.contains(self.rounded, self.half, (places - self.half).T)]
         distance, _ = self.tree.query(places, distance_upper_bound=self.diameter)
         places = places[np.isinf(distance)]
         return places[self._first_come(places)]
@@ -133,13 +134,8 @@ class _Voids:
 
     def _within(self, index: np.ndarray) -> np.ndarray:
         """Return the voxels that reach into the region."""
-        gap = np.maximum(np.abs((index + 0.5) * self.step - self.region.side / 2) - self.step / 2, 0.0)
-        return index[self._contains(gap)]
-
-    def _contains(self, away: np.ndarray) -> np.ndarray:
-        """Return whether places so far from the centre of the region (m), shape (n, 3), are in it."""
-        rounded = round_box.ROUND[self.region.shape]
-        return np.asarray(round_box.contains(rounded, self.region.side / 2, away.T))
+        gap = np.maximum(np.abs((index + 0.5) * self.step - self.half) - self.step / 2, 0.0)
+        return index[round_box.contains(self.rounded, self.half, gap.T)]
 
 
 def _blocks(items: np.ndarray) -> Iterator[np.ndarray]:
