@@ -1,4 +1,4 @@
-"""Shapes by their signed distance, such as a plane that bounds grains."""
+"""Shapes, such as a plane that bounds grains or a ball that is filled, each defined once for all rooms."""
 
 import lazy_loader
 

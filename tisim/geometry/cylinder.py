@@ -1,7 +1,26 @@
-"""The surface of a cylinder."""
+"""The surface of a cylinder, and the distance from a solid one."""
 
+from tisim.backend.taichi import ti
 from tisim.components.component import parameter
 from tisim.geometry.revolved import Barrel
+
+
+@ti.func
+def cylinder_distance(rho, outward, end, upward, radius):
+    """Return the distance (m) of a place from the surface of a solid cylinder, negative inside, and the unit
+    vector along which it grows; on the axis, inside, those of the nearer end.
+
+    rho, outward : m, distance from the axis, and the unit vector from there. end, upward : m, distance beyond
+    the plane of the nearer end, negative before it, and its unit normal. radius : m.
+    """
+    side = rho - radius
+    # Inside, the nearer of side and end; on the axis there is no way to the side.
+    sideways = side >= end and rho > 0.0
+    distance, normal = ti.select(sideways, side, end), ti.select(sideways, outward, upward)
+    if side > 0.0 and end > 0.0:
+        distance = ti.sqrt(side * side + end * end)
+        normal = (side * outward + end * upward) / distance
+    return distance, normal
 
 
 class CylindricalSurface(Barrel):

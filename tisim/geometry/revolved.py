@@ -12,6 +12,7 @@ from pydantic import model_validator
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, option, parameter
 from tisim.components.ranges import check_direction
+from tisim.geometry.directions import across
 from tisim.geometry.surface import Surface
 
 
@@ -39,8 +40,7 @@ class RevolvedSurface(Surface):
     def values(self) -> list[float]:
         origin, direction, *sizes = self.generator()
         axis = np.array(direction) / math.hypot(*direction)
-        side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        return [*super().values(), *origin, *axis.tolist(), *(side / np.linalg.norm(side)).tolist(), *sizes]
+        return [*super().values(), *origin, *axis.tolist(), *across(axis)[0].tolist(), *sizes]
 
     @ti.func
     def nearest(self, w, k, c, r):

@@ -1,8 +1,19 @@
-"""The surface of a sphere."""
+"""The surface of a sphere, and the distance from a ball."""
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector, parameter
 from tisim.geometry.surface import Surface
+
+
+@ti.func
+def ball_distance(r, centre, radius):
+    """Return the distance (m) of r (m) from the surface of a ball, negative inside, and the unit vector along
+    which it grows."""
+    d = r - centre
+    size = d.norm()
+    # From the centre it is as far in any direction.
+    up = ti.Vector([0.0, 0.0, 1.0 + 0.0 * size])
+    return size - radius, ti.select(size > 0.0, d / ti.select(size > 0.0, size, 1.0), up)
 
 
 class SphericalSurface(Surface):
@@ -16,9 +27,5 @@ class SphericalSurface(Surface):
 
     @ti.func
     def nearest(self, w, k, c, r):
-        centre = self.centre(w, k)
-        out = r - centre
-        size = out.norm()
-        # From the centre it is as far in any direction.
-        up = ti.Vector([0.0, 0.0, 1.0 + 0.0 * size])
-        return centre + self.radius(w, k) * ti.select(size > 0.0, out / ti.select(size > 0.0, size, 1.0), up)
+        centre, radius = self.centre(w, k), self.radius(w, k)
+        return centre + radius * ball_distance(r, centre, radius)[1]

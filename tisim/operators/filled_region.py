@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 from pydantic import model_validator
 
@@ -10,7 +10,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects.base import Effect, option, parameter
 from tisim.errors import must
-from tisim.numerics import elementary
+from tisim.geometry import round_box
 
 
 class FilledRegion(Effect):
@@ -21,7 +21,7 @@ class FilledRegion(Effect):
 
     low: Vector = parameter("m", "lower corner of the box", examples=[(0.0, 0.0, 0.0)])
     high: Vector = parameter("m", "upper corner of the box", examples=[(0.1, 0.1, 0.1)])
-    shape: Literal["box", "cylinder", "ball"] = option(
+    shape: round_box.BoxShape = option(
         "what of the box is filled: all, or what is round in it: the cylinder along z, the ball", "box"
     )
 
@@ -43,34 +43,16 @@ class FilledRegion(Effect):
     @ti.func
     def volume(self, w):
         """Return its volume, m^3."""
-        side = self.high(w) - self.low(w)
-        part = ti.static({"box": 1.0, "cylinder": 0.7853981633974483, "ball": 0.5235987755982988}[self.shape])
-        return part * side[0] * side[1] * side[2]
+        return round_box.volume(self.shape, self.high(w) - self.low(w))
 
     @ti.func
     def contains(self, w, r):
         """Return whether a point (m) is in it."""
         half, away = 0.5 * (self.high(w) - self.low(w)), r - 0.5 * (self.high(w) + self.low(w))
-        inside = ti.abs(away[2]) <= half[2]
-        if ti.static(self.shape == "box"):
-            inside = inside and ti.abs(away[0]) <= half[0] and ti.abs(away[1]) <= half[1]
-        elif ti.static(self.shape == "cylinder"):
-            inside = inside and away[0] * away[0] + away[1] * away[1] <= half[0] * half[0]
-        else:
-            inside = away.norm_sqr() <= half[0] * half[0]
-        return inside
+        return round_box.contains(ti.static(round_box.ROUND[self.shape]), half, away)
 
     @ti.func
     def point(self, w, radius, u):
         """Return a centre (m) for a sphere of this radius (m), evenly by three numbers in 0..1."""
         half = 0.5 * (self.high(w) - self.low(w)) - radius
-        place = half * (2.0 * u - 1.0)
-        if ti.static(self.shape != "box"):
-            angle = 2.0 * ti.math.pi * u[1]
-            across = half[0] * ti.sqrt(u[0])
-            if ti.static(self.shape == "ball"):
-                reach = half[0] * elementary.pow(u[0], 1.0 / 3.0)
-                place[2] = reach * (2.0 * u[2] - 1.0)
-                across = ti.sqrt(ti.max(reach * reach - place[2] * place[2], 0.0))
-            place[0], place[1] = across * elementary.cos(angle), across * elementary.sin(angle)
-        return 0.5 * (self.high(w) + self.low(w)) + place
+        return 0.5 * (self.high(w) + self.low(w)) + round_box.point(self.shape, half, u)

@@ -12,8 +12,8 @@ from tisim.components.component import Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import check_direction, check_resolved
 from tisim.errors import InputError, must
+from tisim.geometry.directions import along_axis
 from tisim.packing.placement import Placement
-from tisim.packing.region import along_axis
 
 MAX_ROUNDS = 200
 """The region counts as full after so many rounds, each of as many tries as there are spheres."""

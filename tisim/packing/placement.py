@@ -12,6 +12,7 @@ from tisim.components.component import Component, Vector, option, parameter
 from tisim.components.domain import Domain
 from tisim.components.ranges import PARTICLES, check_direction, check_resolved
 from tisim.errors import must
+from tisim.geometry.directions import along_axis
 from tisim.packing import region
 from tisim.packing.random_sequential import place
 
@@ -67,8 +68,8 @@ class RandomInBall(Placement):
     centre: Vector = parameter("m", "centre of the ball", (0.0, 0.0, 0.0))
 
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        ball = region.inside_ball(np.asarray(self.centre), self.radius, float(radii.max()))
-        return place(radii, ball, seed)
+        half, largest = (self.radius, self.radius, self.radius), float(radii.max())
+        return place(radii, region.inside_round("ball", self.centre, half, largest), seed)
 
 
 class RandomInCylinder(Placement):
@@ -85,9 +86,10 @@ class RandomInCylinder(Placement):
         return self
 
     def centres(self, radii: np.ndarray, domain: Domain, seed: int) -> np.ndarray:
-        cylinder = region.inside_cylinder(self.radius, self.length, float(radii.max()))
+        half, largest = (self.radius, self.radius, self.length / 2), float(radii.max())
+        cylinder = region.inside_round("cylinder", (0.0, 0.0, 0.0), half, largest)
         check_resolved("places in the cylinder", np.abs(self.centre) + cylinder.high, float(radii.min()))
-        return np.asarray(self.centre) + region.along_axis(place(radii, cylinder, seed), self.axis)
+        return np.asarray(self.centre) + along_axis(place(radii, cylinder, seed), self.axis)
 
 
 class Lattice(Placement):

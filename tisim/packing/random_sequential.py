@@ -14,6 +14,7 @@ from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.components.ranges import check_resolved
 from tisim.errors import InputError, must
+from tisim.geometry import round_box
 from tisim.numerics import philox
 from tisim.numerics.random_streams import SEQUENTIAL_ADDITION
 from tisim.packing.region import Region
@@ -68,7 +69,7 @@ def _add(
                 b = philox.uniform(philox.bits(seed, SEQUENTIAL_ADDITION, 0, attempt, 1))
                 u = ti.Vector([a[0], a[1], b[0]])
                 attempt += ti.cast(1, ti.u64)
-                if (rounded * (u - 0.5)).norm_sqr() <= 0.25:
+                if round_box.contains(rounded, ti.Vector([0.5, 0.5, 0.5]), u - 0.5):
                     tries += 1
                     x = low - wider + u * (side + 2.0 * wider)
                     place = (x - widest_low) / widest_side
@@ -153,6 +154,6 @@ def _everywhere(radii: np.ndarray, region: Region, seed: int) -> np.ndarray:
     heads = np.full(ends[-1], -1, dtype=np.int32)
     centres, follow = np.zeros((len(radii), 3)), np.full(len(radii), -1, dtype=np.int32)
     walls = np.stack([region.low, region.side, widest.low, widest.side])
-    axes = np.array([region.periodic, region.round, region.walled], float)
+    axes = np.array([region.periodic, round_box.ROUND[region.shape], region.walled], float)
     placed = _add(centres, heads, follow, radii, levels, cells, walls, axes, seed, MAX_CONSECUTIVE_FAILURES)
     return centres[:placed]

@@ -9,28 +9,26 @@ import numpy as np
 from tisim.components.component import Vector
 from tisim.components.domain import NO_AXIS, Axes, Domain
 from tisim.errors import InputError, must
+from tisim.geometry import round_box
 
 ALL_AXES: Axes = (True, True, True)
-ROUND_PART = {0: 1.0, 2: np.pi / 4, 3: np.pi / 6}
-"""A box has this part of its volume in a shape that is round along so many axes."""
 
 
 @dataclass(frozen=True)
 class Region:
     """A region is a box ``low``..``high`` (m, shape (3,) each) of the centres of spheres, or what is round
-    within it.
+    within it (``tisim.geometry.round_box``).
 
-    periodic : along which axes spheres see each other across opposite faces. round : the axes along which it
-    is round: none of a box, all of the ball and two of the cylinder that touch the faces. walled : the axes
-    along which spheres lie wholly inside a container, so that centres of smaller ones lie farther out.
-    volume : m^3, of the container that volume fractions are of.
+    periodic : along which axes spheres see each other across opposite faces. walled : the axes along which
+    spheres lie wholly inside a container, so that centres of smaller ones lie farther out. volume : m^3, of
+    the container that volume fractions are of.
     """
 
     low: np.ndarray
     high: np.ndarray
     volume: float
     periodic: Axes = NO_AXIS
-    round: Axes = NO_AXIS
+    shape: round_box.BoxShape = "box"
     walled: Axes = NO_AXIS
 
     @property
@@ -38,20 +36,10 @@ class Region:
         """Return the lengths of the box along the axes, m, shape (3,)."""
         return self.high - self.low
 
-    @property
-    def centre(self) -> np.ndarray:
-        """Return the centre of the box, m, shape (3,)."""
-        return (self.low + self.high) / 2
-
-    @property
-    def reach(self) -> float:
-        """Return the radius of the ball or cylinder, m."""
-        return float(self.side[0]) / 2
-
     def reachable_volume(self, radius: float) -> float:
         """Return the volume that spheres of ``radius`` (m) with centres in the region can take up, m^3."""
-        part = ROUND_PART[sum(self.round)]
-        return part * float(np.prod(np.where(self.periodic, self.side, self.side + 2 * radius)))
+        sides = np.where(self.periodic, self.side, self.side + 2 * radius)
+        return float(round_box.volume(self.shape, sides))
 
     def for_radius(self, radius: float, smaller: float) -> Region:
         """Return the region of spheres that are smaller (m) than those of ``radius`` (m) that it is of."""
@@ -93,28 +81,11 @@ def inside_box(low: np.ndarray, high: np.ndarray, radius: float) -> Region:
     return Region(low + radius, high - radius, float(np.prod(high - low)), walled=ALL_AXES)
 
 
-def inside_ball(centre: np.ndarray, size: float, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) wholly inside a ball of radius ``size`` (m)."""
-    must(size > radius, "ball", f"larger than a sphere, of radius {radius:g} m", size)
-    centre = np.asarray(centre, float)
-    reach = size - radius
-    volume = 4 / 3 * np.pi * size**3
-    return Region(centre - reach, centre + reach, volume, round=ALL_AXES, walled=ALL_AXES)
-
-
-def inside_cylinder(size: float, length: float, radius: float) -> Region:
-    """Return the region of spheres of ``radius`` (m) wholly inside a cylinder of radius ``size`` (m) along z,
-    about the origin."""
-    room = size > radius and length > 2 * radius
-    must(room, "cylinder", f"wider and longer than a sphere, of radius {radius:g} m", (size, length))
-    half = np.array([size, size, length / 2]) - radius
-    volume = np.pi * size**2 * length
-    return Region(-half, half, volume, round=(True, True, False), walled=ALL_AXES)
-
-
-def along_axis(points: np.ndarray, axis: Vector) -> np.ndarray:
-    """Return points (m), shape (n, 3), turned about the origin so that their z axis lies along an axis."""
-    direction = np.asarray(axis) / np.linalg.norm(axis)
-    first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
-    first /= np.linalg.norm(first)
-    return points @ np.stack([first, np.cross(direction, first), direction])
+def inside_round(shape: round_box.BoxShape, centre: Vector, half: Vector, radius: float) -> Region:
+    """Return the region of spheres of ``radius`` (m) wholly inside a cylinder or ball about ``centre`` (m);
+    half : m, half the sides of its box."""
+    sizes = half[0] if shape == "ball" else (half[0], 2 * half[2])
+    must(min(half) > radius, shape, f"larger than a sphere, of radius {radius:g} m", sizes)
+    middle, inner = np.array(centre), np.array(half) - radius
+    volume = round_box.volume(shape, 2 * np.array(half))
+    return Region(middle - inner, middle + inner, float(volume), shape=shape, walled=ALL_AXES)

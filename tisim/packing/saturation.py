@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tisim.geometry import round_box
 from tisim.packing.region import Region
 
 FIRST_VOXEL_SIDE = 0.5
@@ -42,6 +43,7 @@ class _Voids:
 
     def __init__(self, centres: np.ndarray, diameter: float, region: Region) -> None:
         self.diameter, self.region = diameter, region
+        self.half, self.rounded = region.side / 2, round_box.ROUND[region.shape]
         # A side of 0 is, for a tree, that of an axis along which nothing is periodic.
         self.box = np.where(region.periodic, region.side, 0.0)
         self.places = centres - region.low
@@ -49,7 +51,7 @@ class _Voids:
         dims = np.maximum(np.ceil(region.side / (FIRST_VOXEL_SIDE * diameter)), 1).astype(int)
         self.step = region.side / dims
         self.index = np.concatenate([
-            self._outside(self._in_round(np.stack(np.unravel_index(block, dims), axis=1)), self.tree)
+            self._outside(self._within(np.stack(np.unravel_index(block, dims), axis=1)), self.tree)
             for block in _blocks(np.arange(np.prod(dims)))
         ])  # fmt: skip
 
@@ -76,9 +78,7 @@ class _Voids:
         """Return the places of ``tries`` that are free, taken one after another; shape (n, 3), m."""
         voxel = self.index[generator.integers(len(self.index), size=tries)]
         places = (voxel + generator.random((tries, 3))) * self.step
-        if any(self.region.round):
-            away = ((places - self.region.side / 2) ** 2 * self.region.round).sum(axis=1)
-            places = places[away <= self.region.reach**2]
+        places = places[round_box.contains(self.rounded, self.half, (places - self.half).T)]
         distance, _ = self.tree.query(places, distance_upper_bound=self.diameter)
         places = places[np.isinf(distance)]
         return places[self._first_come(places)]
@@ -115,7 +115,7 @@ class _Voids:
             for k in range(NEAREST_CENTRES):
                 there = near[:, k] < len(self.places)
                 uncovered[there] &= ~self._is_covered(middle[there], self.places[near[there, k], None, :])
-            children.append(self._in_round(index[uncovered]))
+            children.append(self._within(index[uncovered]))
         self.index = np.concatenate(children)
 
     def _outside(self, index: np.ndarray, tree: cKDTree) -> np.ndarray:
@@ -132,12 +132,10 @@ class _Voids:
         apart = np.minimum(apart, np.abs(self.box - apart))
         return np.asarray(((apart + self.step / 2) ** 2).sum(axis=-1) < self.diameter**2)
 
-    def _in_round(self, index: np.ndarray) -> np.ndarray:
-        """Return the voxels that reach into the region, where it is round."""
-        if not any(self.region.round):
-            return index
-        gap = np.maximum(np.abs((index + 0.5) * self.step - self.region.side / 2) - self.step / 2, 0.0)
-        return index[(gap**2 * self.region.round).sum(axis=1) <= self.region.reach**2]
+    def _within(self, index: np.ndarray) -> np.ndarray:
+        """Return the voxels that reach into the region."""
+        gap = np.maximum(np.abs((index + 0.5) * self.step - self.half) - self.step / 2, 0.0)
+        return index[round_box.contains(self.rounded, self.half, gap.T)]
 
 
 def _blocks(items: np.ndarray) -> Iterator[np.ndarray]:

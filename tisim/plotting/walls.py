@@ -17,6 +17,7 @@ from tisim.effects.motion.translation import Translation
 from tisim.geometry.box import BoxSurface
 from tisim.geometry.cone import ConicalSurface
 from tisim.geometry.cylinder import CylindricalSurface
+from tisim.geometry.directions import across
 from tisim.geometry.disc import Disc
 from tisim.geometry.plane import Plane
 from tisim.geometry.shape import Shape
@@ -95,7 +96,7 @@ def _plane(k: int, faces: list[tuple[np.ndarray, np.ndarray]], inside: np.ndarra
     point, normal = faces[k]
     low, high = inside.min(axis=0), inside.max(axis=0)
     size, middle = np.linalg.norm(high - low), (low + high) / 2
-    foot, (a, b) = middle - (middle - point) @ normal * normal, _across(normal)
+    foot, (a, b) = middle - (middle - point) @ normal * normal, across(normal)
     polygon = np.array([foot + size * (x * a + y * b) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     bounds = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
     for place, inwards in (*bounds, *(face for m, face in enumerate(faces) if m != k)):
@@ -190,12 +191,5 @@ def _barrel(
 
 
 def _circle(centre: np.ndarray, normal: np.ndarray, radius: float) -> Line:
-    a, b = _across(normal / np.linalg.norm(normal))
+    a, b = across(normal / np.linalg.norm(normal))
     return centre + radius * (np.outer(np.cos(AROUND), a) + np.outer(np.sin(AROUND), b))
-
-
-def _across(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two directions at right angles to a normal and to each other."""
-    a = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    a /= np.linalg.norm(a)
-    return a, np.cross(normal, a)

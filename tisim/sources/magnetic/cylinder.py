@@ -14,6 +14,7 @@ from tisim.components.component import Vector
 from tisim.components.ranges import check_direction
 from tisim.effects.base import Effect, option, parameter
 from tisim.errors import InputError, must
+from tisim.geometry.cylinder import cylinder_distance
 from tisim.sources.magnetic import cylinder_field
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_frame import place, split_direction, split_magnetisation
@@ -63,15 +64,8 @@ class Cylinder(Body):
     @ti.func
     def nearest(self, w, k, r):
         rho, outward, z, end = self.place(w, k, r)
-        side = rho - self.radius(w, k)
         upward = ti.select(z < 0.0, -1.0, 1.0) * self.unit(w, k)
-        # Inside, the nearer of side and end; on the axis there is no way to the side.
-        sideways = side >= end and rho > 0.0
-        distance, normal = ti.select(sideways, side, end), ti.select(sideways, outward, upward)
-        if side > 0.0 and end > 0.0:
-            distance = ti.sqrt(side * side + end * end)
-            normal = (side * outward + end * upward) / distance
-        return distance, normal
+        return cylinder_distance(rho, outward, end, upward, self.radius(w, k))
 
     @ti.func
     def unit(self, w, k):

@@ -6,6 +6,7 @@ from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import option, parameter
+from tisim.geometry.sphere import ball_distance
 from tisim.sources.magnetic.magnets import Body, Magnets
 
 
@@ -16,10 +17,7 @@ class Sphere(Body):
 
     @ti.func
     def nearest(self, w, k, r):
-        d = r - self.centre(w, k)
-        size = d.norm()
-        up = ti.Vector([0.0, 0.0, 1.0 + 0.0 * size])
-        return size - self.radius(w, k), ti.select(size > 0.0, d / ti.select(size > 0.0, size, 1.0), up)
+        return ball_distance(r, self.centre(w, k), self.radius(w, k))
 
     @ti.func
     def flux_density(self, w, k, r):
