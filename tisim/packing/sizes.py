@@ -29,11 +29,13 @@ class SizeDistribution(Component):
 
     contract: ClassVar[bool] = True
 
-    by: By = option("what the parts are of: the number of grains, their volume, or their mass", examples=["volume"])
+    by: By = option(
+        "what the parts are of: the number of grains, their volume, or their mass", examples=["volume"]
+    )
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return radii (m), rising, and the part, 0 to 1, of the number, volume or mass that is no larger than
-        each."""
+        """Return radii (m), rising, and the part, 0 to 1, of the number, volume or mass that is no larger
+        than each."""
         raise NotImplementedError(f"{type(self).__name__} must define nodes")
 
     def table(self) -> np.ndarray:

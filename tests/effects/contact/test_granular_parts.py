@@ -9,7 +9,7 @@ from scipy.special import gamma
 from cases.granular_bench import closed_forms
 from tests.effects.contact.compositions import NEUTRAL, along, grains, loaded
 from tests.effects.contact.grains import run
-from tests.scenes import by_id, roundoff
+from tests.scenes import by_id
 
 pytestmark = pytest.mark.long
 
@@ -64,26 +64,6 @@ def test_beside_hookes_spring_an_impact_has_the_restitution_too():
     for steps in (100, 400):
         found = impacts("hooke", np.ones(5), lambda v: np.pi * (0.5 / K) ** 0.5, steps, restitution=e)
         np.testing.assert_allclose(found, e, rtol=0, atol=3 / steps)
-
-
-def test_beside_hookes_spring_grains_without_restitution_stay_together():
-    """At e = 0, of one of the two materials alone too: v t exp(-t sqrt(k / m*)), and no way back."""
-    rate, v = (K / 0.5) ** 0.5, 1.0
-    made = grains("hooke", [[0, 0, 0], [2, 0, 0]], [[v / 2, 0, 0], [-v / 2, 0, 0]], material=[0, 1],
-                  first={"restitution": 0.0}, dt=1e-3 / rate, steps=40_000)  # fmt: skip
-    simulation = loaded([made])
-    for turns in (0.5, 1.0, 3.0, 8.0):
-        simulation.run(until=turns / rate)
-        (result,) = simulation.results()
-        state = by_id(result)
-        overlap = 2 - np.diff(state["position"][:, 0])[0]
-        approach = -np.diff(state["velocity"][:, 0])[0]
-        assert overlap == pytest.approx(v * turns / rate * np.exp(-turns), rel=5e-3)
-        assert approach == pytest.approx(v * (1 - turns) * np.exp(-turns), abs=2e-3 * v)
-    simulation.run()
-    (result,) = simulation.results()
-    # What the rounding of places is to such a spring.
-    assert np.abs(result.state["velocity"]).max() < 20 * rate * roundoff()
 
 
 @pytest.mark.slow

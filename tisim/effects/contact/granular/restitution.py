@@ -19,6 +19,10 @@ class RestitutionDamping(Damping):
     part. At e = 0, where c is 2 f, the damping is critical: surfaces come to rest and never part by
     themselves, beside Hooke's spring as delta = v t exp(-t sqrt(k / m*)).
 
+    It is ``coeff_restitution`` of LAMMPS. The polynomial of Tsuji, Tanaka and Ishida, which is for the mass
+    of one of two equal grains, has the same e to 0.002 from e = 0.05 on; ``tsuji`` of LAMMPS puts m* in its
+    place, so that its e = 0.5 is an e of 0.62.
+
     Source: Y. Tsuji, T. Tanaka and T. Ishida, Powder Technol. 71 (1992) 239, who fit c; D. Antypov and J. A.
     Elliott, EPL 94 (2011) 50004, who found it.
     """

@@ -1,4 +1,4 @@
-"""tisim optimize granular_bench --variant calibrate --measured FILE.csv, of a small silo and a few designs."""
+"""tisim optimize granular_bench --variant calibrate --measured FILE.csv, of a small silo and few designs."""
 
 import csv
 
@@ -6,7 +6,6 @@ import pytest
 
 from cases.case import Size
 from cases.granular_bench import scene as draw_down
-from tests.cli.conftest import tisim  # noqa: F401  a fixture
 
 SMALL = {"number": 250, "silo": 4.0, "outlet": 5.0, "disc": 5.0, "drop": 3.0, "duration": 0.6}
 SEARCH = [
@@ -21,7 +20,7 @@ def table(path):
 
 
 @pytest.mark.slow
-def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim, tmp_path, monkeypatch):  # noqa: F811
+def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim, tmp_path, monkeypatch):
     """The misfit of the best design is that of its run from the numbers in the file, in their uncertainties;
     other numbers are not taken for these."""
     settings = {**draw_down.SEARCH_SETTINGS, "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1}}
