@@ -138,7 +138,7 @@ SHARED = {
         f"{HERTZ_MINDLIN}a_closed_path_yields_no_work",
     ),
     "turned": (
-        f"{LAW}/spring.py", "known *= ti.sqrt(size / (size - out * out))", "known *= 1.0",
+        f"{LAW}/spring.py", "known *= ti.sqrt(size / flat)", "known *= 1.0",
         f"{HERTZ_MINDLIN}what_is_remembered_turns_with_the_pair",
     ),
     "slipping": (
