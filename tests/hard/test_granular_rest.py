@@ -71,7 +71,7 @@ def test_a_tall_column_rests(name):
     for one, states in zip(made[:2], series[:2], strict=True):
         for state in states:
             place = one.start()["position"]
-            np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-11 + 1e2 * roundoff())
+            np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-11 + 1e3 * roundoff())
             assert kinetic(state).sum() < 1e-18 + (1e5 * roundoff()) ** 2
     rest = [weighed(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
     free, damped = (
@@ -82,6 +82,21 @@ def test_a_tall_column_rests(name):
     np.testing.assert_allclose(free, free[0], rtol=0, atol=3e-3 * free[0] + rounding)
     assert np.diff(damped).max() < 1e-6 * damped[0] + rounding
     assert damped[-1] < 0.02 * damped[0] + rounding
+
+
+def lasting():
+    """What becomes of a lossy column in 100 steps."""
+    law = {**ELASTIC["hooke"], **lossy("hooke")[0]}
+    place = balanced("hooke", law, 10)
+    more = {"planes": [FLOOR], "gravity": (0, 0, -G), "dt": 1e-4, "steps": 100_000}
+    simulation = loaded([grains("hooke", place, np.zeros((10, 3)), first=law, **more)])
+    simulation.run(steps=100)
+    return simulation.results()[0].status.reason
+
+
+def test_a_column_lasts_in_single_precision(single):
+    """There what slides is next to nothing, whose square is none."""
+    assert single("hard.test_granular_rest", "lasting") == "running"
 
 
 PRESSED = 0.02
@@ -120,7 +135,7 @@ def test_friction_just_below_and_just_above_its_threshold(name):
         if part > 1:
             assert (v[1] - v[0]) / time == pytest.approx(0.01 * most, rel=1e-6 + 1e5 * roundoff())
         elif name in CREEPS:
-            np.testing.assert_allclose(v, part * most / CREEPS[name], rtol=1e-6)
+            np.testing.assert_allclose(v, part * most / CREEPS[name], rtol=1e-6 + 1e3 * roundoff())
         else:
             # What is so slow does not change the number of a place.
             stuck = roundoff() * x[1] / made[0].stepper.control.dt
