@@ -33,6 +33,8 @@ DILUTE, DENSE, DENSEST = 0.005, 0.5, 2.0
 """The concentrations that are compared, g/mL."""
 ORIENTATIONS = {0.0: "longitudinal", 90.0: "transverse"}
 """The orientations of the cylinder by its angle to the field, degrees."""
+MORE = 3
+"""What differs least, by 0.057 ± 0.015 s over 32 starts, is asked of so many times the starts of others."""
 NO_CAPTURE_BEFORE = 0.05
 """Before this time none of 75 nm is captured, s."""
 
@@ -111,7 +113,7 @@ def of_capture(repeats: int) -> Iterator[Claim]:
 
     Start k lies alike in all settings, so they are compared start by start.
     """
-    keys = [(angle, c) for angle in ORIENTATIONS for c in (DILUTE, DENSE)] + [(90.0, DENSEST)]
+    keys = [(angle, c) for angle in ORIENTATIONS for c in (DILUTE, DENSE)]
     settings = [
         {"angle": angle, "concentration": c, **CAPTURE, **({"duration": LATE} if c == DILUTE else {})}
         for angle, c in keys
@@ -127,8 +129,10 @@ def of_capture(repeats: int) -> Iterator[Claim]:
         yield Claim(f"{name}: {by} at {DILUTE:g} g/mL", Mean.of(late - soon), least=0.0)
         than = f"{name}: {by} of particles that feel nothing of each other"
         yield Claim(than, Mean.of(lone - soon), least=0.0)
+    across_both = [{"angle": 90.0, "concentration": c, **CAPTURE} for c in (DENSE, DENSEST)]
+    dense, densest = map(firsts, results(across_both, MORE * repeats))
     name = f"transverse: first capture at {DENSEST:g} g/mL, sooner by, s, than at {DENSE:g} g/mL"
-    yield Claim(name, Mean.of(across - first_captures[90.0, DENSEST]), least=0.0)
+    yield Claim(name, Mean.of(dense - densest), least=0.0)
 
 
 def without_interaction(repeats: int) -> list[np.ndarray]:

@@ -43,6 +43,22 @@ SIDE, STEP = 8, 5e-4
 SOFT = {"young": 1e5, "poisson": 0.3, "restitution": 0.6, "friction": 0.3, "damping": 300.0}
 LAW = TwinLaw((SOFT,))
 """Hertz and Mindlin."""
+TSUJI = 0.5
+"""Coefficient of restitution that ``damping tsuji`` is given."""
+
+
+def as_tsuji(restitution: float) -> float:
+    """Return the coefficient of restitution whose damping is ``damping tsuji`` of LAMMPS with another one.
+
+    Both are alpha sqrt(4/3 E* a m*). Tsuji, Tanaka and Ishida (Powder Technol. 71 (1992) 239) fit alpha by a
+    polynomial, for m in place of m*, which of two equal grains of mass m is m / 2; alpha is -sqrt(5) ln e /
+    sqrt(ln^2 e + pi^2) (D. Antypov and J. A. Elliott, EPL 94 (2011) 50004).
+    """
+    alpha = np.polynomial.Polynomial([1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218])
+    share = alpha(restitution) / np.sqrt(5)
+    return float(np.exp(-np.pi * share / np.sqrt(1 - share**2)))
+
+
 ROLLS = {"rolling_stiffness": 4e3, "rolling_damping": 20.0, "rolling_friction": 0.2}
 TWISTS = {"twisting_stiffness": 400.0, "twisting_damping": 5.0, "twisting_friction": 0.1}
 LAWS = {
@@ -54,6 +70,7 @@ LAWS = {
         rolling="rolling_sds",
         twisting="twisting_sds",
     ),
+    "hertz, tsuji, mindlin": TwinLaw(({**SOFT, "restitution": as_tsuji(TSUJI)},), options={"tsuji": TSUJI}),
     "hertz, constant damping, mindlin's displacement": TwinLaw(
         (SOFT,), damping="constant_damping", tangential="mindlin_displacement"
     ),
@@ -157,6 +174,8 @@ def lammps_model(law: TwinLaw) -> str:
     of = law.materials[0]
     damping = {"restitution_damping": "coeff_restitution", "constant_damping": "velocity"}[str(law.damping)]
     loss = of["restitution"] if damping == "coeff_restitution" else of["damping"]
+    if "tsuji" in law.options:
+        damping, loss = "tsuji", law.options["tsuji"]
     elastic = f"{of.get('young', 0):.17g} {loss:.17g} {of.get('poisson', 0):.17g}"
     normal = {
         "hooke": f"hooke {of.get('stiffness', 0):.17g} {loss:.17g}",

@@ -5,7 +5,9 @@ nothing unless a liquid or a cement is given.
 """
 
 import numpy as np
+from scipy.integrate import quad
 
+from cases.granular_bench import closed_forms
 from tests.effects.contact import compositions
 from tests.effects.contact.grains import AWAY, FAR, HERTZ_MINDLIN
 from tests.scenes import by_id, compiled, scene
@@ -61,6 +63,37 @@ def grains(name, position, velocity, spin=None, **more):
         acting = (*acting, CapillaryBridge(**liquid), ParallelBond(**cement))
     given = {"radius": 1.0, "mass": 1.0, **more}
     return scene(position, velocity, acting, quantities={"spin": spin}, materials=made, **given)
+
+
+def lossy(name):
+    """Two materials that lose energy in every way that the law has."""
+    soft, hard = LOSSY[name]
+    if name == "hooke":
+        # Where 2 pi k_c R* is above the stiffness nothing holds grains apart.
+        soft, hard = ({**one, "cohesion_energy_density": 500.0} for one in (soft, hard))
+    return soft, hard
+
+
+def push(name, overlap, radius, law):
+    """The elastic and cohesive force (N) at an overlap (m) of some R* (m)."""
+    if name == "hooke":
+        return (law["stiffness"] - 2 * np.pi * radius * law["cohesion_energy_density"]) * overlap
+    e_star, energy = law["young"] / (2 * (1 - law["poisson"] ** 2)), law.get("surface_energy", 0.0)
+    if name == "jkr":
+        return closed_forms.jkr_force(overlap, energy, radius, e_star)
+    return 4 / 3 * e_star * radius**0.5 * overlap**1.5 - 4 * np.pi * energy * radius
+
+
+def stored(name, overlap, radius, law):
+    """What an overlap (m) of some R* (m) holds of energy, J: the integral of the elastic and cohesive
+    force from where contact ends."""
+    if name == "hooke":
+        return (law["stiffness"] - 2 * np.pi * radius * law["cohesion_energy_density"]) * overlap**2 / 2
+    e_star, energy = law["young"] / (2 * (1 - law["poisson"] ** 2)), law.get("surface_energy", 0.0)
+    if name == "jkr":
+        ends_at = closed_forms.jkr_stretch(energy, radius, e_star)
+        return quad(lambda d: closed_forms.jkr_force(d, energy, radius, e_star), -ends_at, overlap)[0]
+    return 8 / 15 * e_star * radius**0.5 * overlap**2.5 - 4 * np.pi * energy * radius * overlap
 
 
 def loaded(scenes):

@@ -3,10 +3,8 @@ nanometres and of kilometres, light beside heavy."""
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
-from cases.granular_bench import closed_forms
-from tests.hard.granular_scenes import ELASTIC, LAWS, LOSSY, ends, grains, kinetic, loaded, momenta
+from tests.hard.granular_scenes import ELASTIC, LAWS, ends, grains, kinetic, loaded, lossy, momenta, stored
 from tests.scenes import by_id, roundoff
 from tisim.geometry import Disc
 
@@ -49,15 +47,6 @@ def gaps(state):
     return np.minimum(np.abs(r[:, 2]), disc) - state["radius"]
 
 
-def lossy(name):
-    """Two materials that lose energy in every way that the law has."""
-    soft, hard = LOSSY[name]
-    if name == "hooke":
-        # Where 2 pi k_c R* is above the stiffness nothing holds grains apart.
-        soft, hard = ({**one, "cohesion_energy_density": 500.0} for one in (soft, hard))
-    return soft, hard
-
-
 WET = {"surface_tension": 5.0, "volume": 1e-3}
 RUPTURE = 0.1
 """m, for this volume."""
@@ -89,18 +78,6 @@ def test_energy_is_not_created_at_planes_and_rims(name, rng):
         else:
             assert gain.max() < rounding
             assert gain.min() < -0.15
-
-
-def stored(name, overlap, radius, law):
-    """What an overlap (m) of some R* (m) holds of energy, J: the integral of the elastic and cohesive
-    force from where contact ends."""
-    if name == "hooke":
-        return (law["stiffness"] - 2 * np.pi * radius * law["cohesion_energy_density"]) * overlap**2 / 2
-    e_star, energy = law["young"] / (2 * (1 - law["poisson"] ** 2)), law.get("surface_energy", 0.0)
-    if name == "jkr":
-        ends_at = closed_forms.jkr_stretch(energy, radius, e_star)
-        return quad(lambda d: closed_forms.jkr_force(d, energy, radius, e_star), -ends_at, overlap)[0]
-    return 8 / 15 * e_star * radius**0.5 * overlap**2.5 - 4 * np.pi * energy * radius * overlap
 
 
 ADHESION = {

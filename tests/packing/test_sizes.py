@@ -51,6 +51,32 @@ def test_sizes_are_distributed_as_scipy_has_it(name, by):
     np.testing.assert_allclose(cumulative(sizes.radii(uniform)), uniform, atol=1e-5)
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_by_mass_is_by_volume_within_a_class(name):
+    kind, values, _ = LAWS[name]
+    by_mass, by_volume = (kind(by=by, **BOUNDS, **values) for by in ("mass", "volume"))
+    np.testing.assert_array_equal(by_mass.table(), by_volume.table())
+    uniform = np.linspace(0, 1, 999)
+    np.testing.assert_array_equal(by_mass.radii(uniform), by_volume.radii(uniform))
+    assert by_mass.mean_cube() == by_volume.mean_cube()
+
+
+def test_scales_find_the_mass_that_passes_a_sieve_again_in_a_mixture_of_densities():
+    """Two classes by mass, the heavier a quarter of it: of all mass, and of that of each class."""
+    diameters, passing = (1e-3, 2e-3, 4e-3), (0.0, 0.3, 1.0)
+    coarse = SieveCurve(by="mass", diameters=diameters, passing=passing)
+    fine = SieveCurve(by="mass", diameters=tuple(0.5 * d for d in diameters), passing=passing)
+    classes = (GrainClass(sizes=coarse, density=2000.0, share=3.0), GrainClass(sizes=fine, density=8000.0))
+    which, radius = draw(classes, 400_000, seed=5)
+    mass = masses(classes, which, radius)
+    for k, one in enumerate((coarse, fine)):
+        own, size = mass[which == k], 2 * radius[which == k]
+        found = [own[size <= d].sum() / own.sum() for d in one.diameters]
+        np.testing.assert_allclose(found, passing, atol=0.01)
+    # Those of the coarser class that pass 2 mm, and all of the finer.
+    assert mass[2 * radius <= 2e-3].sum() / mass.sum() == pytest.approx(0.75 * 0.3 + 0.25, abs=0.01)
+
+
 def test_a_lognormal_law_over_volume_is_one_over_number():
     """Hatch and Choate, where the bounds are far out."""
     far = {"smallest": 1e-4, "largest": 2e-2}

@@ -30,7 +30,7 @@ class ContactProperties(Component):
         "N/m", "stiffness k of a contact, in Hooke's law; of two materials, their harmonic mean", None, gt=0
     )
     restitution: float | None = parameter(
-        "", "coefficient e of restitution; of two materials, their geometric mean", None, gt=0, le=1
+        "", "coefficient e of restitution; of two materials, their geometric mean", None, ge=0, le=1
     )
     viscous_time: float | None = parameter(
         "s", "time A of viscoelastic damping; of two materials, their geometric mean", None, ge=0

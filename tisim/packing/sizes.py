@@ -8,14 +8,15 @@ import numpy as np
 
 from tisim.components.component import Component, option
 
-By = Literal["number", "volume"]
+By = Literal["number", "volume", "mass"]
 
 
 class SizeDistribution(Component):
     """A size distribution says which part of some grains has which radii.
 
-    It is that of their number, or that of their volume, which is that of their mass as all have one density:
-    what sieves and weighing give. Parts by volume q_3 and by number q_0 are bound by
+    It is that of their number, or that of their volume or mass, which are one as all of a class have one
+    density: what sieves and weighing give. Classes of other densities have their ``share`` of the mass. Parts
+    by volume q_3 and by number q_0 are bound by
 
         q_0(r) = q_3(r) / r^3 / integral of q_3(r) / r^3
 
@@ -28,11 +29,13 @@ class SizeDistribution(Component):
 
     contract: ClassVar[bool] = True
 
-    by: By = option("what the parts are of: the number of grains, or their volume", examples=["volume"])
+    by: By = option(
+        "what the parts are of: the number of grains, their volume, or their mass", examples=["volume"]
+    )
 
     def nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return radii (m), rising, and the part, 0 to 1, of the number or volume that is no larger than
-        each."""
+        """Return radii (m), rising, and the part, 0 to 1, of the number, volume or mass that is no larger
+        than each."""
         raise NotImplementedError(f"{type(self).__name__} must define nodes")
 
     def table(self) -> np.ndarray:

@@ -165,13 +165,14 @@ def test_what_is_more_concentrated_is_captured_sooner_along_the_field_too():
 
 @pytest.mark.slow
 def test_chains_do_not_depend_on_the_steps():
-    """Particles that move a third or three times as far in one: as long, within a confidence interval."""
+    """Particles that move a third or three times as far in one: to half a particle, of three by which chains
+    grow, at 95 % confidence. The first differ by 0.19 ± 0.14, the second by -0.02 ± 0.15."""
     settings = [{"concentration": 0.5, **CHAINS, "coarse": coarse} for coarse in (1.0, 1 / 3, 3.0)]
-    usual, *others = (np.array([grown(result) for result in group]) for group in results(settings, 16))
+    usual, *others = (np.array([grown(result) for result in group]) for group in results(settings, 64))
     assert Mean.of(usual).value > 2
     for other in others:
         change = Mean.of(other - usual)
-        assert abs(change.value) < change.half < 0.5
+        assert abs(change.value) + change.half < 0.5
 
 
 @pytest.mark.slow

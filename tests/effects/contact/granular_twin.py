@@ -86,7 +86,9 @@ class TwinLaw:
             return self.of("damping", which)
         if self.damping == "viscoelastic_damping":
             return self.of("viscous_time", which) * stiffness
-        log = np.log(self.of("restitution", which))
+        e = self.of("restitution", which)
+        # That of e = 0 to rounding.
+        log = np.log(np.maximum(e, 1e-300)) * np.where(e > 0, 1, 1e9)
         shape = 1.0 if self.normal == "hooke" else np.sqrt(5 / 6)
         return -2 * shape * log / np.sqrt(np.pi**2 + log**2) * np.sqrt(stiffness * mass)
 

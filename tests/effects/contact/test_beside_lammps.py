@@ -13,12 +13,6 @@ pytestmark = [
 ]
 ROUNDING = 1e-12
 LIKE_LAMMPS = replace(bench.LAW, levers="radius")
-
-
-REMEMBERS_OTHERWISE = ("hooke, linear, rolling, twisting", "jkr, marshall")
-"""In these LAMMPS turns a couple round where its limit falls below it, or remembers the angle of it."""
-
-
 NARROW = {
     "height of the centre of mass, m": 0.02,
     "contacts of a grain": 0.1,
@@ -35,11 +29,11 @@ def rough(friction):
 
 @pytest.mark.parametrize("name", bench.LAWS)
 def test_each_law_that_both_have_is_the_same(name):
-    """After a step, and where memory is alike after 100, NumPy with the two points of LAMMPS is LAMMPS, and
-    the package is NumPy without them."""
+    """After a step and after 100, NumPy with the points of LAMMPS is LAMMPS, and the package is NumPy without
+    them."""
     at, law = bench.start(), bench.LAWS[name]
     theirs = replace(law, levers="radius")
-    for steps in (1,) if name in REMEMBERS_OTHERWISE else (1, 100):
+    for steps in (1, 100):
         ours, twin = (by(at, law, False, steps) for by in (bench.by_package, bench.by_numpy))
         assert max(bench.apart(ours, twin).values()) < ROUNDING
         there = bench.by_lammps(at, law, False, steps)

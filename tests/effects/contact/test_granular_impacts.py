@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from cases.granular_bench.closed_forms import hertz_depth, hertz_duration
 from tests.effects.contact.grains import AWAY, CAPACITY, FLOOR, USUAL, WORLDS, grains, run
@@ -59,6 +60,48 @@ def test_an_impact_has_the_restitution_at_any_speed():
         np.testing.assert_allclose(found, np.broadcast_to(EXACT, found.shape), rtol=0, atol=0.2 / steps)
         # In units of its own an impact is the same at any speed.
         assert np.ptp(found, axis=0).max() < 1e-9
+
+
+def critically_damped(tau, speed):
+    """Time (s), overlap (m) and speed of approach (m/s) in an impact at a wall of e = 0, after Antypov and
+    Elliott: x = delta^(5/4) is a damped oscillator in the time tau (m^(1/4) s), d tau = delta^(1/4) dt."""
+    rate = (5 / 3 * E_STAR) ** 0.5
+
+    def stretched(tau):
+        return 1.25 * speed * tau * np.exp(-rate * tau)
+
+    # By tau = u^(5/4), as the integrand tau^(-1/5) grows at 0.
+    time, _ = quad(lambda u: 1.25 * u**0.25 * stretched(u**1.25) ** -0.2, 0, tau**0.8)
+    return time, stretched(tau) ** 0.8, speed * (1 - rate * tau) * np.exp(-rate * tau)
+
+
+def test_without_restitution_a_grain_stays_where_it_hits():
+    """At e = 0 damping is critical: the overlap goes to 0 as Antypov and Elliott have it, at a wall and at
+    another grain, one of which may have e = 1; at no time does a grain part."""
+    speed, unit = 1.0, (5 / 3 * E_STAR) ** -0.5
+    made = grains(
+        [[0, 0, 1], [10, 0, 9], [12, 0, 9]], [[0, 0, -speed], [speed, 0, 0], [-speed, 0, 0]],
+        planes=[FLOOR], law={"restitution": 0.0, "friction": 0.0}, mass=[1.0, 4.0, 4.0],
+        radius=[1.0, 1.0, 1.0], dt=duration(speed) / 2000, steps=50_000,
+    )  # fmt: skip
+    simulation = compiled(made, WORLDS, CAPACITY)
+    simulation.load([made])
+    energies = [0.5 * speed**2]
+    for parts in (0.3, 1.0, 2.0, 4.0):
+        time, overlap, approach = critically_damped(parts * unit, speed)
+        simulation.run(until=time)
+        (result,) = simulation.results()
+        state = by_id(result)
+        assert 1 - state["position"][0, 2] == pytest.approx(overlap, rel=2e-3)
+        assert -state["velocity"][0, 2] == pytest.approx(approach, abs=2e-3 * speed)
+        energies.append(0.5 * approach**2 + 8 / 15 * E_STAR * (1 - state["position"][0, 2]) ** 2.5)
+    assert (np.diff(energies) < 0).all()
+    simulation.run()
+    (result,) = simulation.results()
+    state = by_id(result)
+    assert np.abs(state["velocity"]).max() < 1e-4 * speed
+    assert state["position"][0, 2] < 1
+    assert np.diff(state["position"][1:, 0]) < 2
 
 
 @pytest.mark.long

@@ -16,7 +16,12 @@ class RestitutionDamping(Damping):
         gamma = c sqrt(S m*),    c = -2 f ln e / sqrt(ln^2 e + pi^2)
 
     f is 1 beside Hooke's spring and sqrt(5/6) beside Hertz's. The normal force pulls a little before surfaces
-    part.
+    part. At e = 0, where c is 2 f, the damping is critical: surfaces come to rest and never part by
+    themselves, beside Hooke's spring as delta = v t exp(-t sqrt(k / m*)).
+
+    It is ``coeff_restitution`` of LAMMPS. The polynomial of Tsuji, Tanaka and Ishida, which is for the mass
+    of one of two equal grains, has the same e to 0.002 from e = 0.05 on; ``tsuji`` of LAMMPS puts m* in its
+    place, so that its e = 0.5 is an e of 0.62.
 
     Source: Y. Tsuji, T. Tanaka and T. Ishida, Powder Technol. 71 (1992) 239, who fit c; D. Antypov and J. A.
     Elliott, EPL 94 (2011) 50004, who found it.
@@ -25,7 +30,11 @@ class RestitutionDamping(Damping):
     uses: ClassVar = ("restitution",)
 
     def mix(self, pair: Touching) -> dict[str, float]:
-        logarithm = math.log(pair.mixed("restitution"))
+        restitution = pair.mixed("restitution")
+        if restitution == 0:
+            # This is the limit of what follows, the logarithm of which has none.
+            return {"loss": 2.0}
+        logarithm = math.log(restitution)
         return {"loss": -2 * logarithm / math.hypot(logarithm, math.pi)}
 
     @ti.func

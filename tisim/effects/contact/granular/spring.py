@@ -15,9 +15,10 @@ def turned(remembered, normal):
     """Return a vector that is remembered as it turns with the pair: into the plane of contact, with its
     size."""
     out, size = remembered.dot(normal), remembered.norm_sqr()
-    known = remembered - out * normal
-    if out * out > TURN * size and out * out < size:
-        known *= ti.sqrt(size / (size - out * out))
+    known, flat = remembered - out * normal, size - out * out
+    # What is left of squares may be none though they differ: the smallest numbers are taken for 0.
+    if out * out > TURN * size and flat > 0.0:
+        known *= ti.sqrt(size / flat)
     return known
 
 

@@ -1,0 +1,50 @@
+"""tisim optimize granular_bench --variant calibrate --measured FILE.csv, of a small silo and few designs."""
+
+import csv
+
+import pytest
+
+from cases.case import Size
+from cases.granular_bench import scene as draw_down
+
+SMALL = {"number": 250, "silo": 4.0, "outlet": 5.0, "disc": 5.0, "drop": 3.0, "duration": 0.6}
+SEARCH = [
+    "optimize", "granular_bench", "--variant", "calibrate", "--measured", "mine.csv", "--out", "found",
+    "--method", "genetic", "--generations", "1", "--population", "4", "--set", "search.options.parents=2",
+]  # fmt: skip
+
+
+def table(path):
+    """Rows of a CSV file by their first cell."""
+    return {name: value for name, value, *_ in csv.reader(path.read_text().splitlines())}
+
+
+@pytest.mark.slow
+def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim, tmp_path, monkeypatch):
+    """The misfit of the best design is that of its run from the numbers in the file, in their uncertainties;
+    other numbers are not taken for these."""
+    settings = {**draw_down.SEARCH_SETTINGS, "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1}}
+    monkeypatch.setitem(draw_down.SIZES, "default", Size("a small draw-down test", SMALL, settings))
+    mine = tmp_path / "mine.csv"
+    mine.write_text("quantity,value,uncertainty\ndischarge_rate,0.0815,0.0125\nangle_of_repose,19.25,2.5\n")
+    code, out, err = tisim(*SEARCH)
+    assert code == 0, err
+    for text in ("0.0815 ± 0.0125 kg/s", "19.25 ± 2.5 degrees"):
+        assert text in " ".join((out + err).split())
+    run = table(tmp_path / "found/best_run.csv")
+    assert float(run["discharge_rate as measured, kg/s"]) == 0.0815
+    assert float(run["angle_of_repose as measured, degrees"]) == 19.25
+    off = [
+        (float(run["discharge_rate, kg/s"]) - 0.0815) / 0.0125,
+        (float(run["angle_of_repose, degrees"]) - 19.25) / 2.5,
+    ]
+    heading, best, *_ = csv.reader((tmp_path / "found/best.csv").read_text().splitlines())
+    best = dict(zip(heading, best, strict=True))
+    assert float(best["misfit"]) == pytest.approx((off[0] ** 2 + off[1] ** 2) / 2, rel=1e-3)
+    for name, low, high in (("friction", 0.05, 1), ("rolling_friction", 0, 0.4), ("restitution", 0.2, 0.9)):
+        assert low <= float(best[name]) <= high
+    # What was found for these is not given for others.
+    mine.write_text("quantity,value,uncertainty\ndischarge_rate,0.05,0.0125\n")
+    code, _, err = tisim(*SEARCH)
+    assert code == 2
+    assert "output folder must be without another search" in " ".join(err.split())

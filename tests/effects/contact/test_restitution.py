@@ -1,0 +1,50 @@
+"""Damping by restitution where there is none, and beside the polynomial by which others have it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tests.effects.contact.compositions import NEUTRAL, grains, loaded
+from tests.scenes import by_id, roundoff
+from tisim import Material
+from tisim.components.materials import Materials
+from tisim.effects import HertzMaterial, RestitutionDamping
+
+
+@pytest.mark.long
+def test_beside_hookes_spring_grains_without_restitution_stay_together():
+    """At e = 0, of one of the two materials alone too: v t exp(-t sqrt(k / m*)), and no way back."""
+    rate, v = (NEUTRAL["hooke"]["stiffness"] / 0.5) ** 0.5, 1.0
+    made = grains("hooke", [[0, 0, 0], [2, 0, 0]], [[v / 2, 0, 0], [-v / 2, 0, 0]], material=[0, 1],
+                  first={"restitution": 0.0}, dt=1e-3 / rate, steps=40_000)  # fmt: skip
+    simulation = loaded([made])
+    for turns in (0.5, 1.0, 3.0, 8.0):
+        simulation.run(until=turns / rate)
+        (result,) = simulation.results()
+        state = by_id(result)
+        overlap = 2 - np.diff(state["position"][:, 0])[0]
+        approach = -np.diff(state["velocity"][:, 0])[0]
+        assert overlap == pytest.approx(v * turns / rate * np.exp(-turns), rel=5e-3, abs=20 * roundoff())
+        assert approach == pytest.approx(v * (1 - turns) * np.exp(-turns), abs=2e-3 * v)
+    simulation.run()
+    (result,) = simulation.results()
+    # What the rounding of places is to such a spring.
+    assert np.abs(result.state["velocity"]).max() < 20 * rate * roundoff()
+
+
+def test_tsujis_polynomial_is_a_fit_of_the_damping_by_restitution():
+    """alpha(e) sqrt(m 4/3 E* a), with m = 2 m* that of one of two equal grains: the damping of an e that is
+    the same to 0.002 from 0.05 on, and 0.014 at 0."""
+    alpha = np.polynomial.Polynomial([1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218])
+    e = np.append(0.0, np.linspace(0.05, 1, 20))
+    (alike,) = Materials({"grain": Material(restitution=0.5)}, {}).touching()
+    for wanted, size in zip(e, alpha(e) * (2 * 2 / 3) ** 0.5, strict=True):
+
+        def excess(found, size=size):
+            pair = replace(alike, first=Material(restitution=found), second=Material(restitution=found))
+            (loss,) = RestitutionDamping().mix(pair).values()
+            return HertzMaterial.restitution_factor * loss - size
+
+        assert brentq(excess, 0, 1) == pytest.approx(wanted, abs=0.002 if wanted else 0.015)

@@ -1,0 +1,170 @@
+"""What is broken in each law of contact and motion of a wall, and the test that must see it."""
+
+LAW = "tisim/effects/contact/granular"
+PARTS = "tests/effects/contact/test_granular_parts.py::test_"
+PARTS_OF_LAWS = {
+    "hooke": (
+        f"{LAW}/hooke.py", "(w, pair) * overlap", "(w, pair) * overlap * 1.01",
+        f"{PARTS}hooke_pushes_like_a_spring_and_damping_goes_by_speed",
+    ),
+    "hertz_material": (
+        f"{LAW}/hertz.py", "2.0 / 3.0", "0.66", f"{PARTS}cohesion_pulls_while_surfaces_touch",
+    ),
+    "jkr": (
+        f"{LAW}/jkr.py", "1.5 * (ratio", "1.4 * (ratio",
+        f"{PARTS}jkr_begins_at_contact_lasts_beyond_it_and_pulls_three_pi_gamma_r_at_most",
+    ),
+    "restitution_damping": (
+        f"{LAW}/restitution.py", "hypot(logarithm, math.pi)", "hypot(logarithm, 3.0)",
+        f"{PARTS}beside_hookes_spring_an_impact_has_the_restitution_too",
+    ),
+    "viscoelastic_damping": (
+        f"{LAW}/viscoelastic.py", "* stiffness", "* stiffness * 1.1",
+        f"{PARTS}viscoelastic_restitution_falls_as_the_fifth_root_of_the_speed",
+    ),
+    "constant_damping": (
+        f"{LAW}/constant.py", "+ 0.0 * stiffness", "+ 1e-3 * stiffness",
+        f"{PARTS}hooke_pushes_like_a_spring_and_damping_goes_by_speed",
+    ),
+    "mindlin_displacement": (
+        f"{LAW}/mindlin.py", "known / spring, 0.0)", "0.9 * known / spring, 0.0)",
+        f"{PARTS}the_displacement_of_mindlins_spring_is_remembered_whatever_the_pressure",
+    ),
+    "linear_spring": (
+        f"{LAW}/mindlin.py", "return self.stiffness_ratio", "return 0.9 * self.stiffness_ratio",
+        f"{PARTS}a_linear_spring_is_remembered_and_slides",
+    ),
+    "mindlin_force": (
+        f"{LAW}/mindlin.py", "elastic = turned(elastic, normal) + spring * dt * sliding",
+        "elastic = spring * dt * sliding",
+        "tests/effects/contact/test_walls.py::test_a_grain_between_two_walls_hangs_by_mindlins_springs",
+    ),
+    "viscous_friction": (
+        f"{LAW}/viscous.py", "grip *= most / ti.sqrt(square)", "grip *= 1.0",
+        f"{PARTS}viscous_friction_forgets",
+    ),
+    "rolling_cdt": (
+        f"{LAW}/rolling.py", "share * rolling, past", "-share * rolling, past",
+        f"{PARTS}a_constant_torque_holds_back_rolling_at_any_speed",
+    ),
+    "rolling_epsd": (
+        f"{LAW}/rolling.py", "2.25 * friction", "2.0 * friction",
+        "tests/effects/contact/test_compositions.py::test_one_step_and_some_hundred_are_those_of_the_twin[jkr]",
+    ),
+    "rolling_sds": (
+        f"{LAW}/rolling.py", "return grip, known / spring", "return grip, drawn",
+        f"{PARTS}a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once",
+    ),
+    "twisting_marshall": (
+        f"{LAW}/twisting.py", "0.5 * circle * circle", "circle * circle",
+        f"{PARTS}a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once",
+    ),
+    "twisting_sds": (
+        f"{LAW}/twisting.py", "self.arm(w, pair) * limit", "self.arm(w, pair) * limit * 1.1",
+        f"{PARTS}a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once",
+    ),
+    "sjkr": (
+        f"{LAW}/cohesion.py", "2.0 * ti.math.pi", "ti.math.pi", f"{PARTS}cohesion_pulls_while_surfaces_touch",
+    ),
+    "dmt": (
+        f"{LAW}/cohesion.py", "adhesive: ClassVar[bool] = True", "adhesive: ClassVar[bool] = False",
+        f"{PARTS}cohesion_pulls_while_surfaces_touch",
+    ),
+}  # fmt: skip
+"""By part of a composed law: a file, what is in it once, what it becomes, and a test that must fail then."""
+CONTACT = "tisim/effects/contact"
+TWIN = "tests/effects/contact/test_contact.py::test_contact_is_its_numpy_twin"
+SOFT_GRAINS = {
+    "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{TWIN}[contact]"),
+    "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{TWIN}[hertz]"),
+    "contact_softening": (
+        f"{CONTACT}/softening.py", "ti.max(stiffness", "ti.min(stiffness", f"{TWIN}[softening]",
+    ),
+    "contact_dissipation": (
+        f"{CONTACT}/dissipation.py", "* opening *", "* ti.max(opening, 0.0) *", f"{TWIN}[dissipation]",
+    ),
+    "contact_friction": (
+        f"{CONTACT}/friction.py", "self.dynamic(w) * pressed", "self.static(w) * pressed",
+        f"{TWIN}[friction]",
+    ),
+    "contact_bond": (
+        f"{CONTACT}/bond.py", "if e >= self.threshold(w)", "if e >= 0.9 * self.threshold(w)", f"{TWIN}[bond]",
+    ),
+}  # fmt: skip
+"""The same of the laws of Z16."""
+BONDS = "tests/effects/contact/test_bonds.py::test_"
+BONDED = {
+    "capillary_bridge": (
+        f"{CONTACT}/capillary_bridge.py", "2.5 * gap", "2.4 * gap",
+        f"{BONDS}a_liquid_bridge_forms_at_contact_pulls_as_willett_has_it_and_ruptures",
+    ),
+    "parallel_bond": (
+        f"{CONTACT}/parallel_bond.py", "ti.abs(twist) * r / (2.0 * second)", "ti.abs(twist) * r / second",
+        f"{BONDS}a_bond_breaks_at_its_strength_and_stays_broken",
+    ),
+}  # fmt: skip
+"""The same of what holds grains together."""
+MOTION = "tisim/effects/motion"
+MOVING = "tests/effects/contact/test_moving_walls.py::test_"
+WALLS = {
+    "walls": (
+        f"{CONTACT}/wall_contacts.py", "self.past[w, i, begin + c] = known[c]",
+        "self.past[w, i, begin + c] = 0.0 * known[c]",
+        "tests/effects/contact/test_walls.py::test_a_grain_between_two_walls_hangs_by_mindlins_springs",
+    ),
+    "servo": (
+        f"{MOTION}/servo.py", "/ QUANTA - 1.0", "/ QUANTA - 1.01",
+        f"{MOVING}a_servo_presses_with_the_wanted_force",
+    ),
+    "oscillation": (
+        f"{MOTION}/oscillation.py", "elementary.sin(", "elementary.cos(",
+        f"{MOVING}a_grain_goes_along_with_a_plate_that_shakes_gently",
+    ),
+    "rotation": (
+        f"{MOTION}/rotation.py", "return self.rate(w).cross(", "return 0.9 * self.rate(w).cross(",
+        f"{MOVING}a_turning_drum_drags_a_grain_with_mu_times_its_weight",
+    ),
+    "translation": (
+        f"{MOTION}/translation.py", "return r - ti.cast(", "return r - 0.99 * ti.cast(",
+        f"{MOVING}a_moving_wall_is_one_at_rest_for_those_who_go_along",
+    ),
+}  # fmt: skip
+"""The same of walls and their motions."""
+MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
+HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
+SHARED = {
+    "eased": (
+        f"{LAW}/spring.py", "ti.min(stiffness", "ti.max(stiffness",
+        f"{HERTZ_MINDLIN}a_closed_path_yields_no_work",
+    ),
+    "turned": (
+        f"{LAW}/spring.py", "known *= ti.sqrt(size / flat)", "known *= 1.0",
+        f"{HERTZ_MINDLIN}what_is_remembered_turns_with_the_pair",
+    ),
+    "slipping": (
+        f"{LAW}/spring.py", "known = grip - drag", "known = elastic",
+        f"{HERTZ_MINDLIN}coulombs_limit_holds_with_the_damping_and_is_left_at_once",
+    ),
+    "can_follow": (
+        f"{LAW}/spring.py", "2.0 * damping * dt", "0.0 * damping * dt",
+        "tests/effects/contact/test_granular_input.py"
+        "::test_what_no_step_can_follow_stops_the_world_and_is_named",
+    ),
+    "force_of_a_pair": (
+        f"{LAW}/contact.py", "back = (distance - arm) * moment", "back = arm * moment",
+        "tests/effects/contact/test_compositions.py::test_one_step_and_some_hundred_are_those_of_the_twin[jkr]",
+    ),
+    "force_of_a_wall": (
+        f"{LAW}/contact.py", "arm, radius = s.radius[w, i] - 0.5 * overlap", "arm, radius = s.radius[w, i]",
+        "tests/effects/contact/test_compositions.py::test_one_step_and_some_hundred_are_those_of_the_twin[jkr]",
+    ),
+    "memory_at_surfaces": (
+        f"{CONTACT}/wall_contacts.py", "STILL_THE_SAME = 0.9", "STILL_THE_SAME = 1.1",
+        "tests/effects/contact/test_surfaces.py::test_a_sphere_that_rolls_downhill_over_seams_keeps_its_grip",
+    ),
+    "arm": (
+        f"{CONTACT}/normal.py", "0.5 * (distance + (a - b)", "0.5 * (distance - (a - b)", f"{TWIN}[friction]",
+    ),
+}  # fmt: skip
+"""The same of what several laws share."""
+EVERY = {**MUTATIONS, **SHARED}

@@ -1,0 +1,219 @@
+"""Every granular law for long: a column at rest, friction at its threshold, spinning until all is still."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tests.effects.contact.granular_twin import law_of
+from tests.hard.granular_scenes import ELASTIC, LAWS, grains, kinetic, loaded, lossy, push, stored
+from tests.scenes import by_id, roundoff
+
+pytestmark = pytest.mark.slow
+
+FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+G = 10.0
+"""m/s^2."""
+
+
+def looks(scenes, number):
+    """States of each world at the start and after each of so many equal parts of its run, which goes well."""
+    simulation = loaded(scenes)
+    steps = max(round(one.duration / one.stepper.control.dt) for one in scenes)
+    series = [[by_id(result)] for result in simulation.results()]
+    for _ in range(number):
+        simulation.run(steps=-(-steps // number))
+        for states, result in zip(series, simulation.results(), strict=True):
+            assert result.status.ok or result.status.reason == "running", result.status.reason
+            states.append(by_id(result))
+    return series
+
+
+STRONG = {
+    "hooke": {"restitution": 0.1},
+    "jkr": {"viscous_time": 1e-2},
+    "dmt": {"damping": 100.0},
+    "mindlin": {"restitution": 0.1},
+}
+"""Losses by which a column comes to rest within seconds."""
+
+
+def balanced(name, law, n):
+    """Places of n grains of 1 kg that rest on each other and on the floor, by the force of the law alone."""
+    place = np.zeros((n, 3))
+    for k in range(n):
+        load, radius = G * (n - k), 0.5 if k else 1.0
+        overlap = brentq(lambda d, f=load, r=radius: push(name, d, r, law) - f, 0, 0.9, xtol=1e-16)
+        place[k, 2] = 1 - overlap if k == 0 else place[k - 1, 2] + 2 - overlap
+    return place
+
+
+def weighed(name, law, state):
+    """Energy of a column: of motion, of height, and of its contacts, J."""
+    z = state["position"][:, 2]
+    contacts = [stored(name, 1 - z[0], 1.0, law)] + [stored(name, 2 - d, 0.5, law) for d in np.diff(z)]
+    return kinetic(state).sum() + G * z.sum() + sum(contacts)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_tall_column_rests(name):
+    """Ten grains for 200 times the period of a contact: what starts in balance stays, without creep or heat,
+    undamped and with every loss; what starts off balance keeps its energy, and with losses comes to rest."""
+    soft = {**lossy(name)[0], **STRONG[name]}
+    made, still = [], np.zeros((10, 3))
+    laws = [{**ELASTIC[name]}, {**ELASTIC[name], **soft}]
+    for off in (0.0, 1e-4):
+        for law in laws:
+            place = balanced(name, law, 10)
+            place[5:, 2] += off
+            more = {"planes": [FLOOR], "gravity": (0, 0, -G), "dt": 1e-4, "steps": 40_000}
+            made.append(grains(name, place, still, first=law, **more))
+    series = looks(made, 40)
+    for one, states in zip(made[:2], series[:2], strict=True):
+        for state in states:
+            place = one.start()["position"]
+            np.testing.assert_allclose(state["position"], place, rtol=0, atol=1e-11 + 1e3 * roundoff())
+            assert kinetic(state).sum() < 1e-18 + (1e5 * roundoff()) ** 2
+    rest = [weighed(name, law, states[0]) for law, states in zip(laws, series[:2], strict=True)]
+    free, damped = (
+        np.array([weighed(name, law, state) - lowest for state in states])
+        for law, lowest, states in zip(laws, rest, series[2:], strict=True)
+    )
+    rounding = 1e3 * roundoff() * rest[0]
+    np.testing.assert_allclose(free, free[0], rtol=0, atol=3e-3 * free[0] + rounding)
+    assert np.diff(damped).max() < 1e-6 * damped[0] + rounding
+    assert damped[-1] < 0.02 * damped[0] + rounding
+
+
+def lasting():
+    """What becomes of a lossy column in 100 steps."""
+    law = {**ELASTIC["hooke"], **lossy("hooke")[0]}
+    place = balanced("hooke", law, 10)
+    more = {"planes": [FLOOR], "gravity": (0, 0, -G), "dt": 1e-4, "steps": 100_000}
+    simulation = loaded([grains("hooke", place, np.zeros((10, 3)), first=law, **more)])
+    simulation.run(steps=100)
+    return simulation.results()[0].status.reason
+
+
+def test_a_column_lasts_in_single_precision(single):
+    """There what slides is next to nothing, whose square is none."""
+    assert single("hard.test_granular_rest", "lasting") == "running"
+
+
+PRESSED = 0.02
+"""m; of a grain in each of two planes, between which it is."""
+SLOT = [FLOOR, ((0.0, 0.0, 2 - 2 * PRESSED), (0.0, 0.0, -1.0))]
+GRIPS = {
+    "hooke": {"friction": 0.5, "restitution": 0.0},
+    "jkr": {"friction": 0.5, "viscous_time": 4e-3, "surface_energy": 20.0},
+    "dmt": {"friction": 0.5, "damping": 200.0, "surface_energy": 20.0},
+    "mindlin": {"friction": 0.5, "restitution": 0.0},
+}
+"""Friction, damping so strong that what sticks does not swing, and adhesion where a law has it."""
+CREEPS = {"dmt": 2 * 0.7 * 200.0}
+"""N s/m, of both planes; laws whose friction is a dashpot."""
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_friction_just_below_and_just_above_its_threshold(name):
+    """A grain between two planes is pulled along them by 0.99 and 1.01 of what friction can hold, 2 mu N: it
+    hangs at rest, adhesive ones too, or creeps as a dashpot has it; or gains speed by what is left over."""
+    law = {**ELASTIC[name], **GRIPS[name]}
+    pulls = {"jkr": 2 * 3, "dmt": 2 * 4}.get(name, 0) * np.pi * law.get("surface_energy", 0.0)
+    most = 2 * 0.5 * (push(name, PRESSED, 1.0, law) + pulls)
+    made = [
+        grains(
+            name, [[0, 0, 1 - PRESSED]], np.zeros((1, 3)), planes=SLOT, gravity=(part * most, 0, 0),
+            first=law, dt=2e-5, steps=40_000,
+        )
+        for part in (0.99, 1.01)
+    ]  # fmt: skip
+    below, above = looks(made, 8)
+    for states, part in ((below, 0.99), (above, 1.01)):
+        late, last = states[-2:]
+        x, v = ([state[what][0, 0] for state in (late, last)] for what in ("position", "velocity"))
+        time = made[0].duration / 8
+        if part > 1:
+            assert (v[1] - v[0]) / time == pytest.approx(0.01 * most, rel=1e-6 + 1e5 * roundoff())
+        elif name in CREEPS:
+            np.testing.assert_allclose(v, part * most / CREEPS[name], rtol=1e-6 + 1e3 * roundoff())
+        else:
+            # What is so slow does not change the number of a place.
+            stuck = roundoff() * x[1] / made[0].stepper.control.dt
+            assert np.abs(v).max() < 1e-9 * most + stuck
+            assert x[1] == pytest.approx(x[0], abs=1e-9)
+            assert x[1] > 0
+        np.testing.assert_allclose(last["spin"], 0, atol=1e-9)
+
+
+def springs(name, made, memory, overlap, radius):
+    """What the springs of a contact hold (J), by what it remembers, and the tangential one's force, N."""
+    law, slots = law_of(made), LAWS[name].slots()
+    part = {key: memory[begin : begin + size] for key, (begin, size) in slots.items()}
+    which, at = np.zeros((1, 2), int), (np.array([overlap]), np.array([radius]))
+    _, stiffness, *_ = law.press(which, *at)
+    spring, _, _ = (values[0] for values in law.tangential_constants(which, stiffness, 0 * stiffness))
+    soft, tangential = law.materials[0], np.linalg.norm(part["tangential"][:3])
+    force = tangential if law.tangential == "mindlin_force" else spring * tangential
+    held = force**2 / (2 * spring) if spring > 0 else 0.0
+    if law.rolling == "rolling_sds":
+        held += soft["rolling_stiffness"] * (part["rolling"] ** 2).sum() / 2
+        held += soft["twisting_stiffness"] * (part["twisting"] ** 2).sum() / 2
+    if law.rolling == "rolling_epsd" and part["rolling"][3]:
+        held += (part["rolling"][:3] ** 2).sum() / (2 * part["rolling"][3])
+        held += part["twisting"][0] ** 2 / (2 * part["twisting"][1])
+    return held, force
+
+
+def total(name, made, state, law, liquid):
+    """All energy of a grain on a floor, or of a pair far above it (J), and the force of its tangential
+    spring, N."""
+    z, n, none = state["position"][:, 2], len(state["position"]), np.zeros((2, 4))
+    if n == 1:
+        overlap, radius, memory = 1 - z[0], 1.0, state.get("walls_past", none)[0]
+    else:
+        overlap, radius = 2 - np.linalg.norm(np.diff(state["position"], axis=0)), 0.5
+        past = state.get("granular_past", none)
+        memory = past.reshape(n, -1, LAWS[name].memory or 4).sum(axis=(0, 1))
+    height = -(state["position"] @ made.effects[3].acceleration).sum()
+    wet = 2 * np.pi * liquid["surface_tension"] * 2 * radius * -overlap if liquid else 0.0
+    held, force = springs(name, made, memory, overlap, radius)
+    return kinetic(state).sum() + height + stored(name, overlap, radius, law) + wet + held, force
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_what_spins_in_a_lasting_contact_never_gains_energy(name):
+    """On a floor, and a pair that adheres or that a liquid holds: it rolls, slides and twists until it is
+    still or goes round as a top does, and energy with what all springs hold never rises from one look to the
+    next, but for what steps give.
+
+    A spring acts with the surfaces of half a step ago. One that carries a steady force T, such as that by
+    which a pair with a spin about its normal goes round, so does a work of T^2 dt / (2 m_t) in a second, with
+    m_t = 2/7 m* the inertia of the surfaces; a constant torque trembles about rest by a step's worth of spin.
+    At the start dashpots alone are beyond Coulomb's limit, which draws springs against them at once.
+    """
+    law = {**ELASTIC[name], **lossy(name)[0]}
+    liquid = {"surface_tension": 5.0, "volume": 1e-3} if name == "mindlin" else None
+    spins = np.array([[3.0, 4.0, 7.0], [-5.0, 1.0, -6.0]])
+    dt, steps, number = 5e-5, 80_000, 80
+    more = {"first": law, "dt": dt, "steps": steps}
+    floor = {"planes": [FLOOR], "gravity": (0, 0, -G)}
+    made = [
+        grains(name, balanced(name, law, 1), [[0.5, 0, 0]], spin[None], **floor, **more) for spin in spins
+    ]
+    if name != "hooke":
+        pull = liquid["surface_tension"] * 2 * np.pi if liquid else 0.0
+        rest = brentq(lambda d: push(name, d, 0.5, law) - pull, 0, 0.9)
+        wet = {"liquid": liquid} if liquid else {}
+        place, turning = [[0, 0, 5], [2 - rest, 0, 5]], np.abs(spins) / 5
+        made += [grains(name, place, np.zeros((2, 3)), way * turning, **wet, **more) for way in (1, -1)]
+    for one, states in zip(made, looks(made, number), strict=True):
+        pair = len(states[0]["position"]) > 1
+        found = [total(name, one, state, law, liquid if pair else None) for state in states]
+        energies, forces = np.array(found).T
+        first, last = kinetic(states[0]).sum(), kinetic(states[-1]).sum()
+        lag = np.maximum(forces[1:], forces[:-1]) ** 2 * dt / (4 / 7 * (0.5 if pair else 1.0))
+        most = 4 * np.pi * law.get("surface_energy", 0.0) + G
+        tremble = (law["rolling_friction"] * most * dt) ** 2 if name == "dmt" else 0.0
+        given = 1.02 * lag * dt * steps / number + tremble
+        assert (np.diff(energies) < given + (1e-9 + 1e4 * roundoff()) * first).all()
+        assert last < 0.9 * first
