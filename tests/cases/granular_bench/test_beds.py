@@ -81,9 +81,9 @@ def test_settings_of_the_search_are_sound():
 
 @pytest.mark.slow
 def test_rough_grains_make_a_steeper_heap_and_flow_more_slowly():
-    """Draw-down tests with three kinds of grains, from four starts each, between which rates differ by a tenth;
-    what flows out is near Beverloo's law. The heap of the case as it is has an angle of repose between those
-    of glass beads and of sand."""
+    """Draw-down tests with three kinds of grains, from four starts each, whose rates differ by a tenth; what
+    flows out is near Beverloo's law. The heap of the case as it is has an angle of repose between those of
+    glass beads and of sand."""
     smooth_grains = {"friction": 0.1, "rolling_friction": 0.0, "restitution": 0.5}
     rough_grains = {"friction": 0.8, "rolling_friction": 0.4, "restitution": 0.5}
     results = tisim.run([
