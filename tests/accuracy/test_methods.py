@@ -416,14 +416,20 @@ def test_a_method_has_one_colour_in_all_precisions_and_arithmetics():
 
 def test_values_of_one_parameter_are_joined_and_laws_are_not():
     turned = [replace(row("Verlet: dt", t, 1e-3), setting=f"dt={t:.3g}") for t in (1e-5, 2.5, 300.0)]
-    softer = [replace(row("softer", t, 1e-3), setting=f"by {10 * t:g}, dt={t:.3g}") for t in (1.0, 10.0)]
-    parts = ("a=None", "b=Other(), a=None")
-    laws = [replace(row("Law", k, 1e-3), setting=what) for k, what in enumerate(parts, 1)]
+    softer = [replace(row("softer", t, 1e-3), setting=f"by {10 * t:g}, dt={t:.3g}") for t in (1.0, 1e6)]
+    laws = [
+        replace(row(name, k, 1e-3), setting=what)
+        for name, parts in {
+            "Law": ("a=None", "b=Other(), a=None"),
+            "Spring": ("a=One()", "a=Other2()"),
+        }.items()
+        for k, what in enumerate(parts, 1)
+    ]
     cost_study = Study(oscillator(), (KNOWN,))
     cost_study.rows = turned + softer + laws
     lines = {line.get_label(): line for line in picture(cost_study).axes[0].get_lines()}
-    styles = [lines[name].get_linestyle() for name in ("Verlet: dt", "softer", "Law")]
-    assert styles == ["-", "-", "None"]
+    styles = [lines[name].get_linestyle() for name in ("Verlet: dt", "softer", "Law", "Spring")]
+    assert styles == ["-", "-", "None", "None"]
 
 
 def test_a_picture_of_large_errors_is_not_blank():

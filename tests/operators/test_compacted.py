@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.scenes import compiled, fixed
+from tests.scenes import compiled, fixed, scene, simulate
 from tisim import Box, Cloud, InputError, Material, MeasureSeries, Scene
 from tisim.analysis import solid_fraction
 from tisim.effects import Granular, MindlinForce, RestitutionDamping, Servo, Walls
@@ -77,6 +77,25 @@ def test_to_a_wanted_pressure_or_a_wanted_part_of_a_region():
     on_the_way = series[1]["filled_fraction"]
     assert (on_the_way[:-1] < 0.5).all()
     assert on_the_way[1] == pytest.approx(filled(dense.start), abs=0.05)
+
+
+def test_a_region_is_looked_at_once_in_each_interval():
+    """One grain flies into the region, at a time of its own in each world, which ends at the next look."""
+    dt, interval, side, speed = 1e-4, 1e-3, 2.0, 1.0
+    arrivals = np.random.Generator(np.random.Philox(1)).uniform(0.0, 0.5, 64)
+    look = Compacted(fraction=0.1, low=(0, 0, 0), high=(side,) * 3, interval=interval)
+    scenes = [
+        scene([[-speed * at, 1, 1]], [[speed, 0, 0]], (look,), radius=0.8, dt=dt, duration=1.0)
+        for at in arrivals
+    ]
+    results = simulate(scenes, worlds=len(scenes), capacity=4)
+    ends = np.array([result.time for result in results])
+    assert all(result.status.reason.startswith("grains fill the region") for result in results)
+    # By rounding, the first step of an interval may be the one after it.
+    assert np.isin(np.round(ends / dt) % 10, (0, 1)).all()
+    assert ((ends >= arrivals) & (ends <= arrivals + interval + dt)).all()
+    filled_part = 4 / 3 * np.pi * 0.8**3 / side**3
+    assert results[0].measures["filled_fraction"] == pytest.approx(filled_part, rel=1e-6)
 
 
 @pytest.mark.parametrize(

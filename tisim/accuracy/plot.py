@@ -113,7 +113,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
 def _parameters(row: Row) -> str:
     """Return what a setting sets, without its values: a line joins values of the same parameters, not laws
     that differ in one part or another."""
-    return re.sub(r"(?<==)[^,]*|[0-9.]+", "", row.setting)
+    return re.sub(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?", "", row.setting)
 
 
 def _usual_method(row: Row) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator, parameter
 from tisim.operators.filled_part import FilledPart
 
@@ -14,12 +15,14 @@ class Compacted(FilledPart, Operator):
 
         4/3 pi sum_i R_i^3  >=  fraction * V
 
-    The sum is over the grains whose centres are in the region, at every ``interval``; the ``duration`` of the
-    scene is the latest. Keep the region a few grains away from walls, next to which there is less room for
-    centres. ``measures`` have the part that was filled at the last look as ``filled_fraction``.
+    The sum is over the grains whose centres are in the region, after the first step of every ``interval``;
+    the ``duration`` of the scene is the latest. Keep the region a few grains away from walls, next to which
+    there is less room for centres. ``measures`` have the part that was filled at the last look as
+    ``filled_fraction``.
     """
 
     world_quantities = ("filled_fraction",)
+    flags: ClassVar = ("looks_at_region",)
     any_order: ClassVar[bool] = True
     fields = ("radius",)
     ends: ClassVar = "grains fill the region"
@@ -30,13 +33,21 @@ class Compacted(FilledPart, Operator):
         return {"filled_fraction": ""}
 
     @ti.func
+    def intervals(self, s, w):
+        """Return how many intervals have passed."""
+        return ti.cast(ti.min(ti.floor(s.time[w] / ti.cast(self.interval(w), ti.f64)), 2.0**31 - 1), ti.i32)
+
+    @ti.func
     def acts(self, s, w):
-        interval = ti.cast(self.interval(w), ti.f64)
-        return ti.cast(ti.floor(s.time[w] / interval) > ti.floor((s.time[w] - s.dt[w]) / interval), ti.i32)
+        # Kept, as the time before this step, found anew, may be rounded into another interval.
+        return ti.cast(self.intervals(s, w) > s.looks_at_region[w], ti.i32)
 
     @ti.func
     def world(self, s, w):
+        s.looks_at_region[w] = self.intervals(s, w)
         filled, enough = self.cubes(s, w), self.enough(s, w)
         s.filled_fraction[w] = ti.cast(self.fraction(w) * (filled / enough), ti.f64)
-        if filled >= enough:
+        if not finite(s.filled_fraction[w]):
+            s.fail_world_by_effect(w, self.index)
+        elif filled >= enough:
             s.finish(w, self.index)

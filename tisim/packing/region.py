@@ -85,7 +85,8 @@ def inside_round(shape: round_box.BoxShape, centre: Vector, half: Vector, radius
     """Return the region of spheres of ``radius`` (m) wholly inside a cylinder or ball about ``centre`` (m);
     half : m, half the sides of its box."""
     sizes = half[0] if shape == "ball" else (half[0], 2 * half[2])
-    must(min(half) > radius, shape, f"larger than a sphere, of radius {radius:g} m", sizes)
+    larger = "larger" if shape == "ball" else "wider and longer"
+    must(min(half) > radius, shape, f"{larger} than a sphere, of radius {radius:g} m", sizes)
     middle, inner = np.array(centre), np.array(half) - radius
     volume = round_box.volume(shape, 2 * np.array(half))
     return Region(middle - inner, middle + inner, float(volume), shape=shape, walled=ALL_AXES)

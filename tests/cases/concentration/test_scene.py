@@ -164,7 +164,7 @@ def test_what_is_more_concentrated_is_captured_sooner_along_the_field_too():
 
 
 @pytest.mark.slow
-def test_chains_do_not_depend_on_the_steps():
+def test_chains_hardly_depend_on_the_steps():
     """Particles that move a third or three times as far in one: to half a particle, of three by which chains
     grow, at 95 % confidence. The first differ by 0.19 ± 0.14, the second by -0.02 ± 0.15."""
     settings = [{"concentration": 0.5, **CHAINS, "coarse": coarse} for coarse in (1.0, 1 / 3, 3.0)]

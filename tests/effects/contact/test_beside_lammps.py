@@ -18,6 +18,8 @@ NARROW = {
     "contacts of a grain": 0.1,
     "upright part of the contacts": 0.1,
     "mean overlap, mm": 0.2,
+    "kinetic energy on the way, J": 0.6,
+    "that of spin, J": 0.6,
 }
 """Half of an interval over the mean of what is narrow."""
 
@@ -89,7 +91,8 @@ def test_the_levers_are_what_makes_the_difference():
 @pytest.mark.parametrize("name", bench.LAWS)
 def test_a_bed_that_settles_has_the_bulk_statistics_of_lammps(name):
     """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
-    thousand tests fails by chance, and narrow beside the mean itself."""
+    thousand tests fails by chance. All are narrow beside the mean itself, but for the last speed, which is
+    nearly none."""
     law, starts = settled_lammps.bulk_law(name), [settled_lammps.random_start(100 + k) for k in range(6)]
     ours, theirs = (
         settled_lammps.table(starts, by(law, starts))

@@ -77,7 +77,7 @@ def critically_damped(tau, speed):
 
 def test_without_restitution_a_grain_stays_where_it_hits():
     """At e = 0 damping is critical: the overlap goes to 0 as Antypov and Elliott have it, at a wall and at
-    another grain, one of which may have e = 1; at no time does a grain part."""
+    another grain; at no time does a grain part."""
     speed, unit = 1.0, (5 / 3 * E_STAR) ** -0.5
     made = grains(
         [[0, 0, 1], [10, 0, 9], [12, 0, 9]], [[0, 0, -speed], [speed, 0, 0], [-speed, 0, 0]],

@@ -16,8 +16,8 @@ def turned(remembered, normal):
     size."""
     out, size = remembered.dot(normal), remembered.norm_sqr()
     known, flat = remembered - out * normal, size - out * out
-    # What is left of squares may be none though they differ: the smallest numbers are taken for 0.
-    if out * out > TURN * size and flat > 0.0:
+    # Not beside 0: the smallest numbers are taken for it by processors, and not by all compilers.
+    if out * out > TURN * size and flat > TURN * size:
         known *= ti.sqrt(size / flat)
     return known
 
