@@ -69,7 +69,9 @@ def picture(study: Study) -> Figure:
 def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
     methods = list(dict.fromkeys(map(_usual_method, study.rows)))
     for at, method in enumerate(lines):
-        rows = [row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same]
+        drawn = (row for row in study.line(method) if row.at_most(k) > 0 and row.errors and not row.same)
+        # Not as they were measured, which is another order where a study was stopped and goes on.
+        rows = sorted(drawn, key=lambda row: row.median)
         one = study.line(method)[0]
         colour = METHOD_COLOURS[methods.index(_usual_method(one)) % len(METHOD_COLOURS)]
         marker, style = MARKERS[at % len(MARKERS)], STYLES.get((one.precision, one.arithmetic), "--")
