@@ -93,7 +93,7 @@ def test_a_bed_that_settles_has_the_bulk_statistics_of_lammps(name):
     """Zero is within the interval of the mean difference between the programs, which is so wide that one of a
     thousand tests fails by chance. All are narrow beside the mean itself, but for the last speed, which is
     nearly none."""
-    law, starts = settled_lammps.bulk_law(name), [settled_lammps.random_start(100 + k) for k in range(6)]
+    law, starts = settled_lammps.bulk_law(name), [settled_lammps.random_start(100 + k) for k in range(10)]
     ours, theirs = (
         settled_lammps.table(starts, by(law, starts))
         for by in (settled_lammps.by_package, settled_lammps.by_lammps)
