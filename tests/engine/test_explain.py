@@ -67,7 +67,7 @@ def test_without_any_effect_nothing_of_effects_is_compiled():
     assert {
         item.why for item in explanation.memory if item.bytes and not item.name.endswith(("table", "list"))
     } == {"every scene"}
-    assert not {"OpenContacts*", "Bid*", "Resolve*", "Rearrange", "SumForces"} & set(explanation.phases)
+    assert not {"OpenContacts*", "Bid*", "Resolve*", "MarkLive*", "SumForces"} & set(explanation.phases)
 
 
 @pytest.mark.slow

@@ -23,10 +23,11 @@ from tisim.interactions.failure_attribution import FailureAttribution
 from tisim.interactions.force_sum import FORCE, TORQUE, SumForces, SumTrialForces, turning
 from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, ExportedTerms, fuse, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
-from tisim.interactions.rearrangement import Rearrange, StoreBefore
+from tisim.interactions.rearrangement import StoreBefore, rearrange
 from tisim.interactions.rebuild_pairs import update_pairs
 from tisim.interactions.self_consistent import SelfConsistentSolver, solver
 from tisim.interactions.spatial_sort import SpatialSort
+from tisim.interactions.vacated_slots import VacatedSlots
 from tisim.neighbours.half_list import HalfList, ListSizes
 from tisim.neighbours.lists import NeighbourLists
 from tisim.neighbours.near_list import NearList, update_near_list
@@ -155,10 +156,11 @@ class Assembly:
             first += [ClearContacts(contacts), survey]
         if events and contacts:
             step += [Rounds(contacts)]
-        if events or operators:
+        slots = VacatedSlots(s, domain, self.lists) if events or operators else None
+        if slots:
             if self.pairs and self.pairs.memories:
                 step += [StoreBefore(self.pairs, operators)]
-            step += [Rearrange(s, domain, operators, self.lists)]
+            step += rearrange(slots, operators)
             surveys = (survey,) if near and contacts and control.data.watches_pairs else ()
             if anew := (*surveys, *derived, *again):
                 step += [*lists, EnterAfterEvents(s), *anew, Enter(s, Occasion.STEP)]
@@ -175,6 +177,7 @@ class Assembly:
             (self.pairs, "pair list", steady),
             (self.exported, "forces between chunks", steady),
             (self.sort, "sorting by place", steady),
+            (slots, "slots of what is gone", "removals"),
         )
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),

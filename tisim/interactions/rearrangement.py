@@ -3,13 +3,34 @@
 from typing import Any
 
 from tisim.backend.taichi import ti
-from tisim.components.domain import Domain
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.rebuild_pairs import StoreMemory
-from tisim.neighbours.lists import NeighbourLists
+from tisim.interactions.vacated_slots import FillSlots, VacatedSlots
+from tisim.worlds.block_sum import BlockSums, PerBlock
 from tisim.worlds.bound import Bound
-from tisim.worlds.phases import Phase
+from tisim.worlds.phases import Item, Phase
 from tisim.worlds.state import State
+
+
+def rearrange(slots: VacatedSlots, operators: tuple[Bound[Any], ...]) -> tuple[Item, ...]:
+    """Return the items in which operators act on the world as a whole, and vacated slots are filled."""
+    s, fill = slots.s, FillSlots(slots)
+    acts = tuple(item for operator in acting(operators) for item in act(s, operator))
+    # Before operators too: a slot that a merger has freed has room for a fragment.
+    return (fill, *acts, fill, ForgetPairs(s)) if acts else (fill, ForgetPairs(s))
+
+
+def acting(operators: tuple[Bound[Any], ...]) -> tuple[Bound[Any], ...]:
+    """Return the operators that act on worlds as a whole."""
+    return tuple(operator for operator in operators if operator.data.offers("world"))
+
+
+def act(s: State, operator: Bound[Any]) -> tuple[Phase, ...]:
+    """Return the phases in which an operator acts on the world, after its terms are summed."""
+    if operator.data.terms == 0:
+        return (ActOnWorld(s, operator),)
+    operator.sums = BlockSums(s, operator.data.terms)
+    return SumTerms(operator), ActOnWorld(s, operator)
 
 
 class StoreBefore(StoreMemory):
@@ -17,7 +38,7 @@ class StoreBefore(StoreMemory):
 
     def __init__(self, pairs: PairChunks, operators: tuple[Bound[Any], ...]) -> None:
         super().__init__(pairs)
-        self.operators = tuple(operator for operator in operators if operator.data.offers("world"))
+        self.operators = acting(operators)
 
     @ti.func
     def when(self, w):
@@ -27,51 +48,48 @@ class StoreBefore(StoreMemory):
         return ti.min(due, self.p.unsaved[w])
 
 
-class Rearrange(Phase):
-    """This phase lets operators act on the world as a whole, and fills the slots of removed particles from
-    the end."""
+class SumTerms(PerBlock):
+    """This phase sums an operator's terms over the particles of a world, where it acts on that."""
 
-    def __init__(
-        self,
-        s: State,
-        domain: Bound[Domain],
-        operators: tuple[Bound[Any], ...],
-        lists: NeighbourLists | None,
-    ) -> None:
-        self.s, self.domain = s, domain
-        self.lists, self.listed = lists, lists is not None
-        self.operators = tuple(operator for operator in operators if operator.data.offers("world"))
+    conditional = True
+
+    def __init__(self, operator: Bound[Any]) -> None:
+        super().__init__(operator.sums)
+        self.operator = operator
+
+    @ti.func
+    def when(self, w):
+        return self.operator.acts(self.s, w)
+
+    @ti.func
+    def each(self, w, i):
+        return self.operator.each(self.s, w, i)
+
+
+class ActOnWorld(Phase):
+    """This phase lets an operator act on the world."""
+
+    def __init__(self, s: State, operator: Bound[Any]) -> None:
+        self.s, self.operator = s, operator
+
+    @property
+    def name(self) -> str:
+        return f"{super().name} {self.operator.data.label}"
+
+    @ti.func
+    def run(self, w, _k):
+        if self.operator.acts(self.s, w) > 0:
+            self.operator.world(self.s, w)
+
+
+class ForgetPairs(Phase):
+    """After events, what the survey of near pairs told the step control is no longer true."""
+
+    def __init__(self, s: State) -> None:
+        self.s = s
 
     @ti.func
     def run(self, w, _k):
         s = self.s
-        # Before operators too: a slot that a merger has freed has room for a fragment.
-        for turn in range(2):
-            if turn == 1:
-                for operator in ti.static(self.operators):
-                    if operator.acts(s, w) > 0:
-                        operator.world(s, w)
-            self.fill(w)
         if s.events[w] > 0:
-            # What the survey told the controller is no longer true.
             s.approach_time[w], s.fastest[w] = ti.math.inf, 0.0
-
-    @ti.func
-    def fill(self, w):
-        s = self.s
-        if s.changed[w] > 0:
-            i = 0
-            count = s.count[w]
-            while i < count:
-                if s.mass[w, i] > 0.0:
-                    self.domain.put(s, w, i, s.position[w, i], s.time[w])
-                    i += 1
-                else:
-                    count -= 1
-                    if i < count:
-                        s.copy(w, count, i)
-            s.count[w] = count
-            s.changed[w] = 0
-            s.events[w] = 1
-            if ti.static(self.listed):
-                self.lists.invalidate(w)

@@ -8,7 +8,8 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint
 from tisim.effects.external.gravity import Gravity
 from tisim.numerics.ieee import finite
-from tisim.operators.base import Operator, parameter
+from tisim.operators.at_intervals import AtIntervals
+from tisim.operators.base import parameter
 from tisim.operators.insertion import Insertion
 from tisim.worlds.bound import Peers
 
@@ -16,7 +17,7 @@ LOOKS = 10
 """Grains are looked at so many times while they have to be at rest."""
 
 
-class AtRest(Operator):
+class AtRest(AtIntervals):
     """A world ends when its grains have been at rest under gravity for a while.
 
         sum_i (m_i v_i^2 + 2/5 m_i R_i^2 w_i^2) / 2  <=  energy * g sum_i m_i R_i
@@ -38,6 +39,7 @@ class AtRest(Operator):
     world_quantities = ("kinetic_ratio", "unbalanced_ratio")
     flags: ClassVar = ("looks_at_rest",)
     any_order: ClassVar[bool] = True
+    terms: ClassVar = 4
     requires: ClassVar = (Gravity,)
     ends: ClassVar = "grains are at rest"
 
@@ -53,32 +55,32 @@ class AtRest(Operator):
         }
 
     @ti.func
-    def acts(self, s, w):
-        interval = ti.cast(self.time(w), ti.f64) / LOOKS
-        before = s.time[w] - s.dt[w]
-        return ti.cast(ti.floor(s.time[w] / interval) > ti.floor(before / interval), ti.i32)
+    def elapsed(self, s, w):
+        return LOOKS * s.time[w] / ti.cast(self.time(w), ti.f64)
+
+    @ti.func
+    def each(self, s, w, i):
+        terms = ti.Vector.zero(ti.f64, self.terms)
+        if self.is_free(s, w, i):
+            energy, force = self.balance(s, w, i)
+            m, radius = s.mass[w, i], s.radius[w, i]
+            terms = ti.cast(ti.Vector([energy, force, m, m * radius]), ti.f64)
+        return terms
 
     @ti.func
     def world(self, s, w):
-        g = 0.0 * s.position[w, 0]
+        self.count_interval(s, w)
+        acceleration = 0.0 * s.position[w, 0]
         for gravity in ti.static(self.gravity):
-            g += gravity.acceleration(w)
-        kinetic, unbalanced, weight, depth = 0.0 * g[0], 0.0 * g[0], 0.0 * g[0], 0.0 * g[0]
-        for i in range(s.count[w]):
-            if self.is_free(s, w, i):
-                m, radius = s.mass[w, i], s.radius[w, i]
-                energy, force = self.balance(s, w, i)
-                kinetic += energy
-                unbalanced += force
-                weight += m * g.norm()
-                depth += m * g.norm() * radius
+            acceleration += gravity.acceleration(w)
+        total, g = self.sums.total(w), ti.cast(acceleration.norm(), ti.f64)
+        kinetic, unbalanced, weight, depth = total[0], total[1], g * total[2], g * total[3]
         calm = weight > 0.0 and kinetic <= self.energy(w) * depth
         calm = calm and unbalanced <= self.unbalanced(w) * weight
         for insertion in ti.static(self.insertions):
             calm = calm and insertion.pending(s, w) == 0
         if weight > 0.0:
-            s.kinetic_ratio[w] = ti.cast(kinetic / depth, ti.f64)
-            s.unbalanced_ratio[w] = ti.cast(unbalanced / weight, ti.f64)
+            s.kinetic_ratio[w], s.unbalanced_ratio[w] = kinetic / depth, unbalanced / weight
             if not finite(s.kinetic_ratio[w] + s.unbalanced_ratio[w]):
                 s.fail_world_by_effect(w, self.index)
         s.looks_at_rest[w] = ti.select(calm, s.looks_at_rest[w] + 1, 0)

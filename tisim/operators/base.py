@@ -2,8 +2,9 @@
 
 An operator is an effect (see tisim/effects/base). ``particle`` is called for each particle on its own, and
 may write only that particle; then ``world`` is called once per world, serially, where ``acts`` says so, and
-may add particles, remove them, and end the world. One that defines no ``world`` leaves a stepper free to take
-each particle through many steps by itself.
+may add particles, remove them, and end the world. What it needs of all particles is summed before, in
+parallel: ``each`` returns ``terms`` of a particle, and ``self.sums.total(w)`` their sums. One that defines no
+``world`` leaves a stepper free to take each particle through many steps by itself.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ class Operator(Effect):
 
     any_order : whether ``world`` does the same in whatever order particles are in memory, but for rounding;
     then large worlds may be sorted by place.
+    terms : so many numbers of each particle are summed for ``world``.
     """
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
     any_order: ClassVar[bool] = False
+    terms: ClassVar[int] = 0
 
     @ti.func
     def particle(self, s, w, i, t, dt):
@@ -41,5 +44,16 @@ class Operator(Effect):
         return 1
 
     @ti.func
+    def each(self, s, w, i):
+        """Return the ``terms`` of particle i, a vector of f64; may change and remove that particle alone. It
+        is asked of all particles at once, before ``world``; those of mass 0 have been removed in this step.
+        """
+        return ti.Vector.zero(ti.f64, self.terms)
+
+    @ti.func
     def world(self, s, w):
-        """Change the world as a whole, serially, after pair events; may append and remove."""
+        """Change the world as a whole, serially, after pair events; may append and remove.
+
+        ``self.sums.total(w)`` are the sums of the ``terms``, in an order that is always the same. A loop over
+        particles belongs into ``each``.
+        """

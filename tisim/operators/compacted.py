@@ -6,11 +6,11 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.numerics.ieee import finite
-from tisim.operators.base import Operator, parameter
+from tisim.operators.base import parameter
 from tisim.operators.filled_part import FilledPart
 
 
-class Compacted(FilledPart, Operator):
+class Compacted(FilledPart):
     """A world ends when its grains fill a region to a given part of its volume, such as under a servo wall.
 
         4/3 pi sum_i R_i^3  >=  fraction * V
@@ -22,7 +22,6 @@ class Compacted(FilledPart, Operator):
     """
 
     world_quantities = ("filled_fraction",)
-    flags: ClassVar = ("looks_at_region",)
     any_order: ClassVar[bool] = True
     fields = ("radius",)
     ends: ClassVar = "grains fill the region"
@@ -33,20 +32,10 @@ class Compacted(FilledPart, Operator):
         return {"filled_fraction": ""}
 
     @ti.func
-    def intervals(self, s, w):
-        """Return how many intervals have passed."""
-        return ti.cast(ti.min(ti.floor(s.time[w] / ti.cast(self.interval(w), ti.f64)), 2.0**31 - 1), ti.i32)
-
-    @ti.func
-    def acts(self, s, w):
-        # Kept, as the time before this step, found anew, may be rounded into another interval.
-        return ti.cast(self.intervals(s, w) > s.looks_at_region[w], ti.i32)
-
-    @ti.func
     def world(self, s, w):
-        s.looks_at_region[w] = self.intervals(s, w)
-        filled, enough = self.cubes(s, w), self.enough(s, w)
-        s.filled_fraction[w] = ti.cast(self.fraction(w) * (filled / enough), ti.f64)
+        self.count_interval(s, w)
+        filled, enough = self.sums.total(w)[0], self.enough(s, w)
+        s.filled_fraction[w] = self.fraction(w) * (filled / enough)
         if not finite(s.filled_fraction[w]):
             s.fail_world_by_effect(w, self.index)
         elif filled >= enough:

@@ -6,15 +6,17 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint, parameter
+from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.filled_region import FilledRegion
 from tisim.worlds.bound import Peers
 
 
-class FilledPart(FilledRegion):
-    """A region, and the part of its volume that grains fill: each whose centre is in it with all of its
+class FilledPart(FilledRegion, AtIntervals):
+    """The part of a region's volume that grains fill is looked at: each whose centre is in it with all of its
     volume, a rigid clump with the union of its spheres."""
 
     contract: ClassVar[bool] = True
+    terms: ClassVar = 1
 
     fraction: float = parameter("", "part of the region's volume that is filled", gt=0, lt=1, examples=[0.2])
 
@@ -27,15 +29,7 @@ class FilledPart(FilledRegion):
         return self.fraction(w) * self.volume(w) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
 
     @ti.func
-    def cubes(self, s, w):
-        """Return the sum of the cubes of the radii (m^3) of the grains that are in the region."""
-        filled = 0.0 * s.radius[w, 0]
-        for i in range(s.count[w]):
-            filled += self.cube(s, w, i)
-        return filled
-
-    @ti.func
-    def cube(self, s, w, i):
+    def each(self, s, w, i):
         """Return the cube of the radius (m^3) of a ball of the volume of the grain that particle i stands
         for, where its centre is in the region; else 0."""
         place, cube = s.position[w, i], s.radius[w, i] ** 3
@@ -46,4 +40,4 @@ class FilledPart(FilledRegion):
                     cube = constraint.volume(s, w, i) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
         if s.mass[w, i] == 0.0 or not self.contains(w, place):
             cube = 0.0 * cube
-        return cube
+        return ti.Vector([ti.cast(cube, ti.f64)])

@@ -111,7 +111,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
             if hasattr(s, name):
                 given.append((getattr(s, name), first, np.size(value)))
             first += np.size(value)
-        return {"inserted": number, "inserted_mass": mass, "given_fields": tuple(given)}
+        own = {"inserted": number, "inserted_mass": mass, "given_fields": tuple(given)}
+        return {**super().remembers(s), **own}
 
     @ti.func
     def pending(self, s, w):

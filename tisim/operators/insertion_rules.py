@@ -66,23 +66,20 @@ class InsertionByFraction(FilledPart, Insertion):
     tries: int = option("places that are tried for a grain", 1000, gt=0, le=MOST_TRIES)
 
     @ti.func
-    def acts(self, s, w):
-        begin, interval = ti.cast(self.begin(w), ti.f64), ti.cast(self.interval(w), ti.f64)
-        before = s.time[w] - s.dt[w]
-        due = ti.floor((s.time[w] - begin) / interval) > ti.floor((before - begin) / interval)
-        first = s.time[w] >= begin and (before < begin or before <= 0.0)
-        due = (due and before >= begin) or first
-        return ti.cast(due and self.inserted[w] < self.number, ti.i32)
+    def elapsed(self, s, w):
+        # The first interval counts when it begins.
+        return (s.time[w] - ti.cast(self.begin(w), ti.f64)) / ti.cast(self.interval(w), ti.f64) + 1.0
 
     @ti.func
     def pending(self, s, w):
-        return ti.cast(s.time[w] <= self.begin(w), ti.i32)
+        return ti.cast(self.counted[w] == 0, ti.i32)
 
     @ti.func
     def world(self, s, w):
-        filled, most = self.cubes(s, w), self.enough(s, w)
+        self.count_interval(s, w)
+        filled, most = self.sums.total(w)[0], self.enough(s, w)
         placed = True
         while placed and filled < most and self.inserted[w] < self.number:
             radius = self.insert(s, w)
-            filled += radius**3
+            filled += ti.cast(radius, ti.f64) ** 3
             placed = radius > 0.0

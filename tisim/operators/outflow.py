@@ -21,6 +21,7 @@ class Outflow(BehindPlanes):
     counters = ("outflow",)
     world_quantities = ("outflow_mass",)
     flags: ClassVar = ("outflow_due",)
+    terms: ClassVar = 2
 
     def measured(self) -> dict[str, str]:
         return {"outflow_mass": "kg"}
@@ -35,13 +36,19 @@ class Outflow(BehindPlanes):
         return s.outflow_due[w]
 
     @ti.func
+    def each(self, s, w, i):
+        terms = ti.Vector.zero(ti.f64, self.terms)
+        if self.is_behind(s, w, i):
+            terms = ti.Vector([ti.cast(self.counts(s, w, i), ti.f64), ti.cast(s.mass[w, i], ti.f64)])
+            s.remove(w, i)
+        return terms
+
+    @ti.func
     def world(self, s, w):
         s.outflow_due[w] = 0
-        for i in range(s.count[w]):
-            if self.is_behind(s, w, i):
-                s.outflow[w] += self.counts(s, w, i)
-                s.outflow_mass[w] += ti.cast(s.mass[w, i], ti.f64)
-                s.remove(w, i)
+        total = self.sums.total(w)
+        s.outflow[w] += ti.cast(total[0], ti.i64)
+        s.outflow_mass[w] += total[1]
 
     @ti.func
     def counts(self, s, w, i):

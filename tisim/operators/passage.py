@@ -26,6 +26,7 @@ class Passage(BehindPlanes):
     fields: ClassVar = (Field("passed", "", 1, "keep", integer=True, default=0),)
     world_quantities: ClassVar = ("passed_mass", "passage_rate", "passage_begin_time", "passage_begin_mass")
     flags: ClassVar = ("passage_due",)
+    terms: ClassVar = 1
     # What has been taken out weighs nothing.
     precedes: ClassVar = (Outflow,)
 
@@ -45,12 +46,17 @@ class Passage(BehindPlanes):
         return s.passage_due[w]
 
     @ti.func
+    def each(self, s, w, i):
+        terms = ti.Vector.zero(ti.f64, self.terms)
+        if s.passed[w, i] == 0 and self.is_behind(s, w, i):
+            s.passed[w, i] = 1
+            terms[0] = ti.cast(s.mass[w, i], ti.f64)
+        return terms
+
+    @ti.func
     def world(self, s, w):
         s.passage_due[w] = 0
-        for i in range(s.count[w]):
-            if s.passed[w, i] == 0 and self.is_behind(s, w, i):
-                s.passed[w, i] = 1
-                s.passed_mass[w] += ti.cast(s.mass[w, i], ti.f64)
+        s.passed_mass[w] += self.sums.total(w)[0]
         mass, began = s.passed_mass[w], s.passage_begin_mass[w]
         if began == 0.0 and mass >= self.begin(w):
             s.passage_begin_mass[w], s.passage_begin_time[w] = mass, s.time[w]

@@ -22,19 +22,21 @@ class PeakDisplacement(Operator):
 
     fields: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
     world_quantities: ClassVar = ("peak_displacement",)
+    terms: ClassVar = 4
 
     def measured(self) -> dict[str, str]:
         return {"peak_displacement": "m"}
 
     @ti.func
+    def each(self, s, w, i):
+        mass, shift = s.mass[w, i], s.position[w, i] - s.origin[w, i]
+        return ti.cast(ti.Vector([mass * shift[0], mass * shift[1], mass * shift[2], mass]), ti.f64)
+
+    @ti.func
     def world(self, s, w):
-        shift, mass = 0.0 * s.position[w, 0], 0.0 * s.mass[w, 0]
-        for i in range(s.count[w]):
-            shift += s.mass[w, i] * (s.position[w, i] - s.origin[w, i])
-            mass += s.mass[w, i]
-        farthest = ti.cast(0.0, ti.f64)
-        if mass > 0.0:
-            farthest = ti.cast(shift.norm() / mass, ti.f64)
+        total, farthest = self.sums.total(w), ti.cast(0.0, ti.f64)
+        if total[3] > 0.0:
+            farthest = ti.Vector([total[0], total[1], total[2]]).norm() / total[3]
         # The maximum would drop NaN.
         if not finite(farthest):
             s.fail_world_by_effect(w, self.index)

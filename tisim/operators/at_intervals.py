@@ -1,0 +1,50 @@
+"""The contract of operators that act on a world at intervals of time."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.operators.base import Operator
+
+MOST_INTERVALS = 2**31 - 1
+"""Intervals are counted up to here."""
+
+
+class AtIntervals(Operator):
+    """It acts after the first step of each interval of time that has begun since it last did.
+
+    ``world`` says that it has acted by ``count_interval``. The number of the interval is kept, as that of the
+    time before a step, found anew, may be rounded into another one.
+    """
+
+    contract: ClassVar[bool] = True
+
+    def keeps(self, what: str) -> tuple[str, ...]:
+        own = (f"{self.label}_intervals",) if what == "flags" else ()
+        return *super().keeps(what), *own
+
+    def remembers(self, s: Any) -> dict[str, Any]:
+        """Return the field of the intervals that have been counted."""
+        return {**super().remembers(s), "counted": getattr(s, f"{self.label}_intervals")}
+
+    @ti.func
+    def elapsed(self, s, w):
+        """Return how many intervals have gone by, as a real number, f64; by default of ``interval`` each, a
+        parameter, since the start: it first acts when one is over."""
+        return s.time[w] / ti.cast(self.interval(w), ti.f64)
+
+    @ti.func
+    def intervals(self, s, w):
+        """Return how many whole intervals have gone by."""
+        whole = ti.floor(self.elapsed(s, w))
+        return ti.cast(ti.max(0.0, ti.min(whole, ti.cast(MOST_INTERVALS, ti.f64))), ti.i32)
+
+    @ti.func
+    def acts(self, s, w):
+        return ti.cast(self.intervals(s, w) > self.counted[w], ti.i32)
+
+    @ti.func
+    def count_interval(self, s, w):
+        """Note that it has acted in this interval."""
+        self.counted[w] = self.intervals(s, w)
