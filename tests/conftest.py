@@ -22,9 +22,11 @@ ON_DEVICES = (
     *("effects/contact/test_walls.py", "effects/contact/test_contact.py", "effects/pair/test_near_field.py"),
     *("effects/pair/test_mie.py", "effects/external/test_drag.py", "effects/magnetic/test_dipole_dipole.py"),
     *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
-    "test_testing.py",
+    *("effects/test_contract.py", "operators/test_contract.py", "operators/test_passage.py"),
+    *("operators/test_peak_displacement.py", "interactions/test_vacated_slots.py", "test_testing.py"),
 )
-"""These files hold on every device: the contracts, and the physics of each kind of law."""
+"""These files hold on every device: the contracts, and the physics of each kind of law. Insertions and
+clumps, whose steps take longest to compile, are left out."""
 
 
 def pytest_collection_modifyitems(items):

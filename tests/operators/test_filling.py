@@ -276,6 +276,8 @@ def test_grains_at_rest_end_the_run(outcome):
     assert result.status.ok
     assert result.status.reason == "grains are at rest, by effects.at_rest"
     assert 3.5 < result.time < 16.0
+    # A tenth of the time goes by from one look to the next; each is after a step.
+    assert (result.time + 1e-9) % 5e-3 < DT + 2e-9
     assert result.measures["pour_number"] == FLUX_NUMBER
     m, radius, v, f = (result.state[name] for name in ("mass", "radius", "velocity", "force"))
     kinetic = 0.5 * (m * (v**2).sum(axis=1)).sum() / (G * (m * radius).sum())

@@ -41,6 +41,7 @@ class Fragmentation(ImpactLaw, Operator):
         Field("fracture_energy", "J", 1, "sum"),
     )
     counters = ("fractures",)
+    flags: ClassVar = ("fracture_due",)
     requires: ClassVar = (Impact,)
 
     surface_energy: float = parameter("J/m^2", "surface energy gamma", examples=[10.0], gt=0)
@@ -86,15 +87,18 @@ class Fragmentation(ImpactLaw, Operator):
             for law in ti.static(self.heating):
                 s.temperature[w, i] = law.temperature(s, w, i, -energy)
             ti.atomic_add(s.fractures[w], 1)
+            ti.atomic_max(s.fracture_due[w], 1)
             broke = 1
         return broke
 
     @ti.func
+    def acts(self, s, w):
+        return s.fracture_due[w]
+
+    @ti.func
     def world(self, s, w):
-        whole = s.count[w]
-        if s.events[w] == 0:
-            whole = 0
-        for i in range(whole):
+        s.fracture_due[w] = 0
+        for i in range(s.count[w]):
             n = s.pieces[w, i]
             if n >= 2:
                 s.pieces[w, i] = 0

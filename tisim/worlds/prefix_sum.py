@@ -37,13 +37,30 @@ class PrefixSum:
         return self.tree.bytes
 
     def phases(self) -> tuple[Phase, ...]:
-        """Return the phases that make the sums."""
+        """Return the phases that make the sums; a single block takes one to compile and run."""
+        if self.blocks == 1:
+            return (SumAll(self),)
         return SumBlocks(self), SumOverBlocks(self), AddToBlocks(self)
 
     @ti.func
     def number(self, w):
         """Return the number of blocks in use."""
         return (self.items.size(w) + self.block - 1) // self.block
+
+
+class SumAll(Phase):
+    """This phase makes the sums where all items are one block."""
+
+    def __init__(self, sums: PrefixSum) -> None:
+        self.sums = sums
+
+    @ti.func
+    def run(self, w, _k):
+        p, total = self.sums, 0
+        for k in range(p.items.size(w)):
+            total += p.source[w, k]
+            p.target[w, k] = total
+        p.total[w] = total
 
 
 class SumBlocks(Phase):
