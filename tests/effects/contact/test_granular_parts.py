@@ -182,8 +182,13 @@ def test_a_contact_that_is_pressed_twisted_eased_and_twisted_back_yields_no_work
 def test_cohesion_pulls_while_surfaces_touch():
     """SJKR k_c 2 pi R* delta; DMT 4 pi gamma R*, of which friction at no load holds mu times."""
     overlap = np.array([-1e-9, 0.0, PRESSED])
-    force, _, lasts = along("hooke", overlap, cohesion_energy_density=4e3)
-    np.testing.assert_allclose(force[:, 0], (8e3 * np.pi - K) * np.maximum(overlap, 0), rtol=1e-14)
+    force, _, lasts = along("hooke", overlap, cohesion_energy_density=2e3)
+    np.testing.assert_allclose(force[:, 0], (4e3 * np.pi - K) * np.maximum(overlap, 0), rtol=1e-14)
+    most = K / (2 * np.pi)
+    for part in (0.999, 1.001):
+        force, _, _ = along("hooke", held(1), cohesion_energy_density=part * most)
+        # Beyond it nothing holds them apart, and the world stops.
+        assert np.isfinite(force).all() == (part < 1)
     force, _, lasts = along("dmt", overlap, surface_energy=5.0)
     np.testing.assert_array_equal(lasts, [0, 1, 1])
     hertz = 4 / 3 * E_STAR * PRESSED**1.5

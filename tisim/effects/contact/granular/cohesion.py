@@ -31,6 +31,9 @@ class SJKR(Cohesion):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"density": pair.mixed("cohesion_energy_density")}
 
+    def deepest_pull(self, pair: Touching, radius: float) -> float:
+        return 2 * math.pi * pair.mixed("cohesion_energy_density") * radius * radius
+
     @ti.func
     def pull(self, w, pair, radius, overlap):
         return 2.0 * ti.math.pi * self.density(w, pair) * radius * overlap

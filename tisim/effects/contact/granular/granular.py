@@ -1,13 +1,16 @@
 """The contact law that is composed of parts."""
 
+from collections.abc import Mapping, Sequence
 from typing import Self
 
+import numpy as np
 from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component
 from tisim.components.material_law import MaterialLaw
-from tisim.effects.base import option
+from tisim.effects.base import Effect, option
+from tisim.effects.contact.granular.cohesion_limit import check_grains, check_wall
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.granular.hertz import HertzMaterial
 from tisim.effects.contact.granular.hooke import Hooke
@@ -20,7 +23,13 @@ from tisim.effects.contact.granular.parts import (
     TangentialForce,
     TwistingResistance,
 )
-from tisim.effects.contact.granular.spring import can_follow
+from tisim.effects.contact.granular.step_limit import (
+    SLIDING,
+    can_follow,
+    can_follow_both,
+    least_held,
+    least_mass,
+)
 from tisim.errors import must
 from tisim.numerics.vectors import piece
 
@@ -75,8 +84,7 @@ class Granular(GranularContact):
         spring: dict[str, Component | None] = {"tangential": self.tangential and LinearSpring()}
         drawn: dict[str, Component | None] = {"tangential": self.tangential and MindlinDisplacement()}
         # A spring would not pull, and is not to be held against what pulls by the overlap.
-        held = self.normal.adhesive or (self.cohesion is not None and self.cohesion.by_overlap)
-        linear = () if held else ({"normal": Hooke(), **spring},)
+        linear = () if self.normal.adhesive or self.by_overlap else ({"normal": Hooke(), **spring},)
         changes = ({"rolling": None}, *linear, spring, drawn)
         tried: list[Self] = []
         for change in changes:
@@ -84,6 +92,14 @@ class Granular(GranularContact):
             if law not in (self, *tried):
                 tried.append(law)
         return tuple(tried)
+
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
+        if self.by_overlap:
+            check_grains(self, self._materials, start)
+
+    def suits_wall(self, start: Mapping[str, np.ndarray], material: int, label: str) -> None:
+        if self.by_overlap:
+            check_wall(self, self._materials, start, material, label)
 
     def members(self) -> dict[str, Component]:
         names = ("normal", "damping", "tangential", "rolling", "twisting", "cohesion")
@@ -111,6 +127,11 @@ class Granular(GranularContact):
         """Return whether Coulomb's limit knows of the force that parts two grains."""
         return self.normal.adhesive or (self.cohesion is not None and self.cohesion.adhesive)
 
+    @property
+    def by_overlap(self) -> bool:
+        """Return whether cohesion grows with the overlap."""
+        return self.cohesion is not None and self.cohesion.by_overlap
+
     def reaches(self) -> bool:
         return self.normal.beyond_contact
 
@@ -135,7 +156,7 @@ class Granular(GranularContact):
         return touches
 
     @ti.func
-    def contact(self, w, pair, normal, overlap, radius, mass, slip, spinning, past, dt):
+    def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt):
         known, couple, opening = 0.0 * past, 0.0 * normal, slip.dot(normal)
         deep = overlap
         if ti.static(not self.normal.beyond_contact):
@@ -147,8 +168,16 @@ class Granular(GranularContact):
         if ti.static(self.has("damping")):
             damping = self.damping.coefficient(w, pair, stiffness, mass, self.normal.restitution_factor)
         press = elastic - damping * opening
-        # Beyond this step the overlap would alternate and grow.
-        press = ti.select(can_follow(stiffness, damping, mass, dt), press, ti.math.nan)
+        spring, dashpot, friction = 0.0 * stiffness, 0.0 * stiffness, 0.0 * stiffness
+        if ti.static(self.has("tangential")):
+            spring = self.tangential.spring(w, pair, stiffness)
+            dashpot = self.tangential.dashpot(w, pair, damping)
+            friction = self.tangential.coulomb(w, pair)
+        # Else what moves would alternate and grow, or what touches fall into each other.
+        follows = self.can_follow(
+            w, pair, circle, radius, mass, inverses, stiffness, damping, spring, dashpot, friction, dt
+        )
+        press = ti.select(follows & self.holds_apart(w, pair, radius), press, ti.math.nan)
         limit = ti.abs(press)
         if ti.static(self.adhesive):
             limit = ti.abs(elastic + self.adhesion(w, pair, radius, deep))
@@ -158,7 +187,6 @@ class Granular(GranularContact):
         if ti.static(self.normal.memory > 0):
             known[0] = 1.0
 
-        spring, dashpot, friction = 0.0 * stiffness, 0.0 * stiffness, 0.0 * stiffness
         if ti.static(self.has("tangential")):
             begin, size = ti.static(self.slots()["tangential"])
             sliding = slip - opening * normal
@@ -168,10 +196,6 @@ class Granular(GranularContact):
             force += grip
             for k in ti.static(range(size)):
                 known[begin + k] = kept[k]
-            if ti.static(self.has("twisting")):
-                spring = self.tangential.spring(w, pair, stiffness)
-                dashpot = self.tangential.dashpot(w, pair, damping)
-                friction = self.tangential.coulomb(w, pair)
         if ti.static(self.has("rolling")):
             first, length = ti.static(self.slots()["rolling"])
             rolling = radius * spinning.cross(normal)
@@ -191,6 +215,42 @@ class Granular(GranularContact):
             for k in ti.static(range(extent)):
                 known[start + k] = turned[k]
         return force, couple, known
+
+    @ti.func
+    def can_follow(
+        self, w, pair, circle, radius, mass, inverses, stiffness, damping, spring, dashpot, friction, dt
+    ):
+        """Return whether steps of dt (s) can follow what presses, slides, rolls and twists, each by what its
+        part says of it."""
+        inverse, rolls, twists = 1.0 / mass, 0.0 * mass, 0.0 * mass
+        slides = least_held(friction, spring, dashpot, dt)
+        if ti.static(self.has("rolling")):
+            spin, drag = (
+                self.rolling.spring(w, pair, stiffness),
+                self.rolling.dashpot(w, pair, stiffness, mass),
+            )
+            rolls = least_held(self.rolling.coulomb(w, pair), spin, drag, dt)
+        if ti.static(self.has("twisting")):
+            arm, loss = (
+                self.twisting.coulomb(w, pair, circle, friction),
+                self.twisting.dashpot(w, pair, circle, dashpot),
+            )
+            twists = (
+                least_held(arm, self.twisting.spring(w, pair, circle, spring), loss, dt) / radius / radius
+            )
+        follows = can_follow(least_mass(stiffness, damping, dt), inverse)
+        follows = follows & can_follow(twists, inverses[0] * inverse)
+        light, both = inverses[0] * inverse, inverses[1] * inverse
+        return follows & can_follow_both(slides, rolls, SLIDING * inverse, light, both)
+
+    @ti.func
+    def holds_apart(self, w, pair, radius):
+        """Return whether it pushes more than cohesion by the overlap pulls, at one of R*."""
+        holds = True
+        if ti.static(self.by_overlap):
+            push = self.normal.elastic(w, pair, radius, radius, radius)
+            holds = self.cohesion.pull(w, pair, radius, radius) < push
+        return holds
 
     @ti.func
     def adhesion(self, w, pair, radius, overlap):

@@ -28,6 +28,10 @@ class RollingCDT(RollingResistance):
         return {"slope": pair.mixed("rolling_friction")}
 
     @ti.func
+    def coulomb(self, w, pair):
+        return self.slope(w, pair)
+
+    @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
         speed = rolling.norm()
         share = ti.select(speed > 0.0, self.slope(w, pair) * limit / speed, 0.0)
@@ -58,11 +62,23 @@ class RollingEPSD(RollingResistance):
         return {"slope": friction, "share": 2.25 * friction * friction}
 
     @ti.func
+    def spring(self, w, pair, stiffness):
+        return self.share(w, pair) * stiffness
+
+    @ti.func
+    def dashpot(self, w, pair, stiffness, mass):
+        return 2.0 * self.damping_ratio(w) * ti.sqrt(self.share(w, pair) * stiffness * mass)
+
+    @ti.func
+    def coulomb(self, w, pair):
+        return self.slope(w, pair)
+
+    @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
-        spring = self.share(w, pair) * stiffness
+        spring = self.spring(w, pair, stiffness)
         elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
         elastic = turned(elastic, normal) + spring * dt * rolling
-        drag = 2.0 * self.damping_ratio(w) * ti.sqrt(spring * mass) * rolling
+        drag = self.dashpot(w, pair, stiffness, mass) * rolling
         grip, known = slipping(elastic, drag, self.slope(w, pair) * limit)
         return grip, ti.Vector([known[0], known[1], known[2], spring])
 
@@ -89,6 +105,18 @@ class RollingSDS(RollingResistance):
             "constant": pair.mixed("rolling_stiffness"),
             "drag": pair.mixed("rolling_damping"),
         }
+
+    @ti.func
+    def spring(self, w, pair, stiffness):
+        return self.constant(w, pair)
+
+    @ti.func
+    def dashpot(self, w, pair, stiffness, mass):
+        return self.drag(w, pair)
+
+    @ti.func
+    def coulomb(self, w, pair):
+        return self.slope(w, pair)
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
