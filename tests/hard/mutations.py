@@ -160,14 +160,14 @@ SHARED = {
         f"{LAW}/step_limit.py", "return TURNING * ti", "return 2.0 * ti", f"{STEPS}[jkr]",
     ),
     "can_follow_what_twists": (
-        f"{LAW}/granular.py", "can_follow(twists, ", "can_follow(0.0 * twists, ", f"{STEPS}[hooke]",
+        f"{LAW}/guards.py", "can_follow(twists, ", "can_follow(0.0 * twists, ", f"{STEPS}[hooke]",
     ),
     "least_held": (
         f"{LAW}/step_limit.py", "ti.select(friction > 0.0, ", "ti.select(friction >= 0.0, ",
         "tests/hard/test_granular_steps.py::test_springs_without_friction_stop_nothing",
     ),
     "cohesion_by_overlap": (
-        f"{LAW}/granular.py", "radius, radius) < push", "radius, radius) < 2.0 * push",
+        f"{LAW}/guards.py", "radius, radius) < push", "radius, radius) < 2.0 * push",
         f"{PARTS}cohesion_pulls_while_surfaces_touch",
     ),
     "bonds_of_unlike_grains": (

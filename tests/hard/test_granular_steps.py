@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests.effects.contact.grains import twin
+from tests.effects.contact.grains import AWAY, twin
 from tests.effects.contact.granular_twin import law_of
 from tests.hard.granular_scenes import ELASTIC, grains, loaded, push
+from tisim import InputError
+from tisim.effects import Granular
 
 pytestmark = pytest.mark.slow
 
@@ -158,3 +160,24 @@ def test_springs_without_friction_stop_nothing():
     simulation = loaded([made])
     simulation.run()
     assert simulation.results()[0].status.ok, simulation.results()[0].status.reason
+
+
+def test_grains_that_nothing_holds_apart_stop_their_world(monkeypatch):
+    """As of grains that have grown, or that are put in: a start is refused, unless nobody asks."""
+    radius, k = np.array([1.0, 3.0]), ELASTIC["hooke"]["stiffness"]
+    most = k / (2 * np.pi * radius.prod() / radius.sum())
+    made = [
+        grains("hooke", [[0, 0, 5], [4 - 1e-6, 0, 5]], np.zeros((2, 3)), radius=radius, dt=1e-4, steps=100,
+               planes=[(AWAY[0], AWAY[1])], first={"cohesion_energy_density": part * most})
+        for part in (0.99, 1.01)
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="cohesion must be below"):
+        loaded(made)
+    for name in ("suits_start", "suits_wall"):
+        monkeypatch.setattr(Granular, name, lambda *_: None)
+    simulation = loaded(made)
+    simulation.run()
+    below, above = simulation.results()
+    assert below.status.ok, below.status.reason
+    assert "effects.granular, at particle 0" in above.status.reason
+    np.testing.assert_array_equal(above.state["position"], above.start["position"])

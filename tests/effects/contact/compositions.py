@@ -29,6 +29,7 @@ from tisim.effects import (
     ViscoelasticDamping,
     ViscousFriction,
 )
+from tisim.testing.uncompiled import started
 
 LAWS = {
     "hooke": Granular(
@@ -234,3 +235,12 @@ def along(name, overlap, moved=0.0, turned=0.0, **first):
     path, out = np.column_stack([overlap, *steps]), np.zeros((len(overlap), 7))
     _along(bound, path, out)
     return out[:, :3], out[:, 3:6], out[:, 6]
+
+
+def alone(law, overlap, **material):
+    """Force (N) of another law at some overlaps of a contact of R* = 1 m and m* = 1 kg at rest; (n, 3)."""
+    made = scene([[0, 0, 0]], [[0, 0, 0]], (law,), materials={"grain": Material(**material)})
+    out = np.zeros((len(overlap), 7))
+    with started(made) as (allocation, _):
+        _along(allocation.effects[0], np.column_stack([overlap, np.zeros((len(overlap), 6))]), out)
+    return out[:, :3]
