@@ -16,7 +16,8 @@ class RollingCDT(RollingResistance):
 
         M = mu_r R* N,    against the relative spin across the normal
 
-    It jumps where rolling changes its sense: grains at rest tremble, by a step's worth of rolling.
+    It jumps where rolling changes its sense: grains at rest tremble, by a step's worth of rolling. As it is
+    no spring, no step is too long for it.
 
     Source: Y. C. Zhou, B. D. Wright, R. Y. Yang, B. H. Xu and A. B. Yu, Physica A 269 (1999) 536, as type A
     of J. Ai, J.-F. Chen, J. M. Rotter and J. Y. Ooi, Powder Technol. 206 (2011) 269.
