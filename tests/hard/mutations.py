@@ -56,7 +56,7 @@ PARTS_OF_LAWS = {
         f"{PARTS}a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once",
     ),
     "twisting_marshall": (
-        f"{LAW}/twisting.py", "0.5 * circle * circle", "circle * circle",
+        f"{LAW}/twisting.py", "return spring * (0.5 * circle", "return spring * (circle",
         f"{PARTS}a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once",
     ),
     "twisting_sds": (
