@@ -56,7 +56,7 @@ PARTS_OF_LAWS = {
         f"{PARTS}a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once",
     ),
     "twisting_marshall": (
-        f"{LAW}/twisting.py", "0.5 * circle * circle", "circle * circle",
+        f"{LAW}/twisting.py", "return spring * (0.5 * circle", "return spring * (circle",
         f"{PARTS}a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once",
     ),
     "twisting_sds": (
@@ -131,6 +131,7 @@ WALLS = {
 }  # fmt: skip
 """The same of walls and their motions."""
 MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
+STEPS = "tests/hard/test_granular_steps.py::test_what_no_step_can_follow_stops_the_world"
 HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
 SHARED = {
     "eased": (
@@ -146,9 +147,32 @@ SHARED = {
         f"{HERTZ_MINDLIN}coulombs_limit_holds_with_the_damping_and_is_left_at_once",
     ),
     "can_follow": (
-        f"{LAW}/spring.py", "2.0 * damping * dt", "0.0 * damping * dt",
+        f"{LAW}/step_limit.py", "+ 2.0 * damping)", "+ 0.0 * damping)",
         "tests/effects/contact/test_granular_input.py"
         "::test_what_no_step_can_follow_stops_the_world_and_is_named",
+    ),
+    "can_follow_both": (
+        f"{LAW}/step_limit.py", "> (both * first) * (both * second)", "> 0.0 * both * first * second",
+        f"{STEPS}[jkr]",
+    ),
+    "can_follow_what_slides": (f"{LAW}/step_limit.py", "SLIDING = 3.5", "SLIDING = 3.0", f"{STEPS}[hooke]"),
+    "can_follow_what_rolls": (
+        f"{LAW}/step_limit.py", "return TURNING * ti", "return 2.0 * ti", f"{STEPS}[jkr]",
+    ),
+    "can_follow_what_twists": (
+        f"{LAW}/guards.py", "can_follow(twists, ", "can_follow(0.0 * twists, ", f"{STEPS}[hooke]",
+    ),
+    "least_held": (
+        f"{LAW}/step_limit.py", "ti.select(friction > 0.0, ", "ti.select(friction >= 0.0, ",
+        "tests/hard/test_granular_steps.py::test_springs_without_friction_stop_nothing",
+    ),
+    "cohesion_by_overlap": (
+        f"{LAW}/guards.py", "radius, radius) < push", "radius, radius) < 2.0 * push",
+        f"{PARTS}cohesion_pulls_while_surfaces_touch",
+    ),
+    "bonds_of_unlike_grains": (
+        f"{CONTACT}/parallel_bond.py", "coupled = arm / inertia", "coupled = 0.0 * arm / inertia",
+        f"{BONDS}what_no_step_can_follow_of_unlike_grains_stops_the_world",
     ),
     "force_of_a_pair": (
         f"{LAW}/contact.py", "back = (distance - arm) * moment", "back = arm * moment",

@@ -29,6 +29,7 @@ from tisim.effects import (
     ViscoelasticDamping,
     ViscousFriction,
 )
+from tisim.testing.uncompiled import started
 
 LAWS = {
     "hooke": Granular(
@@ -208,12 +209,13 @@ def _along(law: ti.template(), path: Array, out: Array):
     """Forces along a path of overlap, slip and relative spin, of R* = 1 m, m* = 1 kg and the normal x."""
     ti.loop_config(serialize=True)
     for _ in range(1):
+        at_wall = ti.Vector([2.5, 2.5])
         past = ti.Vector.zero(ti.f64, max(1, law.memory))
         n = ti.Vector([1.0, 0.0, 0.0])
         for k in range(path.shape[0]):
             slip = ti.Vector([path[k, 1], path[k, 2], path[k, 3]])
             spin = ti.Vector([path[k, 4], path[k, 5], path[k, 6]])
-            force, couple, known = law.contact(0, 0, n, path[k, 0], 1.0, 1.0, slip, spin, past, DT)
+            force, couple, known = law.contact(0, 0, n, path[k, 0], 1.0, 1.0, at_wall, slip, spin, past, DT)
             out[k, 6] = ti.cast(law.lasts(0, 0, path[k, 0], 1.0, past), ti.f64)
             past = ti.select(out[k, 6] > 0.0, known, 0.0)
             for c in ti.static(range(3)):
@@ -233,3 +235,12 @@ def along(name, overlap, moved=0.0, turned=0.0, **first):
     path, out = np.column_stack([overlap, *steps]), np.zeros((len(overlap), 7))
     _along(bound, path, out)
     return out[:, :3], out[:, 3:6], out[:, 6]
+
+
+def alone(law, overlap, **material):
+    """Force (N) of another law at some overlaps of a contact of R* = 1 m and m* = 1 kg at rest; (n, 3)."""
+    made = scene([[0, 0, 0]], [[0, 0, 0]], (law,), materials={"grain": Material(**material)})
+    out = np.zeros((len(overlap), 7))
+    with started(made) as (allocation, _):
+        _along(allocation.effects[0], np.column_stack([overlap, np.zeros((len(overlap), 6))]), out)
+    return out[:, :3]

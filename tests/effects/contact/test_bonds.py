@@ -220,6 +220,35 @@ def test_what_no_step_can_follow_stops_the_world():
     assert np.abs(result.state["velocity"]).max() < 1e-5
 
 
+def test_what_no_step_can_follow_of_unlike_grains_stops_the_world():
+    """Of unlike grains shear bends and bending shears: springs K with inverse masses B are followed where B K
+    dt^2 has no eigenvalue above 4."""
+    radius, mass, wide, kappa = np.array([R, R / 3]), np.array([1e-2, 4e-4]), 1.0, 2.0
+    place = [[0, 0, 0], radius.sum() * X]
+    stiff, r = 1e8 / radius.sum(), wide * radius.min()
+    area, second = np.pi * r**2, np.pi * r**4 / 4
+    inertia = 0.4 * mass * radius**2
+    both = (radius / inertia * [1, -1]).sum()
+    inverse = np.array([[(1 / mass + radius**2 / inertia).sum(), both], [both, (1 / inertia).sum()]])
+    fastest = np.linalg.eigvals(inverse @ np.diag([stiff / kappa * area, stiff * second])).max()
+    alone = (np.diag(inverse) * [stiff / kappa * area, stiff * second]).max()
+    assert fastest > 1.1 * alone
+    made = [
+        grains(place, [[0, 0, 0], 1e-8 * Y], 1e-6 * np.array([Z, -Z]), radius=radius, mass=mass, steps=500,
+               cement={"gap": 1e-6, "stiffness_ratio": kappa, "radius_ratio": wide, "tensile_strength": 1e12,
+                       "shear_strength": 1e12}, dt=part * 2 / np.sqrt(fastest))
+        for part in (0.98, 1.02)
+    ]  # fmt: skip
+    simulation = compiled(made[0], WORLDS, CAPACITY)
+    simulation.load(made)
+    simulation.run()
+    below, above = simulation.results()
+    assert below.status.ok, below.status.reason
+    assert np.abs(below.state["spin"]).max() < 1e-4
+    assert "effects.parallel_bond" in above.status.reason
+    np.testing.assert_array_equal(above.state["spin"], above.start["spin"])
+
+
 def test_bonded_grains_turn_as_one():
     """A dumbbell with a third that spins, bends and shears: momentum and angular momentum stay, and so does
     its size."""

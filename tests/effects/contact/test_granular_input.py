@@ -6,9 +6,21 @@ import pytest
 from tests.effects.contact.grains import CAPACITY, FLOOR, HERTZ_MINDLIN, USUAL, WORLDS, grains
 from tests.scenes import scene, simulate
 from tisim import InputError, Material, MaterialPair
-from tisim.effects import DMT, JKR, CapillaryBridge, Granular, Hertz, TwistingMarshall, Walls
+from tisim.effects import (
+    DMT,
+    JKR,
+    SJKR,
+    CapillaryBridge,
+    Granular,
+    Hertz,
+    HertzMaterial,
+    Hooke,
+    TwistingMarshall,
+    Walls,
+)
 from tisim.geometry import Plane
 from tisim.steppers import Verlet
+from tisim.testing.uncompiled import started
 
 
 def material(**changes):
@@ -62,6 +74,67 @@ WRONG = {
         normal=JKR(), cohesion=DMT()
     ),
 }
+
+
+def cohesive(normal, density, radius, pairs=None, material=None, acting=(), **given):
+    """Asks whether grains that lie in a row, and walls, may cohere so; grain is of the given constants."""
+    law = Granular(normal=normal, cohesion=SJKR())
+    own = {"stiffness": 2e4, "young": 1e6, "poisson": 0.3, "cohesion_energy_density": density, **given}
+    other = {**own, "cohesion_energy_density": 1.0}
+    made = scene(
+        9.0 * np.arange(len(radius))[:, None] * [1.0, 0.0, 0.0],
+        np.zeros((len(radius), 3)),
+        (law, *acting),
+        radius=radius,
+        material=material,
+        materials={"grain": Material(**own), "dust": Material(**other)},
+        material_pairs=pairs or {},
+    )
+    for effect in made.acting():
+        effect.suits_start(made.start(), made.acting())
+
+
+FLAT = Walls(planes=[Plane()], material="grain")
+MOST = 2e4 / (2 * np.pi)
+"""J/m^3; the cohesion beyond which nothing holds grains of R* = 1 m apart, of this stiffness."""
+COHESIVE = {
+    "of the largest two": ("1 m touches grain of 0.5 m", (Hooke(), 3 * MOST, [0.2, 0.5, 1.0])),
+    "of a wall": ("1 m in radius touches walls", (Hooke(), MOST, [1.0], None, None, (FLAT,))),
+    "of two materials": (
+        "dust of 0.5 m",
+        (Hooke(), 1.0, [1.0, 0.5], {"dust-grain": MaterialPair(cohesion_energy_density=3 * MOST)}, [0, 1]),
+    ),
+    "beside hertz": ("3 m touches grain of 3 m", (HertzMaterial(), 1e6 / (1.82 * 1.5 * np.pi), [3.0, 3.0])),
+}
+"""Where a cohesion is just what is too much."""
+
+
+@pytest.mark.parametrize("case", COHESIVE)
+def test_cohesion_that_nothing_holds_is_refused(case):
+    """Above k / (2 pi R*) beside a spring, and 2 E* / (3 pi) beside Hertz; just below it is none."""
+    words, (normal, density, *more) = COHESIVE[case]
+
+    def ask(part):
+        scaled = [{k: MaterialPair(cohesion_energy_density=part * p.cohesion_energy_density)
+                   for k, p in one.items()} if isinstance(one, dict) else one for one in more]  # fmt: skip
+        cohesive(normal, part * density, *scaled)
+
+    ask(0.999)
+    with pytest.raises(InputError) as fault:
+        ask(1.001)
+    message = str(fault.value)
+    assert message.startswith(f"granular.cohesion must be below what {normal.kind()} pushes with")
+    assert words in message
+
+
+def test_a_scene_is_asked_before_it_runs():
+    """By whoever loads it."""
+    made = one(Granular(normal=Hooke(), cohesion=SJKR()), Walls(planes=[Plane()]), radius=1.0,
+               materials={"grain": Material(stiffness=1.0, cohesion_energy_density=1.0)})  # fmt: skip
+    wrong = "granular.cohesion must be below what hooke pushes with at an overlap of R*, 1 N, where grain of "
+    with pytest.raises(InputError) as fault, started(made):
+        pass
+    assert str(fault.value) == f"{wrong}1 m in radius touches walls; received 6.283"
 
 
 @pytest.mark.parametrize("message", WRONG)

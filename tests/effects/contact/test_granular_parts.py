@@ -4,12 +4,14 @@ its closed form."""
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.special import gamma
 
 from cases.granular_bench import closed_forms
-from tests.effects.contact.compositions import NEUTRAL, along, grains, loaded
+from tests.effects.contact.compositions import NEUTRAL, alone, along, grains, loaded
 from tests.effects.contact.grains import run
 from tests.scenes import by_id
+from tisim.effects import SJKR, Granular, HertzMaterial
 
 pytestmark = pytest.mark.long
 
@@ -182,14 +184,38 @@ def test_a_contact_that_is_pressed_twisted_eased_and_twisted_back_yields_no_work
 def test_cohesion_pulls_while_surfaces_touch():
     """SJKR k_c 2 pi R* delta; DMT 4 pi gamma R*, of which friction at no load holds mu times."""
     overlap = np.array([-1e-9, 0.0, PRESSED])
-    force, _, lasts = along("hooke", overlap, cohesion_energy_density=4e3)
-    np.testing.assert_allclose(force[:, 0], (8e3 * np.pi - K) * np.maximum(overlap, 0), rtol=1e-14)
+    force, _, lasts = along("hooke", overlap, cohesion_energy_density=2e3)
+    np.testing.assert_allclose(force[:, 0], (4e3 * np.pi - K) * np.maximum(overlap, 0), rtol=1e-14)
+    most = K / (2 * np.pi)
+    for part in (0.999, 1.001):
+        force, _, _ = along("hooke", held(1), cohesion_energy_density=part * most)
+        # Beyond it nothing holds them apart, and the world stops.
+        assert np.isfinite(force).all() == (part < 1)
     force, _, lasts = along("dmt", overlap, surface_energy=5.0)
     np.testing.assert_array_equal(lasts, [0, 1, 1])
     hertz = 4 / 3 * E_STAR * PRESSED**1.5
     np.testing.assert_allclose(force[:, 0], [0, 20 * np.pi, 20 * np.pi - hertz], rtol=1e-13)
     force, _, _ = along("dmt", held(1, 0.0), at(1, 0.1 * Y), surface_energy=5.0, friction=0.3, damping=1e3)
     assert force[0, 1] == pytest.approx(0.3 * 20 * np.pi, rel=1e-13)
+
+
+@pytest.mark.slow
+def test_beside_hertz_cohesion_by_the_overlap_has_two_rest_at_a_root():
+    """(3 pi k_c / (2 E*))^2 R*, of R* = 1 m, found in NumPy too; up to k_c = 2 E* / (3 pi), of which it is
+    R*."""
+    law = Granular(normal=HertzMaterial(), cohesion=SJKR())
+    elastic, most = {"young": YOUNG, "poisson": POISSON}, 2 * E_STAR / (3 * np.pi)
+    for part in (0.05, 0.5, 0.999):
+        density = part * most
+        rest = brentq(lambda d, k=density: 4 / 3 * E_STAR * d**1.5 - k * 2 * np.pi * d, 1e-6, 2, xtol=1e-15)
+        assert rest == pytest.approx((1.5 * np.pi * density / E_STAR) ** 2, rel=1e-10)
+        assert rest == pytest.approx(part**2, rel=1e-10)
+        # Pulled where they lie less deep, and pushed where deeper.
+        near = rest * np.array([0.9, 1.0, 1.1])
+        force = alone(law, near, **elastic, cohesion_energy_density=density)
+        assert force[0, 0] > 0 > force[2, 0]
+        assert force[1, 0] == pytest.approx(0.0, abs=1e-9 * force[0, 0])
+    assert np.isnan(alone(law, held(1), **elastic, cohesion_energy_density=1.001 * most)[:, 0]).all()
 
 
 GAMMA = 20.0

@@ -26,11 +26,14 @@ def _along(law: ti.template(), normal: ti.types.ndarray(), path: ti.types.ndarra
     """Forces along a path of overlap and slip, of R* = 1 m and m* = 1 kg."""
     ti.loop_config(serialize=True)
     for _ in range(1):
+        at_wall = ti.Vector([2.5, 2.5])
         past = ti.Vector.zero(ti.f64, 4)
         for k in range(path.shape[0]):
             n = ti.Vector([normal[k, 0], normal[k, 1], normal[k, 2]])
             slip = ti.Vector([path[k, 1], path[k, 2], path[k, 3]])
-            force, _couple, known = law.contact(0, 0, n, path[k, 0], 1.0, 1.0, slip, 0.0 * slip, past, DT)
+            force, _couple, known = law.contact(
+                0, 0, n, path[k, 0], 1.0, 1.0, at_wall, slip, 0.0 * slip, past, DT
+            )
             past = known
             for c in ti.static(range(3)):
                 out[k, c], out[k, 3 + c] = force[c], known[c]

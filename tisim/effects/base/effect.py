@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -86,6 +86,10 @@ class Effect(LawHints, Component):
         """Return the radii (m) of the largest two particles that it may put in, or of the one; by default it
         puts in none."""
         return ()
+
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
+        """Raise InputError unless it can act on the particles of a start, by field name, among the effects of
+        the scene; by default it can."""
 
     def at_start(self, masses: np.ndarray) -> Self:
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""

@@ -6,7 +6,8 @@ from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import PairForce, parameter
-from tisim.effects.contact.granular.spring import can_follow, turned
+from tisim.effects.contact.granular.spring import turned
+from tisim.effects.contact.granular.step_limit import can_follow, can_follow_both, least_mass
 from tisim.numerics.vectors import piece
 
 
@@ -107,7 +108,7 @@ class ParallelBond(PairForce):
         inertia, other = 0.4 * m * a * a, 0.4 * n * b * b
         mass, turning = reduced(m, n), reduced(inertia, other)
         # Surfaces that are sheared push and turn both grains.
-        sheared = 1.0 / (1.0 / mass + arm * arm / inertia + back * back / other)
+        sheared = 1.0 / mass + arm * arm / inertia + back * back / other
         twice = 2.0 * self.damping_ratio(w)
         along, across = twice * ti.sqrt(stiff * area * mass), twice * ti.sqrt(soft * area * mass)
         bent = twice * ti.sqrt(stiff * second * turning)
@@ -115,9 +116,12 @@ class ParallelBond(PairForce):
         force = (pull + along * opening) * normal + shear + across * sliding
         couple = moment + bent * bending + (twist + twisted * twisting) * normal
         # In a longer step what is stretched, sheared, bent or twisted would alternate and grow.
-        follows = can_follow(stiff * area, along, mass, dt) & can_follow(soft * area, across, sheared, dt)
-        follows = follows & can_follow(stiff * second, bent, turning, dt)
-        follows = follows & can_follow(2.0 * soft * second, twisted, turning, dt)
+        follows = can_follow(least_mass(stiff * area, along, dt), 1.0 / mass)
+        follows = follows & can_follow(least_mass(2.0 * soft * second, twisted, dt), 1.0 / turning)
+        shears, bends = least_mass(soft * area, across, dt), least_mass(stiff * second, bent, dt)
+        # Of unlike grains what is sheared bends too.
+        coupled = arm / inertia - back / other
+        follows = follows & can_follow_both(shears, bends, sheared, 1.0 / turning, coupled)
         force = ti.select(follows, force, ti.math.nan)
 
         force, couple = ti.select(holds, force, 0.0), ti.select(holds, couple, 0.0)

@@ -77,6 +77,11 @@ class Walls(WallContacts, UsesMaterials, Force):
     def check_materials(self, materials: Materials) -> None:
         self.material_index(materials)
 
+    def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
+        for law in effects:
+            if isinstance(law, GranularContact):
+                law.suits_wall(start, self.material_index(self._materials), self.label)
+
     def material_index(self, materials: Materials) -> int:
         """Return the index of the material of the walls among those of a scene."""
         return 0 if self.material is None else materials.index(self.material, f"{self.label}.material")

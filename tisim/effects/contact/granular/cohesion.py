@@ -16,8 +16,13 @@ class SJKR(Cohesion):
         F = k_c A,    A = 2 pi R* delta
 
     A is the area of the lens that two spheres share, to first order in delta / R*. Coulomb's limit is that of
-    the normal force without cohesion. Where 2 pi k_c R* is above the stiffness of ``hooke`` nothing holds
-    grains apart: they fall into each other.
+    the normal force without cohesion.
+
+    Beside ``hooke`` it is held at all overlaps or at none: where 2 pi k_c R* is above the stiffness k grains
+    fall into each other. Beside ``hertz_material`` two that nothing presses rest at delta = (3 pi k_c / (2
+    E*))^2 R*. Where that is above R*, for k_c > 2 E* / (3 pi), the circle of contact would be wider than R*
+    and the area above means nothing. Both are so where the pull is not below the elastic force at an overlap
+    of R*: grains and walls of a start are then refused, and what grows to be so stops its world.
 
     Source: L21 section 2.2.1; C. Kloss, C. Goniva, A. Hager, S. Amberger and S. Pirker, Prog. Comput. Fluid
     Dyn. 12 (2012) 140, for its use.
@@ -31,6 +36,9 @@ class SJKR(Cohesion):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"density": pair.mixed("cohesion_energy_density")}
 
+    def deepest_pull(self, pair: Touching, radius: float) -> float:
+        return 2 * math.pi * pair.mixed("cohesion_energy_density") * radius * radius
+
     @ti.func
     def pull(self, w, pair, radius, overlap):
         return 2.0 * ti.math.pi * self.density(w, pair) * radius * overlap
@@ -42,7 +50,9 @@ class DMT(Cohesion):
 
         F = 4 pi gamma R*
 
-    gamma is the surface energy, half the work of adhesion. Coulomb's limit is taken of |F_n + 2 F|, with F_n
+    gamma is the surface energy, half the work of adhesion. A constant force is held by every normal force:
+    beside ``hertz_material`` two that nothing presses rest at delta = (3 pi gamma / (E* R*))^(2/3) R*.
+    Coulomb's limit is taken of |F_n + 2 F|, with F_n
     the elastic and cohesive force, so that it is mu F where the contact is about to part.
 
     Source: B. V. Derjaguin, V. M. Muller and Y. P. Toporov, J. Colloid Interface Sci. 53 (1975) 314; L21 Eq.

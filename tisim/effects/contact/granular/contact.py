@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.material_law import MaterialLaw
 from tisim.effects.base import Field, PairForce
+from tisim.effects.contact.granular.step_limit import TURNING, rolling_inertia
 
 
 class GranularContact(MaterialLaw, PairForce):
@@ -28,6 +32,9 @@ class GranularContact(MaterialLaw, PairForce):
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
 
+    def suits_wall(self, start: Mapping[str, np.ndarray], material: int, label: str) -> None:
+        """Raise InputError unless it can act between the particles of a start and walls of a material."""
+
     def required_fields(self) -> tuple[str | Field, ...]:
         return (*self.fields, "material") if self.several else self.fields
 
@@ -37,14 +44,15 @@ class GranularContact(MaterialLaw, PairForce):
         return overlap >= 0.0
 
     @ti.func
-    def contact(self, w, pair, normal, overlap, radius, mass, slip, spinning, past, dt):
+    def contact(self, w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt):
         """Return the force (N) and the couple (N m) on i, and what the contact remembers after a further dt
         (s), given ``past``.
 
         pair : which materials touch (see tisim/components/material_law.py). normal : unit vector from i to
-        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. slip :
-        velocity (m/s) of the surface of the other past that of i. spinning : spin (rad/s) of the other
-        relative to i. Where there is no contact what it returns is not used, and may be no number.
+        the other. overlap : delta (m). radius, mass : R* (m) and m* (kg), 1/R* = 1/R_i + 1/R_j. inverses : of
+        what rolls, over 1/m* (see ``rolling_inertia``). slip : velocity (m/s) of the surface of the other
+        past that of i. spinning : spin (rad/s) of the other relative to i. Where there is no contact what it
+        returns is not used, and may be no number.
         """
         return 0.0 * normal, 0.0 * normal, past
 
@@ -60,10 +68,13 @@ class GranularContact(MaterialLaw, PairForce):
         # R* and m*, by one division, and by no product of masses, which of small grains is below f32.
         sizes, masses = a + b, m + n
         inverse = 1.0 / (sizes * masses)
-        radius, mass = a * (b * (masses * inverse)), m * (n * (sizes * inverse))
+        lever, share = b * (masses * inverse), n * (sizes * inverse)
+        radius, mass, inverses = a * lever, m * share, rolling_inertia(lever, share)
         pair, spinning = self.material_pair(s, w, i, j), s.spin[w, j] - s.spin[w, i]
         # Chosen afterwards, not by a branch: several pairs are computed at once.
-        force, couple, known = self.contact(w, pair, normal, overlap, radius, mass, slip, spinning, past, dt)
+        force, couple, known = self.contact(
+            w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt
+        )
         lasts = self.lasts(w, pair, overlap, radius, past)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
         # n x F is the same seen from either: both turn round at once.
@@ -89,7 +100,11 @@ class GranularContact(MaterialLaw, PairForce):
             pair = s.material[w, i] * self.number_of_materials + material
         slip = velocity - s.velocity[w, i] - (arm * spin).cross(normal)
         mass, spinning = s.mass_at_wall(w, i), turning - spin
-        force, couple, known = self.contact(w, pair, normal, overlap, radius, mass, slip, spinning, past, dt)
+        # What rolls on a wall slides past it as fast.
+        inverses = TURNING * ti.Vector([1.0, 1.0])
+        force, couple, known = self.contact(
+            w, pair, normal, overlap, radius, mass, inverses, slip, spinning, past, dt
+        )
         lasts = self.lasts(w, pair, overlap, radius, past)
         force, couple = ti.select(lasts, force, 0.0), ti.select(lasts, couple, 0.0)
         return force, arm * normal.cross(force) + couple, ti.select(lasts, known, 0.0)

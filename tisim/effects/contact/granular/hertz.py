@@ -25,6 +25,9 @@ class HertzMaterial(NormalForce):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"modulus": 2 * pair.effective_young}
 
+    def deepest_push(self, pair: Touching, radius: float) -> float:
+        return 4 / 3 * pair.effective_young * radius * radius
+
     @ti.func
     def stiffness(self, w, pair, circle):
         return self.modulus(w, pair) * circle

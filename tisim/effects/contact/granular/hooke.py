@@ -25,6 +25,9 @@ class Hooke(NormalForce):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"constant": pair.mixed("stiffness")}
 
+    def deepest_push(self, pair: Touching, radius: float) -> float:
+        return pair.mixed("stiffness") * radius
+
     @ti.func
     def stiffness(self, w, pair, circle):
         return self.constant(w, pair) + 0.0 * circle

@@ -22,8 +22,9 @@ class JKR(NormalForce):
 
     gamma is the surface energy, half the work of adhesion. Contact begins at delta = 0, with F_n = -8/9 F_c;
     the largest pull is F_c = 3 pi gamma R*. It lasts to delta = -3/2 (pi gamma / E*)^(2/3) (R*/2)^(1/3),
-    where the equation ends, at F_n = -5/9 F_c. LAMMPS ends it where the pull is largest. Coulomb's limit is
-    taken of |F_n + 2 F_c|.
+    where the equation ends, at F_n = -5/9 F_c. Two that nothing presses rest at delta = (pi gamma / E*)^(2/3)
+    (3 R*)^(1/3), at any gamma: what is pressed deeper is pushed back. LAMMPS ends it where the pull is
+    largest. Coulomb's limit is taken of |F_n + 2 F_c|.
 
     Source: K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; C. Thornton and
     Z. Ning, Powder Technol. 99 (1998) 154; J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.

@@ -3,15 +3,18 @@
 In all of them ``pair`` says which materials touch (see tisim/components/material_law.py), ``radius`` is R*
 and ``mass`` m*; 1/R* = 1/R_i + 1/R_j and 1/m* = 1/m_i + 1/m_j. ``limit`` is the normal force (N) that
 Coulomb's limit is taken of. A part that remembers something says how many values, in ``memory``; they are 0
-when a contact begins.
+when a contact begins. Parts that hold back a motion say by which ``spring``, ``dashpot`` and ``coulomb`` they
+do: where no step can follow these, and there is friction, the world stops (see step_limit.py).
 """
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.material_law import MaterialLaw
+from tisim.components.materials import Touching
 
 
 class ContactPart(MaterialLaw):
@@ -33,6 +36,11 @@ class NormalForce(ContactPart):
     adhesive: ClassVar[bool] = False
     beyond_contact: ClassVar[bool] = False
     memory: ClassVar[int] = 0
+
+    def deepest_push(self, pair: Touching, radius: float) -> float:
+        """Return the elastic force (N) at an overlap of R* (m), which cohesion by the overlap must not reach;
+        where a law does not say it, none is refused before a run."""
+        return math.inf
 
     @ti.func
     def circle(self, w, pair, radius, overlap):
@@ -94,12 +102,12 @@ class TangentialForce(ContactPart):
 
     @ti.func
     def spring(self, w, pair, stiffness):
-        """Return the tangential stiffness S_t (N/m)."""
+        """Return the tangential stiffness S_t (N/m), given S_n."""
         return 0.0 * stiffness
 
     @ti.func
     def dashpot(self, w, pair, damping):
-        """Return the tangential damping (N s/m)."""
+        """Return the tangential damping (N s/m), given that of the normal force."""
         return 0.0 * damping
 
     @ti.func
@@ -123,6 +131,21 @@ class RollingResistance(ContactPart):
         """
         return 0.0 * normal, past
 
+    @ti.func
+    def spring(self, w, pair, stiffness):
+        """Return the stiffness (N/m) by which the force grows, given S_n."""
+        return 0.0 * stiffness
+
+    @ti.func
+    def dashpot(self, w, pair, stiffness, mass):
+        """Return the damping (N s/m), given S_n and m*."""
+        return 0.0 * stiffness
+
+    @ti.func
+    def coulomb(self, w, pair):
+        """Return the coefficient of rolling friction."""
+        return 0.0
+
 
 class TwistingResistance(ContactPart):
     """Twisting resistance holds back two that twist on each other, by a couple about their normal."""
@@ -140,17 +163,37 @@ class TwistingResistance(ContactPart):
         """
         return 0.0 * twisting, past
 
+    @ti.func
+    def spring(self, w, pair, circle, spring):
+        """Return the stiffness (N m/rad), given the radius of the contact and S_t."""
+        return 0.0 * circle
+
+    @ti.func
+    def dashpot(self, w, pair, circle, dashpot):
+        """Return the damping (N m s/rad), given the radius of the contact and gamma_t."""
+        return 0.0 * circle
+
+    @ti.func
+    def coulomb(self, w, pair, circle, friction):
+        """Return the largest couple over N (m), given the radius of the contact and mu."""
+        return 0.0 * circle
+
 
 class Cohesion(ContactPart):
     """Cohesion pulls two that touch towards each other.
 
     adhesive : whether Coulomb's limit knows of it, as of the force that parts the two. by_overlap : whether
-    it grows with the overlap, so that what two that touch do goes by which normal force is beside it.
+    it grows with the overlap, so that what two that touch do goes by which normal force is beside it. Where
+    it is then not below the elastic force at an overlap of R*, grains are refused, or their world stops.
     """
 
     contract: ClassVar[bool] = True
     adhesive: ClassVar[bool] = False
     by_overlap: ClassVar[bool] = False
+
+    def deepest_pull(self, pair: Touching, radius: float) -> float:
+        """Return its force (N) at an overlap of R* (m), where it grows with the overlap."""
+        return 0.0
 
     @ti.func
     def pull(self, w, pair, radius, overlap):

@@ -16,7 +16,8 @@ class RollingCDT(RollingResistance):
 
         M = mu_r R* N,    against the relative spin across the normal
 
-    It jumps where rolling changes its sense: grains at rest tremble, by a step's worth of rolling.
+    It jumps where rolling changes its sense: grains at rest tremble, by a step's worth of rolling. As it is
+    no spring, no step is too long for it.
 
     Source: Y. C. Zhou, B. D. Wright, R. Y. Yang, B. H. Xu and A. B. Yu, Physica A 269 (1999) 536, as type A
     of J. Ai, J.-F. Chen, J. M. Rotter and J. Y. Ooi, Powder Technol. 206 (2011) 269.
@@ -26,6 +27,10 @@ class RollingCDT(RollingResistance):
 
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"slope": pair.mixed("rolling_friction")}
+
+    @ti.func
+    def coulomb(self, w, pair):
+        return self.slope(w, pair)
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
@@ -58,11 +63,23 @@ class RollingEPSD(RollingResistance):
         return {"slope": friction, "share": 2.25 * friction * friction}
 
     @ti.func
+    def spring(self, w, pair, stiffness):
+        return self.share(w, pair) * stiffness
+
+    @ti.func
+    def dashpot(self, w, pair, stiffness, mass):
+        return 2.0 * self.damping_ratio(w) * ti.sqrt(self.share(w, pair) * stiffness * mass)
+
+    @ti.func
+    def coulomb(self, w, pair):
+        return self.slope(w, pair)
+
+    @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
-        spring = self.share(w, pair) * stiffness
+        spring = self.spring(w, pair, stiffness)
         elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
         elastic = turned(elastic, normal) + spring * dt * rolling
-        drag = 2.0 * self.damping_ratio(w) * ti.sqrt(spring * mass) * rolling
+        drag = self.dashpot(w, pair, stiffness, mass) * rolling
         grip, known = slipping(elastic, drag, self.slope(w, pair) * limit)
         return grip, ti.Vector([known[0], known[1], known[2], spring])
 
@@ -89,6 +106,18 @@ class RollingSDS(RollingResistance):
             "constant": pair.mixed("rolling_stiffness"),
             "drag": pair.mixed("rolling_damping"),
         }
+
+    @ti.func
+    def spring(self, w, pair, stiffness):
+        return self.constant(w, pair)
+
+    @ti.func
+    def dashpot(self, w, pair, stiffness, mass):
+        return self.drag(w, pair)
+
+    @ti.func
+    def coulomb(self, w, pair):
+        return self.slope(w, pair)
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):

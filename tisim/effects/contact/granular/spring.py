@@ -38,15 +38,3 @@ def eased(stiffness, before):
     """Return the part of an elastic force that a spring holds which was stiffer ``before``: at constant force
     more would come back than was put in."""
     return ti.min(stiffness / ti.max(before, NO_GRIP), 1.0)
-
-
-@ti.func
-def can_follow(stiffness, damping, mass, dt):
-    """Return whether steps of dt (s) by half kicks can follow a spring (N/m) with a dashpot (N s/m) of a
-    reduced mass (kg), or those of a rotation (N m/rad, N m s/rad, kg m^2).
-
-    The dashpot acts with the velocity of half a step ago, so that with S = k dt^2 / m and g = c dt / m an
-    amplitude goes by the roots of z^2 - (2 - S - g) z + 1 - g from step to step; beyond S + 2 g = 4 one of
-    them is below -1.
-    """
-    return stiffness * dt * dt + 2.0 * damping * dt < 4.0 * mass

@@ -33,12 +33,23 @@ class TwistingMarshall(TwistingResistance):
     needs_tangential: ClassVar[bool] = True
 
     @ti.func
+    def spring(self, w, pair, circle, spring):
+        return spring * (0.5 * circle * circle)
+
+    @ti.func
+    def dashpot(self, w, pair, circle, dashpot):
+        return dashpot * (0.5 * circle * circle)
+
+    @ti.func
+    def coulomb(self, w, pair, circle, friction):
+        return 2.0 / 3.0 * circle * friction
+
+    @ti.func
     def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
-        area = 0.5 * circle * circle
-        stiffness = spring * area
+        stiffness = self.spring(w, pair, circle, spring)
         elastic = eased(stiffness, past[1]) * past[0] + stiffness * dt * twisting
-        most = 2.0 / 3.0 * circle * friction * limit
-        couple, known = _slipping(elastic, dashpot * area * twisting, most)
+        drag = self.dashpot(w, pair, circle, dashpot) * twisting
+        couple, known = _slipping(elastic, drag, self.coulomb(w, pair, circle, friction) * limit)
         return couple, ti.Vector([known, stiffness])
 
 
@@ -62,6 +73,18 @@ class TwistingSDS(TwistingResistance):
             "constant": pair.mixed("twisting_stiffness"),
             "drag": pair.mixed("twisting_damping"),
         }
+
+    @ti.func
+    def spring(self, w, pair, circle, spring):
+        return self.constant(w, pair) + 0.0 * circle
+
+    @ti.func
+    def dashpot(self, w, pair, circle, dashpot):
+        return self.drag(w, pair) + 0.0 * circle
+
+    @ti.func
+    def coulomb(self, w, pair, circle, friction):
+        return self.arm(w, pair) + 0.0 * circle
 
     @ti.func
     def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):

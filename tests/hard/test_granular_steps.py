@@ -1,0 +1,183 @@
+"""Steps that no spring and no dashpot of a contact can follow, in each way to move: just below the limit a
+motion stays small, and so it does in NumPy, where nothing stops it; just beyond it grows there, and the world
+stops."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from tests.effects.contact.grains import AWAY, twin
+from tests.effects.contact.granular_twin import law_of
+from tests.hard.granular_scenes import ELASTIC, grains, loaded, push
+from tisim import InputError
+from tisim.effects import Granular
+
+pytestmark = pytest.mark.slow
+
+FLOOR = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+G, TINY = 10.0, 1e-4
+"""m/s^2; m/s and rad/s, of what is nearly at rest."""
+STICKS, ROLLS, TWISTS = {"friction": 1e3}, {"rolling_friction": 1e3}, {"twisting_friction": 1e3}
+WAYS = {
+    "hooke": {
+        "slides": STICKS,
+        "slides, damped": {**STICKS, "restitution": 0.3},
+        "rolls": {**ROLLS, "rolling_stiffness": 9e4},
+        "rolls, damped": {**ROLLS, "rolling_damping": 900.0},
+        "twists": {**TWISTS, "twisting_stiffness": 9e4},
+        "twists, damped": {**TWISTS, "twisting_damping": 900.0},
+        "slides and rolls": {**STICKS, **ROLLS, "rolling_stiffness": 1e4, "rolling_damping": 20.0},
+    },
+    "jkr": {
+        "slides": STICKS,
+        "slides, damped": {**STICKS, "viscous_time": 0.01},
+        "rolls": {"rolling_friction": 2.0},
+        "slides and rolls": {**STICKS, "rolling_friction": 0.7},
+        "a pair slides and rolls": {**STICKS, "rolling_friction": 0.7, "surface_energy": 20.0},
+    },
+    "dmt": {"slides, damped": {**STICKS, "damping": 2e4, "rolling_friction": 0.5}},
+    "mindlin": {"slides": STICKS, "slides, damped": {**STICKS, "restitution": 0.3}},
+}
+"""By law and way to move, what the material has other than what presses alone."""
+PAIR = {"radius": np.array([1.0, 0.3]), "mass": np.array([1.0, 0.05])}
+
+
+def nearly_at_rest(name, way, dt, steps, **more_of_it):
+    """A grain on a floor, or a pair that adheres; it presses by what balances it, and moves a little in all
+    ways across the normal. Its overlap (m) too."""
+    law, rng = {**ELASTIC[name], **WAYS[name][way], **more_of_it}, np.random.default_rng(1)
+    more = {"first": law, "dt": dt, "steps": steps}
+    if "pair" in way:
+        reduced = PAIR["radius"].prod() / PAIR["radius"].sum()
+        overlap = brentq(lambda d: push(name, d, reduced, law), 0, 0.2, xtol=1e-16)
+        place = [[0, 0, 5], [PAIR["radius"].sum() - overlap, 0, 5]]
+        more, across = {**more, **PAIR}, np.array([0, 1, 1])
+    else:
+        overlap = brentq(lambda d: push(name, d, 1.0, law) - G, 0, 0.2, xtol=1e-16)
+        place, across = [[0, 0, 1 - overlap]], np.array([1, 1, 0])
+        more.update(planes=[FLOOR], gravity=(0, 0, -G))
+    velocity, spin = TINY * rng.normal(size=(2, len(place), 3))
+    return grains(name, place, velocity * across, spin, **more), overlap
+
+
+def springs(made, overlap, radius, mass):
+    """Of what presses, slides, rolls and twists: spring and dashpot; none where there is no friction."""
+    law, which = law_of(made), np.zeros((1, 2), int)
+    soft = law.materials[0]
+    circle, stiffness, *_ = law.press(which, np.array([overlap]), np.array([radius]))
+    damping = law.loss(which, np.broadcast_to(stiffness, 1), np.array([mass]))
+    slides = np.ravel(law.tangential_constants(which, stiffness, damping)[:2]) * (soft["friction"] > 0)
+    rolls, twists = np.zeros(2), np.zeros(2)
+    if law.rolling == "rolling_sds":
+        rolls, twists = (
+            np.array([soft[f"{way}_stiffness"], soft[f"{way}_damping"]]) * (soft[f"{way}_friction"] > 0)
+            for way in ("rolling", "twisting")
+        )
+    if law.rolling == "rolling_epsd":
+        rolls[0] = 2.25 * soft["rolling_friction"] ** 2 * stiffness[0]
+        rolls[1] = 2 * law.options["rolling_damping_ratio"] * np.sqrt(rolls[0] * mass)
+        twists = slides * circle[0] ** 2 / 2
+    return np.array([np.ravel([stiffness, damping]), slides, rolls, twists])
+
+
+def inverse_masses(overlap, radius, mass):
+    """How forces along the normal and across it, couples of rolling over R*, and those of twisting accelerate
+    what they act on: 1/kg, and 1/(kg m^2) of twisting."""
+    inverse, inertia = 1 / mass, 1 / (0.4 * mass * radius**2)
+    arm, effective = radius - overlap / 2, 1 / (1 / radius).sum()
+    sign = np.array([1, -1])[: len(radius)]
+    out = np.diag([inverse.sum(), inverse.sum() + (arm**2 * inertia).sum(), 0, inertia.sum()])
+    out[2, 2] = effective**2 * inertia.sum()
+    out[1, 2] = out[2, 1] = effective * (sign * arm * inertia).sum()
+    return out, effective, 1 / inverse.sum()
+
+
+def limit(name, way):
+    """The step (s) from which on one of them grows, and which it is: half kicks of springs K and dashpots C
+    with inverse masses B are stable where B (K dt^2 + 2 C dt) has no eigenvalue above 4."""
+    made, overlap = nearly_at_rest(name, way, 1.0, 1)
+    start = made.start()
+    inverse, radius, mass = inverse_masses(overlap, start["radius"], start["mass"])
+    k, c = springs(made, overlap, radius, mass).T
+
+    def worst(dt):
+        values, vectors = np.linalg.eig(inverse @ np.diag(k * dt**2 + 2 * c * dt))
+        return values.max(), np.abs(vectors[:, values.argmax()]).argmax()
+
+    dt = brentq(lambda dt: worst(dt)[0] - 4, 1e-9, 1.0, xtol=1e-16)
+    return dt, worst(dt)[1]
+
+
+def fastest(velocity, spin):
+    return max(np.abs(velocity).max(), np.abs(spin).max())
+
+
+CASES = [(name, way) for name, ways in WAYS.items() for way in ways]
+
+
+@pytest.mark.parametrize(("name", "way"), CASES)
+def test_the_limit_is_where_a_motion_grows(name, way):
+    """In NumPy, which goes on beyond it, until surfaces slip; what grows is not what presses."""
+    dt, grows = limit(name, way)
+    assert grows > 0
+    for part in (0.98, 1.02):
+        made, _ = nearly_at_rest(name, way, part * dt, 1)
+        known = twin(made)
+        first, most = fastest(known.v, known.w), 0.0
+        for _ in range(500):
+            known.run(1, part * dt)
+            most = max(most, fastest(known.v, known.w) / first)
+            if most > 10:
+                break
+        assert (most > 10) == (part > 1)
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_what_no_step_can_follow_stops_the_world(name):
+    """The law is named, and the last good state is kept, which is the start."""
+    tried = [(way, part) for way in WAYS[name] for part in (0.98, 1.02)]
+    made = [nearly_at_rest(name, way, part * limit(name, way)[0], 400)[0] for way, part in tried]
+    simulation = loaded(made)
+    simulation.run()
+    for (way, part), one, result in zip(tried, made, simulation.results(), strict=True):
+        start = one.start()
+        if part < 1:
+            assert result.status.ok, (way, result.status.reason)
+            speed = fastest(result.state["velocity"], result.state["spin"])
+            assert speed < 10 * fastest(start["velocity"], start["spin"]), way
+        else:
+            by = "granular" if "pair" in way else "walls"
+            for word in ("not finite", f"effects.{by}", "particle 0"):
+                assert word in result.status.reason, (way, result.status.reason)
+            for field in ("position", "velocity", "spin"):
+                np.testing.assert_array_equal(result.state[field], start[field], err_msg=way)
+
+
+def test_springs_without_friction_stop_nothing():
+    """What holds nothing back has no limit, however stiff."""
+    idle = {"rolling_stiffness": 1e9, "twisting_stiffness": 1e9, "rolling_damping": 1e9}
+    made, _ = nearly_at_rest("hooke", "slides", 0.9 * limit("hooke", "slides")[0], 400, **idle)
+    simulation = loaded([made])
+    simulation.run()
+    assert simulation.results()[0].status.ok, simulation.results()[0].status.reason
+
+
+def test_grains_that_nothing_holds_apart_stop_their_world(monkeypatch):
+    """As of grains that have grown, or that are put in: a start is refused, unless nobody asks."""
+    radius, k = np.array([1.0, 3.0]), ELASTIC["hooke"]["stiffness"]
+    most = k / (2 * np.pi * radius.prod() / radius.sum())
+    made = [
+        grains("hooke", [[0, 0, 5], [4 - 1e-6, 0, 5]], np.zeros((2, 3)), radius=radius, dt=1e-4, steps=100,
+               planes=[(AWAY[0], AWAY[1])], first={"cohesion_energy_density": part * most})
+        for part in (0.99, 1.01)
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="cohesion must be below"):
+        loaded(made)
+    for name in ("suits_start", "suits_wall"):
+        monkeypatch.setattr(Granular, name, lambda *_: None)
+    simulation = loaded(made)
+    simulation.run()
+    below, above = simulation.results()
+    assert below.status.ok, below.status.reason
+    assert "effects.granular, at particle 0" in above.status.reason
+    np.testing.assert_array_equal(above.state["position"], above.start["position"])

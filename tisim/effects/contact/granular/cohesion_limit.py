@@ -1,0 +1,51 @@
+"""How much cohesion by the overlap a normal force can hold: known of the grains of a start before it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tisim.errors import must
+
+if TYPE_CHECKING:
+    from tisim.components.materials import Materials, Touching
+    from tisim.effects.contact.granular.granular import Granular
+
+
+def largest_radii(start: Mapping[str, np.ndarray]) -> dict[int, list[float]]:
+    """Return the radius (m) of the largest grain of each material, by its number, and of the one after it."""
+    radius, material = start["radius"], start.get("material", np.zeros(len(start["radius"]), int))
+    return {int(k): np.sort(radius[material == k])[:-3:-1].tolist() for k in np.unique(material)}
+
+
+def check_grains(law: Granular, materials: Materials, start: Mapping[str, np.ndarray]) -> None:
+    """Raise InputError unless a law pushes more than it pulls where the largest grains of any two materials
+    touch."""
+    radii, number = largest_radii(start), max(1, len(materials.named))
+    for i, j in combinations_with_replacement(radii, 2):
+        both = radii[i] if i == j else [radii[i][0], radii[j][0]]
+        if len(both) == 2:
+            pair, (a, b) = materials.touching()[i * number + j], both
+            what = f"{pair.names[0]} of {a:g} m touches {pair.names[1]} of {b:g} m in radius"
+            _check(law, pair, a * b / (a + b), what)
+
+
+def check_wall(
+    law: Granular, materials: Materials, start: Mapping[str, np.ndarray], wall: int, label: str
+) -> None:
+    """Raise InputError unless a law does so where the largest grains touch a wall of a material."""
+    number = max(1, len(materials.named))
+    for i, (radius, *_) in largest_radii(start).items():
+        pair = materials.touching()[i * number + wall]
+        _check(law, pair, radius, f"{pair.names[0]} of {radius:g} m in radius touches {label}")
+
+
+def _check(law: Granular, pair: Touching, radius: float, what: str) -> None:
+    """Compare both at an overlap of R* (m)."""
+    if law.cohesion is not None:
+        push, pull = law.normal.deepest_push(pair, radius), law.cohesion.deepest_pull(pair, radius)
+        rule = f"below what {law.normal.kind()} pushes with at an overlap of R*, {push:.4g} N, where {what}"
+        must(pull < push, f"{law.label}.cohesion", rule, float(f"{pull:.4g}"))

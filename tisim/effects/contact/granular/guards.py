@@ -1,0 +1,67 @@
+"""What stops the world of a contact law: steps that no part can follow, and cohesion that nothing holds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tisim.backend.taichi import ti
+from tisim.effects.contact.granular.step_limit import (
+    SLIDING,
+    can_follow,
+    can_follow_both,
+    least_held,
+    least_mass,
+)
+
+
+class ContactGuards:
+    """Contact guards ask the parts of a law by which springs, dashpots and forces they act.
+
+    The attributes are the parts of tisim/effects/contact/granular/granular.py.
+    """
+
+    if TYPE_CHECKING:
+        normal: Any
+        rolling: Any
+        twisting: Any
+        cohesion: Any
+        by_overlap: Any
+        has: Any
+
+    @ti.func
+    def steps_follow(
+        self, w, pair, circle, radius, mass, inverses, stiffness, damping, spring, dashpot, friction, dt
+    ):
+        """Return whether steps of dt (s) can follow what presses, slides, rolls and twists.
+
+        stiffness, damping : S_n (N/m) and gamma_n (N s/m). spring, dashpot, friction : those of the
+        tangential force.
+        """
+        inverse, rolls, twists = 1.0 / mass, 0.0 * mass, 0.0 * mass
+        slides = least_held(friction, spring, dashpot, dt)
+        if ti.static(self.has("rolling")):
+            stiff, drag = (
+                self.rolling.spring(w, pair, stiffness),
+                self.rolling.dashpot(w, pair, stiffness, mass),
+            )
+            rolls = least_held(self.rolling.coulomb(w, pair), stiff, drag, dt)
+        if ti.static(self.has("twisting")):
+            turn, loss = (
+                self.twisting.spring(w, pair, circle, spring),
+                self.twisting.dashpot(w, pair, circle, dashpot),
+            )
+            arm = self.twisting.coulomb(w, pair, circle, friction)
+            # As a mass, I/R*^2: moments of inertia of the smallest grains are no numbers of f32.
+            twists = least_held(arm, turn, loss, dt) / radius / radius
+        light, both = inverses[0] * inverse, inverses[1] * inverse
+        follows = can_follow(least_mass(stiffness, damping, dt), inverse) & can_follow(twists, light)
+        return follows & can_follow_both(slides, rolls, SLIDING * inverse, light, both)
+
+    @ti.func
+    def holds_apart(self, w, pair, radius):
+        """Return whether the elastic force is above cohesion by the overlap, at an overlap of R* (m)."""
+        holds = True
+        if ti.static(self.by_overlap):
+            push = self.normal.elastic(w, pair, radius, radius, radius)
+            holds = self.cohesion.pull(w, pair, radius, radius) < push
+        return holds
