@@ -87,6 +87,7 @@ class Case:
     name : of the package. title, source : for people. sizes : by name; "default" is among them.
     scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
     quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
+    cost_size : the size that 'tisim cost' takes unless one is given; None for "default".
     problem : (size, variant) -> Problem; variants : its names, the first the default.
     calibration : (size, variant, file) -> Problem, the same for measurements that a file has.
     pictures : what the case is about, drawn from a run's trajectory; by name of file.
@@ -102,6 +103,7 @@ class Case:
     problem: Callable[[str, str], Problem] | None = None
     variants: tuple[str, ...] = ()
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None
+    cost_size: str | None = None
     pictures: Callable[[Frames], Mapping[str, Figure]] | None = None
     figures: Callable[[str, Progress], Mapping[str, Figure | str]] | None = None
     calibration: Callable[[str, str, Path], Problem] | None = None

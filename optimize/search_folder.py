@@ -2,6 +2,7 @@
 
 search.h5         every evaluation, the settings, logbooks and best designs; all that is needed to go on
 best.csv          the best designs, all digits
+met.csv           all that meet what is asked, where the problem says which do
 convergence.png   (and .pdf) best and mean fitness by generation; of several objectives the best of each
 front.png         (and .pdf) the front of several objectives
 best_scene.toml   the best design from the first random start, for ``tisim run``
@@ -32,6 +33,7 @@ SEARCH_FILE = "search.h5"
 """Name of the cache file of a search."""
 RESULT_FILES = (
     "best.csv",
+    "met.csv",
     "convergence.png",
     "convergence.pdf",
     "front.png",

@@ -102,6 +102,8 @@ def session(
         if outcome.best is not None:
             say.print(report.best_table(outcome))
             say.print(report.notes(outcome))
+            if problem.met_at is not None:
+                say.print(report.met_table(outcome))
             paths += report.write(outcome, folder).values()
             if not outcome.interrupted:
                 paths += _show_best(outcome.best, outcome, evaluator, folder, say)

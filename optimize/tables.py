@@ -1,4 +1,5 @@
-"""Hall of fame and logbook as plain columns: what the report prints and the cache file keeps."""
+"""Hall of fame, designs that meet what is asked, and logbook as plain columns: what the report prints and the
+cache file keeps."""
 
 from __future__ import annotations
 
@@ -45,6 +46,30 @@ def _objectives(
         for heading, function in problem.derived.items():
             columns[f"{heading}{after}"] = [float(function(mean)) for mean in means]
     return columns
+
+
+Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
+"""What is known of designs, by their strings."""
+
+
+def met_strings(problem: Problem, estimates: Estimates) -> list[tuple[float, ...]]:
+    """Return the strings of the designs that meet what is asked, best first; none where the problem does not
+    say which do."""
+    if problem.met_at is None:
+        return []
+    (objective,) = problem.objectives
+    costs = {string: of_all[0].mean for string, of_all in estimates.items()}
+    limit = objective.sign * problem.met_at
+    return sorted((one for one in costs if costs[one] <= limit), key=lambda one: (costs[one], one))
+
+
+def met_columns(problem: Problem, estimates: Estimates) -> dict[str, list[Any]]:
+    """Return every gene and the fitness of the designs that meet what is asked, best first: heading ->
+    values."""
+    strings, (objective,) = met_strings(problem, estimates), problem.objectives
+    designs = [problem.genome.decode(string) for string in strings]
+    columns = {gene.label: [design[gene.name] for design in designs] for gene in problem.genome.genes}
+    return {**columns, objective.label: [objective.sign * estimates[one][0].mean for one in strings]}
 
 
 def logbook_columns(problem: Problem, logbook: tools.Logbook) -> dict[str, list[Any]]:

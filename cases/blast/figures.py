@@ -134,7 +134,7 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
 
 def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
     """Draw a state as it is seen in a square: left, bottom and side, m."""
-    panel(axis, state, square, NO_BOX, None)
+    panel(axis, state, square, NO_BOX)
 
 
 def envelope(history: BlastHistory) -> Figure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cases.case import Case, Late
 from cases.granular_bench.accuracy import quantities
-from cases.granular_bench.scene import SIZES, TITLE
+from cases.granular_bench.scene import BED, SIZES, TITLE
 from cases.granular_bench.sizes import scene_for
 
 CASE = Case(
@@ -15,6 +15,7 @@ CASE = Case(
     scene=scene_for,
     check=Late("cases.granular_bench.checks", "check"),
     quantities=quantities,
+    cost_size=BED,
     problem=Late("cases.granular_bench.problem", "problem"),
     variants=("calibrate",),
     calibration=Late("cases.granular_bench.problem", "calibration"),

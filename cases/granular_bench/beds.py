@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,7 @@ from cases.granular_bench.measures import discharge, heap, repose
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from tisim import Result, RunError, run
 from tisim.engine.batches import Progress
-from tisim.plotting.cloud import common, corners, panel
+from tisim.plotting.cloud import common, corners, panel, walls_at
 from tisim.plotting.style import empty, letters, plain
 
 VALUES = {
@@ -86,9 +87,12 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
     figure = empty(11.6, 7.2)
     (first, second, angles), (third, rates, law) = figure.subplots(2, 3)
     chosen = [next(one for one in found if (one.what, one.value) == key) for key in SHOWN]
-    square = common([one.result.state for one in chosen], corners(None, None))
-    for axis, one in zip((first, second, third), chosen, strict=True):
-        panel(axis, one.result.state, square, corners(None, None), None)
+    states = [one.result.state for one in chosen]
+    walls = [walls_at(one.result.scene, states, one.result.time) for one in chosen]
+    # No box: the silo stands in open space.
+    square = common(states, np.vstack([corners(None, None), *itertools.chain(*walls)]))
+    for axis, one, lines in zip((first, second, third), chosen, walls, strict=True):
+        panel(axis, one.result.state, square, corners(None, None), walls=lines)
         angle = "no heap" if np.isnan(one.angle) else f"{one.angle:.0f} degrees"
         axis.set_title(f"{one.what.replace('_', ' ')} {one.value:g}: {angle}")
     for k, what in enumerate(NATURAL):

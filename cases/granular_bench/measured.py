@@ -5,9 +5,13 @@ The file is CSV with a heading, in any order, a line each:
     quantity,value,uncertainty
     angle_of_repose,24.5,1.0
     discharge_rate,0.150,0.005
+    rebound_ratio,0.36,0.02
+    sliding_angle,22.0,1.0
 
-An angle of repose is in degrees, a discharge rate in kg/s. The uncertainty is one standard deviation, of the
-measurement and of what a simulation of so few grains can resolve.
+Angles are in degrees, a discharge rate in kg/s. A rebound ratio is the height to which a grain rebounds from
+a plate over that of its fall; at a sliding angle a block of grains begins to slide on a plate. The
+uncertainty is one standard deviation, of the measurement and of what a simulation of so few grains can
+resolve.
 """
 
 from __future__ import annotations
@@ -20,7 +24,9 @@ from pathlib import Path
 
 from tisim.errors import InputError, did_you_mean, must
 
-QUANTITY_UNITS = {"angle_of_repose": "degrees", "discharge_rate": "kg/s"}
+QUANTITY_UNITS = {
+    "angle_of_repose": "degrees", "discharge_rate": "kg/s", "rebound_ratio": "", "sliding_angle": "degrees",
+}  # fmt: skip
 """The quantities that may be measured, and their units."""
 HEADING = ["quantity", "value", "uncertainty"]
 

@@ -69,7 +69,7 @@ def expected_ratio(inertial: np.ndarray | float) -> np.ndarray:
 @dataclass(frozen=True)
 class ShearedBed:
     """A sheared bed has means over time: the gap (m), pressure and shear stress (Pa), and profiles of the
-    velocity (m/s) over the height (m)."""
+    velocity (m/s) over the height (m); and the state of its grains at the end."""
 
     gap: float
     pressure: float
@@ -77,6 +77,7 @@ class ShearedBed:
     fraction: float
     height: np.ndarray
     velocity: np.ndarray
+    state: Arrays
 
     @property
     def wall_speed(self) -> float:
@@ -203,7 +204,8 @@ def sheared_beds(
             progress(float(time / lasts))
             for gap, look, result in zip(gaps, looks, unbroken(simulation), strict=True):
                 look.append(seen(result, gap))
-    return [mean_of(gap, look) for gap, look in zip(gaps, looks, strict=True)]
+        states = [result.state for result in simulation.results()]
+    return [mean_of(*one) for one in zip(gaps, looks, states, strict=True)]
 
 
 def unbroken(simulation: Simulation) -> list[Result]:
@@ -230,8 +232,8 @@ def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:
     return np.array([pressing, dragging, fraction]), sums, numbers
 
 
-def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]]) -> ShearedBed:
-    """Return the means over some looks at a cell with a gap (m)."""
+def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]], state: Arrays) -> ShearedBed:
+    """Return the means over some looks at a cell with a gap (m), and its state at the end."""
     scalars, sums, numbers = (np.array(one) for one in zip(*looks, strict=True))
     pressing, dragging, fraction = scalars.mean(axis=0)
     edges = np.linspace(0.0, gap, BINS + 1)
@@ -246,4 +248,5 @@ def mean_of(gap: float, looks: Sequence[tuple[np.ndarray, ...]]) -> ShearedBed:
         fraction=float(fraction),
         height=(edges[1:] + edges[:-1]) / 2,
         velocity=velocity,
+        state=state,
     )

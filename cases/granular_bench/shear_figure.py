@@ -1,4 +1,5 @@
-"""The figure of the shear cell: profiles of the velocity, mu(I), and the solid fraction; and its table."""
+"""The figure of the shear cell: its grains, profiles of the velocity, mu(I), and the solid fraction; and its
+table."""
 
 from __future__ import annotations
 
@@ -7,9 +8,13 @@ import io
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from cases.granular_bench.shear_cell import ShearedBed, expected_ratio
+from cases.granular_bench.scene import DIAMETER
+from cases.granular_bench.shear_cell import CELL_SIDES, ShearedBed, expected_ratio
+from tisim.plotting.cloud import common, corners, panel
 from tisim.plotting.style import TIME, empty, letters, plain
 
 FRACTIONS = (0.45, 0.49, 0.52, 0.54, 0.56, 0.57, 0.58)
@@ -17,10 +22,12 @@ FRACTIONS = (0.45, 0.49, 0.52, 0.54, 0.56, 0.57, 0.58)
 
 
 def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
-    """Draw what sheared beds have: velocity by height, mu by the inertial number beside what is published,
-    and the solid fraction, which da Cruz and others (2005) found to fall as the inertial number grows."""
-    figure = empty(11.6, 3.8)
-    profile, ratio, fraction = figure.subplots(1, 3)
+    """Draw what sheared beds have: the grains of the one in the middle, velocity by height, mu by the
+    inertial number beside what is published, and the solid fraction, which da Cruz and others (2005) found to
+    fall as the inertial number grows."""
+    figure = empty(9.6, 8.0)
+    (grains, profile), (ratio, fraction) = figure.subplots(2, 2)
+    sheared_grains(grains, beds[len(beds) // 2])
     inertial = np.array([bed.inertial_number for bed in beds])
     colours = TIME(np.linspace(0.0, 1.0, len(beds)))
     for bed, number, colour in zip(beds, inertial, colours, strict=True):
@@ -45,8 +52,19 @@ def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
         axis.legend(frameon=False, fontsize=8)
     for axis in (profile, ratio, fraction):
         plain(axis)
-    letters((profile, ratio, fraction))
+    letters((grains, profile, ratio, fraction))
     return figure
+
+
+def sheared_grains(axis: Axes, bed: ShearedBed) -> None:
+    """Draw the grains of a cell and of its walls, coloured by their velocity along the walls."""
+    part = bed.state["velocity"][:, 0] / bed.wall_speed
+    box = corners(np.array([0.0, 0.0, -DIAMETER]), np.array([*CELL_SIDES, bed.gap + DIAMETER]))
+    panel(axis, bed.state, common([bed.state], box), box, TIME(part)[:, :3])
+    axis.set_title(f"grains between rough walls, I = {bed.inertial_number:.2g}")
+    bar = axis.figure.colorbar(ScalarMappable(cmap=TIME), ax=axis, shrink=0.72, pad=0.01)
+    bar.set_label("velocity over that of the wall")
+    bar.outline.set_visible(False)
 
 
 def shear_table(beds: Sequence[ShearedBed]) -> str:

@@ -34,6 +34,8 @@ class Problem:
     derived : extra report columns computed from the fitness, heading -> function; for one objective only.
     picture : (Scene, Result) -> figure of a run, for the report.
     details : (design, Result) -> what the best design's run shows beside what was wanted, for the report.
+    met_at : the fitness at which a design meets all that is asked, and so does any better one; the report
+        then has how far each gene spreads over those that the search has seen. For one objective only.
     code : what tells its code from that of another problem of this name and version; by default a checksum of
         the files, outside of this package, that define scene and objectives. Part of the cache key.
     Raises InputError for an empty name, and for objectives that are none or not told apart by their names.
@@ -51,6 +53,7 @@ class Problem:
     meanings: Mapping[str, str] = field(default_factory=dict)
     picture: Callable[[Scene, Result], Figure] | None = None
     details: Callable[[Mapping[str, float], Result], Mapping[str, float]] | None = None
+    met_at: float | None = None
     code: str = ""
 
     def __post_init__(self) -> None:
@@ -63,6 +66,8 @@ class Problem:
         names = [objective.name for objective in self.objectives]
         must(bool(names) and len(set(names)) == len(names), "objectives", "one or more, all different", names)
         must(len(names) == 1 or not self.derived, "derived", "empty for several objectives", [*self.derived])
+        one = len(names) == 1 or self.met_at is None
+        must(one, "met_at", "left out for several objectives", self.met_at)
 
     @property
     def objectives(self) -> tuple[Objective, ...]:

@@ -17,7 +17,7 @@ from rich.text import Text
 from optimize.outcome import Outcome
 from optimize.report.convergence import convergence_figure
 from optimize.report.front import front_figure
-from optimize.tables import best_columns
+from optimize.tables import best_columns, met_columns, met_strings
 from tisim.console import TERMINAL_WIDTH
 from tisim.files.atomic import replace_file
 
@@ -63,6 +63,26 @@ def notes(outcome: Outcome) -> RenderableType:
     return Group("", *(Text(f"{heading}: {meaning}", "dim") for heading, meaning in meanings.items()))
 
 
+def met_table(outcome: Outcome) -> RenderableType:
+    """Return how far each gene spreads over the designs that meet what is asked, for the terminal."""
+    problem = outcome.problem
+    strings, (objective,) = met_strings(problem, outcome.estimates), problem.objectives
+    bound = "at least" if objective.maximise else "at most"
+    number = f"{len(strings)} of {len(outcome.estimates)} designs"
+    title = Text(f"{number} have {objective.label} of {bound} {problem.met_at:g}", "italic")
+    if not strings:
+        return Group("", title)
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("over these", no_wrap=True)
+    for heading in ("lowest", "highest", "part of its range"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for gene, values in zip(problem.genome.genes, zip(*strings, strict=True), strict=True):
+        ends = min(values), max(values)
+        low, high = (_text(gene.decode(end)) for end in ends)
+        table.add_row(Text(gene.label), low, high, f"{100 * (ends[1] - ends[0]):.0f} %")
+    return Group("", title, table)
+
+
 def _spread(number: int, places: int) -> list[int]:
     """Return at most so many places in a row of that number, the first and the last among them."""
     return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})
@@ -91,7 +111,15 @@ def _widest(rows: Sequence[Sequence[str]]) -> int:
 
 def best_csv(outcome: Outcome) -> bytes:
     """Return the best designs as CSV, all digits, one column per heading of best_columns."""
-    columns = best_columns(outcome.problem, outcome.hall)
+    return _columns_csv(best_columns(outcome.problem, outcome.hall))
+
+
+def met_csv(outcome: Outcome) -> bytes:
+    """Return the designs that meet what is asked as CSV, all digits."""
+    return _columns_csv(met_columns(outcome.problem, outcome.estimates))
+
+
+def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> bytes:
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(columns)
@@ -100,8 +128,8 @@ def best_csv(outcome: Outcome) -> bytes:
 
 
 def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
-    """Write best.csv, convergence and front (of several objectives) as .png and .pdf into a folder (made if
-    missing); name -> path.
+    """Write best.csv, met.csv (where the problem says which designs meet it), convergence and front (of
+    several objectives) as .png and .pdf into a folder (made if missing); name -> path.
 
     Each file is, at every instant, the old one or the new one. RunError if the disk is full.
     """
@@ -111,6 +139,8 @@ def write(outcome: Outcome, folder: str | Path) -> dict[str, Path]:
     if outcome.problem.several:
         figures["front"] = front_figure(outcome)
     contents = {"best.csv": best_csv(outcome)}
+    if outcome.problem.met_at is not None:
+        contents["met.csv"] = met_csv(outcome)
     for name, figure in figures.items():
         contents |= {
             f"{name}.png": figure_bytes(figure, "png", dpi=200),

@@ -26,10 +26,13 @@ def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim
     settings = {**draw_down.SEARCH_SETTINGS, "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1}}
     monkeypatch.setitem(draw_down.SIZES, "default", Size("a small draw-down test", SMALL, settings))
     mine = tmp_path / "mine.csv"
-    mine.write_text("quantity,value,uncertainty\ndischarge_rate,0.0815,0.0125\nangle_of_repose,19.25,2.5\n")
+    mine.write_text(
+        "quantity,value,uncertainty\ndischarge_rate,0.0815,0.0125\nangle_of_repose,19.25,2.5\n"
+        "rebound_ratio,0.3,0.05\n"
+    )
     code, out, err = tisim(*SEARCH)
     assert code == 0, err
-    for text in ("0.0815 ± 0.0125 kg/s", "19.25 ± 2.5 degrees"):
+    for text in ("0.0815 ± 0.0125 kg/s", "19.25 ± 2.5 degrees", "rebound_ratio 0.3 ± 0.05"):
         assert text in " ".join((out + err).split())
     run = table(tmp_path / "found/best_run.csv")
     assert float(run["discharge_rate as measured, kg/s"]) == 0.0815
@@ -37,10 +40,18 @@ def test_a_file_of_measurements_is_calibrated_to_and_told_with_the_outcome(tisim
     off = [
         (float(run["discharge_rate, kg/s"]) - 0.0815) / 0.0125,
         (float(run["angle_of_repose, degrees"]) - 19.25) / 2.5,
+        (float(run["rebound_ratio"]) - 0.3) / 0.05,
     ]
     heading, best, *_ = csv.reader((tmp_path / "found/best.csv").read_text().splitlines())
     best = dict(zip(heading, best, strict=True))
-    assert float(best["misfit"]) == pytest.approx((off[0] ** 2 + off[1] ** 2) / 2, rel=1e-3)
+    misfit = sum(one**2 for one in off) / len(off)
+    assert float(best["misfit"]) == pytest.approx(misfit, rel=1e-3)
+    # What the single grain on the plate tells is its restitution.
+    assert float(run["rebound_ratio"]) == pytest.approx(float(best["restitution"]) ** 2, rel=0.03)
+    met = (tmp_path / "found/met.csv").read_text().splitlines()
+    assert met[0] == "friction,rolling_friction,restitution,misfit"
+    assert (len(met) > 1) == (misfit <= 1)
+    assert "designs have misfit of at most 1" in " ".join(out.split())
     for name, low, high in (("friction", 0.05, 1), ("rolling_friction", 0, 0.4), ("restitution", 0.2, 0.9)):
         assert low <= float(best[name]) <= high
     # What was found for these is not given for others.

@@ -13,6 +13,7 @@ from typer.main import get_command
 from cases.case import every
 from tests.accuracy.scenes import only, oscillator
 from tests.own_files import LAW
+from tisim import InputError
 from tisim.accuracy import Row, Study, reference, storage
 from tisim.accuracy.formatting import options, shell_line
 from tisim.accuracy.sweep import methods
@@ -45,6 +46,35 @@ def test_wrong_input_is_reported_and_nothing_written(tisim, tmp_path, arguments,
     assert "Traceback" not in err
     assert out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_case_has_a_size_of_its_own_for_costs(tisim, tmp_path, monkeypatch):
+    """granular_bench is measured in a bed, unless another size is given; others as they are run."""
+    asked = []
+
+    def note(target, size, *others):
+        asked.append((target, size))
+        raise InputError("scene must be left alone; received one")
+
+    (tmp_path / "swing.toml").touch()
+    with monkeypatch.context() as patch:
+        patch.setattr(scene_arguments, "load_scene", note)
+        for words in (
+            ["granular_bench"],
+            ["granular_bench", "--size", "default"],
+            ["vibration"],
+            ["swing.toml"],
+        ):
+            assert tisim("cost", *words)[0] == 2
+    assert asked == [
+        ("granular_bench", "bed"),
+        ("granular_bench", "default"),
+        ("vibration", None),
+        ("swing.toml", None),
+    ]
+    code, out, _ = tisim("cases")
+    assert code == 0
+    assert " ".join(out.split()).count("fallen into a cup; that of tisim cost") == 1
 
 
 @pytest.fixture

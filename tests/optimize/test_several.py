@@ -230,6 +230,8 @@ def test_what_cannot_be_is_refused(path):
         fake_problem(objective=OBJECTIVES[:1] * 2)
     with pytest.raises(InputError, match="derived must be empty for several objectives"):
         fake_problem(objective=OBJECTIVES, derived={"twice": lambda x: 2 * x})
+    with pytest.raises(InputError, match="met_at must be left out for several objectives"):
+        fake_problem(objective=OBJECTIVES, met_at=1.0)
 
 
 def test_one_objective_to_be_made_large(path):

@@ -21,7 +21,6 @@ from tisim.cli.options import (
     Overwrite,
     Plugins,
     Seed,
-    Size,
     Target,
     Threads,
 )
@@ -35,6 +34,10 @@ if TYPE_CHECKING:
     from tisim.accuracy import Quantity, Row, Study
     from tisim.scene.scene import Scene
 
+CostSize = Annotated[
+    str | None,
+    typer.Option("--size", help="Size of the case; by default the one that 'tisim cases' has for this."),
+]
 QUICK_LIMIT = 20.0
 """With --quick a setting that runs longer is stopped, s: what takes so long is no match for the others."""
 
@@ -48,7 +51,7 @@ def cost(
         str | None,
         typer.Option(metavar="NAME", help="What --error is of; first of the table by default."),
     ] = None,
-    size: Size = None,
+    size: CostSize = None,
     seed: Seed = None,
     absent: Absent = None,
     changes: Changes = None,
@@ -106,6 +109,7 @@ def cost(
 
     must(error is None or error > 0, "--error", "greater than 0", error)
     runtime.init(device, "f64", threads)
+    size = size or _size(target)
     name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or ())
     study = Study(
         scene,
@@ -180,6 +184,11 @@ def _run_options(
             yield from ("--set", change)
     for plugin in plugins or ():
         yield from ("--plugin", plugin)
+
+
+def _size(target: str) -> str | None:
+    """Return the size that costs of a case are measured of unless one is given; none for a scene file."""
+    return None if target.endswith(".toml") else targets.case(target, targets.SCENE_FILE).cost_size
 
 
 def _quantities(target: str, scene: Scene) -> tuple[Quantity, ...]:

@@ -32,7 +32,7 @@ def load_scene(
         if seed is not None:
             scene = scene.replace({"seed": seed})
     else:
-        case = targets.case(target, f"or a scene file ending in .toml, {targets.OWN_FILE}")
+        case = targets.case(target, targets.SCENE_FILE)
         case.size(size or "default")
         name, scene = case.name, case.scene(size or "default", seed or 0)
     return name, scene.without(*absent).replace(assignments(changes))

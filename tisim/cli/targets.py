@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 OWN_FILE = "or your own NAME.py with a CASE"
+SCENE_FILE = f"or a scene file ending in .toml, {OWN_FILE}"
 
 
 def case(target: str, alternatives: str = OWN_FILE) -> Case:

@@ -10,3 +10,4 @@ from .insertion_rules import InsertionByFraction as InsertionByFraction
 from .outflow import Outflow as Outflow
 from .passage import Passage as Passage
 from .peak_displacement import PeakDisplacement as PeakDisplacement
+from .peak_height import PeakHeight as PeakHeight

@@ -9,6 +9,9 @@ from tisim.numerics.ieee import finite
 from tisim.operators.base import Operator
 from tisim.worlds.fields import Field
 
+START_POSITION = Field("origin", "m", 3, "mean", default="position")
+"""The position of a particle at the start."""
+
 
 class PeakDisplacement(Operator):
     """The largest displacement of the centre of gravity is observed; nothing is changed.
@@ -20,7 +23,7 @@ class PeakDisplacement(Operator):
     those of open space.
     """
 
-    fields: ClassVar = (Field("origin", "m", 3, "mean", default="position"),)
+    fields: ClassVar = (START_POSITION,)
     world_quantities: ClassVar = ("peak_displacement",)
     terms: ClassVar = 4
 

@@ -67,7 +67,7 @@ def start_and_end(
     walls = [walls_at(scene, states, time) for time in times]
     square = common(states, np.vstack([box, *itertools.chain(*walls)]))
     for axis, state, heading, time, lines in zip(axes, states, ("start", last), times, walls, strict=True):
-        panel(axis, state, square, box, norm, lines)
+        panel(axis, state, square, box, heat_colours(state, norm), lines)
         directions(axis, square, gravity(scene))
         axis.set_title(f"{heading}, {caption(state, time)}")
     letters(axes)
@@ -105,6 +105,12 @@ def temperatures(states: Sequence[Arrays]) -> Normalize | None:
     least = max(0.01 * abs(low), 1e-9) / 2
     middle = (low + high) / 2
     return Normalize(min(low, middle - least), max(high, middle + least))
+
+
+def heat_colours(state: Arrays, norm: Normalize | None) -> np.ndarray | None:
+    """Return the colour of each grain by its temperature, red, green and blue, shape (n, 3); None without a
+    scale of it."""
+    return None if norm is None or not len(state["radius"]) else HEAT(norm(state["temperature"]))[:, :3]
 
 
 def _project(points: np.ndarray) -> np.ndarray:
@@ -149,15 +155,16 @@ def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
 
 
 def panel(
-    axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray, norm: Normalize | None,
-    walls: Sequence[np.ndarray] = (),
+    axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray,
+    colour: np.ndarray | None = None, walls: Sequence[np.ndarray] = (),
 ) -> None:  # fmt: skip
-    """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``,
-    with lines of ``walls_at``."""
+    """Draw a state as seen in a square of ``view``, in a box of ``corners``, with lines of ``walls_at``.
+
+    colour : of each grain, red, green and blue, shape (n, 3); one for all unless given.
+    """
     left, bottom, side = square
-    colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
-    if norm is not None and len(colour):
-        colour = HEAT(norm(state["temperature"]))[:, :3]
+    if colour is None:
+        colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
     image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
     axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
     if len(box):

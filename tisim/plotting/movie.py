@@ -49,7 +49,8 @@ def movie(
             for k, frame in enumerate(frames):
                 axis.clear()
                 walls = cloud.walls_at(frames.scene, [ranges], frame.time)
-                cloud.panel(axis, frame.arrays, square, box, coloured, walls)
+                colours = cloud.heat_colours(frame.arrays, coloured)
+                cloud.panel(axis, frame.arrays, square, box, colours, walls)
                 cloud.directions(axis, square, cloud.gravity(frames.scene))
                 figure.suptitle(cloud.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
                 writer.grab_frame()

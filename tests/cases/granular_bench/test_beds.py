@@ -38,7 +38,7 @@ def cone(degrees, rate=0.1):
         "velocity": velocity,
         "radius": np.full(len(position), DIAMETER / 2),
     }
-    return SimpleNamespace(scene=made, state=state, measures={"passage_rate": rate})
+    return SimpleNamespace(scene=made, state=state, time=1.0, measures={"passage_rate": rate})
 
 
 def test_the_heap_is_what_lies_on_the_disc_and_has_its_slope():
@@ -70,6 +70,10 @@ def test_table_and_figure_have_each_bed():
     assert len(rows) == 1 + len(found)
     assert rows[0].startswith("varied,value,angle_of_repose_degrees,discharge_rate_kg_s")
     figure = bed_figure(found)
+    # The silo, its bottom and the disc are drawn around the grains, beside a scale bar.
+    rims = [line.get_xydata() for line in figure.axes[0].lines if len(line.get_xydata()) > 2]
+    widths = sorted(np.ptp(rim[:, 0]) / DIAMETER for rim in rims)
+    assert widths == pytest.approx([7.0, 12.0, 12.0, 12.0, 16.0], rel=1e-2)
     angles, law = figure.axes[2], figure.axes[5]
     np.testing.assert_allclose(angles.lines[0].get_ydata(), [one.angle for one in found[:4]])
     np.testing.assert_allclose(law.lines[1].get_ydata(), [one.rate**0.4 for one in found[-5:]])

@@ -1,17 +1,35 @@
-"""The calibration: measurements of a file, the misfit, and designs that are found again."""
+"""The calibration: measurements of a file, the misfit, and a known design that is found again."""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+import optimize
+import tisim
 from cases.case import every
 from cases.granular_bench import problem as calibrating
 from cases.granular_bench.measured import Measurement, read
-from cases.granular_bench.problem import EXAMPLE, calibration, misfit, problem
+from cases.granular_bench.problem import (
+    EXAMPLES,
+    KNOWN,
+    SIMULATED,
+    UNCERTAINTIES,
+    calibration,
+    calibration_to,
+    misfit,
+    other_runs,
+    problem,
+)
 from tests.judged import check_message
 from tisim import InputError
 
-GOOD = "quantity, value, uncertainty\n\nangle_of_repose,24.5,1.0\n discharge_rate , 0.15,5e-3\n"
+INTERVALS = {"friction": 0.05, "rolling_friction": 0.08, "restitution": 0.03}
+"""How far what is found may be from the known design."""
+GOOD = (
+    "quantity, value, uncertainty\n\nangle_of_repose,24.5,1.0\n discharge_rate , 0.15,5e-3\n"
+    "sliding_angle,27,1\nrebound_ratio,0.25,0.02\n"
+)
 WRONG = {
     "no heading": ("angle_of_repose,24.5,1.0\n", "heading of .* must be quantity,value,uncertainty"),
     "empty": ("", "heading of .* must be"),
@@ -29,7 +47,8 @@ def test_measurements_of_a_file(tmp_path):
     path = tmp_path / "measured.csv"
     path.write_text(GOOD)
     assert read(path) == {
-        "angle_of_repose": Measurement(24.5, 1.0), "discharge_rate": Measurement(0.15, 5e-3)
+        "angle_of_repose": Measurement(24.5, 1.0), "discharge_rate": Measurement(0.15, 5e-3),
+        "sliding_angle": Measurement(27.0, 1.0), "rebound_ratio": Measurement(0.25, 0.02),
     }  # fmt: skip
 
 
@@ -55,8 +74,8 @@ def test_misfit_counts_in_uncertainties(monkeypatch):
 def test_a_bed_in_a_cup_is_not_calibrated():
     """It is no draw-down test: it has neither an angle of repose nor a discharge rate."""
     with pytest.raises(InputError, match="size must be that of a draw-down test; received 'bed'"):
-        problem("bed")
-    with pytest.raises(InputError, match="size must be one of default for the inverse problem"):
+        calibration_to(EXAMPLES["small"], "bed")
+    with pytest.raises(InputError, match="size must be one of default, small for the inverse problem"):
         every()["granular_bench"].inverse("bed", "calibrate")
 
 
@@ -70,10 +89,35 @@ def test_other_measurements_are_another_problem(tmp_path):
     assert usual.identity != own.identity
     assert own.identity == calibration("default", "calibrate", path).identity
     assert usual.identity == problem().identity
-    assert settings["generations"] == 8
+    assert settings["generations"] == 14
     design = {"friction": 0.3, "rolling_friction": 0.1, "restitution": 0.5}
     assert usual.scene(design, 1).digest() == own.scene(design, 1).digest()
     assert "24.5 ± 1 degrees" in own.title
+    assert own.title.endswith("rebound_ratio 0.25 ± 0.02")
     with pytest.raises(InputError, match="--measured must be given for a case that is calibrated; received"):
         every()["vibration"].inverse("default", None, path)
-    assert EXAMPLE.keys() == calibrating.SIMULATED.keys()
+    searched = [name for name, size in case.sizes.items() if size.search is not None]
+    assert [*EXAMPLES] == searched
+    assert all(example.keys() == SIMULATED.keys() for example in EXAMPLES.values())
+    with pytest.raises(InputError, match="size must be one of default, small; received 'bed'"):
+        problem("bed")
+
+
+@pytest.mark.slow
+def test_a_known_design_is_found_again():
+    """Its measures are means over runs from starts that the search does not make; the case's example has
+    them."""
+    results = tisim.run(other_runs(KNOWN, "small", 8))
+    assert all(result.status.ok for result in results)
+    measured = {}
+    for name, measure in SIMULATED.items():
+        values = np.array([measure(result) for result in results])
+        measured[name] = Measurement(float(values.mean()), UNCERTAINTIES[name])
+        assert values.std(ddof=1) < 1.5 * UNCERTAINTIES[name]
+        assert EXAMPLES["small"][name].value == pytest.approx(values.mean(), abs=0.1 * UNCERTAINTIES[name])
+    search = every()["granular_bench"].sizes["small"].search
+    outcome = optimize.run(calibration_to(measured, "small"), **search)
+    best = outcome.designs[0]
+    assert best.values["misfit"] < 1
+    for name, interval in INTERVALS.items():
+        assert best.genes[name] == pytest.approx(KNOWN[name], abs=interval)

@@ -33,7 +33,13 @@ def bed(pressure=300.0, gap=10 * DIAMETER):
     height = (np.arange(12) + 0.5) / 12 * gap
     velocity = SHEAR_RATE * gap / 2 + 8.0 * (height - gap / 2)
     velocity[0], velocity[-1] = np.nan, np.nan
-    return ShearedBed(gap, pressure, 0.4 * pressure, 0.57, height, velocity)
+    # Two grains of the walls, and one between them.
+    state = {
+        "position": np.array([[0.02, 0.01, z * gap] for z in (0.0, 0.5, 1.0)]),
+        "velocity": np.array([[part * SHEAR_RATE * gap, 0.0, 0.0] for part in (0.0, 0.4, 1.0)]),
+        "radius": np.full(3, DIAMETER / 2),
+    }
+    return ShearedBed(gap, pressure, 0.4 * pressure, 0.57, height, velocity, state)
 
 
 def test_mu_of_glass_beads():
@@ -61,7 +67,8 @@ def test_stresses_are_means_over_both_walls_and_over_time():
         seen(SimpleNamespace(state=state, measures=dict(zip(names, forces, strict=True))), gap)
         for forces in ((3.0, -1.0, -0.5, 0.7), (5.0, -3.0, -1.5, 1.3))
     ]
-    found = mean_of(gap, looks)
+    found = mean_of(gap, looks, state)
+    assert found.state is state
     assert found.pressure == pytest.approx(3.0 / CELL_AREA)
     assert found.shear_stress == pytest.approx(1.0 / CELL_AREA)
     assert found.fraction == pytest.approx(2 * np.pi / 6 * DIAMETER**3 / (CELL_AREA * gap / 2))
@@ -135,7 +142,13 @@ def test_the_cell_begins_without_overlaps_of_what_moves():
 
 def test_figure_and_table_have_each_bed():
     beds = [bed(pressure) for pressure in (30.0, 300.0, 3000.0)]
-    _, ratio, fraction = shear_figure(beds).axes
+    grains, _, ratio, fraction, _ = shear_figure(beds).axes
+    # Grains are coloured by their velocity.
+    picture = grains.images[0].get_array()
+    beds[1].state["velocity"][1, 0] *= 2
+    other = shear_figure(beds).axes[0].images[0].get_array()
+    changed = (picture != other).any(axis=2)
+    assert 0 < changed.sum() < 0.5 * (picture[..., 3] > 0).sum()
     numbers = [one.inertial_number for one in beds]
     np.testing.assert_allclose(ratio.collections[0].get_offsets()[:, 0], numbers)
     np.testing.assert_allclose(fraction.collections[0].get_offsets()[:, 1], 0.57)

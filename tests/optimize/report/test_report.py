@@ -9,6 +9,7 @@ from cases.agglomeration.problem import problem as agglomeration
 from optimize.evaluation.estimate import FitnessEstimate
 from optimize.methods.individual import Individual
 from optimize.outcome import Outcome
+from optimize.problem.objective import Objective
 from optimize.report import report
 from optimize.search import search
 from optimize.settings import Settings
@@ -176,3 +177,54 @@ def test_report_of_failures_and_of_nothing(tmp_path, settings):
     paths = report.write(outcome, tmp_path / "out")
     assert len(paths["best.csv"].read_text().splitlines()) == 1
     assert printed_lines(outcome)[0].strip() == "rank"
+
+
+def spread(table):
+    """Rows of the table of designs that meet what is asked, by their first word."""
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(table)
+    title, *rows = [line for line in console.export_text().splitlines() if line]
+    return title, {row.split()[0]: row.split()[-4:] for row in rows}
+
+
+@pytest.mark.parametrize("maximise", [False, True])
+def test_designs_that_meet_what_is_asked_are_told_with_how_far_they_spread(tmp_path, maximise):
+    """Those of a bowl below 0.6, or of the same turned over above -0.6; a gene that counts for nothing
+    spreads over all of its range."""
+    sign = -1 if maximise else 1
+
+    def flat_in_x0(design, seed):
+        return bowl({name: value for name, value in design.items() if name != "x0"}, 0, noise=0.0)
+
+    objective = Objective("depth", lambda result: sign * result.value, maximise=maximise)
+    problem = fake_problem(genes=3, objective=(objective,), met_at=sign * 0.6)
+    with Cache(tmp_path / "cache.h5") as cache:
+        found = search(
+            problem, FakeEvaluator(flat_in_x0), cache, Settings(seed=1, method="random", generations=9)
+        )
+    met = [one for one in found.estimates if sum((x - 0.3) ** 2 for x in one[1:]) <= 0.1]
+    assert 4 < len(met) < 0.7 * len(found.estimates)
+    title, rows = spread(report.met_table(found))
+    bound = "at least -0.6" if maximise else "at most 0.6"
+    assert title == f"{len(met)} of {len(found.estimates)} designs have depth of {bound}"
+    for k, name in enumerate(("x0", "x1", "x2")):
+        values = [one[k] for one in met]
+        low, high, part, _ = rows[name]
+        assert (float(low), float(high)) == pytest.approx((min(values), max(values)), rel=1e-3)
+        assert float(part) == pytest.approx(100 * (max(values) - min(values)), abs=0.6)
+    assert float(rows["x0"][2]) > 80 > 70 > float(rows["x1"][2])
+    lines = list(csv.reader(report.met_csv(found).decode().splitlines()))
+    assert lines[0] == ["x0 (m)", "x1 (m)", "x2 (m)", "depth"]
+    assert sorted(tuple(map(float, line[:3])) for line in lines[1:]) == sorted(met)
+    depths = [sign * float(line[3]) for line in lines[1:]]
+    assert depths == sorted(depths)
+
+
+def test_where_no_design_meets_what_is_asked_that_is_said(tmp_path):
+    problem = fake_problem(met_at=0.1)
+    with Cache(tmp_path / "cache.h5") as cache:
+        found = search(problem, FakeEvaluator(), cache, Settings(seed=1, generations=1))
+    title, rows = spread(report.met_table(found))
+    assert title == f"0 of {len(found.estimates)} designs have fitness of at most 0.1"
+    assert rows == {}
+    assert {path.name for path in report.write(found, tmp_path / "out").values()} >= {"best.csv", "met.csv"}

@@ -1,0 +1,72 @@
+"""What is measured of grains of a known design, and what tells it from others.
+
+    python tests/benchmarks/draw_down.py [--size small] [--starts 8]
+    python tests/benchmarks/draw_down.py --valley [--size small] [--starts 2]
+
+First each quantity of cases/granular_bench/measured.py with its mean, its standard deviation over random
+starts, which are others than those of a search, and the uncertainty that a calibration takes it with. With
+--valley: of each friction the rolling friction of some with which angle of repose and discharge rate, means
+over the starts, are nearest to those of the known design at its restitution; with these and their misfit.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numpy as np
+
+import tisim
+from cases.granular_bench.problem import EXAMPLES, KNOWN, SIMULATED, UNCERTAINTIES, other_runs
+
+FRICTIONS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+ROLLING_FRICTIONS = (0.19, 0.23, 0.27, 0.31, 0.35)
+BULK = ("angle_of_repose", "discharge_rate")
+
+
+def known(size: str, starts: int) -> None:
+    """Print what KNOWN has."""
+    results = tisim.run(other_runs(KNOWN, size, starts))
+    print("of", ", ".join(f"{name} {value:g}" for name, value in KNOWN.items()))
+    print(f"{'quantity':16} {'mean':>9} {'deviation':>9} {'uncertainty':>11}")
+    for name, measure in SIMULATED.items():
+        values = np.array([measure(result) for result in results])
+        print(f"{name:16} {values.mean():9.4g} {values.std(ddof=1):9.2g} {UNCERTAINTIES[name]:11g}")
+
+
+def valley(size: str, starts: int) -> None:
+    """Print the designs of each friction that are nearest to KNOWN by angle of repose and discharge rate."""
+    designs = [
+        {**KNOWN, "friction": mu, "rolling_friction": rolling}
+        for mu in FRICTIONS for rolling in ROLLING_FRICTIONS
+    ]  # fmt: skip
+    results = tisim.run([scene for design in designs for scene in other_runs(design, size, starts)])
+    shape = (len(FRICTIONS), len(ROLLING_FRICTIONS), starts)
+    means = {
+        name: np.reshape([SIMULATED[name](result) for result in results], shape).mean(axis=2) for name in BULK
+    }
+    wanted = EXAMPLES[size]
+    misfits = sum(wanted[name].misfit(means[name]) for name in BULK) / len(BULK)
+    print("friction  rolling friction  angle of repose  discharge rate  misfit")
+    for k, mu in enumerate(FRICTIONS):
+        best = int(np.argmin(np.nan_to_num(misfits[k], nan=np.inf)))
+        angle, rate = (means[name][k, best] for name in BULK)
+        print(f"{mu:8g}  {ROLLING_FRICTIONS[best]:16g}  {angle:15.1f}  {rate:14.3f}  {misfits[k, best]:6.2f}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
+    parser.add_argument("--size", default="small")
+    parser.add_argument("--starts", type=int)
+    parser.add_argument("--valley", action="store_true")
+    options = parser.parse_args()
+    tisim.init()
+    if options.valley:
+        valley(options.size, options.starts or 2)
+    else:
+        known(options.size, options.starts or 8)
+
+
+if __name__ == "__main__":
+    main()
