@@ -154,7 +154,7 @@ def test_induced_dipoles_are_those_of_a_linear_solve(schedule):
 def test_what_does_not_converge_is_a_clear_failure():
     """Sweeps of too strong a coupling grow without bound: the world stops and says which effect it was, and
     by how much they grow, which tends to the spectral radius: as in NumPy."""
-    setup = cloud(3, n=20, chi=60.0, spread=1.0, sweeps=20)
+    setup = cloud(3, n=20, chi=60.0, spread=1.0, sweeps=20, acceleration="none")
     start = setup.particles.arrays(setup.domain, 0)
     coupling = np.eye(60) - solved(start, 60.0)[2]
     spread = np.abs(np.linalg.eigvals(coupling)).max()
@@ -178,6 +178,37 @@ def test_what_does_not_converge_is_a_clear_failure():
     ):
         assert words in result.status.reason
     np.testing.assert_array_equal(result.state["position"], result.start["position"])
+
+
+def mixed_sweeps(coupling, alone, tolerance):
+    """The values after each sweep until nothing changes by more than a tolerance; NumPy."""
+    x, last, values = np.zeros_like(alone), None, []
+    while True:
+        f = alone + coupling @ x
+        r, values = f - x, [*values, f]
+        size = np.linalg.norm(np.stack([r, f]).reshape(2, -1, 3), axis=2).max(axis=1)
+        if size[0] <= tolerance * size[1]:
+            return values
+        change = r - last[1] if last else r
+        theta = r @ change / (change @ change) if last else 0.0
+        x, last = f - theta * (f - last[0] if last else 0.0), (f, r)
+
+
+@pytest.mark.long
+def test_mixed_sweeps_are_those_of_anderson():
+    """As many as in NumPy, for the same tolerance; under strong coupling a third of plain ones."""
+    setups = [cloud(seed, n=20, chi=chi, spread=1.5, tolerance=1e-10) for seed, chi in ((1, 1.0), (2, 2.0))]
+    simulation = Simulation(setups[0], worlds=2)
+    simulation.load(setups)
+    for setup, result in zip(setups, simulation.results(), strict=True):
+        dipole, _, matrix = solved(result.state, setup.effects[1].chi)
+        values = mixed_sweeps(np.eye(60) - matrix, matrix @ dipole.ravel(), 1e-10)
+        assert result.work["mutual_sweeps"] == len(values)
+        np.testing.assert_allclose(result.state["dipole"], dipole, rtol=0, atol=1e-9 * np.abs(dipole).max())
+    simulation.close()
+    spread = np.abs(np.linalg.eigvals(np.eye(60) - matrix)).max()
+    assert spread < 1
+    assert len(values) < np.log(1e-10) / np.log(spread) / 3
 
 
 @pytest.mark.slow

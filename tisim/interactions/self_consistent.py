@@ -14,8 +14,10 @@ from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.listed_pairs import ExportedTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
+from tisim.interactions.sweep_mixing import TERMS, ChooseMixing, CompareSweeps
 from tisim.numerics.ieee import finite
 from tisim.numerics.vectors import piece
+from tisim.worlds.block_sum import BlockSums
 from tisim.worlds.bound import Bound
 from tisim.worlds.occasion import OnOccasion
 from tisim.worlds.phases import Item, PerParticle, Phase, Repeat
@@ -30,7 +32,8 @@ class SelfConsistentSolver(DerivedSolver):
     """A self-consistent solver finds a quantity that particles give each other: the values of the next sweep,
     and whether there is one.
 
-    changes : the largest of a particle in this sweep, the last, and the one before.
+    changes : the largest of a particle in this sweep, the last, and the one before. mixed : whether sweeps
+    are mixed with the last (sweep_mixing.py).
     """
 
     def __init__(
@@ -44,21 +47,34 @@ class SelfConsistentSolver(DerivedSolver):
         self.domain, self.pairs = domain, pairs
         listed = pairs is not None and effect.data.short_ranged
         self.exported = ExportedTerms(pairs, self.components) if pairs and listed else None
-        self.next = ti.Vector.field(3, s.real) if self.components == 3 else ti.field(s.real)
+        self.mixed = effect.data.acceleration == "anderson" and effect.data.sweeps > 0
+        self.next, *memory = (self.column() for _ in range(3 if self.mixed else 1))
         self.pending, self.sweeps, self.unconverged = (ti.field(ti.i32) for _ in range(3))
         self.largest, *self.changes = (ti.field(s.real) for _ in range(4))
         builder = Builder()
-        builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(self.next)
+        for column in (self.next, *memory):
+            builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
+        if self.mixed:
+            self.last, self.residual = memory
+            self.theta, self.unsolvable = ti.field(ti.f64), ti.field(ti.i32)
+            builder.dense(ti.i, s.worlds).place(self.theta)
+            builder.dense(ti.i, s.worlds).place(self.unsolvable)
+            self.sums = BlockSums(s, TERMS)
         for column in (self.pending, self.sweeps, self.unconverged, self.largest, *self.changes):
             builder.dense(ti.i, s.worlds).place(column)
         self.tree = Tree(builder)
+
+    def column(self) -> Any:
+        """Return a field of values of the quantity."""
+        return ti.Vector.field(3, self.s.real) if self.components == 3 else ti.field(self.s.real)
 
     def phases(self, trial: bool = False) -> tuple[Item, ...]:
         return BeginSweeps(self), SweepUntilConverged(self, trial)
 
     def bytes(self) -> int:
         """Return the device memory, in bytes."""
-        return self.tree.bytes + (self.exported.bytes() if self.exported else 0)
+        parts = (self.exported, self.sums if self.mixed else None)
+        return self.tree.bytes + sum(part.bytes() for part in parts if part)
 
 
 class BeginSweeps(OnOccasion, PerParticle):
@@ -87,7 +103,8 @@ class SweepUntilConverged(Repeat):
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
         sweep = sum_phases(JacobiSweep(solver, trial), solver.exported)
-        super().__init__((*sweep, ReplaceValues(solver, trial), CheckConvergence(solver)))
+        mixing = (CompareSweeps(solver), ChooseMixing(solver)) if solver.mixed else ()
+        super().__init__((*sweep, *mixing, ReplaceValues(solver, trial), CheckConvergence(solver)))
         self.solver = solver
 
     @ti.func
@@ -161,22 +178,28 @@ class ReplaceValues(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        a, s = self.solver, self.s
-        change = a.size(a.next[w, i] - a.value[w, i])
-        a.value[w, i] = a.next[w, i]
+        a = self.solver
+        new, residual = a.next[w, i], a.next[w, i] - a.value[w, i]
+        change, unsolvable = a.size(residual), False
+        a.value[w, i] = new
+        if ti.static(a.mixed):
+            if a.theta[w] != 0.0:
+                a.value[w, i] = new - ti.cast(a.theta[w], self.s.real) * (new - a.last[w, i])
+            a.last[w, i], a.residual[w, i] = new, residual
+            unsolvable = a.unsolvable[w] > 0
         if change > a.changes[0][w]:
             ti.atomic_max(a.changes[0][w], change)
         if ti.static(self.effect.sweeps > 0):
             tolerance = ti.max(self.effect.relaxation(w) * self.effect.tolerance(w), self.least)
             on = change > tolerance * a.largest[w]
-            if on and a.sweeps[w] + 1 < self.effect.sweeps:
+            if on and not unsolvable and a.sweeps[w] + 1 < self.effect.sweeps:
                 ti.atomic_max(a.unconverged[w], 1)
-            elif on:
+            elif on or unsolvable:
                 if ti.static(self.trial):
                     # Forces that are not finite: the step is given up.
                     a.value[w, i] *= ti.math.nan
                 else:
-                    fail_to_converge(s, w, i, self.effect)
+                    fail_to_converge(self.s, w, i, self.effect)
 
 
 @ti.func

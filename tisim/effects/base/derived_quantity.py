@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.accuracy_parameter import AccuracyParameter
@@ -38,17 +38,26 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     largest value, or by rounding. A world in which ``sweeps`` do not suffice fails, and says so; with
     ``sweeps`` of 0 there is one sweep per step and no such test.
 
-    Where the others act by a linear law, with real eigenvalues L, sweeps with a ``relaxation`` of a converge
-    if 1 - 2/a < L < 1 for all of them. There is no solution to find where L exceeds 1; a < 1 helps where one
-    is below -1, as in dense lattices.
+    Where the others act by a linear law, with real eigenvalues L, plain sweeps with a ``relaxation`` of a
+    converge if 1 - 2/a < L < 1 for all of them. Mixed by the method of Anderson they are fewer, and converge
+    as well where some are below -1, as in dense lattices. There is no solution to find where L exceeds 1:
+    what a mixed sweep would then find is none, so a ``linear`` law stops its world as soon as sweeps show
+    such an L.
 
-    ``sweep_factor`` of a world is what sweeps multiply the change by, from the last three; without end it
-    tends to the largest |1 - a + a L|.
+    ``sweep_factor`` of a world is what sweeps multiply the change by, from the last three; of plain ones
+    without end it tends to the largest |1 - a + a L|. Where a world stops as L exceeds 1 it is a bound of L
+    from below.
+
+    linear : whether the response is linear in what the others do. Its ``weight`` then makes what i does to j
+    equal to what j does to i.
+
+    Source: D. G. Anderson, J. ACM 12 (1965) 547, with a depth of 1.
     """
 
     contract: ClassVar[bool] = True
     counters = ("mutual_sweeps",)
     world_quantities = ("sweep_factor",)
+    linear: ClassVar[bool] = False
 
     tolerance: float = parameter(
         "", "change in a sweep, over the largest value, at which the solution counts as converged", 1e-8, gt=0
@@ -57,11 +66,19 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     relaxation: float = parameter(
         "", "part a of its way that a sweep goes, q = (1 - a) q + a response", 1.0, gt=0, le=1
     )
+    acceleration: Literal["anderson", "none"] = option(
+        "how sweeps are mixed with the last, where there are several a step", "anderson"
+    )
 
     accuracy_parameters = (AccuracyParameter(tolerance=1),)
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return (self.model_copy(update={"sweeps": 0}),) if self.sweeps else ()
+
+    @ti.func
+    def weight(self, s, w, i):
+        """Return the weight of particle i in the inner product by which sweeps are mixed."""
+        return ti.cast(1.0, s.real)
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):

@@ -52,6 +52,12 @@ class MutualInducedMoment(MutualMoment, InducedMoment):
     """
 
     independent_law = InducedMoment
+    linear: ClassVar[bool] = True
+
+    @ti.func
+    def weight(self, s, w, i):
+        # Moments over volume are symmetric in what they do to each other; chi is that of all.
+        return 1.0 / s.radius[w, i] ** 3
 
 
 class MutualLangevinMoment(MutualMoment, LangevinMoment):
