@@ -5,7 +5,7 @@ import pytest
 
 from tests.scenes import scene
 from tisim import Box, InputError, Result, ShearedBox
-from tisim.analysis import streaming_part, stress_on_wall, stress_tensor
+from tisim.analysis import streaming_part, stress_on_wall, stress_profile, stress_tensor
 from tisim.effects import Mie, Virial
 from tisim.engine.result import Status
 
@@ -60,3 +60,27 @@ def test_stress_on_a_wall():
         stress_on_wall(measures, "floor", 2.0)
     with pytest.raises(InputError, match="area must be above 0"):
         stress_on_wall(measures, "lid", 0.0)
+
+
+def test_the_stress_in_layers_is_that_of_the_weight_above():
+    """A column of touching grains on a floor: the contact between layers k and k + 1 bears those above it."""
+    n, d, weight = 20, 0.02, 3.0
+    height = d * (np.arange(n) + 0.5)
+    position = np.column_stack([np.full(n, 0.5), np.full(n, 0.5), height])
+    borne = weight * np.arange(n)[::-1]
+    virial = np.zeros((n, 9))
+    # Half of r F of the contact above and, but for the lowest, of that below.
+    virial[:, 8] = d * (borne + np.append(0.0, borne[:-1])) / 2
+    velocity = np.column_stack([height, 0 * height, 0 * height]) * 7
+    result = result_of(position, velocity, virial, Box(**BOX, periodic=(True, True, False)))
+    edges = np.arange(0, 0.41, 0.1)
+    found = stress_profile(result, edges, area=8.0)
+    load = borne + np.append(0.0, borne[:-1])
+    np.testing.assert_allclose(found[:, 2, 2], -load.reshape(4, 5).mean(axis=1) / 2 / 8.0)
+    # Velocities beside the mean of each layer of five: 7 d times 2, 1, 0, 1, 2.
+    moving = 2.0 * 10 * (7 * d) ** 2 / (8.0 * 0.1)
+    np.testing.assert_allclose(found[:, 0, 0], -moving)
+    total = stress_tensor(result, volume=8.0 * 0.4)
+    np.testing.assert_allclose(found[:, 2, 2].mean(), total[2, 2])
+    with pytest.raises(InputError, match="area must be above 0"):
+        stress_profile(result, edges, area=0.0)

@@ -38,6 +38,7 @@ from .slope import slope_angles as slope_angles
 from .slope import surface_profile as surface_profile
 from .stress import streaming_part as streaming_part
 from .stress import stress_on_wall as stress_on_wall
+from .stress import stress_profile as stress_profile
 from .stress import stress_tensor as stress_tensor
 from .voronoi import ShellVolumes as ShellVolumes
 from .voronoi import voronoi_by_shell as voronoi_by_shell

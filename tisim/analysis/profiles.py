@@ -9,7 +9,7 @@ def layer_means(position: np.ndarray, values: np.ndarray, edges: np.ndarray, axi
     """Return the mean of what particles have in each layer between ``edges`` (m, rising) along an axis; NaN
     where none is; shape (edges - 1,), or (edges - 1, k) for values of shape (n, k)."""
     values = np.asarray(values, float)
-    layer, inside = _layers(position, edges, axis)
+    layer, inside = layers(position, edges, axis)
     columns = values[inside].reshape(int(inside.sum()), -1).T
     number = np.bincount(layer, minlength=len(edges) - 1).astype(float)
     number[number == 0] = np.nan
@@ -33,14 +33,13 @@ def granular_temperature(
 
     Source: I. Goldhirsch, Powder Technol. 182 (2008) 130, for the fluctuation about a mean flow that varies.
     """
-    layer, inside = _layers(position, edges, axis)
-    layers = len(edges) - 1
-    number = np.bincount(layer, minlength=layers)
+    layer, inside = layers(position, edges, axis)
+    number = np.bincount(layer, minlength=len(edges) - 1)
 
     def mean(values: np.ndarray) -> np.ndarray:
-        return np.bincount(layer, values, layers) / np.maximum(number, 1)
+        return np.bincount(layer, values, len(number)) / np.maximum(number, 1)
 
-    x, squares = np.asarray(position, float)[inside, axis], np.zeros(layers)
+    x, squares = np.asarray(position, float)[inside, axis], np.zeros(len(number))
     x = x - mean(x)[layer]
     spread = mean(x**2)
     for v in np.asarray(velocity, float)[inside].T:
@@ -51,8 +50,9 @@ def granular_temperature(
     return np.asarray(squares / freedom)
 
 
-def _layers(position: np.ndarray, edges: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the layer of each particle that is in one, and which are."""
+def layers(position: np.ndarray, edges: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the layer, between ``edges`` (m, rising) along an axis, of each particle that is in one, and
+    which are."""
     layer = np.searchsorted(edges, np.asarray(position)[:, axis], side="right") - 1
     inside = (layer >= 0) & (layer < len(edges) - 1)
     return layer[inside], inside

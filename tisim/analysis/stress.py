@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from tisim.analysis.profiles import layer_means, layers
 from tisim.engine.result import Result
 from tisim.errors import must
 
@@ -43,6 +44,30 @@ def streaming_part(result: Result) -> np.ndarray:
     beside = velocity - result.scene.domain.streaming_velocity(state["position"].astype(float))
     beside -= mass @ beside / mass.sum()
     return np.asarray(np.einsum("n,na,nb->ab", mass, beside, beside))
+
+
+def stress_profile(result: Result, edges: np.ndarray, area: float, axis: int = 2) -> np.ndarray:
+    """Return the stress (Pa) in each layer between ``edges`` (m, rising) along an axis, as ``stress_tensor``
+    has it of all; of velocities beside the mean of each layer; shape (edges - 1, 3, 3).
+
+    area : that of the box or container across the axis, m^2. Each particle has the half of each of its pairs,
+    in the layer where its centre is: layers should be wider than a diameter, and in layers at a wall a part
+    of the force goes through the wall, which is no pair. Away from walls and field forces a steady flow has
+    the same stress on all layers as on the walls.
+    """
+    state = result.state
+    must("virial" in state, "scene", "with the effect virial for a stress", sorted(state))
+    must(area > 0, "area", "above 0 m^2", area)
+    position, edges = state["position"].astype(float), np.asarray(edges, float)
+    mass, velocity = state["mass"].astype(float), state["velocity"].astype(float)
+    velocity -= result.scene.domain.streaming_velocity(position)
+    layer, inside = layers(position, edges, axis)
+    momentum = layer_means(position, mass[:, None] * velocity, edges, axis)
+    means = momentum / layer_means(position, mass, edges, axis)[:, None]
+    beside, mass = velocity[inside] - means[layer], mass[inside]
+    parts = np.einsum("n,na,nb->nab", mass, beside, beside).reshape(-1, 9) + state["virial"][inside]
+    sums = np.column_stack([np.bincount(layer, column, len(edges) - 1) for column in parts.T])
+    return -sums.reshape(-1, 3, 3) / (area * np.diff(edges))[:, None, None]
 
 
 def stress_on_wall(measures: Mapping[str, float | np.ndarray], name: str, area: float) -> np.ndarray:
