@@ -14,7 +14,7 @@ from tisim.plotting.walls import AROUND
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
-COLOURS = colormaps["tab20"](np.arange(20))[:, :3]
+CLUSTER_COLOURS = colormaps["tab20"](np.arange(20))[:, :3]
 """Clusters next to each other in size have unlike ones of these colours."""
 SINGLE = (0.88, 0.88, 0.88)
 """Particles that are bound to none are of this grey."""
@@ -34,7 +34,7 @@ def clusters(
     size = np.bincount(cluster)
     rank = np.empty(len(size), int)
     rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
-    colours = COLOURS[rank[cluster] % len(COLOURS)]
+    colours = CLUSTER_COLOURS[rank[cluster] % len(CLUSTER_COLOURS)]
     colours[size[cluster] == 1] = SINGLE
     lines = [] if ellipsoid is None else [_silhouette(ellipsoid)]
     box = corners(*scene.domain.bounds())
