@@ -113,7 +113,7 @@ def heat_colours(state: Arrays, norm: Normalize | None) -> np.ndarray | None:
     return None if norm is None or not len(state["radius"]) else HEAT(norm(state["temperature"]))[:, :3]
 
 
-def _project(points: np.ndarray) -> np.ndarray:
+def project(points: np.ndarray) -> np.ndarray:
     """Return the coordinates right, up and towards the viewer for points of shape (n, 3). m."""
     return np.asarray(points) @ PROJECTION
 
@@ -122,7 +122,7 @@ def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
     """Return the corners of the box as seen, shape (8, 3); none in open space. m."""
     if low is None or high is None:
         return np.empty((0, 3))
-    return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
+    return project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
 def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.ndarray]:
@@ -132,7 +132,7 @@ def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.nda
     if not len(size):
         return []
     low, high = (place - size[:, None]).min(axis=0), (place + size[:, None]).max(axis=0)
-    return [_project(line) for line in outlines(scene, time, low, high, _TOWARDS)]
+    return [project(line) for line in outlines(scene, time, low, high, _TOWARDS)]
 
 
 def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
@@ -146,7 +146,7 @@ def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
     nothing. m."""
     if not len(state["radius"]) and not len(box):
         return -0.5, -0.5, 1.0
-    projected, radius = _project(state["position"]), state["radius"][:, None]
+    projected, radius = project(state["position"]), state["radius"][:, None]
     low = np.vstack([projected - radius, box]).min(axis=0)[:2]
     high = np.vstack([projected + radius, box]).max(axis=0)[:2]
     side = 1.06 * float((high - low).max())
@@ -165,7 +165,7 @@ def panel(
     left, bottom, side = square
     if colour is None:
         colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
-    image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
+    image = _draw(project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
     axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
     if len(box):
         _edges(axis, box)
