@@ -133,9 +133,24 @@ from .impact.softening import Softening as Softening
 from .magnetic.body_force import MagneticBodyForce as MagneticBodyForce
 from .magnetic.dipole_dipole import DipoleDipole as DipoleDipole
 from .magnetic.dipole_dipole import TruncatedDipoleDipole as TruncatedDipoleDipole
+from .magnetic.magnetic_materials import (
+    CARBONYL_IRON as CARBONYL_IRON,
+)
+from .magnetic.magnetic_materials import (
+    IRON as IRON,
+)
+from .magnetic.magnetic_materials import (
+    MAGNETITE as MAGNETITE,
+)
+from .magnetic.magnetic_materials import (
+    MagneticMaterial as MagneticMaterial,
+)
 from .magnetic.magnetophoresis import Magnetophoresis as Magnetophoresis
 from .magnetic.moment import (
     FixedMoment as FixedMoment,
+)
+from .magnetic.moment import (
+    FroehlichMoment as FroehlichMoment,
 )
 from .magnetic.moment import (
     InducedMoment as InducedMoment,
@@ -145,6 +160,9 @@ from .magnetic.moment import (
 )
 from .magnetic.moment import (
     Moment as Moment,
+)
+from .magnetic.mutual_moment import (
+    MutualFroehlichMoment as MutualFroehlichMoment,
 )
 from .magnetic.mutual_moment import (
     MutualInducedMoment as MutualInducedMoment,
