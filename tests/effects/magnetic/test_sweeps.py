@@ -17,8 +17,8 @@ ERRORS = [
     [-1.014, -1.082, -0.590],
     [-0.278, -0.286, 0.026],
 ]
-"""Percent of the force on each in the end, after 0, 1, ... sweeps from moments of the applied field alone, for
-mu_r without end; computed with NumPy in plain loops."""
+"""Of the force on each, percent of that in the end, after 0, 1, ... sweeps from the moments that each has by
+itself, for mu_r without end; computed with NumPy in plain loops."""
 
 
 def force(m):
