@@ -8,18 +8,25 @@ from tests.effects.magnetic.magnets import K_B, MU_0, Quadrupole, dipole_field, 
 from tests.effects.magnetic.test_dipole_dipole import SIDE, magnets
 from tests.effects.magnetic.test_moment import langevin
 from tests.scenes import by_id, fixed, scene, simulate
-from tisim import Simulation
+from tisim import Material, Simulation
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.effects import (
     DipoleDipole,
     FixedMoment,
+    Granular,
+    Hooke,
     LangevinMoment,
+    LinearSpring,
     Magnetophoresis,
     Mie,
+    MutualFroehlichMoment,
     MutualInducedMoment,
     MutualLangevinMoment,
     NearField,
+    PermanentMoment,
+    RestitutionDamping,
+    TruncatedDipoleDipole,
 )
 from tisim.numerics.langevin import langevin_ratio
 from tisim.sources import MagneticField
@@ -327,6 +334,68 @@ def test_a_pair_that_snaps_together_keeps_its_energy():
     assert (np.diff(np.sign(np.diff(gaps))) != 0).sum() > 30
     assert gaps.min() < bottom < 2.55 < gaps.max() < 2.601
     np.testing.assert_allclose(energies, energies[0], rtol=1e-3)
+
+
+CONTACT = Granular(normal=Hooke(), damping=RestitutionDamping(), tangential=LinearSpring())
+STEEL = {"steel": Material(stiffness=1e5, restitution=0.1, friction=0.5)}
+
+
+def chain(*effects, **more):
+    """Five grains in a row along z that just touch."""
+    place = np.array([[0, 0, 2.0 * k] for k in range(5)])
+    return scene(
+        place,
+        0 * place,
+        (CONTACT, *effects),
+        radius=1.0,
+        mass=1.0,
+        stepper=fixed(1e-4),
+        duration=4.0,
+        materials=STEEL,
+        **more,
+    )
+
+
+CHAINS = {
+    "permanent": lambda: chain(PermanentMoment(), DipoleDipole(), quantities={"moment": [[0, 0, 1e4]] * 5}),
+    "mutual": lambda: chain(
+        MagneticField(constant=(0, 0, 1e-3)),
+        MutualInducedMoment(susceptibility=1e3, cutoff=6.0),
+        TruncatedDipoleDipole(cutoff=6.0),
+    ),
+    "mutual, one sweep a step": lambda: chain(
+        MagneticField(constant=(0, 0, 1e-3)),
+        MutualFroehlichMoment(susceptibility=1e3, saturation=1.7e6, sweeps=0, cutoff=6.0, shifted=True),
+        TruncatedDipoleDipole(cutoff=6.0, shifted=True),
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_chain_at_rest_holds(name):
+    """The springs of its contacts bear what the moments on one side of each pull those on the other."""
+    setup = CHAINS[name]()
+    (result,) = simulate([setup], capacity=32)
+    assert result.status.ok, result.status.reason
+    state, law = by_id(result), setup.effects[-1]
+    r, m = state["position"], state["moment"]
+    pull = np.zeros((5, 5))
+    for i, j in np.argwhere(~np.eye(5, dtype=bool)):
+        d = r[j, 2] - r[i, 2]
+        x = abs(d) / (getattr(law, "cutoff", np.inf) or np.inf)
+        part, slope = (
+            (1 - 4 * x**3 + 3 * x**4, 12 * x**3 * (x - 1)) if getattr(law, "shifted", False) else (1.0, 0.0)
+        )
+        # U = -2 c m m / d^3 of a pair in line; F along n is f times -6 c m m / d^4, less d f' U / d.
+        size = 2e-7 * m[i, 2] * m[j, 2] / d**4
+        pull[i, j] = np.sign(d) * (3 * part - slope) * size if x <= 1 else 0.0
+    assert np.abs(state["force"]).max() < 1e-5 * np.abs(pull).max()
+    for k in range(4):
+        spring = 1e5 * (2.0 - (r[k + 1, 2] - r[k, 2]))
+        assert spring == pytest.approx(pull[: k + 1, k + 1 :].sum(), rel=1e-4)
+    np.testing.assert_allclose(r[:, :2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(m[:, :2], 0.0, atol=1e-9 * np.abs(m).max())
 
 
 def colloids():

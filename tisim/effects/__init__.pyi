@@ -133,9 +133,24 @@ from .impact.softening import Softening as Softening
 from .magnetic.body_force import MagneticBodyForce as MagneticBodyForce
 from .magnetic.dipole_dipole import DipoleDipole as DipoleDipole
 from .magnetic.dipole_dipole import TruncatedDipoleDipole as TruncatedDipoleDipole
+from .magnetic.magnetic_materials import (
+    CARBONYL_IRON as CARBONYL_IRON,
+)
+from .magnetic.magnetic_materials import (
+    IRON as IRON,
+)
+from .magnetic.magnetic_materials import (
+    MAGNETITE as MAGNETITE,
+)
+from .magnetic.magnetic_materials import (
+    MagneticMaterial as MagneticMaterial,
+)
 from .magnetic.magnetophoresis import Magnetophoresis as Magnetophoresis
 from .magnetic.moment import (
     FixedMoment as FixedMoment,
+)
+from .magnetic.moment import (
+    FroehlichMoment as FroehlichMoment,
 )
 from .magnetic.moment import (
     InducedMoment as InducedMoment,
@@ -147,6 +162,9 @@ from .magnetic.moment import (
     Moment as Moment,
 )
 from .magnetic.mutual_moment import (
+    MutualFroehlichMoment as MutualFroehlichMoment,
+)
+from .magnetic.mutual_moment import (
     MutualInducedMoment as MutualInducedMoment,
 )
 from .magnetic.mutual_moment import (
@@ -155,6 +173,7 @@ from .magnetic.mutual_moment import (
 from .magnetic.mutual_moment import (
     MutualMoment as MutualMoment,
 )
+from .magnetic.permanent_moment import PermanentMoment as PermanentMoment
 from .motion.base import Fixed as Fixed
 from .motion.base import Motion as Motion
 from .motion.oscillation import Oscillation as Oscillation

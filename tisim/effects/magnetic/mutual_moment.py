@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from scipy.constants import mu_0
-
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, SelfConsistentQuantity
-from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment, Moment
+from tisim.effects.magnetic.dipole_pairs import DipolePairs, dipole_field
+from tisim.effects.magnetic.moment import FroehlichMoment, InducedMoment, LangevinMoment, Moment
 
 
-class MutualMoment(SelfConsistentQuantity, Moment):
-    """This is the contract of a moment that follows the field of the sources and of all other moments.
+class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
+    """This is the contract of a moment that follows the field of the sources and of other moments.
 
-        m_i = law(B(r_i) + sum_j B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
+        m_i = law(B(r_i) + sum_j f(x) B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
     A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,
-    matter as well. In a periodic box only the nearest image of a particle acts.
+    matter as well. In a periodic box only the nearest image of a particle acts. f is 1 for all pairs, unless
+    there is a ``cutoff``, as in ``truncated_dipole_dipole``, which is then to have the same one.
     """
 
     contract: ClassVar[bool] = True
@@ -30,19 +30,20 @@ class MutualMoment(SelfConsistentQuantity, Moment):
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """Return the field (T) of j at i."""
-        inverse = 1.0 / distance
-        n = inverse * separation
-        # Cube first: in f32 a moment of 1e-17 A m^2 squared is nothing.
-        m = inverse * inverse * inverse * s.moment[w, j]
-        return mu_0 / (4.0 * ti.math.pi) * (3.0 * m.dot(n) * n - m)
+        """Return the field (T) of j at i, as far as it counts."""
+        field = dipole_field(s.moment[w, j], separation, distance)
+        if ti.static(self.short_ranged):
+            part, _slope = self.part(s, w, i, j, distance)
+            field *= part
+        return field
 
 
 class MutualInducedMoment(MutualMoment, InducedMoment):
     """Spheres of linear material are magnetised by the sources and by each other.
 
-        m_i = V_i 3 chi / (3 + chi) (B(r_i) + sum_j B_j(r_i)) / mu_0
+        m_i = V_i 3 chi / (3 + chi) (B(r_i) + sum_j f(x) B_j(r_i)) / mu_0
         B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)                        the field of a dipole
+        d_c = cutoff (R_i + R_j)/2 + gap,    x = d/d_c,    f(x) = 1 plain, 1 - 4 x^3 + 3 x^4 shifted
 
     Two at a distance d, with a = chi / (3 + chi) R^3 / d^3, have 1 / (1 - 2 a) times the moment of one alone
     along the line between them, 1 / (1 + a) across it. Near contact the higher multipoles, which are left
@@ -73,3 +74,18 @@ class MutualLangevinMoment(MutualMoment, LangevinMoment):
     """
 
     independent_law = LangevinMoment
+
+
+class MutualFroehlichMoment(MutualMoment, FroehlichMoment):
+    """Spheres of iron or an oxide are magnetised by the sources and by each other, up to saturation.
+
+        M_i = chi H M_s / (M_s + chi H),    H = |B(r_i) + sum_j f(x) B_j(r_i)| / mu_0 - M_i/3
+
+    It is as ``mutual_induced_moment`` in weak fields, and as ``froehlich_moment`` of spheres by themselves.
+    Saturation ends the growth of moments where linear spheres that overlap have none. In a periodic box only
+    the nearest image of a particle acts.
+
+    Source: L21 Eqs (2.6), (4.12); that of ``froehlich_moment``.
+    """
+
+    independent_law = FroehlichMoment

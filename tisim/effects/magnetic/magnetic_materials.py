@@ -1,0 +1,61 @@
+"""Soft magnetic materials by name, for laws whose magnetisation saturates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scipy.constants import mu_0
+
+from tisim.errors import must
+
+
+@dataclass(frozen=True)
+class MagneticMaterial:
+    """A magnetic material is what grains are made of: its magnetisation and its density.
+
+    saturation : saturation magnetisation, A/m. susceptibility : in weak fields, mu_r - 1; None where it goes
+    by how the material was made. Of spheres it hardly matters where it is far above 3. density : kg/m^3.
+    source : where the numbers are from.
+    """
+
+    name: str
+    saturation: float
+    susceptibility: float | None
+    density: float
+    source: str
+
+    def moment(self, susceptibility: float | None = None) -> dict[str, float]:
+        """Return the parameters of ``FroehlichMoment`` and ``MutualFroehlichMoment``; with a susceptibility
+        of one's own, where one is given."""
+        own = self.susceptibility if susceptibility is None else susceptibility
+        must(
+            own is not None,
+            f"susceptibility of {self.name}",
+            "given, as it goes by how it was made",
+            "nothing",
+        )
+        return {"susceptibility": float(own or 0.0), "saturation": self.saturation}
+
+
+CARBONYL_IRON = MagneticMaterial(
+    name="carbonyl iron",
+    saturation=2.1 / mu_0,
+    susceptibility=999.0,
+    density=7860.0,
+    source="J. M. Ginder, L. C. Davis, L. D. Elie, Int. J. Mod. Phys. B 10 (1996) 3293: mu_0 M_s = 2.1 T, "
+    "mu_r = 1000; density of iron",
+)
+IRON = MagneticMaterial(
+    name="iron",
+    saturation=1.714e6,
+    susceptibility=None,
+    density=7874.0,
+    source="B. D. Cullity, C. D. Graham, Introduction to Magnetic Materials (2009), appendix 5, at 20 C",
+)
+MAGNETITE = MagneticMaterial(
+    name="magnetite",
+    saturation=4.8e5,
+    susceptibility=None,
+    density=5197.0,
+    source="D. J. Dunlop, O. Oezdemir, Rock Magnetism (1997), table 3.1",
+)
