@@ -11,4 +11,7 @@ from .clusters import near as near
 from .discharge import beverloo_rate as beverloo_rate
 from .discharge import discharge_rate as discharge_rate
 from .discharge import discharge_rates as discharge_rates
+from .gravitation import angular_momentum as angular_momentum
+from .gravitation import gravitational_energy as gravitational_energy
+from .gravitation import virial_ratio as virial_ratio
 from .heap import angle_of_repose as angle_of_repose
