@@ -163,6 +163,12 @@ def single():
 
 
 @pytest.fixture(scope="module")
+def in_one_thread():
+    """Calls a function of a test module, MODULE.NAME, in a process of one thread: what it returns."""
+    return elsewhere_with("threads=1")
+
+
+@pytest.fixture(scope="module")
 def in_fast_arithmetic():
     """Calls a function of a test module, MODULE.NAME, in a process of fast arithmetic: what it returns."""
     return elsewhere_with("arithmetic='fast'")

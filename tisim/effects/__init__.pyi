@@ -14,6 +14,12 @@ from .base import (
     Force as Force,
 )
 from .base import (
+    LongRange as LongRange,
+)
+from .base import (
+    LongRangeSum as LongRangeSum,
+)
+from .base import (
     PairEvent as PairEvent,
 )
 from .base import (
@@ -131,6 +137,7 @@ from .gravitation.self_gravity import (
 from .gravitation.self_gravity import (
     SoftenedSelfGravity as SoftenedSelfGravity,
 )
+from .gravitation.tree_gravity import TreeGravity as TreeGravity
 from .impact.agglomeration import Agglomeration as Agglomeration
 from .impact.friction import Friction as Friction
 from .impact.heating import DeformationWork as DeformationWork

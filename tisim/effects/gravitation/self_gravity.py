@@ -6,11 +6,14 @@ from scipy.constants import G
 
 from tisim.backend.taichi import ti
 from tisim.components.component import parameter
-from tisim.effects.base import PairForce
+from tisim.effects.base import Effect, PairForce
+from tisim.effects.gravitation.tree_gravity import TreeGravity
 
 ROOT_G = G**0.5
 """The square root of the constant of gravitation, N^(1/2) m/kg: m ROOT_G is to it what a charge is to
 Coulomb's law."""
+OPENING_ANGLES = (0.8, 0.5, 0.3)
+"""These opening angles of a tree are worth a try."""
 
 
 class SelfGravity(PairForce):
@@ -25,8 +28,13 @@ class SelfGravity(PairForce):
     without contacts there is ``softened_self_gravity``. In a periodic box only the nearest image of a
     particle acts, which is no gravity of an infinite medium.
 
+    For thousands of particles ``tree_gravity`` is faster.
+
     Source: L21 section 4.2.1.3, after I. Newton.
     """
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        return tuple(TreeGravity(opening_angle=theta) for theta in OPENING_ANGLES)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
@@ -58,6 +66,10 @@ class SoftenedSelfGravity(SelfGravity):
     """
 
     softening_length: float = parameter("m", "softening length eps", examples=[0.1], gt=0)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        soft = {"softening_length": self.softening_length}
+        return tuple(TreeGravity(opening_angle=theta, **soft) for theta in OPENING_ANGLES)
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):
