@@ -8,7 +8,6 @@ from tests.effects.gravitation.clouds import ball
 from tests.scenes import compiled, scene
 from tisim.effects import TreeGravity
 from tisim.interactions.cell_tree import FAN, LEAF
-from tisim.worlds.radix_sort import BASE, SORT_BLOCK
 
 NUMBERS = (2600, 1100, 17, 1)
 """Of particles in the worlds: some have several blocks of the sort, some one leaf."""
@@ -33,7 +32,7 @@ def trees():
 def test_particles_are_sorted_by_their_keys_and_then_by_number(trees):
     scenes, total = trees
     order, key = total.t.order.to_numpy(), total.t.sort.key.to_numpy()
-    assert max(NUMBERS) > 2 * SORT_BLOCK > BASE
+    assert max(NUMBERS) > 2 * total.t.sort.block
     for w, n in enumerate(NUMBERS):
         own = order[w, :n]
         np.testing.assert_array_equal(np.sort(own), np.arange(n))
