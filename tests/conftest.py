@@ -24,6 +24,7 @@ ON_DEVICES = (
     *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
     *("effects/test_contract.py", "operators/test_contract.py", "operators/test_passage.py"),
     *("operators/test_peak_displacement.py", "interactions/test_vacated_slots.py", "test_testing.py"),
+    *("interactions/test_cell_tree.py", "effects/gravitation/test_tree_gravity.py"),
 )
 """These files hold on every device: the contracts, and the physics of each kind of law. Insertions and
 clumps, whose steps take longest to compile, are left out."""
@@ -162,6 +163,12 @@ def elsewhere_with(setting):
 def single():
     """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
     return elsewhere_with("precision='f32'")
+
+
+@pytest.fixture(scope="module")
+def in_one_thread():
+    """Calls a function of a test module, MODULE.NAME, in a process of one thread: what it returns."""
+    return elsewhere_with("threads=1")
 
 
 @pytest.fixture(scope="module")
