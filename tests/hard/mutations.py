@@ -171,7 +171,7 @@ SHARED = {
         f"{PARTS}cohesion_pulls_while_surfaces_touch",
     ),
     "bonds_of_unlike_grains": (
-        f"{CONTACT}/parallel_bond.py", "coupled = arm / inertia", "coupled = 0.0 * arm / inertia",
+        f"{CONTACT}/parallel_bond.py", "coupled = arm / inertia - back / other", "coupled = 0.0 * arm",
         f"{BONDS}what_no_step_can_follow_of_unlike_grains_stops_the_world",
     ),
     "force_of_a_pair": (
