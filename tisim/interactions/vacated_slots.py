@@ -41,7 +41,7 @@ class FillSlots(Repeat):
 
     def __init__(self, slots: VacatedSlots) -> None:
         find = (MarkLive(slots), *slots.sums.phases(), FindLast(slots))
-        super().__init__((*find, Fill(slots), EndFill(slots)))
+        super().__init__((*find, FillFromEnd(slots), EndFill(slots)))
         self.s = slots.s
 
     @ti.func
@@ -75,7 +75,7 @@ class FindLast(PerSlot):
             slots.last[w, number - slots.alive[w, i]] = i
 
 
-class Fill(PerSlot):
+class FillFromEnd(PerSlot):
     """This phase fills those of the remaining slots that are vacated."""
 
     @ti.func

@@ -12,10 +12,10 @@ MOST_INTERVALS = 2**31 - 1
 
 
 class AtIntervals(Operator):
-    """It acts after the first step of each interval of time that has begun since it last did.
+    """An operator of this kind acts on a world after the first step of each interval of time.
 
-    ``world`` says that it has acted by ``count_interval``. The number of the interval is kept, as that of the
-    time before a step, found anew, may be rounded into another one.
+    Its ``world`` calls ``count_interval``. The number of intervals that have been counted is kept, as the one
+    before a step, found anew from the times, may be rounded into another.
     """
 
     contract: ClassVar[bool] = True
