@@ -8,7 +8,7 @@ from tests.scenes import compiled, fixed, flow, scene
 from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
-from tisim.effects import Force, Lorentz, PairForce, PrescribedMotion, RigidClumps, Tether, option
+from tisim.effects import Force, Lorentz, PairForce, PrescribedMotion, RigidClumps, Tether, Virial, option
 from tisim.engine.explain import known_effects
 from tisim.interactions.force_sum import FORCE
 from tisim.operators import Capture, Operator, Outflow
@@ -318,16 +318,18 @@ def test_a_field_that_only_others_declare_is_reported():
         assert_fields(two(*effects, charge=[1.0, 1.0]))
 
 
-# Capture and constraints exclude impacts. No law of its own, and a series that takes long to compile, has the
-# cylinder. What passes is weighed before it is taken out.
+# Capture, constraints and the virial exclude impacts. No law of its own, and a series that takes long to
+# compile, has the cylinder. What passes is weighed before it is taken out.
 HOLDING = [PrescribedMotion, RigidClumps]
-TOGETHER = [kind for kind in known_effects() if kind not in (Capture, MagneticCylinders, Outflow, *HOLDING)]
+TOGETHER = [
+    kind for kind in known_effects() if kind not in (Capture, MagneticCylinders, Outflow, Virial, *HOLDING)
+]
 TOGETHER.append(Outflow)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "kinds", [TOGETHER, [Capture], HOLDING], ids=["all that go together", "capture", "constraints"]
+    "kinds", [TOGETHER, [Capture, Virial], HOLDING], ids=["all that go together", "capture", "constraints"]
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))
