@@ -113,6 +113,9 @@ def test_voronoi_cells_fill_a_periodic_box(rng, time):
     position = rng.uniform(size=(200, 3)) ** 2 * (3, 4, 5)
     volumes = voronoi_volumes(position, periodic_sides(domain, time))
     assert volumes.sum() == pytest.approx(60.0, rel=1e-12)
+    # Crowded in a corner, so that cells elsewhere are wide.
+    crowded = rng.uniform(size=(400, 3)) ** 6 * (3, 4, 5)
+    assert voronoi_volumes(crowded, periodic_sides(domain, time)).sum() == pytest.approx(60.0, rel=1e-12)
     few = rng.uniform(size=(9, 3)) * (3, 4, 5)
     assert voronoi_volumes(few, (3, 4, 5)).sum() == pytest.approx(60.0, rel=1e-12)
 

@@ -17,7 +17,7 @@ LEANING = ShearedBox(low=(0, 0, 0), high=(3, 4, 5), rate=0.3, flow="z", gradient
         Box(low=(0, 0, 0), high=(3, 4, 5), periodic=(False,) * 3),
         Box(low=(0, 0, 0), high=(3, 4, 5), periodic=(True, False, True)),
         LEANING,
-        LEANING.model_copy(update={"flow": "y"}),
+        LEANING.model_copy(update={"flow": "y", "gradient": "z"}),
     ],
 )
 def test_near_pairs_are_those_whose_nearest_images_are(rng, domain):
