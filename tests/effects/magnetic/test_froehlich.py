@@ -112,11 +112,11 @@ def test_mutual_moments_are_those_of_the_field_where_each_is(rng):
 
 def test_the_named_materials_make_moments():
     """Iron as Ginder, Davis and Elie take it: mu_0 M_s = 2.1 T, mu_r = 1000; magnetite of 480 kA/m."""
-    law = FroehlichMoment(**CARBONYL_IRON.moment())
+    law = FroehlichMoment(**CARBONYL_IRON.parameters())
     assert law.susceptibility == 999.0
     assert MU_0 * law.saturation == pytest.approx(2.1, rel=1e-9)
     assert MAGNETITE.saturation == 4.8e5
     assert InducedMoment(susceptibility=CARBONYL_IRON.susceptibility).susceptibility == 999.0
     with pytest.raises(InputError, match="susceptibility of magnetite must be given"):
-        MAGNETITE.moment()
-    assert MAGNETITE.moment(susceptibility=20.0) == {"susceptibility": 20.0, "saturation": 4.8e5}
+        MAGNETITE.parameters()
+    assert MAGNETITE.parameters(susceptibility=20.0) == {"susceptibility": 20.0, "saturation": 4.8e5}
