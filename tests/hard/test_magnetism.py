@@ -5,6 +5,7 @@ import pytest
 
 from tests.effects.contact.loads import WORLDS, close, loads
 from tests.effects.magnetic.magnets import K_B, MU_0, Quadrupole, dipole_field, flux_density
+from tests.effects.magnetic.test_cutoff import parts
 from tests.effects.magnetic.test_dipole_dipole import SIDE, magnets
 from tests.effects.magnetic.test_moment import langevin
 from tests.scenes import by_id, fixed, scene, simulate
@@ -159,10 +160,12 @@ def solved_results(scenes, capacity=128):
     return results
 
 
-def solve(place):
+def solve(place, law=None):
     n, chi = len(place), 1e6 - 1
     gain = 4 * np.pi / MU_0 * chi / (3 + chi)
-    matrix = np.eye(3 * n) - gain * dipole_field(place).transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+    part = np.ones((n, n)) if law is None else parts(law, place, np.ones(n))
+    influence = part[..., None, None] * dipole_field(place)
+    matrix = np.eye(3 * n) - gain * influence.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
     return np.linalg.solve(matrix, np.tile([0, 0, gain], n)).reshape(n, 3)
 
 
@@ -334,6 +337,60 @@ def test_a_pair_that_snaps_together_keeps_its_energy():
     assert (np.diff(np.sign(np.diff(gaps))) != 0).sum() > 30
     assert gaps.min() < bottom < 2.55 < gaps.max() < 2.601
     np.testing.assert_allclose(energies, energies[0], rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_permanent_moments_antiparallel_at_contact():
+    """Head to head, held together: in unstable balance nothing turns; a little off it the two turn round, and
+    energy stays."""
+    off = 1e-3
+    moment = 1e3 * np.array([[0, 0, 1.0], [np.sin(off), 0, -np.cos(off)]])
+    hold = NearField(alpha1=0.4, beta1=1, alpha2=0.2 * 2.0**13, beta2=13)
+
+    def pair(moment):
+        return scene(
+            [[0, 0, 0], [0, 0, 2.2]],
+            np.zeros((2, 3)),
+            (PermanentMoment(), DipoleDipole(), hold),
+            radius=1.0,
+            mass=1.0,
+            stepper=fixed(2e-3),
+            duration=60.0,
+            quantities={"moment": moment, "spin": np.zeros((2, 3))},
+        )
+
+    def all_energy(state):
+        r, m = state["position"], state["moment"]
+        gap = np.linalg.norm(r[1] - r[0])
+        field = np.einsum("ijab,jb->ia", dipole_field(r), m)
+        motion = 0.5 * (state["velocity"] ** 2).sum() + 0.2 * (state["spin"] ** 2).sum()
+        return motion - 0.5 * (m * field).sum() + 0.4 * np.log(gap) + 0.2 * 2.0**13 / 12 / gap**12
+
+    (still,) = simulate([pair(1e3 * np.array([[0, 0, 1.0], [0, 0, -1.0]]))], capacity=4)
+    np.testing.assert_array_equal(still.state["spin"], 0.0)
+    (result,) = simulate([pair(moment)], capacity=4)
+    start, end = result.start, by_id(result)
+    # By far more than it was off.
+    assert np.linalg.norm(end["moment"] - start["moment"], axis=1).max() > 500.0
+    scale = 2e-7 * 1e6 / 2.2**3
+    assert abs(all_energy(end) - all_energy(start)) < 1e-3 * scale
+
+
+@pytest.mark.slow
+def test_dense_lattices_with_a_cutoff_converge_or_say_that_they_cannot():
+    """mu_r = 1e6, spheres that touch: relaxation takes in what plain sweeps cannot, with a cut-off too, and
+    moments are those of a linear solve with the same pairs."""
+    faces = np.argwhere(np.ones((6, 6, 6)))
+    faces = np.sqrt(2) * faces[faces.sum(axis=1) % 2 == 0]
+    for cut in ({"cutoff": 3.0}, {"cutoff": 2.0, "gap": 1.7}, {"cutoff": 6.0, "shifted": True}):
+        enough = {"sweeps": 2000, "tolerance": 1e-12, **cut}
+        (result,) = solved_results([spheres(faces, relaxation=0.6, **enough)])
+        assert result.status.reason == "running", result.status.reason
+        order = np.argsort(result.state["id"])
+        law = spheres(faces, **cut).effects[1]
+        close(result.state["moment"][order], solve(faces, law), 1e-9)
+    (result,) = solved_results([spheres(faces, cutoff=3.0, sweeps=2000, tolerance=1e-12)])
+    assert "does not converge: a sweep multiplies the change by" in result.status.reason
 
 
 CONTACT = Granular(normal=Hooke(), damping=RestitutionDamping(), tangential=LinearSpring())

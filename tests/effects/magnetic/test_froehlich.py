@@ -86,6 +86,21 @@ def mutual(rng, b, law):
     return scene(place, 0 * place, effects, radius=1.0, mass=1.0)
 
 
+def test_saturation_gives_moments_an_end_where_linear_ones_have_none():
+    """Two that overlap until 2 a = 2 exceeds 1, in a weak field: each saturates the other."""
+    law = MutualFroehlichMoment(**NUMBERS, tolerance=1e-14, sweeps=1000)
+    setup = mutual(np.random.default_rng(0), (0, 0, 1e-6), law)
+    start = setup.particles.model_copy(
+        update={"position": np.array([[0, 0, 0], [0, 0, 1.0]]), "velocity": np.zeros((2, 3))}
+        | {"radius": np.ones(2), "mass": np.ones(2)}
+    )
+    (state,) = loads([setup.model_copy(update={"particles": start})])
+    m = state["moment"][:, 2]
+    inside = 1e-6 + 2e-7 * m[::-1]
+    np.testing.assert_allclose(m, [4 / 3 * np.pi * magnetisation(*NUMBERS.values(), b) for b in inside])
+    assert m.min() > 0.9 * 4 / 3 * np.pi * NUMBERS["saturation"]
+
+
 def test_mutual_moments_are_those_of_the_field_where_each_is(rng):
     """Against a root found by SciPy; from weak fields, where they are linear, to saturation."""
     fields = np.geomspace(1e-3, 50.0, WORLDS)
@@ -112,11 +127,11 @@ def test_mutual_moments_are_those_of_the_field_where_each_is(rng):
 
 def test_the_named_materials_make_moments():
     """Iron as Ginder, Davis and Elie take it: mu_0 M_s = 2.1 T, mu_r = 1000; magnetite of 480 kA/m."""
-    law = FroehlichMoment(**CARBONYL_IRON.moment())
+    law = FroehlichMoment(**CARBONYL_IRON.parameters())
     assert law.susceptibility == 999.0
     assert MU_0 * law.saturation == pytest.approx(2.1, rel=1e-9)
     assert MAGNETITE.saturation == 4.8e5
     assert InducedMoment(susceptibility=CARBONYL_IRON.susceptibility).susceptibility == 999.0
     with pytest.raises(InputError, match="susceptibility of magnetite must be given"):
-        MAGNETITE.moment()
-    assert MAGNETITE.moment(susceptibility=20.0) == {"susceptibility": 20.0, "saturation": 4.8e5}
+        MAGNETITE.parameters()
+    assert MAGNETITE.parameters(susceptibility=20.0) == {"susceptibility": 20.0, "saturation": 4.8e5}

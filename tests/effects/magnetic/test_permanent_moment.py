@@ -9,9 +9,17 @@ from scipy.special import ellipk
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, vector
 from tests.effects.magnetic.magnets import Quadrupole, dipole_field, flux_density
 from tests.scenes import by_id, fixed, scene, simulate
-from tisim import InputError
-from tisim.effects import DipoleDipole, InducedMoment, Magnetophoresis, NearField, PermanentMoment
+from tisim import Clump, InputError, Particles, Scene
+from tisim.effects import (
+    DipoleDipole,
+    InducedMoment,
+    Magnetophoresis,
+    NearField,
+    PermanentMoment,
+    RigidClumps,
+)
 from tisim.sources import MagneticField
+from tisim.steppers import Boris, Collocation, FixedStep, IterationControl, StageControl, Trapezoid
 
 
 def magnets(place, moment, effects, **more):
@@ -133,6 +141,85 @@ def test_two_free_magnets_conserve_energy_and_angular_momentum():
         errors.append(abs(energy(end) - energy(start)))
     assert errors[0] < 1e-4 * abs(energy(start))
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.2)
+
+
+STEPPERS = {
+    "boris": Boris(control=FixedStep(dt=5e-4)),
+    "trapezoid": Trapezoid(control=IterationControl(first=5e-4, longest=5e-4)),
+    "collocation": Collocation(control=StageControl(error=1e-9, first=5e-4, longest=5e-4)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STEPPERS)
+def test_a_needle_swings_under_every_stepper_that_turns(name):
+    """A quarter of a period, to the first order in the step that operators at its end have."""
+    stepper, frequency = STEPPERS[name], np.sqrt(2.0 * 3.0 / 0.4)
+    setup = needle(0.01, stepper=stepper, velocity=[[0.1, 0, 0]], duration=np.pi / 2 / frequency)
+    (result,) = simulate([setup], capacity=4)
+    assert result.status.ok, result.status.reason
+    state = result.state
+    swung = np.arctan2(state["moment"][0, 0], state["moment"][0, 2])
+    assert abs(swung) < 0.01 * frequency * 1e-3
+    assert state["spin"][0, 1] == pytest.approx(-frequency * 0.01, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_a_clump_of_magnets_swings_as_one():
+    """Two magnets in one rigid body: I theta'' = -(m_1 + m_2) B theta, I that of the body across its axis."""
+    clump = Clump(centres=[(0, 0, -1.0), (0, 0, 1.0)], radii=[1.0, 1.0], density=1.0)
+    moments = np.array([[0, 0, 3.0], [0, 0, 5.0]])
+    inertia = clump.body.moments.max()
+    frequency, angle = np.sqrt(8.0 * 2.0 / inertia), 1e-3
+    turn = Rotation.from_euler("y", angle)
+    start = Particles.of_clumps(
+        clump,
+        [(0.0, 0.0, 0.0)],
+        orientation=np.roll(turn.as_quat(), 1)[None],
+        quantities={"moment": [[0.0, 0.0, 1.0]]},
+    )
+    quantities = {**start.quantities, "moment": turn.apply(moments)}
+    setup = Scene(
+        particles=start.model_copy(update={"quantities": quantities}),
+        effects=(
+            RigidClumps(),
+            MagneticField(constant=(0, 0, 2.0)),
+            Magnetophoresis(),
+            PermanentMoment(),
+        ),
+        stepper=fixed(np.pi / 2 / frequency / 1000),
+        duration=np.pi / 2 / frequency,
+    )
+    state = by_id(simulate([setup], capacity=4)[0])
+    np.testing.assert_allclose(state["moment"], moments, rtol=0, atol=5e-6 * angle * 5.0 + 5 * angle**2)
+    np.testing.assert_allclose(state["spin"][:, 1], -frequency * angle, rtol=1e-5)
+
+
+def dragged():
+    """Lengths and directions of moments after 20 000 turns, and the swing of a needle; in any precision."""
+    spin = [[3e3, -2e3, 1e3], [1.0, 0.5, -2.0]]
+    setup = magnets(
+        [[0, 0, 0], [50.0, 0, 0]],
+        [[1e-18, 2e-18, 2e-18], [3e-10, 0, 4e-10]],
+        felt(MagneticField()),
+        stepper=fixed(1e-3),
+        duration=20.0,
+        quantities={"spin": spin},
+    )
+    state = by_id(simulate([setup], capacity=8)[0])
+    lengths = np.linalg.norm(state["moment"].astype(float), axis=1)
+    frequency = np.sqrt(2.0 * 3.0 / 0.4)
+    swing = needle(1.0, stepper=fixed(np.pi / frequency / 2000), duration=np.pi / frequency)
+    return [(lengths / [3e-18, 5e-10]).tolist(), simulate([swing], capacity=4)[0].state["moment"][0].tolist()]
+
+
+@pytest.mark.slow
+def test_single_precision_keeps_magnitudes_and_swings_as_double(single):
+    """Lengths by what 20 000 turns round, each on its own, and not all in one direction."""
+    rough, fine = single("effects.magnetic.test_permanent_moment", "dragged"), dragged()
+    np.testing.assert_allclose(fine[0], 1.0, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(rough[0], 1.0, rtol=0, atol=3e-5)
+    np.testing.assert_allclose(rough[1], fine[1], rtol=0, atol=1e-3)
 
 
 def test_directions_are_drawn_evenly_by_the_seed():

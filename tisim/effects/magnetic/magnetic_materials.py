@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from scipy.constants import mu_0
 
-from tisim.errors import must
+from tisim.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -24,17 +24,14 @@ class MagneticMaterial:
     density: float
     source: str
 
-    def moment(self, susceptibility: float | None = None) -> dict[str, float]:
-        """Return the parameters of ``FroehlichMoment`` and ``MutualFroehlichMoment``; with a susceptibility
-        of one's own, where one is given."""
+    def parameters(self, susceptibility: float | None = None) -> dict[str, float]:
+        """Return the parameters that ``FroehlichMoment`` and ``MutualFroehlichMoment`` have of it; with a
+        susceptibility of one's own, where one is given."""
         own = self.susceptibility if susceptibility is None else susceptibility
-        must(
-            own is not None,
-            f"susceptibility of {self.name}",
-            "given, as it goes by how it was made",
-            "nothing",
-        )
-        return {"susceptibility": float(own or 0.0), "saturation": self.saturation}
+        if own is None:
+            rule = "given, as it goes by how it was made"
+            raise InputError(f"susceptibility of {self.name} must be {rule}; received nothing")
+        return {"susceptibility": own, "saturation": self.saturation}
 
 
 CARBONYL_IRON = MagneticMaterial(
