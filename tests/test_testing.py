@@ -335,7 +335,8 @@ def test_a_field_that_only_others_declare_is_reported():
 
 
 # Capture, constraints and the virial exclude impacts. No law of its own, and a series that takes long to
-# compile, has the cylinder. What passes is weighed before it is taken out. Permanent moments exclude soft ones.
+# compile, has the cylinder. What passes is weighed before it is taken out, and permanent moments exclude soft
+# ones.
 HOLDING = [PrescribedMotion, RigidClumps]
 APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING)
 TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
