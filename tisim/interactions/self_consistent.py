@@ -14,7 +14,7 @@ from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.listed_pairs import ExportedTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
 from tisim.interactions.pair_sum import PairSum
-from tisim.interactions.sweep_mixing import TERMS, ChooseMixing, CompareSweeps
+from tisim.interactions.sweep_mixing import MIXING_TERMS, ChooseMixing, CompareSweeps
 from tisim.numerics.ieee import finite
 from tisim.numerics.vectors import piece
 from tisim.worlds.block_sum import BlockSums
@@ -59,7 +59,7 @@ class SelfConsistentSolver(DerivedSolver):
             self.theta, self.unsolvable = ti.field(ti.f64), ti.field(ti.i32)
             builder.dense(ti.i, s.worlds).place(self.theta)
             builder.dense(ti.i, s.worlds).place(self.unsolvable)
-            self.sums = BlockSums(s, TERMS)
+            self.sums = BlockSums(s, MIXING_TERMS)
         for column in (self.pending, self.sweeps, self.unconverged, self.largest, *self.changes):
             builder.dense(ti.i, s.worlds).place(column)
         self.tree = Tree(builder)

@@ -27,7 +27,7 @@ from tisim.worlds.phases import Phase
 if TYPE_CHECKING:
     from tisim.interactions.self_consistent import SelfConsistentSolver
 
-TERMS = 5
+MIXING_TERMS = 5
 """The sums: <r, r - r_last>, |r - r_last|^2, <x - x_last, r - r_last>, |x - x_last|^2 and |f|^2."""
 EXCESS = 1e-3
 """An eigenvalue so much above 1 is taken for one; what is less may be rounding."""
@@ -44,7 +44,7 @@ class CompareSweeps(PerBlock):
 
     @ti.func
     def each(self, w, i):
-        a, total = self.solver, ti.Vector.zero(ti.f64, TERMS)
+        a, total = self.solver, ti.Vector.zero(ti.f64, MIXING_TERMS)
         if a.sweeps[w] > 0:
             x, f = ti.cast(a.packed(a.value[w, i]), ti.f64), ti.cast(a.packed(a.next[w, i]), ti.f64)
             f_last = ti.cast(a.packed(a.last[w, i]), ti.f64)
