@@ -66,12 +66,17 @@ class MarkLive(PerSlot):
 
 
 class FindLast(PerSlot):
-    """This phase lists live particles that have as many slots before them as there will be, from the end."""
+    """This phase lists live particles beyond the slots that will be in use, from the end."""
 
     @ti.func
-    def run(self, w, i):
+    def size(self, w):
+        return self.s.count[w] - self.slots.sums.total[w]
+
+    @ti.func
+    def run(self, w, k):
         slots, number = self.slots, self.slots.sums.total[w]
-        if i >= number and self.s.mass[w, i] > 0.0:
+        i = number + k
+        if self.s.mass[w, i] > 0.0:
             slots.last[w, number - slots.alive[w, i]] = i
 
 
