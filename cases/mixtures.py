@@ -25,9 +25,9 @@ LARGE_GRAINS: Parts = (
     (24.44, 5.593e-4),
 )  # fmt: skip
 """Of a median of 6.7 um, in the same way (L21 table 2.2b)."""
-VALVE: Parts = ((44.0, 44.0), (38.9, 35.0), (33.8, 24.2), (28.7, 13.2), (23.6, 5.6))
+VALVE_GRAINS: Parts = ((44.0, 44.0), (38.9, 35.0), (33.8, 24.2), (28.7, 13.2), (23.6, 5.6))
 """Grains that jam a valve, parts of the mass, which add up to 122 and are divided by that (L21 3.4.4)."""
-FINE_VALVE: Parts = ((10.0, 44.0), (9.49, 35.0), (8.98, 24.2), (8.47, 13.2), (7.96, 5.6))
+FINE_VALVE_GRAINS: Parts = ((10.0, 44.0), (9.49, 35.0), (8.98, 24.2), (8.47, 13.2), (7.96, 5.6))
 """Grains that do not, parts of the mass in the same way (L21 3.4.4)."""
 
 

@@ -12,7 +12,9 @@ def numbers(parts):
     return diameter * 1e-6, part / part.sum()
 
 
-@pytest.mark.parametrize(("parts", "median"), [(mixtures.SMALL_GRAINS, 1.8e-6), (mixtures.LARGE_GRAINS, 6.7e-6)])
+@pytest.mark.parametrize(
+    ("parts", "median"), [(mixtures.SMALL_GRAINS, 1.8e-6), (mixtures.LARGE_GRAINS, 6.7e-6)]
+)
 def test_curves_are_whole_and_have_the_medians_that_are_printed(parts, median):
     diameter, part = np.array(parts).T
     assert part.sum() == pytest.approx(1.0, abs=2e-4)
@@ -42,7 +44,7 @@ def test_a_mixture_has_its_part_of_small_grains_by_mass():
 
 
 def test_valve_grains_are_parts_of_the_mass():
-    for parts, largest in ((mixtures.VALVE, 44e-6), (mixtures.FINE_VALVE, 10e-6)):
+    for parts, largest in ((mixtures.VALVE_GRAINS, 44e-6), (mixtures.FINE_VALVE_GRAINS, 10e-6)):
         made = mixtures.classes(parts, "mass")
         assert sum(one.share for one in made) == pytest.approx(1.0)
         assert made[0].sizes.radius == pytest.approx(largest / 2)
