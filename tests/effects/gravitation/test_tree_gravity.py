@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.constants import G
 
-from tests.effects.gravitation.clouds import THETAS, ball, loads_of, pair_forces, relative_error
+from tests.effects.gravitation.clouds import CAPACITY, THETAS, ball, loads_of, pair_forces, relative_error
 from tests.scenes import compiled, scene, simulate
 from tisim import Box, InputError
 from tisim.effects import SelfGravity, SoftenedSelfGravity, TreeGravity
@@ -116,6 +116,7 @@ def test_iterations_of_a_step_see_it_as_they_see_all_pairs():
     np.testing.assert_allclose(end[0], end[1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_two_in_one_place_stop_the_world():
     setup = scene([[1, 2, 3], [1, 2, 3], [0, 0, 0]], np.zeros((3, 3)), (TreeGravity(),), mass=1.0)
     (result,) = simulate([setup], capacity=16)
@@ -142,7 +143,8 @@ def test_a_study_of_cost_tries_it_in_place_of_all_pairs():
 
 
 def test_its_memory_is_told():
-    simulation = compiled(scene(np.zeros((1, 3)), np.zeros((1, 3)), (TreeGravity(),), mass=1.0), capacity=16)
+    setup = scene(np.zeros((1, 3)), np.zeros((1, 3)), (TreeGravity(),), mass=1.0)
+    simulation = compiled(setup, worlds=len(THETAS), capacity=CAPACITY)
     (buffer,) = [one for one in simulation.assembly.buffers if one.what == "long-range sum"]
     assert buffer.why == "tree_gravity"
     assert buffer.memory.bytes() > 0
