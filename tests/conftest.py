@@ -22,7 +22,7 @@ ON_DEVICES = (
     *("effects/contact/test_walls.py", "effects/contact/test_contact.py", "effects/pair/test_near_field.py"),
     *("effects/pair/test_mie.py", "effects/external/test_drag.py", "effects/magnetic/test_dipole_dipole.py"),
     *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
-    "test_testing.py",
+    *("interactions/test_cell_tree.py", "effects/gravitation/test_tree_gravity.py", "test_testing.py"),
 )
 """These files hold on every device: the contracts, and the physics of each kind of law."""
 

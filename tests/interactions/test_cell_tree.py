@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from scipy.constants import G
 
-from tests.effects.gravitation.clouds import ball
+from tests.effects.gravitation.clouds import CAPACITY, THETAS, ball, loads_of
 from tests.scenes import compiled, scene
 from tisim.effects import TreeGravity
 from tisim.interactions.cell_tree import FAN, LEAF
-from tisim.worlds.radix_sort import BASE, SORT_BLOCK
 
-NUMBERS = (2600, 1100, 17, 1)
-"""Of particles in the worlds: some have several blocks of the sort, some one leaf."""
+NUMBERS = (CAPACITY, 700, 17, 1)
+"""Of particles in the worlds: one has two blocks of the sort, some have one leaf."""
 
 
 @pytest.fixture(scope="module")
@@ -24,16 +23,15 @@ def trees():
         place = np.concatenate([ball(rng, n - n // 3), 1e-7 * ball(rng, n // 3)])
         place = place[rng.permutation(n)]
         scenes.append(scene(place, 0 * place, (TreeGravity(),), mass=rng.uniform(1, 2, n)))
-    simulation = compiled(scenes[0], worlds=4, capacity=max(NUMBERS))
-    simulation.load(scenes)
-    simulation.first.advance(1)
+    loads_of(scenes)
+    simulation = compiled(scenes[0], worlds=len(THETAS), capacity=CAPACITY)
     return scenes, simulation.assembly.long_range["tree_gravity"]
 
 
 def test_particles_are_sorted_by_their_keys_and_then_by_number(trees):
     scenes, total = trees
     order, key = total.t.order.to_numpy(), total.t.sort.key.to_numpy()
-    assert max(NUMBERS) > 2 * SORT_BLOCK > BASE
+    assert max(NUMBERS) > total.t.sort.block
     for w, n in enumerate(NUMBERS):
         own = order[w, :n]
         np.testing.assert_array_equal(np.sort(own), np.arange(n))

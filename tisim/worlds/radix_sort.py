@@ -1,5 +1,6 @@
 """Sorting by whole numbers, in parallel: one digit after the other, from the lowest, each time stably."""
 
+from tisim.backend import runtime
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
@@ -9,8 +10,8 @@ from tisim.worlds.state import State
 
 DIGIT_BITS = 8
 BASE = 1 << DIGIT_BITS
-SORT_BLOCK = 1024
-"""So many items are counted and moved by one task."""
+SORT_BLOCK = {"cpu": 1024}
+"""One task counts and moves so many items, one after the other; on other devices 64."""
 
 
 @ti.data_oriented
@@ -27,7 +28,8 @@ class RadixSort:
         self.s, self.items, self.capacity = s, items, items.extent
         # An even number of passes ends where the first one began.
         self.passes = 2 * -(-bits // (2 * DIGIT_BITS))
-        self.blocks = -(-items.extent // SORT_BLOCK)
+        self.block = SORT_BLOCK.get(runtime.current().device, 64)
+        self.blocks = -(-items.extent // self.block)
         self.key, self.order = ti.field(ti.i64), ti.field(ti.i32)
         self.start, self.done = ti.field(ti.i32), ti.field(ti.i32)
         builder = Builder()
@@ -70,7 +72,7 @@ class RadixSort:
     @ti.func
     def number(self, w):
         """Return the number of blocks in use."""
-        return (self.items.size(w) + SORT_BLOCK - 1) // SORT_BLOCK
+        return (self.items.size(w) + self.block - 1) // self.block
 
 
 class SortByDigits(Repeat):
@@ -111,7 +113,7 @@ class OfDigitBlocks(Phase):
     @ti.func
     def end(self, w, b):
         """Return the item after the last of a block."""
-        return ti.min((b + 1) * SORT_BLOCK, self.sort.items.size(w))
+        return ti.min((b + 1) * self.sort.block, self.sort.items.size(w))
 
 
 class CountDigits(OfDigitBlocks):
@@ -125,7 +127,7 @@ class CountDigits(OfDigitBlocks):
         # One on, so that the sums up to each are where its items begin.
         for digit in range(BASE):
             a.start[w, digit * number + b + 1] = 0
-        for k in range(b * SORT_BLOCK, self.end(w, b)):
+        for k in range(b * a.block, self.end(w, b)):
             at = a.digit(w, a.half(w) + k) * number + b + 1
             a.start[w, at] = a.start[w, at] + 1
 
@@ -138,7 +140,7 @@ class MoveByDigit(OfDigitBlocks):
         a, number = self.sort, self.sort.number(w)
         source = a.half(w)
         target = a.capacity - source
-        for k in range(b * SORT_BLOCK, self.end(w, b)):
+        for k in range(b * a.block, self.end(w, b)):
             at = a.digit(w, source + k) * number + b
             place = a.start[w, at]
             a.start[w, at] = place + 1

@@ -12,6 +12,9 @@ from tisim.analysis import angular_momentum, gravitational_energy, virial_ratio
 from tisim.effects import SelfGravity, SoftenedSelfGravity
 from tisim.steppers import Collocation, StageControl
 
+CAPACITY = 64
+"""Of all scenes, so that each law is compiled once."""
+
 
 def twin(law, state):
     """F_i = G sum_j m_i m_j d / (d^2 + eps^2)^(3/2) n_ij."""
@@ -26,7 +29,7 @@ def test_forces_are_those_of_the_twin_and_add_up_to_nothing(kind, rng):
     """Action and reaction, and no torque of all of them; and sum r.F is the energy (Clausius's virial)."""
     options = [{"softening_length": float(rng.uniform(0.1, 1))} for _ in range(WORLDS)]
     scenes = [random_cloud(rng, (kind(**one if kind is SoftenedSelfGravity else {}),)) for one in options]
-    for one, state in zip(scenes, loads(scenes), strict=True):
+    for one, state in zip(scenes, loads(scenes, capacity=CAPACITY), strict=True):
         close(state["force"], twin(one.effects[0], state))
         balanced(state)
         if kind is SelfGravity:
@@ -35,9 +38,10 @@ def test_forces_are_those_of_the_twin_and_add_up_to_nothing(kind, rng):
             assert virial == pytest.approx(energy, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_softened_force_is_the_gradient_of_the_softened_energy(rng):
     law = SoftenedSelfGravity(softening_length=0.5)
-    (state,) = loads([random_cloud(rng, (law,), n=5)])
+    (state,) = loads([random_cloud(rng, (law,), n=5)], capacity=CAPACITY)
     h, expected = 1e-5, np.zeros((5, 3))
     for i, a in np.ndindex(5, 3):
         step = np.zeros((5, 3))
@@ -49,16 +53,18 @@ def test_the_softened_force_is_the_gradient_of_the_softened_energy(rng):
     close(state["force"], expected, 1e-8)
 
 
+@pytest.mark.slow
 def test_two_in_one_place_pull_each_other_only_without_softening():
     """Then the force is not finite, and the world stops and says so."""
     law = SoftenedSelfGravity(softening_length=0.5)
     setup = scene(np.zeros((2, 3)), np.zeros((2, 3)), (law,), mass=1e9)
-    assert (loads([setup])[0]["force"] == 0).all()
+    assert (loads([setup], capacity=CAPACITY)[0]["force"] == 0).all()
     (result,) = simulate([setup.model_copy(update={"effects": (SelfGravity(),)})], capacity=16)
     assert not result.status.ok
     assert "effects.self_gravity" in result.status.reason
 
 
+@pytest.mark.slow
 def test_the_nearest_image_acts_in_a_periodic_box():
     box = Box(low=(0, 0, 0), high=(1, 1, 1))
     setup = scene(
@@ -96,7 +102,7 @@ def test_a_uniform_sphere_pulls_as_newton_found():
         (SelfGravity(),),
         mass=np.concatenate([np.full(n, mass / 12), np.full(5, 1e-20)]),
     )
-    force = loads([setup], capacity=64)[0]["force"][n:] / 1e-20
+    force = loads([setup], capacity=CAPACITY)[0]["force"][n:] / 1e-20
     r = np.linalg.norm(probes, axis=1)
     unit = G * mass / r**2
     within = np.arange(5.0)

@@ -31,11 +31,10 @@ class TreeGravity(LongRange, Force):
 
         (4 theta^3 - 3 theta^4) / (1 - theta)^2 G M m_i / d^2
 
-    and mostly a hundredth of that, as errors of third moments cancel. In a uniform ball the error of the
-    force is 0.008 theta^3 of it, root mean square (docs/gravity.md). Nothing makes the force on i by j that
-    on j by i: momentum and angular momentum are conserved to the error of the forces, and not to rounding as
-    in ``self_gravity``, of which this is the fast form; with ``softening_length`` that of
-    ``softened_self_gravity``. A periodic box with images is refused.
+    In a uniform ball the forces are off by at most 0.012 theta^3 of them, root mean square (docs/gravity.md).
+    They are not equal and opposite: momentum and angular momentum are conserved to the errors of the forces,
+    where ``self_gravity``, whose fast form this is, conserves them to rounding. With ``softening_length`` it
+    is that of ``softened_self_gravity``. A periodic box with images is refused.
 
     Source: J. Barnes, P. Hut, Nature 324 (1986) 446; the bound is that of J. K. Salmon, M. S. Warren, J.
     Comput. Phys. 111 (1994) 136.
