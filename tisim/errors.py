@@ -10,6 +10,8 @@ from typing import Any
 
 LONGEST = 200
 """The largest number of characters of a received value, or of a name, that a message repeats."""
+MOST_NAMES, NEAR_NAMES = 40, 5
+"""So many known names are listed; of more, those that are nearest to the one received."""
 
 
 class InputError(ValueError):
@@ -69,3 +71,12 @@ def did_you_mean(received: str, known: Iterable[str]) -> str:
     """Return the end of a message that names the known name next to the one received; empty for none."""
     nearest = difflib.get_close_matches(received, known, n=1)
     return f"; did you mean {abbreviated(nearest[0])}?" if nearest else ""
+
+
+def some_of(known: Iterable[str], received: Any) -> str:
+    """Return the known names as a message lists them: all of a few, else those next to the one received."""
+    names = sorted(known)
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    near = difflib.get_close_matches(str(received), names, n=NEAR_NAMES, cutoff=0.0)
+    return f"{len(names)} that 'tisim effects' lists, such as {', '.join(near)}"

@@ -34,7 +34,10 @@ def data(strength=2.0):
 
 
 def test_an_effect_of_a_file_is_found_by_its_name(own_file):
-    with pytest.raises(InputError, match=r"effects.pull.kind must be one of .*, mie, .*; received 'pull'"):
+    with pytest.raises(
+        InputError,
+        match=r"effects.pull.kind must be one of .*, such as .*; received 'pull'",
+    ):
         Scene.from_dict(data())
     law = plugins.load(own_file("own_laws.py", LAW))
     setup = Scene.from_dict(data())

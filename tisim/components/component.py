@@ -20,7 +20,7 @@ from tisim.backend.taichi import DEVICE_FUNCTION, is_device_function
 from tisim.components.cost_hints import AccuracyHints
 from tisim.components.invalid import explain_invalid, unit_of
 from tisim.components.ranges import WHOLE, check_magnitude
-from tisim.errors import InputError, must
+from tisim.errors import InputError, must, some_of
 from tisim.files import python_file
 
 Vector = tuple[float, float, float]
@@ -95,7 +95,7 @@ class Component(AccuracyHints, Checked):
         """Return the subclass of this name; raise InputError naming ``where`` and the known names
         otherwise."""
         known = cls.known()
-        rule = f"one of {', '.join(sorted(known))}, or your own (--plugin, import)"
+        rule = f"one of {some_of(known, kind)}, or your own (--plugin, import)"
         must(isinstance(kind, str) and kind in known, where, rule, kind)
         return known[kind]
 

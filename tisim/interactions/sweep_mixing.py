@@ -6,11 +6,12 @@ combination of the last two sweeps that would make the residual smallest if f we
 
     x = f - theta (f - f_last),    theta = <r, r - r_last> / |r - r_last|^2
 
-So values are found also where plain sweeps overshoot, and where there is nothing to be found: where what
-others do to a particle grows with its own value by more than that value itself (an eigenvalue of f above 1),
-as in spheres of iron that lie in each other. Of f linear, and alike from i to j and from j to i in the inner
-product, <x - x_last, r - r_last> / |x - x_last|^2 + 1 is a mean of its eigenvalues. Above 1 it shows that one
-of them is.
+So values are found also where plain sweeps overshoot, and would be where there is nothing to be found: where
+what others do to a particle grows with its own value by more than that value itself (an eigenvalue of f above
+1), as in spheres of iron that lie in each other. Of f linear, and alike from i to j and from j to i in the
+inner product, <x - x_last, r - r_last> / |x - x_last|^2 + 1 is a mean of its eigenvalues. Above 1 it shows
+that one of them is: a linear law then has no solution, and of one that saturates plain sweeps go on to that
+which is stable.
 """
 
 from __future__ import annotations
@@ -70,7 +71,8 @@ class ChooseMixing(Phase):
     def run(self, w, _k):
         a, total = self.solver, self.solver.sums.total(w)
         a.theta[w], a.unsolvable[w] = 0.0, 0
-        if total[1] > 0.0 and finite(total[0]) and finite(total[1]):
+        # Where residuals grow along the way there is nothing to extrapolate to, but what plain sweeps leave.
+        if total[1] > 0.0 and total[2] <= 0.0 and finite(total[0]) and finite(total[1]):
             a.theta[w] = total[0] / total[1]
         if ti.static(a.effect.data.linear):
             self.look_for_growth(w, total)

@@ -12,8 +12,7 @@ from tisim.sources.base import Source, parameter
 
 
 class CouetteFlow(Source):
-    """A fluid is sheared between two parallel walls: its velocity goes linearly from that of one to that of
-    the other, which drag laws feel.
+    """A fluid is sheared between two parallel walls that slide past each other, which drag laws feel.
 
         v = v_1 + (x - x_1) / (x_2 - x_1) (v_2 - v_1),    x = r.n
 

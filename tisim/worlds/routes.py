@@ -4,6 +4,7 @@ them."""
 from collections.abc import Callable
 from functools import partial
 from itertools import groupby
+from typing import NamedTuple
 
 from tisim.worlds.phases import Item, Phase, Repeat
 
@@ -13,18 +14,13 @@ NOWHERE = -1
 """This is the place of a world that does not go on."""
 
 
-class Fork:
+class Fork(NamedTuple):
     """A fork leads a world into a repeat while it is pending, else past it."""
 
-    # No dataclass: Quadrants takes those apart, and forks lie within forks.
-    def __init__(self, repeat: Repeat, inside: "Route", past: "Route") -> None:
-        self.repeat, self.inside, self.past = repeat, inside, past
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Fork) and vars(self) == vars(other)
-
-    def __hash__(self) -> int:
-        return hash((self.repeat, self.inside, self.past))
+    # A tuple, as ``ti.static`` takes no objects of other kinds; Quadrants takes dataclasses apart.
+    repeat: Repeat
+    inside: "Route"
+    past: "Route"
 
 
 Route = Fork | int

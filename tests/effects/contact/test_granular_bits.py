@@ -110,9 +110,10 @@ def skin_of(simulation, w):
 
 
 def test_a_step_is_few_launches_which_tell_how_far_worlds_have_come(simulation):
-    """One more than a step has without what takes grains away, after which forces may be summed again."""
+    """Two more than a step has without what takes grains away: operators act between two fillings of slots,
+    after which forces may be summed again."""
     simulation.load([bed(k) for k in range(3)])
-    assert_launches(simulation, 64, each=3)
+    assert_launches(simulation, 64, each=5)
 
 
 @pytest.mark.slow

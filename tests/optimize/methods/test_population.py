@@ -23,7 +23,7 @@ USUAL = {
     "vibration": {"options": {"population": 24, "parents": 8}},
     "agglomeration": {"options": {"population": 10, "parents": 4}},
     "capture": {"method": "cma-es", "options": {"population": 16}},
-    "granular_bench": {"options": {"population": 12, "parents": 4}},
+    "granular_bench": {"method": "cma-es", "options": {"population": 8, "sigma": 0.2}},
 }
 
 
@@ -67,7 +67,10 @@ def test_every_population_is_taken_or_refused_for_a_real_reason(case, method):
             assert expected.format(population) in str(error_info.value)
             continue
         settings = settings_of(USUAL[case], method, {"population": population})
-        alone = Settings(method=method, options={"population": population})
+        usual = USUAL[case]
+        spread = {"sigma"} & usual.get("options", {}).keys() if usual.get("method") == method else ()
+        own = {name: usual["options"][name] for name in spread}
+        alone = Settings(method=method, options={**own, "population": population})
         assert settings.options == alone.options, "the same from Python"
         first, second, new = generations(settings)
         assert first == second == population

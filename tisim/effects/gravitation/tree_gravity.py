@@ -18,14 +18,13 @@ if TYPE_CHECKING:
 
 
 class TreeGravity(LongRange, Force):
-    """Particles attract each other by their gravity, that of far ones summed by cells of a tree, in a time
-    that goes as N log N.
+    """Particles attract each other by their gravity, which is summed by cells of a tree.
 
         F_i = G m_i sum_c [M d / s^3 + (15/2 d.Q.d / s^7 - 3/2 tr Q / s^5) d - 3 Q d / s^5]
 
         s^2 = d^2 + eps^2,    Q = sum_k m_k x_k x_k^T,    |x_k| <= b < theta d
 
-    d leads from particle i to the centre of mass of a cell, x from there to those in it, M is their mass and
+    It takes a time that goes as N log N. d leads from particle i to the centre of mass of a cell, x from there to those in it, M is their mass and
     b the distance of the farthest. Cells that are nearer are opened, down to leaves of 16, whose particles
     are summed one by one: as theta goes to 0, all are. Without softening the error of a cell is at most
 
