@@ -24,9 +24,10 @@ class TreeGravity(LongRange, Force):
 
         s^2 = d^2 + eps^2,    Q = sum_k m_k x_k x_k^T,    |x_k| <= b < theta d
 
-    It takes a time that goes as N log N. d leads from particle i to the centre of mass of a cell, x from there to those in it, M is their mass and
-    b the distance of the farthest. Cells that are nearer are opened, down to leaves of 16, whose particles
-    are summed one by one: as theta goes to 0, all are. Without softening the error of a cell is at most
+    It takes a time that goes as N log N. d leads from particle i to the centre of mass of a cell, x from
+    there to those in it, M is their mass and b the distance of the farthest. Cells that are nearer are
+    opened, down to leaves of 16, whose particles are summed one by one: as theta goes to 0, all are. Without
+    softening the error of a cell is at most
 
         (4 theta^3 - 3 theta^4) / (1 - theta)^2 G M m_i / d^2
 
