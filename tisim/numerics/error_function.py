@@ -29,8 +29,8 @@ CHEBYSHEV = (
     1.5779847481027191e-15,
     -2.6374642632649086e-16,
 )
-"""These are the coefficients of erfcx(x)/t in Chebyshev polynomials of 2 t - 1, t = 2 / (2 + x): interpolation
-in their zeros, from 40 digits (tests/numerics/test_error_function.py). The next ones are below rounding."""
+"""These are the coefficients of erfcx(x)/t in Chebyshev polynomials of 2 t - 1, with t = 2 / (2 + x), by
+interpolation in their zeros. The next ones are below rounding."""
 
 
 @ti.func

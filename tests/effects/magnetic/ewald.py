@@ -74,7 +74,7 @@ class EwaldSum:
 
 
 def ball_of_images(side, position, moment, radius):
-    """Field (T) and force (N) of dipoles with all images of a cubic box in cells within a radius, in sides."""
+    """Field (T) and force (N) of dipoles with all images of a cubic box in cells within a radius (sides)."""
     field, force = np.zeros_like(position), np.zeros_like(position)
     most = int(radius)
     for shift in np.ndindex((2 * most + 1,) * 3):

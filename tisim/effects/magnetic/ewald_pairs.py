@@ -18,6 +18,8 @@ from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.numerics.error_function import erfcx
 
+TWO_OVER_ROOT_PI = 2.0 / math.sqrt(math.pi)
+
 
 class EwaldPairs(LongRange, Pairwise):
     """This is the contract of what dipoles do to each other with all their images, summed after Ewald.
@@ -54,10 +56,10 @@ class EwaldPairs(LongRange, Pairwise):
     )
     accuracy: float = parameter(
         "",
-        "error of the forces, root mean square, over those of dipoles at the cut-off",
+        "error of the forces, root mean square, over that of dipoles at the cut-off",
         1e-4,
         gt=1e-14,
-        lt=1,
+        le=0.1,
     )
     screening: float | None = parameter("1/m", "screening alpha; by the accuracy unless given", None, gt=0)
     wave_cutoff: float | None = parameter(
@@ -101,11 +103,11 @@ class EwaldPairs(LongRange, Pairwise):
 
     @ti.func
     def screened(self, w, distance):
-        """Return b and c, and d = 5 c + 8 x^5 exp(-x^2) / sqrt(pi), which are 1, 3 and 15 for x = 0; all are 0
-        beyond the cut-off."""
+        """Return b and c, and d = 5 c + 8 x^5 exp(-x^2) / sqrt(pi): 1, 3 and 15 for x = 0, and 0 beyond the
+        cut-off."""
         x = self.screening(w) * distance
         near = ti.select(distance <= self.cutoff(w), elementary.exp(-x * x), 0.0 * x)
-        square, tail = x * x, 2.0 / math.sqrt(math.pi) * x * near
+        square, tail = x * x, TWO_OVER_ROOT_PI * x * near
         b = near * erfcx(x) + tail
         c = 3.0 * b + 2.0 * square * tail
         return b, c, 5.0 * c + 4.0 * square * square * tail
