@@ -160,6 +160,9 @@ from .magnetic.ewald_moment import (
 from .magnetic.ewald_moment import (
     EwaldLangevinMoment as EwaldLangevinMoment,
 )
+from .magnetic.ewald_moment import (
+    EwaldMoment as EwaldMoment,
+)
 from .magnetic.magnetic_materials import (
     CARBONYL_IRON as CARBONYL_IRON,
 )

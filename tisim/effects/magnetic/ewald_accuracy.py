@@ -33,8 +33,8 @@ PAIR_COST = 10.0
 """The force of a pair takes about as long as so many terms of a wave vector and a particle."""
 WIDEST = 0.45
 """A cut-off that is chosen is at most this part of the shortest side along which there are images."""
-LARGEST = 12.0
-"""x and s are below this number: exp(-144) is less than any accuracy."""
+WIDEST_DECAY = 12.0
+"""x and s are at most this number: exp(-144) is less than any accuracy."""
 
 
 def space_error(x: float) -> float:
@@ -54,7 +54,7 @@ def screening_for(accuracy: float) -> float:
     """Return the x at which pairs that are left out make half of the squared error."""
     least = math.sqrt(1.5)
     part = min(accuracy / math.sqrt(2), space_error(least))
-    return float(brentq(lambda x: math.log(space_error(x) / part), least, LARGEST, xtol=1e-14))
+    return float(brentq(lambda x: math.log(space_error(x) / part), least, WIDEST_DECAY, xtol=1e-14))
 
 
 @lru_cache
@@ -62,7 +62,7 @@ def waves_for(accuracy: float, x: float) -> float:
     """Return the s at which wave vectors that are left out make half of the squared error."""
     least = math.sqrt(0.75)
     part = min(accuracy / math.sqrt(2), wave_error(x, least))
-    return float(brentq(lambda s: math.log(wave_error(x, s) / part), least, LARGEST, xtol=1e-14))
+    return float(brentq(lambda s: math.log(wave_error(x, s) / part), least, WIDEST_DECAY, xtol=1e-14))
 
 
 def periods(domain: Domain, slab_factor: float) -> np.ndarray:

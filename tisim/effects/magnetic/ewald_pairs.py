@@ -13,7 +13,7 @@ from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
 from tisim.effects.base import LongRange, Vector, option, parameter
 from tisim.effects.base.pairwise import Pairwise
-from tisim.effects.magnetic.ewald_accuracy import most_waves, screening_for, waves_for
+from tisim.effects.magnetic.ewald_accuracy import WIDEST_DECAY, most_waves, screening_for, waves_for
 from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.numerics.error_function import erfcx
@@ -77,6 +77,10 @@ class EwaldPairs(LongRange, Pairwise):
     @model_validator(mode="after")
     def _summable(self) -> Self:
         must(min(self.waves) >= 0, f"{self.label}.waves", "at least 0 each", self.waves)
+        if self.screening is not None:
+            rule = f"from {1 / self.cutoff:g} to {WIDEST_DECAY / self.cutoff:g} with this cutoff"
+            within = 1 <= self.screening * self.cutoff <= WIDEST_DECAY
+            must(within, f"{self.label}.screening", rule, self.screening)
         n = self.demagnetising_factors
         rule = "from 0 on, and at most 1 together"
         must(min(n) >= 0 and sum(n) <= 1 + 1e-6, f"{self.label}.demagnetising_factors", rule, n)
