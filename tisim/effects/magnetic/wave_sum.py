@@ -41,7 +41,7 @@ class WaveSum(LongRangeSum):
         self.centre = x * self.row + y
         self.columns = self.centre + 1
         self.turns, self.amplitude = (ti.Vector.field(2, s.real) for _ in range(2))
-        self.mean, self.field, self.force = (ti.Vector.field(3, s.real) for _ in range(3))
+        self.mean, self.field, *force = (ti.Vector.field(3, s.real) for _ in range(2 + forces))
         self.top = ti.field(ti.i32)
         builder = Builder()
         worlds = builder.dense(ti.i, s.worlds)
@@ -49,8 +49,10 @@ class WaveSum(LongRangeSum):
         worlds.dense(ti.j, sum(self.waves) + 3).dense(ti.k, s.capacity).place(self.turns)
         builder.dense(ti.i, s.worlds).dense(ti.j, self.columns).place(self.top)
         builder.dense(ti.i, s.worlds).dense(ti.j, self.columns * self.height).place(self.amplitude)
-        for column in (self.field, self.force) if forces else (self.field,):
+        for column in (self.field, *force):
             builder.dense(ti.i, s.worlds).dense(ti.j, s.capacity).place(column)
+        if forces:
+            (self.force,) = force
         self.tree = Tree(builder)
 
     def phases(self) -> tuple[Item, ...]:
