@@ -10,7 +10,7 @@ from tests.effects.contact.loads import close, loads, vector
 from tests.effects.magnetic.ewald import EwaldSum, ball_of_images
 from tests.effects.magnetic.magnets import MU_0, Quadrupole, flux_density
 from tests.scenes import scene
-from tisim import Box
+from tisim import Box, InputError, Open
 from tisim.effects import (
     EwaldDipoleDipole,
     EwaldInducedMoment,
@@ -226,3 +226,45 @@ def test_mutual_moments_are_those_of_a_linear_solve_and_of_clausius_and_mossotti
     for one, state in zip(scenes[2:], states[2:], strict=True):
         part = gain * MU_0 / 2.4**3 * (1 / 3 - one.effects[2].demagnetising_factors[2])
         close(state["moment"], np.tile([0, 0, gain * 0.3 / (1 - part)], (8, 1)), 3e-4)
+
+
+def test_settings_are_those_that_cost_least_and_suit_the_box():
+    """The cut-off goes as N^(-1/6) in one box, and wave vectors along an axis as its inverse."""
+    domain = box((60.0, 60.0, 60.0))
+    few, many = (ewald_settings(domain, n, 1e-4) for n in (1000, 64000))
+    assert few["cutoff"] / many["cutoff"] == pytest.approx(2.0)
+    assert max(many["waves"]) == pytest.approx(2 * max(few["waves"]), abs=2)
+    for settings in (few, many, ewald_settings(box((6.0, 9.0, 3.0), (True, False, True)), 50)):
+        EwaldDipoleDipole(**settings)
+    assert ewald_settings(box(), 10)["cutoff"] == pytest.approx(0.45 * 4.0)
+    with pytest.raises(InputError, match=r"^open must be one in which particles see images"):
+        ewald_settings(Open(), 10)
+
+
+FINE = {"cutoff": 1.6, "waves": WAVES}
+WRONG = {
+    "box must be one in which particles see images of each other along two axes or three, with "
+    "effects.ewald_dipole_dipole; received (True, False, False)": (FINE, {"periodic": (True, False, False)}),
+    "effects.ewald_dipole_dipole.waves must be at least (11, 14, 12) in this box; received (11, 13, 12)": (
+        {**FINE, "accuracy": 3e-4},
+        {},
+    ),
+    "ewald_dipole_dipole.screening must be from 0.625 to 7.5 with this cutoff; received 8.0": (
+        {**FINE, "screening": 8.0},
+        {},
+    ),
+    "ewald_dipole_dipole.demagnetising_factors must be from 0 on, and at most 1 together; received "
+    "(0.5, 0.5, 0.5)": ({**FINE, "demagnetising_factors": (0.5, 0.5, 0.5)}, {}),
+    "ewald_dipole_dipole.waves must be at least 0 each; received (-1, 3, 3)": (
+        {**FINE, "waves": (-1, 3, 3)},
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_wrong_is_named(message, rng):
+    options, shape = WRONG[message]
+    with pytest.raises(InputError) as fault:
+        magnets(rng, EwaldDipoleDipole(**options), box(**shape))
+    assert str(fault.value) == message
