@@ -1,12 +1,12 @@
 """Magnetic dipoles in a periodic box: Ewald sums, cut-offs and nearest images; errors and wave vectors.
 
-    python tests/benchmarks/ewald_dipoles.py [--number 1000] [--precision f64]
+    python tests/benchmarks/ewald_dipoles.py [--number 500] [--precision f64]
 
 Iron grains of one size in a field of 0.3 T along z, whose moments are mutual (Froehlich, Kennelly), at random
 at a volume fraction of 0.3 by random sequential addition, and in chains along z that touch, at random across
 it at a volume fraction of 0.1. The sample is a ball: demagnetising factors of 1/3, which is what a cut-off at
 a sphere makes of it. Errors, of moments and of forces, are root mean square over the particles, over the root
-mean square of those by an Ewald sum with an accuracy of 1e-8. ``asked`` is what an accuracy promises: the
+mean square of those by an Ewald sum with an accuracy of 1e-6. ``asked`` is what an accuracy promises: the
 error of forces by F_ref (tisim/effects/magnetic/ewald_accuracy.py), over the same.
 """
 
@@ -39,9 +39,9 @@ RADIUS = 3.35e-6
 """m."""
 FIELD = 0.3
 """T."""
-ACCURACIES = (1e-8, 1e-4, 1e-3, 1e-2)
+ACCURACIES = (1e-6, 1e-3, 1e-2)
 """The first one is the reference."""
-CUTOFFS = (4.0, 6.0, 9.0)
+CUTOFFS = (4.0, 6.0, 8.0)
 """Radii."""
 TRIES = 100_000
 
@@ -96,7 +96,7 @@ def scene(place: np.ndarray, side: float, moment, force) -> tisim.Scene:
 
 def methods(place: np.ndarray, side: float) -> dict[str, tisim.Scene]:
     """Scenes by what sums the dipoles in them."""
-    iron, box = CARBONYL_IRON.moment(), tisim.Box(low=(0, 0, 0), high=(side,) * 3)
+    iron, box = CARBONYL_IRON.parameters(), tisim.Box(low=(0, 0, 0), high=(side,) * 3)
     settings = {a: ewald_settings(box, len(place), a) for a in ACCURACIES}
     # Worlds of a batch have room for as many wave vectors.
     most = {"waves": settings[ACCURACIES[0]]["waves"]}
@@ -115,8 +115,8 @@ def methods(place: np.ndarray, side: float) -> dict[str, tisim.Scene]:
                 place, side, MutualFroehlichMoment(**iron, **cut), TruncatedDipoleDipole(**cut)
             )
     scenes["nearest images of all"] = scene(place, side, MutualFroehlichMoment(**iron), DipoleDipole())
-    poleless = {**settings[1e-4], **most}
-    name = "Ewald sum, accuracy 1e-04, no poles"
+    poleless = {**settings[1e-3], **most}
+    name = "Ewald sum, accuracy 1e-03, no poles"
     scenes[name] = scene(place, side, EwaldFroehlichMoment(**iron, **poleless), EwaldDipoleDipole(**poleless))
     return scenes
 
@@ -129,7 +129,7 @@ def size(values: np.ndarray) -> float:
 def main() -> None:
     """Print errors of both, by every method."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--number", type=int, default=1000)
+    parser.add_argument("--number", type=int, default=500)
     parser.add_argument("--precision", default="f64")
     options = parser.parse_args()
     runtime.init(precision=options.precision)
@@ -139,7 +139,7 @@ def main() -> None:
         scenes = methods(place, side)
         print(f"\n{title}: {len(place)} grains in {side / RADIUS:.1f} radii\n")
         print("| dipoles by | error of moments | error of forces | asked |")
-        print("|---|---|---|---|")
+        print("|---|---|---|---|", flush=True)
         states = [result.state for result in tisim.run(list(scenes.values()))]
         orders = [np.argsort(state["id"]) for state in states]
         values = [
