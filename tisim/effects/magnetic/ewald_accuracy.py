@@ -31,7 +31,7 @@ from tisim.errors import must
 
 PAIR_COST = 10.0
 """The force of a pair takes about as long as so many terms of a wave vector and a particle."""
-WIDEST = 0.45
+WIDEST = 0.4
 """A cut-off that is chosen is at most this part of the shortest side along which there are images."""
 WIDEST_DECAY = 12.0
 """x and s are at most this number: exp(-144) is less than any accuracy."""
