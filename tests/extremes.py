@@ -52,6 +52,9 @@ VALUES = (0.0, *MAGNITUDES, *(-size for size in MAGNITUDES))
 DT, STEPS = 1e-5, 30
 """s, a step of common length; how many of them make a run."""
 
+PERIODIC = {"kind": "box", "low": [-0.04] * 3, "high": [0.04] * 3}
+"""A box for what needs images."""
+EWALD = {"cutoff": 0.035, "waves": [6, 6, 6], "accuracy": 1e-2}
 COMMON: dict[str, dict[str, Any]] = {
     "impact": {"hardness": 1e5},
     "heating": {"heat_capacity": 500.0},
@@ -107,6 +110,10 @@ COMMON: dict[str, dict[str, Any]] = {
     "mutual_langevin_moment": {"temperature": 300.0, "cutoff": 3.0, "shifted": True},
     "mutual_induced_moment": {"susceptibility": 1.0, "cutoff": 2.0, "gap": 1e-3},
     "magnetic_body_force": {"gamma": 1e-4},
+    "ewald_dipole_dipole": EWALD,
+    "ewald_froehlich_moment": EWALD,
+    "ewald_induced_moment": {"susceptibility": 1.0, **EWALD},
+    "ewald_langevin_moment": {"temperature": 300.0, **EWALD},
     "insertion_by_flux": {"low": [0.0, 0.0, 5e-3], "high": [0.02, 0.02, 0.02], "number": 3},
     "insertion_by_fraction": {"low": [0.0, 0.0, 0.02], "high": [0.02, 0.02, 0.04], "number": 3},
     "at_rest": {"time": 2e-4},
@@ -209,7 +216,7 @@ def _scene(effects: dict[str, Any], stepper: dict[str, Any] | None = None) -> di
             "radius": [1e-3, 1e-3, 0.5e-3],
             "mass": [1e-5, 1e-5, 2e-6],
         },
-        "domain": {"kind": "open"},
+        "domain": PERIODIC if any(name.startswith("ewald_") for name in effects) else {"kind": "open"},
         "stepper": stepper or {"kind": "verlet", "control": {"kind": "fixed_step", "dt": DT}},
         "effects": effects,
     }

@@ -36,8 +36,16 @@ def test_a_family_has_all_of_its_parts(family):
     package = importlib.import_module(f"tisim.{family}")
     missing = {name for name in parts(family) if not name.startswith("_")} - set(dir(package))
     # What laws of one family share, and users do not name.
-    shared = {"AtIntervals", "BehindPlanes", "DipolePairs", "FilledPart", "FilledRegion", "GrainShapes"}
-    assert missing <= shared | {"Pairwise", "Uniform"}
+    shared = {
+        "AtIntervals",
+        "BehindPlanes",
+        "DipolePairs",
+        "EwaldPairs",
+        "FilledPart",
+        "FilledRegion",
+        "GrainShapes",
+    }
+    assert missing <= shared | {"LinearSpheres", "Pairwise", "Uniform"}
 
 
 @pytest.mark.parametrize(

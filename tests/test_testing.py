@@ -9,6 +9,10 @@ from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
 from tisim.effects import (
+    EwaldDipoleDipole,
+    EwaldFroehlichMoment,
+    EwaldInducedMoment,
+    EwaldLangevinMoment,
     Force,
     Lorentz,
     PairForce,
@@ -224,7 +228,10 @@ def joined(kinds):
         effects[insertion] = {**effects[insertion], "grains": grains}
     particles = {**every[0]["particles"], "quantities": carried}
     materials = {name: values for data in every for name, values in data.get("materials", {}).items()}
-    return Scene.from_dict({**every[0], "effects": effects, "particles": particles, "materials": materials})
+    domain = next((data["domain"] for data in every if data["domain"]["kind"] != "open"), every[0]["domain"])
+    return Scene.from_dict(
+        {**every[0], "effects": effects, "particles": particles, "materials": materials, "domain": domain}
+    )
 
 
 def is_short_ranged(kind):
@@ -336,17 +343,18 @@ def test_a_field_that_only_others_declare_is_reported():
 
 # Capture, constraints and the virial exclude impacts. No law of its own, and a series that takes long to
 # compile, has the cylinder. What passes is weighed before it is taken out, and permanent moments exclude soft
-# ones.
+# ones. Gravity by a tree has no images, which Ewald sums need.
 HOLDING = [PrescribedMotion, RigidClumps]
-APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING)
+IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
+APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED)
 TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     "kinds",
-    [TOGETHER, [Capture, Virial], HOLDING, [PermanentMoment]],
-    ids=["all that go together", "capture", "constraints", "permanent moments"],
+    [TOGETHER, [Capture, Virial], HOLDING, [PermanentMoment], IMAGED],
+    ids=["all that go together", "capture", "constraints", "permanent moments", "Ewald sums"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))

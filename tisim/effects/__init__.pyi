@@ -149,6 +149,20 @@ from .impact.softening import Softening as Softening
 from .magnetic.body_force import MagneticBodyForce as MagneticBodyForce
 from .magnetic.dipole_dipole import DipoleDipole as DipoleDipole
 from .magnetic.dipole_dipole import TruncatedDipoleDipole as TruncatedDipoleDipole
+from .magnetic.ewald_accuracy import ewald_settings as ewald_settings
+from .magnetic.ewald_dipole_dipole import EwaldDipoleDipole as EwaldDipoleDipole
+from .magnetic.ewald_moment import (
+    EwaldFroehlichMoment as EwaldFroehlichMoment,
+)
+from .magnetic.ewald_moment import (
+    EwaldInducedMoment as EwaldInducedMoment,
+)
+from .magnetic.ewald_moment import (
+    EwaldLangevinMoment as EwaldLangevinMoment,
+)
+from .magnetic.ewald_moment import (
+    EwaldMoment as EwaldMoment,
+)
 from .magnetic.magnetic_materials import (
     CARBONYL_IRON as CARBONYL_IRON,
 )

@@ -118,8 +118,10 @@ class Assembly:
         for law in effects.of(LongRange):
             law.sum = law.data.long_range_sum(law, s, domain)
         self.long_range = {law.data.label: law.sum for law in effects.of(LongRange)}
-        # Trial states are summed by the same phases, so that these are compiled once.
-        self._long_range_items = tuple(item for one in self.long_range.values() for item in one.phases())
+        # Trial states are summed by the same phases, so that these are compiled once. Those of what particles
+        # give each other are part of its sweeps.
+        final = (law.sum for law in effects.of(LongRange) if not isinstance(law.data, SelfConsistentQuantity))
+        self._long_range_items = tuple(item for one in final for item in one.phases())
         for effect in effects:
             for name, value in effect.data.remembers(s).items():
                 setattr(effect, name, value)

@@ -9,7 +9,7 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.components.domain import Domain
-from tisim.effects.base import DerivedQuantity, SelfConsistentQuantity
+from tisim.effects.base import DerivedQuantity, LongRange, SelfConsistentQuantity
 from tisim.interactions.derived import DerivedSolver
 from tisim.interactions.listed_pairs import ExportedTerms, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
@@ -102,7 +102,8 @@ class SweepUntilConverged(Repeat):
     usual = 2
 
     def __init__(self, solver: SelfConsistentSolver, trial: bool) -> None:
-        sweep = sum_phases(JacobiSweep(solver, trial), solver.exported)
+        far = solver.effect.sum.phases() if isinstance(solver.effect.data, LongRange) else ()
+        sweep = (*far, *sum_phases(JacobiSweep(solver, trial), solver.exported))
         mixing = (CompareSweeps(solver), ChooseMixing(solver)) if solver.mixed else ()
         super().__init__((*sweep, *mixing, ReplaceValues(solver, trial), CheckConvergence(solver)))
         self.solver = solver

@@ -35,8 +35,8 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
    where the particle is; it is set before forces are summed. A ``SelfConsistentQuantity`` depends on that of
    all others too, such as an induced dipole.
    A sum over all others that is not made pair by pair, such as by a tree of cells or by waves, is brought by
-   a ``LongRange`` effect as phases of its own, which are taken before forces are summed; its ``force`` reads
-   what they have come to, ``self.sum``.
+   a ``LongRange`` effect as phases of its own, which are taken before forces are summed, or in each sweep for
+   a ``SelfConsistentQuantity``; its ``force`` or ``response`` reads what they have come to, ``self.sum``.
 8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It is handed each pair in ``contact`` with exclusive access
    to both, earliest first (see tisim/interactions/collision_rounds.py); it may remove either.

@@ -41,8 +41,10 @@ class LongRange(Effect):
     """This is the contract of an effect that makes a long-range sum, from which its other hooks take what
     they return: the ``force`` of a ``Force``, for one.
 
-    The sum is made before forces are summed, after derived quantities are set. In kernels it is ``self.sum``
-    of the bound effect. Particles that feel each other so are not stepped one by one.
+    The sum is made before forces are summed, after derived quantities are set; that of a
+    ``SelfConsistentQuantity`` in each of its sweeps, before what others do is summed over pairs, of the
+    values that the sweep begins with. In kernels it is ``self.sum`` of the bound effect. Particles that feel
+    each other so are not stepped one by one.
     """
 
     contract: ClassVar[bool] = True

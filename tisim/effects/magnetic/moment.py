@@ -39,13 +39,18 @@ class Moment(DerivedQuantity):
         return 0.0 * b
 
     @ti.func
+    def with_sources(self, s, w, i, b, t):
+        """Return b (T) with the field of all sources where i is."""
+        total = b
+        for source in ti.static(self.applied):
+            total += source.value(w, s.position[w, i], t)
+        return total
+
+    @ti.func
     def response(self, s, w, i, total, t):
         """Return the moment (A m^2) of i in the field of the sources and, where particles act on each other,
         in theirs: ``total``, T."""
-        b = total
-        for source in ti.static(self.applied):
-            b += source.value(w, s.position[w, i], t)
-        return self.law(s, w, i, b)
+        return self.law(s, w, i, self.with_sources(s, w, i, total, t))
 
 
 class FixedMoment(Moment):

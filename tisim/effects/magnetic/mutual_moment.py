@@ -10,6 +10,23 @@ from tisim.effects.magnetic.dipole_pairs import DipolePairs, dipole_field
 from tisim.effects.magnetic.moment import FroehlichMoment, InducedMoment, LangevinMoment, Moment
 
 
+def independent(moment: Moment, law: type[Moment]) -> Moment:
+    """Return the law of particles that do not magnetise each other, with the options of one where they do."""
+    return law(**{name: getattr(moment, name) for name in law.model_fields})
+
+
+class LinearSpheres(SelfConsistentQuantity):
+    """This is the contract of moments of linear spheres: moments over volume are symmetric in what they do to
+    each other, as chi is that of all."""
+
+    contract: ClassVar[bool] = True
+    linear: ClassVar[bool] = True
+
+    @ti.func
+    def weight(self, s, w, i):
+        return 1.0 / s.radius[w, i] ** 3
+
+
 class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
     """This is the contract of a moment that follows the field of the sources and of other moments.
 
@@ -25,8 +42,7 @@ class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
     """This law is that of a particle that the others do not magnetise."""
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        options = {name: getattr(self, name) for name in self.independent_law.model_fields}
-        return (self.independent_law(**options), *super().approximations(extent))
+        return (independent(self, self.independent_law), *super().approximations(extent))
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
@@ -38,7 +54,7 @@ class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
         return field
 
 
-class MutualInducedMoment(MutualMoment, InducedMoment):
+class MutualInducedMoment(LinearSpheres, MutualMoment, InducedMoment):
     """Spheres of linear material are magnetised by the sources and by each other.
 
         m_i = V_i 3 chi / (3 + chi) (B(r_i) + sum_j f(x) B_j(r_i)) / mu_0
@@ -53,12 +69,6 @@ class MutualInducedMoment(MutualMoment, InducedMoment):
     """
 
     independent_law = InducedMoment
-    linear: ClassVar[bool] = True
-
-    @ti.func
-    def weight(self, s, w, i):
-        # Moments over volume are symmetric in what they do to each other; chi is that of all.
-        return 1.0 / s.radius[w, i] ** 3
 
 
 class MutualLangevinMoment(MutualMoment, LangevinMoment):

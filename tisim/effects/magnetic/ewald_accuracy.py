@@ -1,0 +1,110 @@
+"""How far an Ewald sum of dipoles must go, in space and in wave vectors, to be as good as is asked for.
+
+Errors are those of forces, root mean square, of particles at random, over
+
+    F_ref = 3 mu_0 m^2 / (4 pi r_c^4) sqrt(n r_c^3)
+
+the force of dipoles at the cut-off r_c on each other, of n particles in a unit of volume, m^2 being the mean
+of their squared moments. With x = alpha r_c and s = k_max / (2 alpha) they are
+
+    in space:         Q exp(-x^2) / (3 x^2),    Q^2 = 13/6 C^2 + 2/15 D^2 - 13/15 C D
+                      C = 4 x^4 + 6 x^2 + 3,    D = 8 x^6 + 20 x^4 + 30 x^2 + 15
+    in wave vectors:  8/3 sqrt(2/15) x^(5/2) s^(3/2) exp(-s^2)
+
+and so functions of x and s alone.
+
+Source: Z. Wang, C. Holm, J. Chem. Phys. 115 (2001) 6351.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.constants import mu_0
+from scipy.optimize import brentq
+
+from tisim.components.domain import Domain
+from tisim.errors import must
+
+PAIR_COST = 10.0
+"""The force of a pair takes about as long as so many terms of a wave vector and a particle."""
+WIDEST = 0.4
+"""A cut-off that is chosen is at most this part of the shortest side along which there are images."""
+WIDEST_DECAY = 12.0
+"""x and s are at most this number: exp(-144) is less than any accuracy."""
+
+
+def space_error(x: float) -> float:
+    """Return the error by the pairs that are left out, over F_ref."""
+    c = 4 * x**4 + 6 * x**2 + 3
+    d = 8 * x**6 + 20 * x**4 + 30 * x**2 + 15
+    return math.sqrt(13 / 6 * c * c + 2 / 15 * d * d - 13 / 15 * c * d) * math.exp(-x * x) / (3 * x * x)
+
+
+def wave_error(x: float, s: float) -> float:
+    """Return the error by the wave vectors that are left out, over F_ref."""
+    return 8 / 3 * math.sqrt(2 / 15) * x**2.5 * s**1.5 * math.exp(-s * s)
+
+
+@lru_cache
+def screening_for(accuracy: float) -> float:
+    """Return the x at which pairs that are left out make half of the squared error."""
+    least = math.sqrt(1.5)
+    part = min(accuracy / math.sqrt(2), space_error(least))
+    return float(brentq(lambda x: math.log(space_error(x) / part), least, WIDEST_DECAY, xtol=1e-14))
+
+
+@lru_cache
+def waves_for(accuracy: float, x: float) -> float:
+    """Return the s at which wave vectors that are left out make half of the squared error."""
+    least = math.sqrt(0.75)
+    part = min(accuracy / math.sqrt(2), wave_error(x, least))
+    return float(brentq(lambda s: math.log(wave_error(x, s) / part), least, WIDEST_DECAY, xtol=1e-14))
+
+
+def periods(domain: Domain, slab_factor: float) -> np.ndarray:
+    """Return the periods (m) of the images: sides, or along an open axis so many times the side."""
+    return np.diag(domain.edges(0.0)) * np.where(domain.imaged(), 1.0, slab_factor)
+
+
+def most_waves(domain: Domain, slab_factor: float, wave_cutoff: float) -> tuple[int, int, int]:
+    """Return how many wave vectors there are along each axis up to one (1/m)."""
+    x, y, z = (int(wave_cutoff * side / (2 * math.pi)) for side in periods(domain, slab_factor))
+    return x, y, z
+
+
+def force_scale(moment: np.ndarray, volume: float, cutoff: float) -> float:
+    """Return F_ref (N) of moments (A m^2), shape (n, 3), in a volume (m^3), with a cut-off (m)."""
+    n = len(moment)
+    square = float((moment**2).sum()) / n
+    return 3 * mu_0 * square / (4 * math.pi * cutoff**4) * math.sqrt(n * cutoff**3 / volume)
+
+
+def ewald_settings(
+    domain: Domain,
+    particles: int,
+    accuracy: float = 1e-4,
+    cutoff: float | None = None,
+    slab_factor: float = 3.0,
+) -> dict[str, Any]:
+    """Return settings of Ewald sums in a box, for ``EwaldDipoleDipole(**settings)`` and moments alike.
+
+    particles : how many there are. accuracy : error of the forces, over that of dipoles at the cut-off.
+    cutoff : of pairs, m; unless given, one with which pairs take as long as wave vectors. slab_factor : the
+    period along an open axis, over the side of the box.
+
+    The ``waves`` are those of this box: worlds of a batch, which share them, take those of the largest.
+    """
+    must(any(domain.imaged()), domain.label, "one in which particles see images of each other", domain.kind())
+    must(particles > 0, "particles", "above 0", particles)
+    x = screening_for(accuracy)
+    s, sides = waves_for(accuracy, x), periods(domain, slab_factor)
+    if cutoff is None:
+        # Pairs go as r_c^3, wave vectors as its inverse: the sum is least where both take as long.
+        equal = float(np.prod(sides)) ** 2 * 2 * (x * s) ** 3 / (math.pi**3 * PAIR_COST * particles)
+        cutoff = min(equal ** (1 / 6), WIDEST * float(sides[list(domain.imaged())].min()))
+    waves = most_waves(domain, slab_factor, 2 * x * s / cutoff)
+    return {"cutoff": cutoff, "accuracy": accuracy, "waves": waves, "slab_factor": slab_factor}

@@ -1,0 +1,71 @@
+"""Forces of magnetic moments on each other in a periodic box, with all their images."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import Effect, Force, PairForce
+from tisim.effects.magnetic.ewald_pairs import EwaldPairs
+from tisim.effects.magnetic.moment import MOMENT
+from tisim.effects.magnetic.permanent_moment import PermanentMoment
+from tisim.effects.magnetic.wave_sum import WaveSum
+
+if TYPE_CHECKING:
+    from tisim.components.domain import Domain
+    from tisim.effects.base import LongRange
+    from tisim.worlds.bound import Bound, Peers
+    from tisim.worlds.state import State
+
+
+class EwaldDipoleDipole(EwaldPairs, Force, PairForce):
+    """Magnetic moments attract and repel each other as dipoles, with all images of a periodic box, and turn
+    permanent ones: the Ewald sum.
+
+        F_i = -grad_i U,    T_i = m_i x B_i,    B_i = -dU / dm_i
+
+    U is the energy of all dipoles with their images (``ewald_settings`` has what it takes to be good to an
+    ``accuracy``), m the ``moment`` of each that another effect has set, held fixed. It is to
+    ``dipole_dipole``, in which only nearest images act, what lj/cut/dipole/long with ewald/disp is in LAMMPS.
+    Momentum is conserved to rounding, as each wave does to one what it does to the others, energy to the
+    jumps at the cut-off, which are of the accuracy.
+
+    ``demagnetising_factors`` say what shape the sample has that the box is a piece of: 0 where applied fields
+    are those within it, as between the poles of a yoke.
+
+    Source: that of ``ewald_induced_moment``; B16 Eqs (6.21), (6.23), L21 Eqs (4.8), (4.9).
+    """
+
+    fields = (MOMENT,)
+
+    def turns(self, effects: Sequence[Effect]) -> bool:
+        return any(isinstance(effect, PermanentMoment) for effect in effects)
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {**super().connect(peers), "permanent": bool(peers.of(PermanentMoment))}
+
+    def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> WaveSum:
+        return WaveSum(s, own, domain, forces=True)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return self.sum.force[w, i]
+
+    @ti.func
+    def torque(self, s, w, i, t):
+        torque = 0.0 * s.moment[w, i]
+        if ti.static(self.permanent):
+            torque = s.moment[w, i].cross(self.sum.field[w, i])
+        return torque
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        return self.near_force(s, w, i, j, separation, distance)
+
+    @ti.func
+    def pair_torque(self, s, w, i, j, separation, distance, t):
+        torque = 0.0 * separation
+        if ti.static(self.permanent):
+            torque = s.moment[w, i].cross(self.near_field(s, w, j, separation, distance))
+        return torque
