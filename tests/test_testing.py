@@ -16,6 +16,7 @@ from tisim.effects import (
     PrescribedMotion,
     RigidClumps,
     Tether,
+    Virial,
     option,
 )
 from tisim.engine.explain import known_effects
@@ -333,17 +334,17 @@ def test_a_field_that_only_others_declare_is_reported():
         assert_fields(two(*effects, charge=[1.0, 1.0]))
 
 
-# Capture and constraints exclude impacts. No law of its own, and a series that takes long to compile, has the
-# cylinder. What passes is weighed before it is taken out. Permanent moments exclude soft ones.
+# Capture, constraints and the virial exclude impacts, permanent moments soft ones. No law of its own, and a
+# series that takes long to compile, has the cylinder. What passes is weighed before it is taken out.
 HOLDING = [PrescribedMotion, RigidClumps]
-APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, *HOLDING)
+APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING)
 TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     "kinds",
-    [TOGETHER, [Capture], HOLDING, [PermanentMoment]],
+    [TOGETHER, [Capture, Virial], HOLDING, [PermanentMoment]],
     ids=["all that go together", "capture", "constraints", "permanent moments"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):

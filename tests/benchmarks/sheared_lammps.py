@@ -9,8 +9,8 @@ a step: the images in its forces are where they should have been a step ago. Tha
 granular_lammps.py, are options of the NumPy twin, which with them agrees with LAMMPS, and without them with
 the package, to rounding.
 
-The stress is the virial of the contacts of grains without friction, a mean over a strain of 4 in steady flow;
-errors are those of the means of eight parts of it.
+The stress is the virial of the contacts of grains, without friction and with it, a mean over a strain of 4 in
+steady flow; errors are those of the means of eight parts of it.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from tisim import (  # noqa: E402
     ShearedBox,
     Simulation,
 )
+from tisim.effects import Virial  # noqa: E402
 from tisim.steppers import FixedStep, Verlet  # noqa: E402
 
 RATE, FRICTION, EVERY = 0.5, 0.3, 50
@@ -138,17 +139,15 @@ def apart(a: State, b: State) -> dict[str, float]:
 
 
 def stresses(made: Scene, steps: int) -> np.ndarray:
-    """The virial of the package every EVERY steps, Pa: xx, yy, zz, xy; of grains that remember nothing."""
+    """The virial of the package every EVERY steps, Pa: xx, yy, zz, xy."""
+    made = made.model_copy(update={"effects": (*made.effects, Virial())})
     simulation = Simulation(made)
     simulation.load(made)
-    twin, rows = ShearedGrains(made), []
+    rows = []
     for _ in range(steps // EVERY):
         simulation.run(steps=EVERY)
-        state = simulation.state
-        order = np.argsort(state["id"])
-        twin.x, twin.v, twin.time = state["position"][order], state["velocity"][order], state.time
-        twin.load(0.0)
-        rows.append([*np.diag(twin.virial), twin.virial[0, 1]])
+        (result,) = simulation.results()
+        rows.append([result.measures[f"virial_{which}"] for which in ("xx", "yy", "zz", "xy")])
     simulation.close()
     return np.array(rows) / VOLUME
 
@@ -178,12 +177,14 @@ def main() -> None:
         }
         for name, (a, b) in rows.items():
             print(f"| {name} | {steps} | {' | '.join(f'{value:.1e}' for value in apart(a, b).values())} |")
-    made, steps = scene(0.0, 0.0), round((BEFORE + MEASURED) / RATE / STEP)
-    print("\n| | pressure, Pa | shear stress, Pa |\n|---|---|---|")
-    theirs = by_lammps(made, steps)["pressure"][:, 1:]
-    for name, rows in {"package": stresses(made, steps), "LAMMPS": theirs}.items():
-        (p, tau), (dp, dtau) = mean(rows)
-        print(f"| {name} | {p:.1f} +- {dp:.1f} | {tau:.2f} +- {dtau:.2f} |")
+    steps = round((BEFORE + MEASURED) / RATE / STEP)
+    print("\n| | friction | pressure, Pa | shear stress, Pa |\n|---|---|---|---|")
+    for friction in (0.0, FRICTION):
+        made = scene(friction, 0.0)
+        theirs = by_lammps(made, steps)["pressure"][:, 1:]
+        for name, rows in {"package": stresses(made, steps), "LAMMPS": theirs}.items():
+            (p, tau), (dp, dtau) = mean(rows)
+            print(f"| {name} | {friction:g} | {p:.1f} +- {dp:.1f} | {tau:.2f} +- {dtau:.2f} |")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What positions of particles say about their arrangement, in NumPy."""
+"""What results say: of how particles are arranged and how they flow, in NumPy."""
 
 import lazy_loader
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from scipy.spatial import cKDTree
+
+from tisim.analysis.separations import Sides, near
 
 FEWEST_CONTACTS = 4
 """A grain with fewer contacts is not held in three dimensions: it rattles."""
@@ -26,25 +25,13 @@ def solid_fraction(
     return np.asarray(np.diff(below.sum(axis=0)) / (area * np.diff(edges)))
 
 
-def contacts(
-    position: np.ndarray, radius: np.ndarray, gap: float = 0.0, sides: Sequence[float] | None = None
-) -> np.ndarray:
+def contacts(position: np.ndarray, radius: np.ndarray, gap: float = 0.0, sides: Sides = None) -> np.ndarray:
     """Return the pairs (i < j) of grains whose surfaces are at most ``gap`` (m) apart, sorted; shape (pairs,
     2).
 
-    sides : those of a box that is periodic (m), 0 along an axis along which it is not.
+    sides : those of a box that is periodic, as ``near`` takes them.
     """
-    places, radius = np.asarray(position, float), np.asarray(radius, float)
-    box = None if sides is None else np.asarray(sides, float)
-    if box is not None:
-        places = np.where(box > 0, places % np.where(box > 0, box, 1.0), places - places.min(axis=0))
-    pairs = cKDTree(places, boxsize=box).query_pairs(2 * radius.max() + gap, output_type="ndarray")
-    pairs = pairs.reshape(-1, 2)
-    apart = places[pairs[:, 1]] - places[pairs[:, 0]]
-    if box is not None:
-        apart -= np.where(box > 0, box * np.rint(apart / np.where(box > 0, box, 1.0)), 0.0)
-    near = np.linalg.norm(apart, axis=1) <= radius[pairs].sum(axis=1) + gap
-    return np.asarray(pairs[near][np.lexsort(pairs[near].T[::-1])])
+    return near(position, np.asarray(radius, float) + gap / 2, sides)
 
 
 def coordination_numbers(number: int, pairs: np.ndarray) -> np.ndarray:
@@ -52,15 +39,25 @@ def coordination_numbers(number: int, pairs: np.ndarray) -> np.ndarray:
     return np.bincount(np.asarray(pairs).ravel(), minlength=number)
 
 
-def mean_coordination(number: int, pairs: np.ndarray, rattlers: bool = True) -> float:
-    """Return the mean number of contacts of ``number`` grains; without ``rattlers`` that of the grains that
-    have four contacts or more, where none of the others count.
+def rattling(number: int, pairs: np.ndarray) -> np.ndarray:
+    """Return which of ``number`` grains rattle: those with fewer than four contacts with grains that do not
+    rattle themselves; shape (number,).
 
-    Source: C. Thornton, Geotechnique 50 (2000) 43, as the mechanical coordination number.
+    Source: C. Thornton, Geotechnique 50 (2000) 43.
     """
     held, before = np.ones(number, bool), -1
-    while not rattlers and held.sum() != before:
+    while held.sum() != before:
         # Who rattles holds nobody.
         before, pairs = int(held.sum()), pairs[held[pairs].all(axis=1)]
         held &= coordination_numbers(number, pairs) >= FEWEST_CONTACTS
-    return float(2 * len(pairs) / max(int(held.sum()), 1))
+    return ~held
+
+
+def mean_coordination(number: int, pairs: np.ndarray, rattlers: bool = True) -> float:
+    """Return the mean number of contacts of ``number`` grains; without ``rattlers`` that of
+    the others, where contacts with rattlers do not count.
+
+    Source: C. Thornton, Geotechnique 50 (2000) 43, as the mechanical coordination number.
+    """
+    held = np.ones(number, bool) if rattlers else ~rattling(number, pairs)
+    return float(2 * held[pairs].all(axis=1).sum() / max(int(held.sum()), 1))

@@ -183,3 +183,4 @@ from .motion.translation import Translation as Translation
 from .pair.mie import Mie as Mie
 from .pair.near_field import NearField as NearField
 from .pair.near_field import TruncatedNearField as TruncatedNearField
+from .pair.virial import Virial as Virial

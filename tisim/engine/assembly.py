@@ -116,12 +116,11 @@ class Assembly:
         for effect in effects:
             for name, value in effect.data.remembers(s).items():
                 setattr(effect, name, value)
-        components = 6 if turning([effect.data for effect in effects]) else 3
+        force_sum = SumForces(*self._sees())
         listed = any(isinstance(effect.data, PairForce) for effect in short_ranged)
-        self.exported = ExportedTerms(self.pairs, components) if self.pairs and listed else None
+        self.exported = ExportedTerms(self.pairs, force_sum.components) if self.pairs and listed else None
         pairs = update_pairs(self.pairs) if self.pairs else ()
         lists = (*(update_near_list(near) if near else ()), *pairs)
-        force_sum = SumForces(*self._sees())
         derived, forces = self._derived(), self._forces(force_sum)
         context = StepContext(
             s=s,

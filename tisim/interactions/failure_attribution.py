@@ -58,7 +58,7 @@ class FailureAttribution:
             if finite(most) and not (size <= most):
                 most, index = size, effect.index
         for effect in ti.static(self.forces.pair_forces):
-            total = ti.Vector.zero(s.real, self.forces.components)
+            total = ti.Vector.zero(s.real, self.forces.load_size)
             for j in range(s.count[w]):
                 if i != j:
                     total += self.force_by_other(effect, w, i, j, t)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 FORCE = Field("force", "N", 3, "sum")
 TORQUE = Field("torque", "N m", 3, "sum")
+VIRIAL = Field("virial", "J", 1, "keep", slots=9)
+"""This is the half of a particle in the virial of its pairs: xx, xy, xz, yx, ... zz."""
 
 
 def turning(effects: Sequence[Effect]) -> bool:
@@ -38,12 +40,19 @@ def _force_alone(force, torque):
     return force
 
 
+@ti.func
+def _load_alone(load, separation):
+    return load
+
+
 class SumForces(PairSum):
     """This phase sets force[w, i] to the sum of the scene's forces on i: single, all pairs, near pairs; each
     in a fixed order.
 
-    Where an effect of the scene exerts torques these are summed along with it: one vector of six. A particle
-    that is ``fixed``, where the scene has that field, takes none. What pairs remember advances with the sum.
+    Where an effect of the scene exerts torques these are summed along with it: one vector of six, the load. A
+    particle that is ``fixed``, where the scene has that field, takes none. Where the scene has the field
+    ``virial`` nine more are summed: the half of i in that of its pairs. What pairs remember advances with the
+    sum.
 
     trial : whether the state is one that may be given up. commits : whether what pairs remember may be
     brought up to date with it.
@@ -65,9 +74,14 @@ class SumForces(PairSum):
         self.derived_solvers = derived_solvers
         self.turning = turning([effect.data for effect in effects])
         self.has_fixed = any(field.name == "fixed" for field in s.fields)
-        self.wrench, self.components = (_force_and_torque, 6) if self.turning else (_force_alone, 3)
-        # A listed pair comes to a force, torques on both, and what each law has it remember.
-        self.pair_values, laws = 9 if self.turning else 3, []
+        self.has_virial = VIRIAL in s.fields
+        self.wrench, self.load_size = (_force_and_torque, 6) if self.turning else (_force_alone, 3)
+        self.summand = self.load_and_virial if self.has_virial else _load_alone
+        self.components = self.load_size + (VIRIAL.slots if self.has_virial else 0)
+        # A listed pair comes to a force, torques on both, how far apart they are where that is of use, and
+        # what each law has it remember.
+        self.separation_begin = 9 if self.turning else 3
+        self.pair_values, laws = self.separation_begin + (3 if self.has_virial else 0), []
         for law in self.short_ranged:
             laws.append((law, self.pair_values))
             self.pair_values += law.data.memory if self.commits else 0
@@ -79,15 +93,29 @@ class SumForces(PairSum):
             for effect in (*self.forces, *self.pair_forces)
         )
         able = all(effect.data.offers_inverse() for effect in self.long_ranged)
-        self.by_inverse = able and not self.turning and estimates_roots()
+        self.by_inverse = able and not self.turning and not self.has_virial and estimates_roots()
+
+    @ti.func
+    def load_and_virial(self, load, separation):
+        """Return a load by another particle, which is at ``separation`` (m), with the half of its virial that
+        is of the one it acts on."""
+        total = ti.Vector.zero(self.s.real, self.components)
+        for k in ti.static(range(self.load_size)):
+            total[k] = load[k]
+        for a, b in ti.static(ti.ndrange(3, 3)):
+            total[self.load_size + 3 * a + b] = -0.5 * separation[a] * load[b]
+        return total
 
     @ti.func
     def start(self, w, i, t):
-        return self.external_load(w, i, t)
+        return self.summand(self.external_load(w, i, t), 0.0 * self.s.position[w, i])
 
     @ti.func
     def finish(self, w, i, total, t):
-        taken = ti.select(self.is_free(w, i), total, 0.0)
+        taken = total
+        if ti.static(self.has_fixed):
+            for k in ti.static(range(self.load_size)):
+                taken[k] = ti.select(self.is_free(w, i), total[k], 0.0)
         self.write(w, i, taken)
         self.check(w, i, taken)
 
@@ -116,9 +144,13 @@ class SumForces(PairSum):
     @ti.func
     def read_sum(self, w, i):
         s = self.s
-        total = self.wrench(s.force[w, i], s.force[w, i])
+        load = self.wrench(s.force[w, i], s.force[w, i])
         if ti.static(self.turning):
-            total = self.wrench(s.force[w, i], s.torque[w, i])
+            load = self.wrench(s.force[w, i], s.torque[w, i])
+        total = self.summand(load, 0.0 * s.force[w, i])
+        if ti.static(self.has_virial):
+            for k in ti.static(range(VIRIAL.slots)):
+                total[self.load_size + k] = s.virial[w, i, k]
         return total
 
     @ti.func
@@ -134,6 +166,9 @@ class SumForces(PairSum):
             if ti.static(self.commits):
                 for k in ti.static(range(law.memory)):
                     values[begin + k] = memory[k]
+        if ti.static(self.has_virial):
+            for k in ti.static(range(3)):
+                values[self.separation_begin + k] = separation[k]
         return values
 
     @ti.func
@@ -160,7 +195,10 @@ class SumForces(PairSum):
         if ti.static(self.turning):
             here = self.wrench(force, piece(values, 3, 3))
             there = self.wrench(-force, piece(values, 6, 3))
-        return here, there
+        separation = 0.0 * force
+        if ti.static(self.has_virial):
+            separation = piece(values, self.separation_begin, 3)
+        return self.summand(here, separation), self.summand(there, -separation)
 
     @ti.func
     def write_memory(self, w, m, values):
@@ -207,6 +245,9 @@ class SumForces(PairSum):
             s.force[w, i][k] = total[k]
             if ti.static(self.turning):
                 s.torque[w, i][k] = total[3 + k]
+        if ti.static(self.has_virial):
+            for k in ti.static(range(VIRIAL.slots)):
+                s.virial[w, i, k] = total[self.load_size + k]
 
     @ti.func
     def check(self, w, i, total):
@@ -225,10 +266,11 @@ class SumForces(PairSum):
     @ti.func
     def term(self, effect: ti.template(), w, i, j, separation, distance, t):  # type: ignore[valid-type]
         s = self.s
-        return self.wrench(
+        load = self.wrench(
             effect.pair_force(s, w, i, j, separation, distance, t),
             effect.pair_torque(s, w, i, j, separation, distance, t),
         )
+        return self.summand(load, separation)
 
     @ti.func
     def term_by_inverse(self, effect: ti.template(), w, i, j, separation, inverse, t):  # type: ignore[valid-type]

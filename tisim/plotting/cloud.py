@@ -107,7 +107,7 @@ def temperatures(states: Sequence[Arrays]) -> Normalize | None:
     return Normalize(min(low, middle - least), max(high, middle + least))
 
 
-def _project(points: np.ndarray) -> np.ndarray:
+def project(points: np.ndarray) -> np.ndarray:
     """Return the coordinates right, up and towards the viewer for points of shape (n, 3). m."""
     return np.asarray(points) @ PROJECTION
 
@@ -116,7 +116,7 @@ def corners(low: np.ndarray | None, high: np.ndarray | None) -> np.ndarray:
     """Return the corners of the box as seen, shape (8, 3); none in open space. m."""
     if low is None or high is None:
         return np.empty((0, 3))
-    return _project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
+    return project(np.array(list(itertools.product(*zip(low, high, strict=True)))))
 
 
 def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.ndarray]:
@@ -126,7 +126,7 @@ def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.nda
     if not len(size):
         return []
     low, high = (place - size[:, None]).min(axis=0), (place + size[:, None]).max(axis=0)
-    return [_project(line) for line in outlines(scene, time, low, high, _TOWARDS)]
+    return [project(line) for line in outlines(scene, time, low, high, _TOWARDS)]
 
 
 def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
@@ -140,7 +140,7 @@ def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
     nothing. m."""
     if not len(state["radius"]) and not len(box):
         return -0.5, -0.5, 1.0
-    projected, radius = _project(state["position"]), state["radius"][:, None]
+    projected, radius = project(state["position"]), state["radius"][:, None]
     low = np.vstack([projected - radius, box]).min(axis=0)[:2]
     high = np.vstack([projected + radius, box]).max(axis=0)[:2]
     side = 1.06 * float((high - low).max())
@@ -150,15 +150,15 @@ def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
 
 def panel(
     axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray, norm: Normalize | None,
-    walls: Sequence[np.ndarray] = (),
+    walls: Sequence[np.ndarray] = (), colours: np.ndarray | None = None,
 ) -> None:  # fmt: skip
     """Draw a state as seen in a square of ``view``, in a box of ``corners``, coloured by ``temperatures``,
-    with lines of ``walls_at``."""
+    with lines of ``walls_at``; or in ``colours`` of its own, red, green and blue, 0..1, shape (n, 3)."""
     left, bottom, side = square
-    colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
+    colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1)) if colours is None else colours
     if norm is not None and len(colour):
         colour = HEAT(norm(state["temperature"]))[:, :3]
-    image = _draw(_project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
+    image = _draw(project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
     axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
     if len(box):
         _edges(axis, box)

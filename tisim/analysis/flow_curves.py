@@ -1,0 +1,157 @@
+"""Flow curves: laws of shear stress against shear rate, fitted, with how well they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import curve_fit
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from tisim.errors import must
+from tisim.numerics.statistics import CONFIDENCE
+
+
+class Estimate(NamedTuple):
+    """An estimate has a value and half the width of its confidence interval."""
+
+    value: float
+    half: float
+
+
+class BinghamFit(NamedTuple):
+    """A Bingham fluid has a yield stress (Pa) and a plastic viscosity (Pa s)."""
+
+    yield_stress: Estimate
+    plastic_viscosity: Estimate
+
+    def stress(self, rate: np.ndarray) -> np.ndarray:
+        """Return the shear stress (Pa) at shear rates (1/s)."""
+        return self.yield_stress.value + self.plastic_viscosity.value * np.asarray(rate)
+
+
+class HerschelBulkleyFit(NamedTuple):
+    """A Herschel-Bulkley fluid has a yield stress (Pa), a consistency (Pa s^n) and an exponent n."""
+
+    yield_stress: Estimate
+    consistency: Estimate
+    exponent: Estimate
+
+    def stress(self, rate: np.ndarray) -> np.ndarray:
+        """Return the shear stress (Pa) at shear rates (1/s)."""
+        power = np.asarray(rate, float) ** self.exponent.value
+        return np.asarray(self.yield_stress.value + self.consistency.value * power)
+
+
+def fit_bingham(
+    rate: np.ndarray,
+    stress: np.ndarray,
+    error: np.ndarray | None = None,
+    above: float = 0.0,
+    confidence: float = CONFIDENCE,
+) -> BinghamFit:
+    """Return the Bingham fluid that fits shear stresses (Pa) at shear rates (1/s) best, by least squares.
+
+        tau = tau_y + eta_p rate
+
+    error : standard errors of the stresses, Pa, such as those of means over runs; intervals are then those
+    that follow from them. Without it all stresses are taken to be known alike, and how well is told by how
+    far they are off the law, with Student's t. above : rates up to this (1/s) are left out; L21 fits above
+    200 1/s, where a curve is straight.
+
+    Source: E. C. Bingham, Fluidity and Plasticity (1922); L21 section 2.3.
+    """
+    x, y, sigma = _taken(rate, stress, error, above, 2)
+
+    def law(x: np.ndarray, yields: float, viscosity: float) -> np.ndarray:
+        return yields + viscosity * x
+
+    values, covariance = _fitted(law, x / x.max(), y, sigma, np.polyfit(x / x.max(), y, 1)[::-1])
+    scale = np.array([1.0, 1 / x.max()])
+    return BinghamFit(
+        *_estimates(scale * values, covariance * np.outer(scale, scale), len(x), sigma, confidence)
+    )
+
+
+def fit_herschel_bulkley(
+    rate: np.ndarray,
+    stress: np.ndarray,
+    error: np.ndarray | None = None,
+    above: float = 0.0,
+    confidence: float = CONFIDENCE,
+) -> HerschelBulkleyFit:
+    """Return the Herschel-Bulkley fluid that fits shear stresses (Pa) at shear rates (1/s) best, by least
+    squares.
+
+        tau = tau_y + K rate^n
+
+    Arguments are those of ``fit_bingham``. Intervals are to first order in the errors: where the rates span
+    little, or the exponent is hardly known, they are no better than that.
+
+    Source: W. H. Herschel, R. Bulkley, Kolloid-Z. 39 (1926) 291.
+    """
+    x, y, sigma = _taken(rate, stress, error, above, 3)
+    must(bool((x > 0).all()), "rate", "above 0", x.min())
+    largest, scaled = x.max(), x / x.max()
+
+    def law(x: np.ndarray, yields: float, thickness: float, exponent: float) -> np.ndarray:
+        return np.asarray(yields + thickness * x**exponent)
+
+    def best(exponent: float) -> tuple[float, np.ndarray]:
+        columns = np.column_stack([np.ones_like(scaled), scaled**exponent])
+        line = np.linalg.lstsq(columns, y, rcond=None)[0]
+        return float(((columns @ line - y) ** 2).sum()), np.array([*line, exponent])
+
+    # For each exponent the best of the others is known, so that the search starts near its end.
+    _, start = min((best(n) for n in np.geomspace(0.1, 4.0, 40)), key=lambda one: one[0])
+    (yields, thickness, exponent), covariance = _fitted(law, scaled, y, sigma, start)
+    # K rate^n at the largest rate is what was found.
+    factor = largest**-exponent
+    turn = np.array([[1, 0, 0], [0, factor, -thickness * factor * np.log(largest)], [0, 0, 1]])
+    values = np.array([yields, thickness * factor, exponent])
+    return HerschelBulkleyFit(*_estimates(values, turn @ covariance @ turn.T, len(x), sigma, confidence))
+
+
+def _taken(
+    rate: np.ndarray, stress: np.ndarray, error: np.ndarray | None, above: float, parameters: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Return what is fitted: rates, stresses and errors."""
+    x, y = np.asarray(rate, float), np.asarray(stress, float)
+    must(x.shape == y.shape and x.ndim == 1, "stress", f"of the shape of rate, {x.shape}", y.shape)
+    sigma = None if error is None else np.broadcast_to(np.asarray(error, float), x.shape)
+    must(sigma is None or bool((sigma > 0).all()), "error", "above 0", error)
+    chosen = x > above
+    number = int(chosen.sum())
+    must(number > parameters, "rates", f"more than {parameters} above {above:g} 1/s", number)
+    return x[chosen], y[chosen], None if sigma is None else sigma[chosen]
+
+
+def _fitted(
+    law: Callable[..., np.ndarray],
+    x: np.ndarray,
+    y: np.ndarray,
+    sigma: np.ndarray | None,
+    start: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the parameters that fit best, and their covariance."""
+    scale = float(np.abs(y).max()) or 1.0
+    units = np.array([scale, scale, *np.ones(len(start) - 2)])
+    errors = None if sigma is None else sigma / scale
+    values, covariance = curve_fit(
+        lambda x, *values: law(x, *(units * values)) / scale,
+        x, y / scale, start / units, errors, absolute_sigma=sigma is not None,
+        xtol=1e-14, ftol=1e-14, gtol=1e-14,
+    )  # fmt: skip
+    return units * values, np.outer(units, units) * covariance
+
+
+def _estimates(
+    values: np.ndarray, covariance: np.ndarray, number: int, sigma: np.ndarray | None, confidence: float
+) -> list[Estimate]:
+    """Return values with half of their intervals."""
+    part = 0.5 + confidence / 2
+    width = norm.ppf(part) if sigma is not None else student.ppf(part, number - len(values))
+    halves = width * np.sqrt(np.diag(covariance))
+    return [Estimate(float(value), float(half)) for value, half in zip(values, halves, strict=True)]

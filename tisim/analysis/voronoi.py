@@ -1,0 +1,111 @@
+"""Voronoi cells: the space that is closer to the centre of a particle than to any other."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import Voronoi
+
+from tisim.analysis.bounding_ellipsoid import Ellipsoid
+from tisim.analysis.separations import Sides, vectors_of, with_images
+from tisim.errors import must
+
+SHELL = 4.0
+"""Images are taken from this many mean distances of particles beyond the faces of a periodic box."""
+
+
+class ShellVolumes(NamedTuple):
+    """Shell volumes are the mean Voronoi volume (m^3) of the particles in each shell, NaN where none counts,
+    and the number of those and of those that are left out."""
+
+    volume: np.ndarray
+    number: np.ndarray
+    left_out: np.ndarray
+
+
+def voronoi_volumes(position: np.ndarray, sides: Sides = None) -> np.ndarray:
+    """Return the volume (m^3) of the Voronoi cell of each position (n, 3), m; NaN of one that goes on without
+    end, as at the surface of a sample in open space; shape (n,).
+
+    sides : those of a box that is periodic, as ``near`` takes them; then the cells fill it. Sizes of
+    particles do not count: a face is half-way between two centres.
+
+    Source: G. Voronoi, J. Reine Angew. Math. 134 (1908) 198.
+    """
+    return _cells(np.asarray(position, float), sides)[0]
+
+
+def voronoi_by_shell(position: np.ndarray, ellipsoid: Ellipsoid, shells: int) -> ShellVolumes:
+    """Return the mean Voronoi volume in concentric shells of equal volume, of one shape, from the centre of
+    an ellipsoid to its surface.
+
+    A particle is in the shell of its centre. Cells at the surface are open, or reach far into empty space:
+    those that are not within the ellipsoid as a whole are left out, and counted.
+
+    Source: L21 section 4.2.2.3, which does not say how it takes cells at the surface.
+    """
+    r = np.asarray(position, float)
+    must(shells >= 1, "shells", "1 or above", shells)
+    volume, diagram = _cells(r, None)
+    regions = [diagram.regions[diagram.point_region[i]] for i in range(len(r))]
+    outside = ellipsoid.level(diagram.vertices) > 1
+    closed = np.array([not outside[region].any() for region in regions]) & np.isfinite(volume)
+    shell = (ellipsoid.level(r) ** 3 * shells).astype(int)
+    known = shell < shells
+    count, everybody = (np.bincount(shell[part], minlength=shells) for part in (known & closed, known))
+    total = np.bincount(shell[known & closed], volume[known & closed], shells)
+    mean = total / np.where(count > 0, count, np.nan)
+    return ShellVolumes(mean, count, everybody - count)
+
+
+def _cells(r: np.ndarray, sides: Sides) -> tuple[np.ndarray, Voronoi]:
+    """Return the volumes of cells and their diagram, in which particles come first."""
+    must(len(r) > 4, "particles", "more than 4", len(r))
+    diagram, periodic = Voronoi(r), np.diag(vectors_of(sides))
+    periodic = periodic[periodic > 0]
+    if len(periodic):
+        longest = float(periodic.min())
+        reach = min(SHELL * float(np.cbrt(np.prod(periodic) ** (3 / len(periodic)) / len(r))), longest)
+        diagram = Voronoi(with_images(r, reach, sides)[0])
+        # An image that was left out is farther away than that, and has no part in cells half as wide; with
+        # more images they are no wider.
+        needed = 2 * _width(diagram, len(r))
+        if needed > reach:
+            diagram = Voronoi(with_images(r, min(needed, longest), sides)[0])
+    return _volumes(diagram)[: len(r)], diagram
+
+
+def _width(diagram: Voronoi, number: int) -> float:
+    """Return the distance (m) of the farthest corner of a cell of the first particles from its centre."""
+    corners, ridge = _flat(diagram)
+    ends = diagram.ridge_points[ridge]
+    ends = np.where(ends < number, ends, -1)
+    open_ = corners < 0
+    apart = [np.linalg.norm(diagram.vertices[corners] - diagram.points[end], axis=1) for end in ends.T]
+    apart = [
+        np.where(end < 0, 0.0, np.where(open_, np.inf, way)) for end, way in zip(ends.T, apart, strict=True)
+    ]
+    return float(np.max(apart))
+
+
+def _volumes(diagram: Voronoi) -> np.ndarray:
+    """Return the volumes of all cells: of pyramids, each with a facet half-way to another particle."""
+    corners, ridge = _flat(diagram)
+    begins = np.flatnonzero(np.diff(ridge, prepend=-1))
+    following = np.arange(1, len(corners) + 1)
+    following[np.append(begins[1:], len(corners)) - 1] = begins
+    first = diagram.vertices[corners[begins]][ridge]
+    a, b = (diagram.vertices[some] - first for some in (corners, corners[following]))
+    area = np.linalg.norm(np.add.reduceat(np.cross(a, b), begins), axis=1) / 2
+    area[np.minimum.reduceat(corners, begins) < 0] = np.nan
+    i, j = diagram.ridge_points.T
+    part = area * np.linalg.norm(diagram.points[i] - diagram.points[j], axis=1) / 6
+    number = len(diagram.points)
+    return np.asarray(np.bincount(i, part, number) + np.bincount(j, part, number))
+
+
+def _flat(diagram: Voronoi) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of all facets, in their order around each, and the facet that each is of."""
+    sizes = [len(corners) for corners in diagram.ridge_vertices]
+    return np.concatenate(diagram.ridge_vertices), np.repeat(np.arange(len(sizes)), sizes)

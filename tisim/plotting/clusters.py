@@ -1,0 +1,72 @@
+"""A picture of clusters: particles in the colours of theirs, and outlines of what holds them."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
+
+from tisim.analysis.bounding_ellipsoid import Ellipsoid
+from tisim.plotting.cloud import PROJECTION, corners, directions, panel, project, view
+from tisim.plotting.style import empty, legend_above
+from tisim.plotting.walls import AROUND
+from tisim.scene.initial_state import Arrays
+from tisim.scene.scene import Scene
+
+CLUSTER_COLOURS = colormaps["tab20"](np.arange(20))[:, :3]
+"""Clusters next to each other in size have unlike ones of these colours."""
+SINGLE = (0.88, 0.88, 0.88)
+"""Particles that are bound to none are of this grey."""
+
+
+def clusters(
+    state: Arrays, cluster: np.ndarray, scene: Scene, ellipsoid: Ellipsoid | None = None, hull: bool = False
+) -> Figure:
+    """Draw the particles of a state, seen from one side without perspective: grey those that are alone in
+    their clusters, the others in the colour of theirs.
+
+    cluster : the number of that of each, as ``tisim.analysis.labels`` returns it. ellipsoid : around all,
+    drawn as its outline. hull : whether the outline of the convex hull of the spheres is drawn.
+    """
+    figure = empty(5.6, 5.4)
+    axis = figure.subplots()
+    size = np.bincount(cluster)
+    rank = np.empty(len(size), int)
+    rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
+    colours = CLUSTER_COLOURS[rank[cluster] % len(CLUSTER_COLOURS)]
+    colours[size[cluster] == 1] = SINGLE
+    lines = [] if ellipsoid is None else [_silhouette(ellipsoid)]
+    box = corners(*scene.domain.bounds())
+    around = np.vstack([box, *(np.column_stack([line, 0 * line[:, 0]]) for line in lines)])
+    square = view(state, around)
+    panel(axis, state, square, box, None, colours=colours)
+    for line in lines:
+        axis.plot(*line.T, color="0.2", lw=1.2, zorder=3, label="bounding ellipsoid")
+    if hull:
+        axis.plot(*_outline(state).T, color="0.2", lw=1.2, ls="--", zorder=3, label="convex hull")
+    if lines or hull:
+        legend_above(axis)
+    directions(axis, square, np.zeros(3))
+    several = int((size > 1).sum())
+    bound = int(size[size > 1].sum())
+    axis.set_title(f"{bound} of {len(cluster)} in {several} clusters", loc="left", fontsize=10)
+    return figure
+
+
+def _silhouette(ellipsoid: Ellipsoid) -> np.ndarray:
+    """Return the outline of an ellipsoid as seen, m, shape (n, 2): the image of a circle by the root of
+    M M^T, where M has the semi-axes as seen."""
+    seen = PROJECTION[:, :2].T @ (ellipsoid.axes.T * ellipsoid.semi_axes)
+    squares, axes = np.linalg.eigh(seen @ seen.T)
+    circle = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
+    return project(ellipsoid.centre[None])[:, :2] + circle * np.sqrt(squares) @ axes.T
+
+
+def _outline(state: Arrays) -> np.ndarray:
+    """Return the outline of the convex hull of spheres as seen, m, shape (n, 2)."""
+    circle = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
+    rims = project(state["position"])[:, None, :2] + state["radius"][:, None, None] * circle
+    points = rims.reshape(-1, 2)
+    ring = ConvexHull(points).vertices
+    return points[np.append(ring, ring[0])]
