@@ -22,7 +22,7 @@ ON_DEVICES = (
     *("effects/contact/test_walls.py", "effects/contact/test_contact.py", "effects/pair/test_near_field.py"),
     *("effects/pair/test_mie.py", "effects/external/test_drag.py", "effects/magnetic/test_dipole_dipole.py"),
     *("steppers/test_verlet.py", "steppers/test_conservation.py", "interactions/test_beyond_contact.py"),
-    "test_testing.py",
+    *("interactions/test_cell_tree.py", "effects/gravitation/test_tree_gravity.py", "test_testing.py"),
 )
 """These files hold on every device: the contracts, and the physics of each kind of law."""
 
@@ -160,6 +160,12 @@ def elsewhere_with(setting):
 def single():
     """Calls a function of a test module, MODULE.NAME, in a process of single precision: what it returns."""
     return elsewhere_with("precision='f32'")
+
+
+@pytest.fixture(scope="module")
+def in_one_thread():
+    """Calls a function of a test module, MODULE.NAME, in a process of one thread: what it returns."""
+    return elsewhere_with("threads=1")
 
 
 @pytest.fixture(scope="module")

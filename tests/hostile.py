@@ -150,7 +150,8 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
 
 def _required(kind: type[Component]) -> dict[str, Any]:
     """A value that will do for each parameter that must be given."""
-    fit = {"cutoff": 4.0, "low": (0.0, 0.0, 0.0), "high": (4.0, 4.0, 4.0)}
+    fit = {"cutoff": 4.0, "low": (0.0, 0.0, 0.0), "high": (4.0, 4.0, 4.0), "second": 4.0}
+    fit |= {"duct_radius": 4.0}
     values = {
         name: fit.get(name, 0.5 if size == 1 else (0.0, 0.0, 0.5))
         for name, info, size in kind.parameters()

@@ -12,7 +12,7 @@ from tests.accuracy.scenes import KNOWN, UNKNOWN, drift, oscillator
 from tests.scenes import scene
 from tests.steppers.charged import accurate, charged
 from tests.throwaway import Trap
-from tisim import InputError, Material, MaterialPair, RunError
+from tisim import Box, InputError, Material, MaterialPair, RunError
 from tisim.accuracy import Quantity, Row, Study
 from tisim.accuracy.formatting import expression, options
 from tisim.accuracy.plot import picture
@@ -41,7 +41,9 @@ from tisim.effects import (
     RestitutionDamping,
     RollingEPSD,
     RollingSDS,
+    SelfGravity,
     Tether,
+    TreeGravity,
     TruncatedNearField,
     TwistingSDS,
     ViscoelasticDamping,
@@ -180,6 +182,19 @@ def test_a_cut_off_is_tried_against_the_law_that_has_none():
     assert changed.replace({"effects.truncated_near_field": cuts[0].model_dump()}).effects == (cuts[0],)
     # One that a scene asks for is its law.
     assert "TruncatedNearField" not in methods_of(scene.model_copy(update={"effects": (cuts[0],)}))
+
+
+def test_a_tree_is_tried_in_place_of_all_pairs_where_it_can_stand():
+    """Its opening angle is turned where a scene has it; in a periodic box it would be refused."""
+    scene = oscillator().model_copy(update={"effects": (SelfGravity(),)})
+    angles = [s.scene.effects[0].opening_angle for s in methods_of(scene)["TreeGravity"].settings]
+    assert angles == [0.8, 0.5, 0.3]
+    box = Box(low=(-9, -9, -9), high=(9, 9, 9))
+    assert "TreeGravity" not in methods_of(scene.model_copy(update={"domain": box}))
+    tree = scene.model_copy(update={"effects": (TreeGravity(opening_angle=0.2),)})
+    turned = methods_of(tree)["tree_gravity: opening_angle"]
+    # For errors that are ten times larger; those of 1 and more are none.
+    assert [s.scene.effects[0].opening_angle for s in turned.settings] == [0.928, 0.431, 0.2]
 
 
 def test_what_is_mutual_is_tried_without_the_others_and_with_one_sweep_a_step():

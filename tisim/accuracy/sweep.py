@@ -187,7 +187,7 @@ def _laws(
         named = law.model_copy(update={"name": own.name})
         changed = exchanged(scene, f"effects.{own.label}", named)
         if not _stands(changed):
-            continue  # The materials lack what this law needs of them.
+            continue  # The materials lack what this law needs of them, or it does not suit the domain.
         differ = [
             f"{name}={text_of_setting(getattr(law, name))}"
             for name in type(law).model_fields

@@ -26,6 +26,9 @@ from .flow_curves import Estimate as Estimate
 from .flow_curves import HerschelBulkleyFit as HerschelBulkleyFit
 from .flow_curves import fit_bingham as fit_bingham
 from .flow_curves import fit_herschel_bulkley as fit_herschel_bulkley
+from .gravitation import angular_momentum as angular_momentum
+from .gravitation import gravitational_energy as gravitational_energy
+from .gravitation import virial_ratio as virial_ratio
 from .heap import angle_of_repose as angle_of_repose
 from .profiles import granular_temperature as granular_temperature
 from .profiles import layer_means as layer_means

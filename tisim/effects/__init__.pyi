@@ -14,6 +14,12 @@ from .base import (
     Force as Force,
 )
 from .base import (
+    LongRange as LongRange,
+)
+from .base import (
+    LongRangeSum as LongRangeSum,
+)
+from .base import (
     PairEvent as PairEvent,
 )
 from .base import (
@@ -117,11 +123,21 @@ from .external.drag import (
     Drag as Drag,
 )
 from .external.drag import (
+    SchillerNaumannDrag as SchillerNaumannDrag,
+)
+from .external.drag import (
     StokesDrag as StokesDrag,
 )
 from .external.gravity import Gravity as Gravity
 from .external.lorentz import Lorentz as Lorentz
 from .external.tether import Tether as Tether
+from .gravitation.self_gravity import (
+    SelfGravity as SelfGravity,
+)
+from .gravitation.self_gravity import (
+    SoftenedSelfGravity as SoftenedSelfGravity,
+)
+from .gravitation.tree_gravity import TreeGravity as TreeGravity
 from .impact.agglomeration import Agglomeration as Agglomeration
 from .impact.friction import Friction as Friction
 from .impact.heating import DeformationWork as DeformationWork

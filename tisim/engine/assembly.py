@@ -11,6 +11,7 @@ from tisim.effects.base import (
     DerivedQuantity,
     Effect,
     Force,
+    LongRange,
     PairEvent,
     PairForce,
     SelfConsistentQuantity,
@@ -113,6 +114,11 @@ class Assembly:
         self.derived_solvers = tuple(
             solver(s, effect, domain, self.pairs) for effect in effects.of(DerivedQuantity)
         )
+        for law in effects.of(LongRange):
+            law.sum = law.data.long_range_sum(law, s, domain)
+        self.long_range = {law.data.label: law.sum for law in effects.of(LongRange)}
+        # Trial states are summed by the same phases, so that these are compiled once.
+        self._long_range_items = tuple(item for one in self.long_range.values() for item in one.phases())
         for effect in effects:
             for name, value in effect.data.remembers(s).items():
                 setattr(effect, name, value)
@@ -178,6 +184,7 @@ class Assembly:
         self.buffers = (
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),
             *self._sweeps(),
+            *(Buffer(memory, "long-range sum", label) for label, memory in self.long_range.items()),
             *own.buffers,
         )
 
@@ -213,8 +220,9 @@ class Assembly:
         return tuple(items)
 
     def _derived(self, trial: bool = False) -> tuple[Item, ...]:
-        """Return the items that set derived quantities."""
-        return tuple(item for part in self.derived_solvers for item in part.phases(trial))
+        """Return the items that set derived quantities, then those that make long-range sums."""
+        items = tuple(item for part in self.derived_solvers for item in part.phases(trial))
+        return (*items, *self._long_range_items)
 
     def _forces(self, total: SumForces) -> tuple[Item, ...]:
         """Return the items that sum the forces, where there are any."""

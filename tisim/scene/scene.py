@@ -101,6 +101,8 @@ class Scene(Component):
                 ", ".join(labels),
             )
         self._check_materials()
+        for effect in self.effects:
+            effect.suits(self.domain)
         self.stepper.suits(self.effects, self.domain)
         self.stepper.fewest(self.effects, self.duration)
         rule = "at least one, or put in by an effect such as insertion_by_flux"

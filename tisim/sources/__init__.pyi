@@ -1,5 +1,7 @@
 from .base import Source as Source
 from .base import sources as sources
+from .constriction import ConstrictionFlow as ConstrictionFlow
+from .couette import CouetteFlow as CouetteFlow
 from .flow import (
     DarcyFlow as DarcyFlow,
 )

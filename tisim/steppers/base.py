@@ -9,7 +9,15 @@ from typing import Any, ClassVar
 from tisim.components.component import Component, option
 from tisim.components.cost_hints import StepperHints
 from tisim.components.domain import Domain
-from tisim.effects.base import Constraint, DerivedQuantity, Effect, Force, PairEvent, SelfConsistentQuantity
+from tisim.effects.base import (
+    Constraint,
+    DerivedQuantity,
+    Effect,
+    Force,
+    LongRange,
+    PairEvent,
+    SelfConsistentQuantity,
+)
 from tisim.errors import must
 from tisim.sources.base import Source
 from tisim.steppers.context import Step, StepContext
@@ -20,8 +28,9 @@ from tisim.worlds.fields import Field
 def single(effect: Effect) -> bool:
     """Return whether an effect acts on each particle by itself, and remembers nothing of it."""
     if isinstance(effect, Force):
-        return not effect.offers("load")
-    return isinstance(effect, Source | DerivedQuantity) and not isinstance(effect, SelfConsistentQuantity)
+        return not (effect.offers("load") or isinstance(effect, LongRange))
+    mutual = isinstance(effect, SelfConsistentQuantity | LongRange)
+    return isinstance(effect, Source | DerivedQuantity) and not mutual
 
 
 class Stepper(StepperHints, Component):

@@ -2,8 +2,8 @@
 
 Each kind of effect is made after a class of a file beside this one: ``effect.py`` is what all of them have,
 ``force.py``, ``pair_force.py``, ``pair_event.py``, ``constraint.py`` and ``derived_quantity.py`` say which
-methods a law of that kind defines, ``pairwise.py`` what is summed over pairs. These are the rules for all of
-them:
+methods a law of that kind defines, ``pairwise.py`` what is summed over pairs, and ``long_range.py`` what is
+summed over all others in another way. These are the rules for all of them:
 
 What a scene holds is plain data; what kernels hold is a bound object (tisim/worlds/bound.py).
 
@@ -34,6 +34,9 @@ What a scene holds is plain data; what kernels hold is a bound object (tisim/wor
 7. A ``DerivedQuantity`` of a particle follows from the rest of the state, such as a moment along the field
    where the particle is; it is set before forces are summed. A ``SelfConsistentQuantity`` depends on that of
    all others too, such as an induced dipole.
+   A sum over all others that is not made pair by pair, such as by a tree of cells or by waves, is brought by
+   a ``LongRange`` effect as phases of its own, which are taken before forces are summed; its ``force`` reads
+   what they have come to, ``self.sum``.
 8. What changes the state between steps is an ``Operator`` (see tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It is handed each pair in ``contact`` with exclusive access
    to both, earliest first (see tisim/interactions/collision_rounds.py); it may remove either.
@@ -64,6 +67,7 @@ from tisim.effects.base.constraint import Constraint
 from tisim.effects.base.derived_quantity import DerivedQuantity, SelfConsistentQuantity
 from tisim.effects.base.effect import Effect
 from tisim.effects.base.force import Force
+from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
 from tisim.effects.base.pair_force import PairForce
 from tisim.effects.base.pairwise import Pairwise
@@ -75,6 +79,8 @@ __all__ = [
     "Effect",
     "Field",
     "Force",
+    "LongRange",
+    "LongRangeSum",
     "PairEvent",
     "PairForce",
     "Pairwise",

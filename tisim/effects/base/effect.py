@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from tisim.components.component import Component, option
 from tisim.components.cost_hints import LawHints
 from tisim.worlds.bound import Peers
 from tisim.worlds.fields import Field
+
+if TYPE_CHECKING:
+    from tisim.components.domain import Domain
 
 
 class Effect(LawHints, Component):
@@ -62,6 +65,9 @@ class Effect(LawHints, Component):
     def required_effects(self) -> tuple[type[Component], ...]:
         """Return the effects without which it means nothing, given its options; by default ``requires``."""
         return self.requires
+
+    def suits(self, domain: Domain) -> None:
+        """Raise InputError where it cannot act in a domain; by default it can in any."""
 
     def keeps(self, what: str) -> tuple[str, ...]:
         """Return the names of the ``counters``, ``world_quantities`` or ``totals`` that it keeps of a world,

@@ -1,0 +1,66 @@
+"""Energy of gravity, angular momentum and balance of particles that attract each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.constants import G
+
+BLOCK_PAIRS = 2**20
+"""So many pairs are computed at once."""
+
+
+def gravitational_energy(position: np.ndarray, mass: np.ndarray, softening_length: float = 0.0) -> float:
+    """Return the energy of the gravity of particles on each other (J), over all pairs; below 0.
+
+        U = -G sum_(i < j) m_i m_j / (d^2 + eps^2)^(1/2)
+
+    position : m, shape (n, 3). mass : kg, shape (n,). softening_length : eps, m. It is that of the forces of
+    ``self_gravity`` and ``softened_self_gravity`` without images, and takes a time that goes as n^2.
+    """
+    places, mass = np.asarray(position, float), np.asarray(mass, float)
+    total, block = 0.0, max(1, BLOCK_PAIRS // max(len(places), 1))
+    for begin in range(0, len(places), block):
+        some = slice(begin, begin + block)
+        apart = places[None, begin:] - places[some, None]
+        square = np.einsum("ijk,ijk->ij", apart, apart) + softening_length**2
+        # Of a pair within the block only the one in which j comes after i.
+        after = np.arange(len(places) - begin) > np.arange(len(places[some]))[:, None]
+        inverse = np.divide(1.0, np.sqrt(square), out=np.zeros_like(square), where=after)
+        total -= G * float(mass[some] @ inverse @ mass[begin:])
+    return total
+
+
+def virial_ratio(position: np.ndarray, velocity: np.ndarray, mass: np.ndarray) -> float:
+    """Return 2 K / |U| of particles held together by their gravity alone: 1 in the mean over time where they
+    neither contract nor expand, 0 at rest, and above 2 where they are not bound.
+
+    K is the kinetic energy relative to the centre of mass, U that of ``gravitational_energy``. position : m,
+    velocity : m/s, each of shape (n, 3). mass : kg, shape (n,).
+    """
+    mass = np.asarray(mass, float)
+    relative = np.asarray(velocity, float) - np.average(velocity, axis=0, weights=mass)
+    kinetic = 0.5 * float(mass @ (relative**2).sum(axis=1))
+    return 2 * kinetic / abs(gravitational_energy(position, mass))
+
+
+def angular_momentum(
+    position: np.ndarray,
+    velocity: np.ndarray,
+    mass: np.ndarray,
+    radius: np.ndarray | None = None,
+    spin: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the angular momentum of particles about their centre of mass (kg m^2/s), shape (3,).
+
+        L = sum_i (m_i (r_i - r_c) x (v_i - v_c) + 2/5 m_i R_i^2 w_i)
+
+    position : m, velocity : m/s, each of shape (n, 3). mass : kg, shape (n,). radius : R, m, shape (n,), and
+    spin : w, rad/s, shape (n, 3), where what spheres turn with is to count.
+    """
+    mass = np.asarray(mass, float)
+    arm = np.asarray(position, float) - np.average(position, axis=0, weights=mass)
+    relative = np.asarray(velocity, float) - np.average(velocity, axis=0, weights=mass)
+    total = (mass[:, None] * np.cross(arm, relative)).sum(axis=0)
+    if spin is not None and radius is not None:
+        total = total + ((0.4 * mass * np.asarray(radius, float) ** 2)[:, None] * spin).sum(axis=0)
+    return np.asarray(total)

@@ -1,0 +1,77 @@
+"""Gravity of particles on each other, summed over all pairs (L21 section 4.2.1.3)."""
+
+from __future__ import annotations
+
+from scipy.constants import G
+
+from tisim.backend.taichi import ti
+from tisim.components.component import parameter
+from tisim.effects.base import Effect, PairForce
+from tisim.effects.gravitation.tree_gravity import TreeGravity
+
+ROOT_G = G**0.5
+"""The square root of the constant of gravitation, N^(1/2) m/kg: m ROOT_G is to it what a charge is to
+Coulomb's law."""
+OPENING_ANGLES = (0.8, 0.5, 0.3)
+"""These opening angles of a tree are worth a try."""
+
+
+class SelfGravity(PairForce):
+    """Particles attract each other by their gravity, over all pairs.
+
+        F_i = G sum_j m_i m_j / d^2 n_ij
+
+    n_ij is the unit vector from i to j, d the distance of the centres, G that of CODATA. Spheres that are the
+    same at all depths attract each other exactly as points of their masses do, as long as they do not
+    overlap; those that overlap are taken as points as well, whose force has no bound as d goes to 0. Grains
+    in contact, which overlap by a small part of their radii, are never near that; for clouds of points
+    without contacts there is ``softened_self_gravity``. In a periodic box only the nearest image of a
+    particle acts, which is no gravity of an infinite medium.
+
+    For thousands of particles ``tree_gravity`` is faster.
+
+    Source: L21 section 4.2.1.3, after I. Newton.
+    """
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        return tuple(TreeGravity(opening_angle=theta) for theta in OPENING_ANGLES)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        return self.attraction(s, w, i, j, 1.0 / distance) * separation
+
+    @ti.func
+    def pair_force_by_inverse(self, s, w, i, j, separation, inverse, t):
+        return self.attraction(s, w, i, j, inverse) * separation
+
+    @ti.func
+    def attraction(self, s, w, i, j, inverse):
+        """Return the force between i and j over their distance (N/m), given the inverse of that (1/m)."""
+        # Each mass over the distance first: in f32 the product of two of 1e20 kg, or of 1e-20 kg, is none.
+        a, b = ROOT_G * s.mass[w, i] * inverse, ROOT_G * s.mass[w, j] * inverse
+        return a * b * inverse
+
+
+class SoftenedSelfGravity(SelfGravity):
+    """Particles attract each other by a gravity that is softened at small distances, over all pairs.
+
+        F_i = G sum_j m_i m_j d / (d^2 + eps^2)^(3/2) n_ij
+
+    Each pulls as a Plummer sphere of length eps does: close encounters scatter no more than that, and two in
+    one place do not pull at all. It is for clouds whose particles stand for many bodies each; the gravity of
+    grains with contacts needs no softening. All else is as in ``self_gravity``.
+
+    Source: H. C. Plummer, Mon. Not. R. Astron. Soc. 71 (1911) 460; S. J. Aarseth, Mon. Not. R. Astron. Soc.
+    126 (1963) 223.
+    """
+
+    softening_length: float = parameter("m", "softening length eps", examples=[0.1], gt=0)
+
+    def approximations(self, extent: float) -> tuple[Effect, ...]:
+        soft = {"softening_length": self.softening_length}
+        return tuple(TreeGravity(opening_angle=theta, **soft) for theta in OPENING_ANGLES)
+
+    @ti.func
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        soft = self.softening_length(w)
+        return self.attraction(s, w, i, j, 1.0 / ti.sqrt(distance * distance + soft * soft)) * separation

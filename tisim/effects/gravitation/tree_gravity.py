@@ -1,0 +1,59 @@
+"""Gravity of particles on each other by a tree of cells."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.component import parameter
+from tisim.effects.base import Force, LongRange
+from tisim.effects.gravitation.tree_walk import TreeSum
+from tisim.errors import must
+
+if TYPE_CHECKING:
+    from tisim.components.domain import Domain
+    from tisim.worlds.bound import Bound
+    from tisim.worlds.state import State
+
+
+class TreeGravity(LongRange, Force):
+    """Particles attract each other by their gravity, that of far ones summed by cells of a tree, in a time
+    that goes as N log N.
+
+        F_i = G m_i sum_c [M d / s^3 + (15/2 d.Q.d / s^7 - 3/2 tr Q / s^5) d - 3 Q d / s^5]
+
+        s^2 = d^2 + eps^2,    Q = sum_k m_k x_k x_k^T,    |x_k| <= b < theta d
+
+    d leads from particle i to the centre of mass of a cell, x from there to those in it, M is their mass and
+    b the distance of the farthest. Cells that are nearer are opened, down to leaves of 16, whose particles
+    are summed one by one: as theta goes to 0, all are. Without softening the error of a cell is at most
+
+        (4 theta^3 - 3 theta^4) / (1 - theta)^2 G M m_i / d^2
+
+    In a uniform ball the forces are off by at most 0.012 theta^3 of them, root mean square (docs/gravity.md).
+    They are not equal and opposite: momentum and angular momentum are conserved to the errors of the forces,
+    where ``self_gravity``, whose fast form this is, conserves them to rounding. With ``softening_length`` it
+    is that of ``softened_self_gravity``. A periodic box with images is refused.
+
+    Source: J. Barnes, P. Hut, Nature 324 (1986) 446; the bound is that of J. K. Salmon, M. S. Warren, J.
+    Comput. Phys. 111 (1994) 136.
+    """
+
+    opening_angle: float = parameter(
+        "", "opening angle theta, 0.5 for forces good to a thousandth", 0.5, gt=0, lt=1
+    )
+    softening_length: float = parameter("m", "softening length eps; 0 for points", 0.0, ge=0)
+
+    accuracy_parameters = (AccuracyParameter(opening_angle=3),)
+
+    def suits(self, domain: Domain) -> None:
+        rule = f"one in which particles do not see images of each other, with effects.{self.label}"
+        must(not any(domain.imaged()), domain.label, rule, domain.imaged())
+
+    def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> TreeSum:
+        return TreeSum(s, own)
+
+    @ti.func
+    def force(self, s, w, i, t):
+        return s.mass[w, i] * self.sum.acceleration[w, i]

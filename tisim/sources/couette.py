@@ -1,0 +1,56 @@
+"""The velocity of a fluid between two walls that slide past each other (L21 section 2.2.2)."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from tisim.backend.taichi import ti
+from tisim.components.component import Vector
+from tisim.components.ranges import check_direction
+from tisim.errors import must
+from tisim.sources.base import Source, parameter
+
+
+class CouetteFlow(Source):
+    """A fluid is sheared between two parallel walls: its velocity goes linearly from that of one to that of
+    the other, which drag laws feel.
+
+        v = v_1 + (x - x_1) / (x_2 - x_1) (v_2 - v_1),    x = r.n
+
+    n is the unit normal of the walls, x_1 and x_2 are their places along it. Beyond a wall the fluid moves
+    with it. The flow is steady and free of divergence where v_1 and v_2 lie along the walls, as those of
+    walls that slide do. Neither particles nor walls of the scene change it.
+
+    Source: L21 section 2.2.2, figure 2.4.
+    """
+
+    quantity = "flow_velocity"
+
+    normal: Vector = parameter("", "normal n of both walls", (0.0, 0.0, 1.0))
+    first: float = parameter("m", "place x_1 of the first wall along the normal", examples=[0.0])
+    second: float = parameter("m", "place x_2 of the second wall along the normal", examples=[1e-3])
+    first_velocity: Vector = parameter("m/s", "velocity v_1 of the first wall", examples=[(-0.1, 0.0, 0.0)])
+    second_velocity: Vector = parameter("m/s", "velocity v_2 of the second wall", examples=[(0.1, 0.0, 0.0)])
+
+    @model_validator(mode="after")
+    def _apart(self) -> CouetteFlow:
+        check_direction(f"{self.label}.normal", self.normal)
+        must(self.first < self.second, f"{self.label}.second", f"above {self.label}.first", self.second)
+        return self
+
+    @ti.func
+    def value(self, w, r, t):
+        first, change = self.first_velocity(w), self.second_velocity(w) - self.first_velocity(w)
+        return first + ti.min(ti.max(self.part(w, r), 0.0), 1.0) * change
+
+    @ti.func
+    def gradient(self, w, r, t):
+        part, change = self.part(w, r), self.second_velocity(w) - self.first_velocity(w)
+        rate = ti.select(part >= 0.0 and part <= 1.0, 1.0 / (self.second(w) - self.first(w)), 0.0)
+        return rate * change.outer_product(self.normal(w) / self.normal(w).norm())
+
+    @ti.func
+    def part(self, w, r):
+        """Return how far r (m) is on the way from the first wall, at 0, to the second, at 1."""
+        x = r.dot(self.normal(w)) / self.normal(w).norm()
+        return (x - self.first(w)) / (self.second(w) - self.first(w))
