@@ -19,7 +19,7 @@ from tisim import Result, run
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.plotting.cloud import corners, panel, view
-from tisim.plotting.style import empty, letters, plain
+from tisim.plotting.style import empty, letters, plain, si
 
 STARTS = 3
 """Each setting is run from so many starts."""
@@ -85,12 +85,13 @@ def part_bars(axis: Axes, parts: Mapping[str, Sequence[Result]]) -> None:
 
 
 def chain_figure(chained: Result, sheared: Result) -> Figure:
-    """Draw a cell as it begins, with its chains, and sheared, on one scale."""
+    """Draw a cell as it begins, with its chains, and sheared, on one scale; with the contacts of a grain and
+    their order along the field, (3 cos^2 - 1)/2."""
     figure = empty(12.0, 4.6, pad=0.1)
     states = (
         ("at the start", chained.start),
-        (f"in the field, {1e6 * chained.time:.0f} us", chained.state),
-        (f"sheared, {1e6 * sheared.time:.0f} us", sheared.state),
+        (f"in the field, {si(chained.time, 's')}", chained.state),
+        (f"sheared, {si(sheared.time, 's')}", sheared.state),
     )
     domain = sheared.scene.domain
     box = corners(*domain.bounds())
@@ -100,6 +101,6 @@ def chain_figure(chained: Result, sheared: Result) -> Figure:
         known = {name: state[name] for name in ("position", "radius")}
         panel(axis, known, square, box, None)
         chains = order(state, domain)
-        axis.set_title(f"{heading}: contacts {chains.contacts:.1f}, along the field {chains.alignment:.2f}")
-    letters(axes)
+        axis.set_title(f"{heading}: contacts {chains.contacts:.1f}, order {chains.alignment:.2f}")
+    letters(axes, 9)
     return figure
