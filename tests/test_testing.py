@@ -25,7 +25,7 @@ from tisim.effects import (
 )
 from tisim.engine.explain import known_effects
 from tisim.interactions.force_sum import FORCE
-from tisim.operators import Capture, Operator, Outflow
+from tisim.operators import Capture, JoinGroup, Operator, Outflow
 from tisim.sources import MagneticCylinders, MagneticField, MagneticSpheres
 from tisim.steppers import (
     Boris,
@@ -344,7 +344,7 @@ def test_a_field_that_only_others_declare_is_reported():
 # Capture, constraints and the virial exclude impacts. No law of its own, and a series that takes long to
 # compile, has the cylinder. What passes is weighed before it is taken out, and permanent moments exclude soft
 # ones. Gravity by a tree has no images, which Ewald sums need.
-HOLDING = [PrescribedMotion, RigidClumps]
+HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED)
 TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]

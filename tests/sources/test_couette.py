@@ -33,6 +33,14 @@ def test_beyond_a_wall_the_fluid_moves_with_it():
     assert (gradient == 0).all()
 
 
+def test_the_fluid_is_still_until_the_walls_begin_to_move():
+    late = FLOW.model_copy(update={"begin": 2.0})
+    for t, part in ((1.99, 0.0), (2.0, 1.0)):
+        velocity, gradient = sample((late,), "flow_velocity", [0.5 * N / 3], t)
+        np.testing.assert_allclose(velocity[0], part * (LOW + HIGH) / 2, rtol=1e-6)
+        np.testing.assert_allclose(gradient[0], part * np.outer(HIGH - LOW, N / 3) / 2, rtol=1e-5, atol=1e-6)
+
+
 @pytest.mark.slow
 def test_a_grain_in_it_moves_with_its_layer():
     """From rest, v = v_f (1 - exp(-t/tau)): the flow along the wall does not carry it to another layer."""

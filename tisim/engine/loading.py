@@ -73,10 +73,13 @@ def check_held(scene: Scene, start: Arrays) -> None:
     constraints = [effect for effect in scene.effects if isinstance(effect, Constraint)]
     by = np.zeros(len(start["mass"]), int)
     for constraint in constraints:
-        # What an effect puts in may be all that there is of a kind.
-        awaited = any(type(constraint) in effect.required_effects() for effect in scene.effects)
-        if constraint.mark in start or not awaited:
-            by += constraint.held(start, scene.domain)
+        # What comes later may be all that there is of a kind.
+        later = any(effect.gives(constraint) for effect in scene.effects)
+        if constraint.mark in start or not later:
+            held = constraint.held(start, scene.domain)
+            rule = f"that of some particles in effects.{constraint.label}"
+            must(later or bool(held.any()), f"particles.{constraint.mark}", rule, "that of none")
+            by += held
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
         must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max(initial=0)}")
         for effect in scene.effects:

@@ -7,6 +7,8 @@ from .fragmentation import Fragmentation as Fragmentation
 from .insertion import Insertion as Insertion
 from .insertion_rules import InsertionByFlux as InsertionByFlux
 from .insertion_rules import InsertionByFraction as InsertionByFraction
+from .join_group import JoinGroup as JoinGroup
+from .mean_force import MeanForce as MeanForce
 from .outflow import Outflow as Outflow
 from .passage import Passage as Passage
 from .peak_displacement import PeakDisplacement as PeakDisplacement

@@ -17,8 +17,9 @@ class CouetteFlow(Source):
         v = v_1 + (x - x_1) / (x_2 - x_1) (v_2 - v_1),    x = r.n
 
     n is the unit normal of the walls, x_1 and x_2 are their places along it. Beyond a wall the fluid moves
-    with it. The flow is steady and free of divergence where v_1 and v_2 lie along the walls, as those of
-    walls that slide do. Neither particles nor walls of the scene change it.
+    with it. The flow is free of divergence where v_1 and v_2 lie along the walls, as those of walls that
+    slide do. It is still before ``begin`` and steady from then on: that shear spreads across the gap, in a
+    time of (x_2 - x_1)^2 rho / mu, is left out. Neither particles nor walls of the scene change it.
 
     Source: L21 section 2.2.2, figure 2.4.
     """
@@ -31,6 +32,8 @@ class CouetteFlow(Source):
     first_velocity: Vector = parameter("m/s", "velocity v_1 of the first wall", examples=[(-0.1, 0.0, 0.0)])
     second_velocity: Vector = parameter("m/s", "velocity v_2 of the second wall", examples=[(0.1, 0.0, 0.0)])
 
+    begin: float = parameter("s", "time at which the walls begin to move", 0.0, ge=0)
+
     @model_validator(mode="after")
     def _apart(self) -> CouetteFlow:
         check_direction(f"{self.label}.normal", self.normal)
@@ -40,13 +43,18 @@ class CouetteFlow(Source):
     @ti.func
     def value(self, w, r, t):
         first, change = self.first_velocity(w), self.second_velocity(w) - self.first_velocity(w)
-        return first + ti.min(ti.max(self.part(w, r), 0.0), 1.0) * change
+        return self.moving(w, t) * (first + ti.min(ti.max(self.part(w, r), 0.0), 1.0) * change)
 
     @ti.func
     def gradient(self, w, r, t):
         part, change = self.part(w, r), self.second_velocity(w) - self.first_velocity(w)
         rate = ti.select(part >= 0.0 and part <= 1.0, 1.0 / (self.second(w) - self.first(w)), 0.0)
-        return rate * change.outer_product(self.normal(w) / self.normal(w).norm())
+        return self.moving(w, t) * rate * change.outer_product(self.normal(w) / self.normal(w).norm())
+
+    @ti.func
+    def moving(self, w, t):
+        """Return 1 from the time on at which the walls begin to move, 0 before."""
+        return ti.select(t >= self.begin(w), 1.0, 0.0)
 
     @ti.func
     def part(self, w, r):

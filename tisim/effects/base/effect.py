@@ -83,6 +83,11 @@ class Effect(LawHints, Component):
         """Return attributes to set on its bound object, chosen among the fields of the state."""
         return {}
 
+    def gives(self, constraint: Effect) -> bool:
+        """Return whether it may give a constraint particles to hold after the start; by default it does to
+        those without which it means nothing."""
+        return type(constraint) in self.required_effects()
+
     def newcomers(self) -> Mapping[str, np.ndarray] | None:
         """Return what it gives to particles it adds, beside what all particles have: by the name of the
         field, its values in SI, a row for each class of them; None where it adds none, or only copies."""

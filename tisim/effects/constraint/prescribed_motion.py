@@ -27,11 +27,12 @@ class PrescribedMotion(Constraint):
         r(t) = M(t) M(0)^-1 r(0),    v = velocity of M at r,    spin = angular velocity of M
 
     M(t) takes the body to where the motion has it; frozen it stays. They are of the group whose number the
-    field ``group`` of the start has; 0 is that of particles that move freely. Their velocities and spins at
-    the start are those of the motion, whatever the start says. They act on others as ever, and in granular
-    contacts they count as so heavy as a wall; short-ranged laws do not act between them. The result tells the
-    sum of all forces (N) on the group, gravity among them, as ``measures["NAME_force_x"]`` and so on, and
-    that of their torques (N m), about the origin or the centre of its rotation, as ``NAME_torque_x``.
+    field ``group`` of the start has, or join it on the way (``join_group``); 0 is that of particles that move
+    freely. Their velocities and spins at the start are those of the motion, whatever the start says. They act
+    on others as ever, and in granular contacts they count as so heavy as a wall; short-ranged laws do not act
+    between them. The result tells the sum of all forces (N) on the group, gravity among them, as
+    ``measures["NAME_force_x"]`` and so on, and that of their torques (N m), about the origin or the centre of
+    its rotation, as ``NAME_torque_x``.
 
     It is what LAMMPS has in fix freeze and fix move.
     """
@@ -54,8 +55,6 @@ class PrescribedMotion(Constraint):
 
     def held(self, start: Mapping[str, np.ndarray], domain: Domain) -> np.ndarray:
         held: np.ndarray = start.get("group", np.zeros(len(start["mass"]))) == self.group
-        rule = f"that of some particles in effects.{self.label}, group {self.group}"
-        must(bool(held.any()), "particles.group", rule, "that of none")
         return held
 
     def remembers(self, s: Any) -> dict[str, Any]:
@@ -85,6 +84,15 @@ class PrescribedMotion(Constraint):
         if s.time[w] == 0.0:
             # The start may be the end of another run.
             s.reference_position[w, i] = s.position[w, i]
+
+    @ti.func
+    def join(self, s, w, i):
+        """Have a free particle be of the group from now on, where it is."""
+        start, place = ti.cast(0.0, ti.f64), s.position[w, i]
+        body = self.motion.to_body(self.kept, w, place, s.time[w])
+        s.group[w, i], s.body_mass[w, i] = self.group, HEAVY * s.mass[w, i]
+        s.reference_position[w, i] = self.motion.from_body(self.kept, w, body, start)
+        s.velocity[w, i], s.spin[w, i] = self.velocity(s, w, i, s.time[w])
 
     @ti.func
     def position(self, s, w, i, t):

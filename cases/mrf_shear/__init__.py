@@ -1,0 +1,20 @@
+"""A magnetorheological fluid in a shear cell (L21 chapter 2)."""
+
+from __future__ import annotations
+
+from cases.case import Case, Late
+from cases.mrf_shear.accuracy import quantities
+from cases.mrf_shear.scene import SIZES, TITLE, scene_for
+
+CASE = Case(
+    name="mrf_shear",
+    title=TITLE,
+    source="T. Leps, PhD thesis, Univ. of Maryland (2021), chapter 2",
+    sizes=SIZES,
+    scene=scene_for,
+    check=Late("cases.mrf_shear.checks", "check"),
+    quantities=quantities,
+    problem=Late("cases.mrf_shear.problem", "problem"),
+    variants=("front", "bounded", "field"),
+    figures=Late("cases.mrf_shear.figures", "figures"),
+)

@@ -1,0 +1,15 @@
+"""What accuracy is of in a sheared cell, over random starts: shear stress, and how deep grains overlap."""
+
+from __future__ import annotations
+
+from cases.mrf_shear.measures import largest_overlap, shear_stress
+from tisim import Scene
+from tisim.accuracy import Quantity
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Paths of grains are chaotic; what counts is the stress of the fluid."""
+    return (
+        Quantity("shear stress", shear_stress, random=True),
+        Quantity("largest overlap", largest_overlap, random=True),
+    )

@@ -1,0 +1,104 @@
+"""The flow curve of a cell, the stress by field, and what each part of the model does to it; and their fits.
+
+The measurements and simulations beside which they are drawn are those of L21: their yield stresses, not their
+curves, which it has only as figures.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from cases.mrf_shear.measures import shear_rate, shear_stress
+from cases.mrf_shear.problem import flux
+from cases.mrf_shear.runs import Settings, cells
+from cases.mrf_shear.scene import RATES, mixture
+from cases.statistics import Mean
+from tisim import Result
+from tisim.analysis import BinghamFit, fit_bingham
+from tisim.effects import CARBONYL_IRON
+from tisim.engine.batches import Progress
+from tisim.numerics.statistics import CONFIDENCE
+
+COMPARED = {"rate": RATES[-1]}
+"""Variants and fields are compared at the fastest of the rates, which is the quickest to run."""
+FLUXES = (0.1, 0.2, 0.3, 0.45, 0.6)
+"""Flux densities of the sweep, T."""
+VARIATIONS: dict[str, Settings] = {
+    "as L21 has it": {},
+    "no resistance to rolling": {"rolling": 0.0},
+    "no cohesion": {"cohesion": 0.0},
+    "oil at rest": {"still": True},
+    "a third of small grains": {"grains": mixture(1 / 3)},
+    "iron that saturates": {"saturation": CARBONYL_IRON.saturation},
+}
+"""The variants that L21 compares (section 2.4.2), a mixture, and grains that saturate, which L21 has not."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve has results of settings, each from several starts, and what was varied."""
+
+    x: np.ndarray
+    groups: Sequence[Sequence[Result]]
+
+    @property
+    def stresses(self) -> list[Mean]:
+        """Return the mean shear stress of each, Pa."""
+        return [Mean.of([shear_stress(one) for one in group]) for group in self.groups]
+
+    @property
+    def values(self) -> np.ndarray:
+        """Return the means alone, Pa."""
+        return np.array([one.value for one in self.stresses])
+
+    @property
+    def halves(self) -> np.ndarray:
+        """Return half the widths of their intervals, Pa."""
+        return np.array([one.half for one in self.stresses])
+
+    def bingham(self) -> BinghamFit:
+        """Return the fluid of Bingham that fits, with intervals by the spread over starts."""
+        factor = student.ppf(0.5 + CONFIDENCE / 2, len(self.groups[0]) - 1)
+        return fit_bingham(self.x, self.values, self.halves / factor)
+
+    def power(self) -> float:
+        """Return the exponent of the power law through the means."""
+        return float(np.polyfit(np.log(self.x), np.log(self.values), 1)[0])
+
+
+def flow_curve(starts: int, rates: Sequence[float] = RATES, progress: Progress | None = None) -> Curve:
+    """Return stress by shear rate; one world for each rate and start, all as one batch."""
+    groups = cells([{"rate": rate} for rate in rates], starts, progress)
+    return Curve(np.array([shear_rate(group[0]) for group in groups]), groups)
+
+
+def by_field(starts: int, fluxes: Sequence[float] = FLUXES, progress: Progress | None = None) -> Curve:
+    """Return stress by flux density."""
+    groups = cells([{**COMPARED, "flux": one} for one in fluxes], starts, progress)
+    return Curve(np.array([flux(group[0]) for group in groups]), groups)
+
+
+def by_part(
+    starts: int, parts: Sequence[str] = tuple(VARIATIONS), progress: Progress | None = None
+) -> dict[str, list[Result]]:
+    """Return the results of each variant of the model, by its name."""
+    return dict(
+        zip(parts, cells([{**COMPARED, **VARIATIONS[one]} for one in parts], starts, progress), strict=True)
+    )
+
+
+def table(curve: Curve, heading: str) -> str:
+    """Return a curve as CSV: what was varied, the stress and half of its interval, and that of each start."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow([heading, "shear_stress_Pa", "half_interval_Pa", "of_each_start_Pa"])
+    for x, mean, group in zip(curve.x, curve.stresses, curve.groups, strict=True):
+        each = " ".join(f"{shear_stress(one):.5g}" for one in group)
+        writer.writerow([f"{x:.6g}", f"{mean.value:.5g}", f"{mean.half:.3g}", each])
+    return text.getvalue()

@@ -1,0 +1,122 @@
+"""The inverse problem of mrf_shear: which fluid bears the most stress in a field, and flows easily without?
+
+A design is the share of small grains of the volume of all, the volume fraction of grains, and the field. More
+grains bear more, and thicken the fluid when the field is off; small grains among large ones fill holes. The
+stress is simulated, at one shear rate at which drag is small beside magnetic forces, so that it is all but
+the yield stress. The viscosity without field is that of ``off_state``, which is no simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cases.case import size_named
+from cases.mrf_shear.measures import extent, shear_stress, volume_fraction
+from cases.mrf_shear.off_state import off_state_viscosity
+from cases.mrf_shear.scene import LARGE_RADIUS, SEARCHED, SIZES, SMALL_RADIUS, TITLE, mixture, scene
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.objective import Objective
+from optimize.problem.problem import Problem
+from tisim import Cloud, Result, Scene
+from tisim.errors import must
+from tisim.plotting.cloud import cloud
+from tisim.sources import MagneticField
+
+VARIANTS = ("front", "bounded", "field")
+GENES = (
+    Gene("small", "of grains", 0.0, 0.6),
+    Gene("fraction", "of volume", 0.15, 0.34),
+    Gene("flux", "T", 0.2, 0.8),
+)
+BOUND = 24e-3
+"""A bounded off-state viscosity is at most so large, Pa s."""
+WANTED = {
+    "front": "the front of shear stress in the field and viscosity without it",
+    "bounded": f"the highest shear stress of fluids of at most {1e3 * BOUND:g} mPa s without field",
+    "field": "the front of shear stress, viscosity without field, and the field that it takes",
+}
+"""What each variant of the problem looks for."""
+MEANINGS = {
+    "stress": "shear stress in the field, the mean over a strain",
+    "viscosity": "viscosity without field, after Krieger and Dougherty",
+    "small": "share of the small grains of the volume of all",
+    "fraction": "volume fraction of the grains",
+}
+
+
+def design_viscosity(small: float, fraction: float) -> float:
+    """Return the viscosity without field of a design, Pa s."""
+    return off_state_viscosity(fraction, (2 * LARGE_RADIUS, 2 * SMALL_RADIUS), (1 - small, small))
+
+
+def viscosity(result: Result) -> float:
+    """Return the viscosity without field of the fluid of a run, Pa s: by the sizes that it was asked for."""
+    start = start_of(result)
+    diameters = [2 * float(one.sizes.nodes()[0].mean()) for one in start.grains]
+    return off_state_viscosity(asked_fraction(result), diameters, [one.share for one in start.grains])
+
+
+def asked_fraction(result: Result) -> float:
+    """Return the volume fraction that the grains of a run would have in the mean over all starts."""
+    start, volume = start_of(result), float(extent(result.scene.domain).prod())
+    each = sum(one.share / one.density for one in start.grains) / sum(one.number() for one in start.grains)
+    return start.count() * each / volume
+
+
+def start_of(result: Result) -> Cloud:
+    """Return what a cell starts with."""
+    particles = result.scene.particles
+    assert isinstance(particles, Cloud)
+    return particles
+
+
+def flux(result: Result) -> float:
+    """Return the flux density of the field, T."""
+    return float(next(e for e in result.scene.effects if isinstance(e, MagneticField)).constant[2])
+
+
+LARGE_STRESS = Objective("stress", shear_stress, "Pa", maximise=True)
+LOW_VISCOSITY = Objective("viscosity", viscosity, "Pa s")
+OBJECTIVES = {
+    "front": (LARGE_STRESS, LOW_VISCOSITY),
+    "bounded": (LARGE_STRESS,),
+    "field": (LARGE_STRESS, LOW_VISCOSITY, Objective("field", flux, "T")),
+}
+
+
+def problem(size: str = "default", variant: str = "front") -> Problem:
+    """Return the search for fluids; by variant the front of stress and viscosity, the highest stress at a
+    bounded viscosity, or the front of stress, viscosity and field."""
+    must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
+    settings = {**size_named(size, SIZES).scene, **SEARCHED}
+
+    def designed(design: Mapping[str, float], seed: int) -> Scene:
+        small, fraction = design["small"], design["fraction"]
+        thick = design_viscosity(small, fraction)
+        allowed = BOUND if variant == "bounded" else np.inf
+        must(thick <= allowed, "viscosity of the design", f"at most {BOUND:g} Pa s", thick)
+        return scene(flux=design["flux"], grains=mixture(small), fraction=fraction, seed=seed, **settings)
+
+    return Problem(
+        name=f"mrf_shear-{variant}" + ("" if size == "default" else f"-{size}"),
+        title=TITLE,
+        description=WANTED[variant],
+        genome=Genome(GENES),
+        scene=designed,
+        objective=OBJECTIVES[variant],
+        meanings=MEANINGS,
+        picture=lambda scene, result: cloud(result),
+        details=details,
+    )
+
+
+def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
+    """Return what else is known of the fluid of a design."""
+    return {
+        "grains": float(len(result.state["radius"])),
+        "volume fraction as drawn": volume_fraction(result),
+        "shear stress, kPa": 1e-3 * shear_stress(result),
+        "viscosity without field, mPa s": 1e3 * viscosity(result),
+    }

@@ -1,0 +1,250 @@
+"""A magnetorheological fluid in a shear cell: iron grains in oil form chains along a field, and bear stress.
+
+The cell is periodic along x and y. Grains begin at random places, and a field along z draws them into chains.
+Once they have formed, grains at the bottom and at the top are frozen into rafts, with which the oil and the
+chains are sheared along x. The shear stress is the mean force on the rafts over their area.
+
+It is the simulation of L21 chapter 2. What differs at the sizes that a laptop runs is in SIZES and in the
+page of the case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cases.case import Size, size_named
+from cases.mixtures import classes, magnetorheological
+from cases.mrf_shear import published
+from cases.mrf_shear.published import MICRO
+from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
+from tisim.components.accuracy_parameter import three_digits
+from tisim.components.component import Vector
+from tisim.effects import (
+    CARBONYL_IRON,
+    SJKR,
+    Effect,
+    Granular,
+    HertzMaterial,
+    MindlinForce,
+    MutualFroehlichMoment,
+    PrescribedMotion,
+    RestitutionDamping,
+    RollingEPSD,
+    StokesDrag,
+    Translation,
+    TruncatedDipoleDipole,
+    Walls,
+)
+from tisim.geometry import Plane
+from tisim.operators import JoinGroup, MeanForce
+from tisim.sources import CouetteFlow, MagneticField
+from tisim.steppers import FixedStep, Verlet
+
+TITLE = "A magnetorheological fluid in a shear cell: flow curve and yield stress"
+
+DENSITY, SUSCEPTIBILITY = CARBONYL_IRON.density, 999.0
+"""Of carbonyl iron, kg/m^3; of such a susceptibility a sphere is magnetised as one without end, to 0.3 %."""
+LINEAR = 1e12
+"""Grains whose magnetisation saturates at so much (A/m) do not saturate: those of L21."""
+LARGE_RADIUS, SMALL_RADIUS = published.MEAN_LARGE / 2, published.MEAN_LARGE / 4
+"""The radius of the large grains, and of the small ones of a mixture at sizes for a laptop, m: half as large,
+where those of L21 are a quarter, which would be 25 for each large one in a mixture of 33:67."""
+SIDES: Vector = (40 * MICRO, 40 * MICRO, 60 * MICRO)
+RAFT = 8 * MICRO
+"""The sides of the cell, and how much of its bottom and top becomes rafts, m."""
+RATES = (2000.0, 5000.0, 10000.0)
+"""The shear rates of a flow curve, 1/s."""
+BEFORE, STRAIN = 0.5, 1.0
+"""The stress is a mean from the first of these strains to the second."""
+MAGNETISING_TIME = 2 * published.CHAINS_FORM
+"""After so long rafts are frozen, s."""
+CUT = {"cutoff": 2.0, "gap": published.NEIGHBOUR_GAP}
+"""Up to where grains magnetise and attract each other: a gap between their surfaces."""
+REST: Vector = (0.0, 0.0, 0.0)
+"""The oil at rest, m/s."""
+LOWER, UPPER = 1, 2
+"""The groups of the rafts."""
+STEPS_OF_IMPACT = 40.0
+"""A step is one of so many parts of the time of an impact of the smallest grains at IMPACT."""
+IMPACT = 1.0
+"""m/s, about as fast as grains of 6.7 um meet that fields of 0.6 T draw together."""
+
+
+def equal(radius: float, share: float) -> tuple[GrainClass, ...]:
+    """Return grains of one radius (m) that have a share of a mixture; none for a share of 0."""
+    return classes(((2 * radius / MICRO, 1.0),), "mass", share) if share > 0 else ()
+
+
+def mixture(share: float) -> tuple[GrainClass, ...]:
+    """Return a mixture of large and small grains of one size each; share : of the small ones, 0 to 1."""
+    return (*equal(LARGE_RADIUS, 1 - share), *equal(SMALL_RADIUS, share))
+
+
+MONODISPERSE = mixture(0.0)
+"""Grains of one size, the mean of the large ones of L21."""
+SEARCHED: dict[str, Any] = {
+    "rate": RATES[-1], "sides": (32 * MICRO, 32 * MICRO, 48 * MICRO), "raft": 7 * MICRO, "strain": 0.7,
+    "before": 0.35,
+}  # fmt: skip
+"""What a search runs of each design: a smaller cell, for a shorter time."""
+SEARCH_SETTINGS = {
+    "generations": 6, "options": {"population": 12},
+    "ensemble": {"min_starts": 1, "block": 1, "max_starts": 1, "confirm": 0},
+}  # fmt: skip
+LEPS: dict[str, Any] = {
+    "sides": (published.CELL_SIDE,) * 3, "raft": published.RAFT_DEPTH, "rate": published.SHEAR_RATES[0],
+    "magnetising": published.CHAINS_FORM, "dt": published.STEP, "strain": 0.93, "before": 0.7,
+}  # fmt: skip
+"""L21's own cell, sheared at the first of its rates."""
+SIZES = {
+    "default": Size(
+        "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search has 32 x 32 x 48 um", {},
+        SEARCH_SETTINGS,
+    ),
+    "polydisperse": Size(
+        "some 260 grains of L21's mixture 00:100 in a cell of 66 x 66 x 80 um, at 10 000 1/s",
+        {
+            "grains": magnetorheological(0.0), "sides": (66 * MICRO, 66 * MICRO, 80 * MICRO),
+            "raft": 10 * MICRO, "rate": RATES[-1],
+        },
+    ),
+    "l21": Size(
+        "L21's own: a cube of 250 um, its mixture 00:100 by number, steps of 0.2 ns",
+        {**LEPS, "grains": magnetorheological(0.0)},
+    ),
+    "l21_volume": Size("the same, 00:100 by volume", {**LEPS, "grains": magnetorheological(0.0, "mass")}),
+    "l21_bidisperse": Size("the same, 33:67 by number", {**LEPS, "grains": magnetorheological(0.33)}),
+    "l21_monodisperse": Size("the same, grains of 6.7 um", {**LEPS, "grains": MONODISPERSE}),
+}  # fmt: skip
+
+
+def number_of(grains: Sequence[GrainClass], fraction: float, volume: float) -> int:
+    """Return how many grains fill a fraction of a volume (m^3)."""
+    # Numbers of a class are for each kg of its share.
+    filled = sum(one.share / one.density for one in grains)
+    return round(fraction * volume * sum(one.number() for one in grains) / filled)
+
+
+def smallest(grains: Sequence[GrainClass]) -> float:
+    """Return the radius of the smallest grain that there may be, m."""
+    return float(min(one.sizes.nodes()[0].min() for one in grains))
+
+
+def impact_step(radius: float, young: float) -> float:
+    """Return a step (s) that is short beside the impact of two grains of a radius (m) and a Young's modulus
+    (Pa) at IMPACT, after Hertz."""
+    modulus = young / (2 * (1 - published.POISSON**2))
+    mass = DENSITY * 2 / 3 * np.pi * radius**3
+    lasts = 2.94 * (15 * mass / (16 * modulus * np.sqrt(radius / 2 * IMPACT))) ** 0.4
+    return float(three_digits(lasts / STEPS_OF_IMPACT))
+
+
+CONTACT = Granular(
+    normal=HertzMaterial(),
+    damping=RestitutionDamping(),
+    tangential=MindlinForce(),
+    rolling=RollingEPSD(damping_ratio=published.ROLLING_DAMPING),
+    cohesion=SJKR(),
+)
+"""The law of contact of L21 section 2.2.1."""
+
+
+def iron(young: float, rolling: float, cohesion: float) -> Material:
+    """Return what grains are made of, by table 2.1 but for Young's modulus (Pa), the coefficient of rolling
+    friction and the cohesion energy density (J/m^3)."""
+    return Material(
+        young=young,
+        poisson=published.POISSON,
+        restitution=published.RESTITUTION,
+        friction=published.FRICTION,
+        rolling_friction=rolling,
+        cohesion_energy_density=cohesion,
+    )
+
+
+def smooth(young: float) -> Material:
+    """Return what the plates below and above are made of, along which grains slide freely; young : Pa."""
+    return iron(young, 0.0, 0.0).model_copy(update={"friction": 0.0})
+
+
+def scene(
+    rate: float = 2000.0,
+    flux: float = published.FLUX,
+    grains: Sequence[GrainClass] = MONODISPERSE,
+    fraction: float = published.FRACTION,
+    seed: int = 0,
+    sides: Vector = SIDES,
+    raft: float = RAFT,
+    magnetising: float = MAGNETISING_TIME,
+    strain: float = STRAIN,
+    before: float = BEFORE,
+    young: float = published.YOUNG,
+    dt: float | None = None,
+    rolling: float = published.ROLLING_FRICTION,
+    cohesion: float = published.COHESION,
+    saturation: float = LINEAR,
+    still: bool = False,
+) -> Scene:
+    """Return the scene of a cell.
+
+    rate : of shear between the rafts, 1/s. flux : density of the field along z, T. fraction : of the volume
+    that grains fill. sides : of the cell; raft : how much of it is frozen below and above, m. magnetising :
+    time after which rafts are frozen, s. strain : at the end; before : at which the mean of the stress
+    begins. young : Pa. dt : s; unless given a part of the time of an impact of the smallest grains. rolling :
+    coefficient of rolling friction. cohesion : energy density, J/m^3. saturation : magnetisation at which
+    grains saturate, A/m. still : whether the oil stays at rest. All are values of one structure: cells that
+    differ in them run as one batch.
+    """
+    plates = (Plane(point=(0.0, 0.0, 0.0)), Plane(point=(0.0, 0.0, sides[2]), normal=(0.0, 0.0, -1.0)))
+    return Scene(
+        name="mrf_shear",
+        particles=Cloud(
+            number=number_of(grains, fraction, float(np.prod(sides))),
+            grains=tuple(grains),
+            placement=RandomInDomain(),
+        ),
+        materials={"iron": iron(young, rolling, cohesion), "plate": smooth(young)},
+        domain=Box(low=(0.0, 0.0, 0.0), high=sides, periodic=(True, True, False)),
+        effects=(
+            MagneticField(constant=(0.0, 0.0, flux)),
+            # One sweep a step, as L21 has it (section 2.2.3).
+            MutualFroehlichMoment(susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, **CUT),
+            TruncatedDipoleDipole(**CUT),
+            CONTACT,
+            Walls(name="plates", planes=plates, material="plate"),
+            StokesDrag(viscosity=published.OIL_VISCOSITY),
+            *sheared(rate, sides[2], raft, magnetising, before, still),
+        ),
+        stepper=Verlet(control=FixedStep(dt=dt or impact_step(smallest(grains), young))),
+        duration=magnetising + strain / rate,
+        seed=seed,
+    )
+
+
+def sheared(
+    rate: float, height: float, raft: float, begin: float, before: float, still: bool
+) -> tuple[Effect, ...]:
+    """Return what shears a cell from a time ``begin`` (s) on, and observes the forces from a strain on; the
+    other arguments are those of ``scene``."""
+    bottom, top = raft, height - raft
+    speed = rate * (top - bottom) / 2
+    back, on = (-speed, 0.0, 0.0), (speed, 0.0, 0.0)
+    flow = (REST, REST) if still else (back, on)
+    oil = CouetteFlow(first=bottom, second=top, first_velocity=flow[0], second_velocity=flow[1], begin=begin)
+    below, above = Plane(point=(0.0, 0.0, bottom)), Plane(point=(0.0, 0.0, top), normal=(0.0, 0.0, -1.0))
+    return (
+        oil,
+        PrescribedMotion(name="lower", group=LOWER, motion=Translation(velocity=back)),
+        PrescribedMotion(name="upper", group=UPPER, motion=Translation(velocity=on)),
+        JoinGroup(name="lower_raft", group=LOWER, planes=[below], time=begin),
+        JoinGroup(name="upper_raft", group=UPPER, planes=[above], time=begin),
+        MeanForce(begin=begin + before / rate),
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """Return the scene of a size."""
+    return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -1,0 +1,48 @@
+"""A small cell that is run: chains form, rafts are frozen and driven, and bear what they should."""
+
+import numpy as np
+import pytest
+
+from cases.mrf_shear.measures import largest_overlap, order, raft_force, shear_rate, shear_stress
+from cases.mrf_shear.scene import LOWER, UPPER, scene
+from tests.scenes import simulate
+
+UM = 1e-6
+SMALL_CELL = {"sides": (30 * UM, 30 * UM, 36 * UM), "raft": 7 * UM, "rate": 1e4, "magnetising": 10e-6,
+              "strain": 0.4, "before": 0.2}  # fmt: skip
+"""As wide as twice the reach of grains, and five diameters high."""
+
+
+@pytest.fixture(scope="module")
+def results():
+    scenes = [scene(**SMALL_CELL), scene(**SMALL_CELL, flux=0.3), scene(**SMALL_CELL, flux=0.0)]
+    return simulate(scenes, worlds=8, capacity=128)
+
+
+@pytest.mark.slow
+def test_rafts_are_frozen_and_driven_apart(results):
+    result = results[0]
+    state = result.state
+    assert result.status.ok
+    rafts = [state["group"] == group for group in (LOWER, UPPER)]
+    assert result.work["joined"] == sum(int(raft.sum()) for raft in rafts)
+    speed = 1e4 * 22 * UM / 2
+    for raft, sign in zip(rafts, (-1, 1), strict=True):
+        assert raft.sum() > 5
+        np.testing.assert_allclose(state["velocity"][raft], [[sign * speed, 0, 0]] * raft.sum(), rtol=1e-9)
+    assert shear_rate(result) == pytest.approx(1e4)
+
+
+@pytest.mark.slow
+def test_chains_bear_a_stress_that_goes_as_the_field_squared(results):
+    """Grains are in contact along the field, and both rafts are held back alike; without a field neither."""
+    strong, weak, none = (shear_stress(result) for result in results)
+    assert strong > 10e3
+    assert 2.5 < strong / weak < 6.0
+    assert abs(none) < 0.02 * strong
+    back, on = (raft_force(results[0].state, group)[0] for group in (LOWER, UPPER))
+    assert back == pytest.approx(-on, rel=0.15)
+    chains = order(results[0].state, results[0].scene.domain)
+    assert chains.alignment > 0.1
+    assert chains.contacts > 2.5
+    assert 0.02 < largest_overlap(results[0]) < 0.12

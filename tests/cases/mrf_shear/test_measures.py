@@ -1,0 +1,101 @@
+"""What is taken of a cell: stress on rafts, shear rate, chains, and numbers of the regime."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.constants import mu_0
+
+from cases.mrf_shear import published
+from cases.mrf_shear.flow_curve import Curve, table
+from cases.mrf_shear.measures import (
+    area,
+    largest_overlap,
+    mason_number,
+    order,
+    shear_rate,
+    shear_stress,
+    stokes_time,
+    volume_fraction,
+)
+from cases.mrf_shear.runs import paired
+from cases.mrf_shear.scene import LARGE_RADIUS, LOWER, UPPER, scene
+
+R, UM = LARGE_RADIUS, 1e-6
+CELL = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0)
+
+
+def result_of(position, mean_force=None, group=None, radius=R, cell=CELL):
+    """A result with the grains given."""
+    n = len(position)
+    state = {
+        "position": np.asarray(position, float),
+        "radius": np.full(n, radius),
+        "group": np.zeros(n) if group is None else np.asarray(group),
+        "mean_force": np.zeros((n, 3)) if mean_force is None else np.asarray(mean_force, float),
+    }
+    return SimpleNamespace(state=state, scene=cell)
+
+
+def test_stress_is_the_mean_of_both_rafts_over_their_area():
+    force = [[3e-6, 0, 5e-6], [1e-6, 0, 1e-6], [-2e-6, 9.0, -3e-6], [7.0, 7.0, 7.0]]
+    result = result_of(np.zeros((4, 3)), force, [LOWER, LOWER, UPPER, 0])
+    assert area(result) == pytest.approx(1200 * UM**2)
+    assert shear_stress(result) == pytest.approx((4e-6 + 2e-6) / 2 / 1.2e-9)
+    double = result_of(np.zeros((4, 3)), 2 * np.array(force), [LOWER, LOWER, UPPER, 0])
+    assert paired([double, double], [result, result]).value == pytest.approx(2.0)
+
+
+def test_the_shear_rate_is_that_between_the_rafts():
+    assert shear_rate(result_of(np.zeros((1, 3)))) == pytest.approx(500.0)
+    # L21 names these of its own speeds.
+    np.testing.assert_allclose(np.array(published.SHEAR_RATES)[[1, 5, 7]], [590, 36.4, 9], rtol=0.02)
+
+
+def test_a_chain_along_the_field_across_a_face_and_one_that_lies():
+    """Five grains in line with the field, and three along x, through a face of the cell."""
+    upright = np.column_stack([np.full(5, 0.02e-6), np.full(5, 5e-6), 2 * R * np.arange(5) + R])
+    lying = np.array([[39 * UM, 20 * UM, 9 * UM]] * 3) + np.outer(np.arange(3), [2 * R, 0, 0])
+    lying[:, 0] %= 40 * UM
+    state = result_of(np.vstack([upright, lying])).state
+    found = order(state, CELL.domain)
+    assert found.contacts == pytest.approx(2 * 6 / 8)
+    assert found.size == pytest.approx((5 * 5 + 3 * 3) / 8 / 8)
+    assert found.length == pytest.approx((5 * 8 * R + 3 * 4 * R) / 8 / (60 * UM))
+    assert found.breadth == pytest.approx(1.0)
+    # Four contacts along the field, and two across.
+    assert found.alignment == pytest.approx((3 * 4 / 6 - 1) / 2)
+
+
+def test_overlap_and_volume_fraction():
+    result = result_of([[0.5 * UM, 0, 0], [40 * UM - 6 * UM, 0, 0], [20 * UM, 0, 0]])
+    assert largest_overlap(result) == pytest.approx((2 * R - 6.5 * UM) / R)
+    assert largest_overlap(result_of([[0, 0, 0], [9 * UM, 0, 0]])) == 0.0
+    assert volume_fraction(result) == pytest.approx(3 * 4 / 3 * np.pi * R**3 / (72000 * UM**3))
+
+
+def test_the_regime():
+    """Drag is far below magnetic forces, and oil stops a grain in microseconds."""
+    assert mason_number(1000.0, 0.6) == pytest.approx(8 * 0.01 * 1000 * mu_0 / 0.36)
+    assert stokes_time() == pytest.approx(2e-6, rel=0.05)
+
+
+def test_a_curve_is_fitted_with_the_spread_over_starts():
+    def group(rate, stresses):
+        cell = scene(rate=rate, sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM)
+        force = [[[one * 1.2e-9, 0, 0], [-one * 1.2e-9, 0, 0]] for one in stresses]
+        return [result_of(np.zeros((2, 3)), one, [LOWER, UPPER], cell=cell) for one in force]
+
+    rates = np.array([1e3, 2e3, 4e3])
+    curve = Curve(rates, [group(rate, 40e3 + 0.5 * rate + np.array([-1e3, 1e3, 0.0])) for rate in rates])
+    np.testing.assert_allclose(curve.values, 40e3 + 0.5 * rates)
+    fit = curve.bingham()
+    assert fit.yield_stress.value == pytest.approx(40e3)
+    assert fit.plastic_viscosity.value == pytest.approx(0.5)
+    assert fit.yield_stress.half > 0
+    rows = table(curve, "shear_rate_per_s").splitlines()
+    assert rows[0] == "shear_rate_per_s,shear_stress_Pa,half_interval_Pa,of_each_start_Pa"
+    assert rows[1].startswith("1000,40500,")
+    assert rows[1].endswith("39500 41500 40500")
+    square = Curve(rates, [group(rate, [rate**2, rate**2]) for rate in rates])
+    assert square.power() == pytest.approx(2.0)

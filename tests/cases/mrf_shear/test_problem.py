@@ -1,0 +1,46 @@
+"""The search: what a design makes, what it is judged by, and which designs are not allowed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cases.case import every
+from cases.mrf_shear.off_state import off_state_viscosity
+from cases.mrf_shear.problem import BOUND, design_viscosity, flux, problem, viscosity
+from cases.mrf_shear.scene import LARGE_RADIUS, SMALL_RADIUS
+from tisim import InputError
+
+DESIGN = {"small": 0.25, "fraction": 0.2, "flux": 0.5}
+
+
+def test_a_design_is_the_fluid_it_says():
+    made = problem().scene(DESIGN, 3)
+    assert made.seed == 3
+    result = SimpleNamespace(scene=made)
+    assert flux(result) == 0.5
+    expected = off_state_viscosity(0.2, (2 * LARGE_RADIUS, 2 * SMALL_RADIUS), (0.75, 0.25))
+    assert viscosity(result) == pytest.approx(expected, rel=0.01)
+    one_size = problem().scene({**DESIGN, "small": 0.0}, 0)
+    assert viscosity(SimpleNamespace(scene=one_size)) == pytest.approx(
+        off_state_viscosity(0.2, (1.0,), (1.0,)), rel=0.01
+    )
+    radius = made.particles.arrays(made.domain, 0)["radius"]
+    assert set(np.unique(radius)) == {SMALL_RADIUS, LARGE_RADIUS}
+
+
+def test_too_thick_a_fluid_is_refused_where_viscosity_is_bounded():
+    thick = {"small": 0.0, "fraction": 0.33, "flux": 0.6}
+    assert design_viscosity(0.0, 0.33) > BOUND > design_viscosity(0.25, 0.2)
+    problem(variant="front").scene(thick, 0)
+    with pytest.raises(InputError, match=r"viscosity of the design must be at most 0\.024 Pa s; received"):
+        problem(variant="bounded").scene(thick, 0)
+
+
+def test_objectives_of_each_variant():
+    names = {one: [each.name for each in problem(variant=one).objectives] for one in ("front", "field")}
+    assert names == {"front": ["stress", "viscosity"], "field": ["stress", "viscosity", "field"]}
+    assert not problem(variant="bounded").several
+    assert [each.maximise for each in problem(variant="field").objectives] == [True, False, False]
+    _, settings = every()["mrf_shear"].inverse("default", None)
+    assert settings["generations"] > 0

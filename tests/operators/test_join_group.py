@@ -1,0 +1,109 @@
+"""Layers of grains that join a group at a time: which do, where they go from then on, and what they bear."""
+
+import numpy as np
+import pytest
+
+from tests.scenes import RADIUS, by_id, scene, simulate
+from tisim import InputError, Material, Simulation
+from tisim.effects import (
+    Granular,
+    Gravity,
+    HertzMaterial,
+    PrescribedMotion,
+    Rotation,
+    Translation,
+)
+from tisim.geometry import Plane
+from tisim.operators import JoinGroup, MeanForce
+
+G, DT, STEPS, JOINS = 9.81, 1e-3, 100, 0.0305
+"""m/s^2, s; joins at the end of the 31st step."""
+SPEED, RATE = (0.1, 0.0, 0.0), (0.0, 0.0, 2.0)
+PLACE = np.array([[0.0, 0, -0.2], [0.3, 0, 0.2], [0.0, 0, 0.004], [0.0, 0.2, 0.7], [0.1, 0, 0.6]])
+"""m; by then the third has fallen through 0, and the fourth is above the upper plane."""
+LOWER, UPPER = Plane(point=(0, 0, 0)), Plane(point=(0, 0, 0.5), normal=(0, 0, -1))
+
+
+def falling(lower=None, group=None, **more):
+    """Grains that fall until some below and above two planes join two groups."""
+    effects = (
+        PrescribedMotion(name="down", group=1, motion=lower or Translation(velocity=SPEED)),
+        PrescribedMotion(name="up", group=2, motion=Rotation(rate=RATE)),
+        Gravity(acceleration=(0, 0, -G)),
+        JoinGroup(name="below", planes=[LOWER], group=group or 1, time=JOINS),
+        JoinGroup(name="above", planes=[UPPER], group=2, time=JOINS),
+        MeanForce(begin=0.05),
+    )
+    quantities = {"group": [0, 0, 0, 0, 2]}
+    return scene(
+        PLACE, np.zeros_like(PLACE), effects, mass=[1.0, 2, 3, 4, 5], dt=DT, steps=STEPS,
+        quantities=quantities, **more,
+    )  # fmt: skip
+
+
+def fallen(t):
+    """The way of a free fall by Verlet, which is that of Galilei."""
+    return -G * t**2 / 2
+
+
+@pytest.mark.long
+def test_layers_join_when_it_is_time_and_go_on_from_there():
+    (result,) = simulate([falling()], capacity=8)
+    state, t, joined = by_id(result), 31 * DT, fallen(31 * DT)
+    assert result.work["joined"] == 3
+    np.testing.assert_array_equal(state["group"], [1, 0, 1, 2, 2])
+    rest = DT * STEPS - t
+    expected = PLACE.copy()
+    expected[[0, 2, 3], 2] += joined
+    expected[[0, 2]] += np.array(SPEED) * rest
+    expected[1, 2] += fallen(DT * STEPS)
+    # The other was of its group from the start.
+    for i, turned in ((3, 2.0 * rest), (4, 2.0 * DT * STEPS)):
+        x, y = PLACE[i, :2]
+        expected[i, :2] = (
+            np.cos(turned) * x - np.sin(turned) * y,
+            np.sin(turned) * x + np.cos(turned) * y,
+        )
+    np.testing.assert_allclose(state["position"], expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(state["velocity"][[0, 2]], [SPEED, SPEED], rtol=1e-12)
+    np.testing.assert_allclose(state["spin"][[3, 4]], [RATE, RATE], rtol=1e-12)
+    np.testing.assert_array_equal(state["body_mass"][[0, 2, 3]], 2.0**40 * np.array([1.0, 3, 4]))
+    assert result.measures["down_force_z"] == pytest.approx(-4 * G, rel=1e-12)
+
+
+@pytest.mark.long
+def test_the_mean_force_is_that_of_the_steps_since_it_began():
+    """Of a constant force it is that; what has not begun is 0."""
+    one = falling()
+    late = (*one.effects[:-1], MeanForce(begin=1.0))
+    kept, none = simulate([one, one.model_copy(update={"effects": late})], worlds=2, capacity=8)
+    weights = np.outer(np.arange(1.0, 6), [0, 0, -G])
+    np.testing.assert_allclose(by_id(kept)["mean_force"], weights, rtol=1e-12)
+    assert not none.state["mean_force"].any()
+
+
+@pytest.mark.slow
+def test_laws_no_longer_act_between_two_that_have_joined():
+    """Two grains that press on each other and on a third: once they are frozen, only the third feels it."""
+    law = Granular(normal=HertzMaterial())
+    place = RADIUS * np.array([[0.0, 0, -0.8], [1.9, 0, -0.8], [0.95, 0, 0.8]])
+    effects = (
+        PrescribedMotion(group=1),
+        law,
+        JoinGroup(planes=[LOWER], time=1e-9),
+    )
+    made = scene(
+        place, 0 * place, effects, dt=1e-9, steps=2, materials={"grain": Material(young=1e7, poisson=0.3)}
+    )
+    (result,) = simulate([made], capacity=4)
+    state = by_id(result)
+    np.testing.assert_array_equal(state["group"], [1, 1, 0])
+    reduced, modulus = RADIUS / 2, 1e7 / (2 * (1 - 0.3**2))
+    apart = np.linalg.norm(place[2] - place[0])
+    press = 4 / 3 * modulus * np.sqrt(reduced) * (2 * RADIUS - apart) ** 1.5
+    np.testing.assert_allclose(np.linalg.norm(state["force"][:2], axis=1), press, rtol=1e-4)
+
+
+def test_a_group_of_no_motion_is_refused():
+    with pytest.raises(InputError, match=r"effects\.below\.group must be that of a prescribed motion"):
+        Simulation(falling(group=3))

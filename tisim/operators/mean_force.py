@@ -1,0 +1,33 @@
+"""The mean force on each particle over time: an observer."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.operators.base import Operator, parameter
+from tisim.worlds.fields import Field
+
+
+class MeanForce(Operator):
+    """The mean over time of the force on each particle is kept; nothing is changed.
+
+        mean_force = 1/(t - t_0) sum over steps of F dt
+
+    t_0 is ``begin``, t the time, and F the sum of all forces as it was known when the step was taken, also
+    that on a particle which is held or moves as prescribed. It is the field ``mean_force`` (N), 0 up to t_0:
+    what a wall of grains bears in steady flow is the sum of that of its grains.
+    """
+
+    fields: ClassVar = (Field("mean_force", "N", 3, "keep", double=True),)
+
+    begin: float = parameter("s", "time t_0 from which on the mean is taken", 0.0, ge=0)
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        if ti.static(hasattr(s, "force")):
+            step = ti.cast(dt, ti.f64)
+            lasts = t - ti.cast(self.begin(w), ti.f64)
+            # The whole of the first step, which may begin before; none of those that end before.
+            part = ti.select(lasts > 0.0, step / ti.max(lasts, step), 0.0)
+            s.mean_force[w, i] += part * (ti.cast(s.force[w, i], ti.f64) - s.mean_force[w, i])
