@@ -18,13 +18,14 @@ class Fork:
 
     # No dataclass: Quadrants takes those apart, and forks lie within forks.
     def __init__(self, repeat: Repeat, inside: "Route", past: "Route") -> None:
-        self.repeat, self.inside, self.past = repeat, inside, past
+        # In a tuple, out of which kernels of Quadrants take one fork within another.
+        self.repeat, self.ways = repeat, (inside, past)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Fork) and vars(self) == vars(other)
 
     def __hash__(self) -> int:
-        return hash((self.repeat, self.inside, self.past))
+        return hash((self.repeat, self.ways))
 
 
 Route = Fork | int
