@@ -24,7 +24,7 @@ from tisim.interactions.failure_attribution import FailureAttribution
 from tisim.interactions.force_sum import FORCE, TORQUE, SumForces, SumTrialForces, turning
 from tisim.interactions.listed_pairs import AdvancePairs, AdvanceParticles, ExportedTerms, fuse, sum_phases
 from tisim.interactions.pair_chunks import PairChunks
-from tisim.interactions.rearrangement import StoreBefore, rearrange
+from tisim.interactions.rearrangement import StoreBefore, acting, active, rearrange
 from tisim.interactions.rebuild_pairs import update_pairs
 from tisim.interactions.self_consistent import SelfConsistentSolver, solver
 from tisim.interactions.spatial_sort import SpatialSort
@@ -174,7 +174,7 @@ class Assembly:
         self.step: tuple[Item, ...] = (*step, FinishStep(s))
         self.first: tuple[Item, ...] = tuple(first)
         # Events tell pairs apart by index.
-        ordered = events or any(one.data.offers("world") and not one.data.any_order for one in operators)
+        ordered = events or not all(one.data.any_order for one in acting(operators))
         sorts = s.records and not ordered and s.capacity >= spatial_sort.SORTED_FROM
         self.sort = SpatialSort(self.pairs, self.lists) if sorts and self.pairs and self.lists else None
         sudden, steady = "impacts, step control", "short-ranged forces"
@@ -190,6 +190,7 @@ class Assembly:
             *(Buffer(memory, what, why) for memory, what, why in beside if memory is not None),
             *self._sweeps(),
             *(Buffer(memory, "long-range sum", label) for label, memory in self.long_range.items()),
+            *(Buffer(one.action, "action on worlds", one.data.label) for one in active(operators)),
             *own.buffers,
         )
 

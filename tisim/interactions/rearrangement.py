@@ -22,15 +22,25 @@ def rearrange(slots: VacatedSlots, operators: tuple[Bound[Any], ...]) -> tuple[I
 
 def acting(operators: tuple[Bound[Any], ...]) -> tuple[Bound[Any], ...]:
     """Return the operators that act on worlds as a whole."""
-    return tuple(operator for operator in operators if operator.data.offers("world"))
+    return tuple(operator for operator in operators if operator.data.acts_on_worlds())
 
 
-def act(s: State, operator: Bound[Any]) -> tuple[Phase, ...]:
-    """Return the phases in which an operator acts on the world, after its terms are summed."""
-    if operator.data.terms == 0:
-        return (ActOnWorld(s, operator),)
-    operator.sums = BlockSums(s, operator.data.terms)
-    return SumTerms(operator), ActOnWorld(s, operator)
+def active(operators: tuple[Bound[Any], ...]) -> tuple[Bound[Any], ...]:
+    """Return those operators that act on worlds in phases of their own."""
+    return tuple(operator for operator in acting(operators) if operator.action is not None)
+
+
+def act(s: State, operator: Bound[Any]) -> tuple[Item, ...]:
+    """Return the items in which an operator acts on the world: its terms are summed before, and phases of its
+    own follow."""
+    items: tuple[Item, ...] = ()
+    if operator.data.terms > 0:
+        operator.sums = BlockSums(s, operator.data.terms)
+        items += (SumTerms(operator),)
+    if operator.data.offers("world"):
+        items += (ActOnWorld(s, operator),)
+    operator.action = operator.data.world_action(operator, s)
+    return items if operator.action is None else (*items, *operator.action.phases())
 
 
 class StoreBefore(StoreMemory):

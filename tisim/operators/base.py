@@ -3,16 +3,20 @@
 An operator is an effect (see tisim/effects/base). ``particle`` is called for each particle on its own, and
 may write only that particle; then ``world`` is called once per world, serially, where ``acts`` says so, and
 may add particles, remove them, and end the world. What it needs of all particles is summed before, in
-parallel: ``each`` returns ``terms`` of a particle, and ``self.sums.total(w)`` their sums. One that defines no
-``world`` leaves a stepper free to take each particle through many steps by itself.
+parallel: ``each`` returns ``terms`` of a particle, and ``self.sums.total(w)`` their sums. What else is long
+for one thread follows in phases of its own, ``world_action``. One that defines neither ``world`` nor that
+leaves a stepper free to take each particle through many steps by itself.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
+from tisim.worlds.bound import Bound
+from tisim.worlds.state import State
+from tisim.worlds.world_action import WorldAction
 
 __all__ = ["Operator", "option", "parameter"]
 
@@ -20,8 +24,8 @@ __all__ = ["Operator", "option", "parameter"]
 class Operator(Effect):
     """An operator changes the state between steps.
 
-    any_order : whether ``world`` does the same in whatever order particles are in memory, but for rounding;
-    then large worlds may be sorted by place.
+    any_order : whether it does the same to a world in whatever order particles are in memory, but for
+    rounding; then large worlds may be sorted by place.
     terms : so many numbers of each particle are summed for ``world``.
     """
 
@@ -29,6 +33,16 @@ class Operator(Effect):
     homogeneous: ClassVar[bool] = False
     any_order: ClassVar[bool] = False
     terms: ClassVar[int] = 0
+
+    @classmethod
+    def acts_on_worlds(cls) -> bool:
+        """Return whether it changes a world as a whole, not each particle by itself alone."""
+        return cls.offers("world") or cls.offers("world_action")
+
+    def world_action(self, own: Bound[Any], s: State) -> WorldAction | None:
+        """Return what it does to a world after ``world`` in phases of its own, if anything; ``own`` is the
+        bound operator, which kernels find it in as ``self.action``."""
+        return None
 
     @ti.func
     def particle(self, s, w, i, t, dt):

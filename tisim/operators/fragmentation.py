@@ -13,9 +13,11 @@ from tisim.effects.impact.law import ImpactLaw
 from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.operators.base import Operator, parameter
-from tisim.worlds.bound import Peers
+from tisim.operators.fractures import Fractures
+from tisim.worlds.bound import Bound, Peers
 from tisim.worlds.fields import Field
-from tisim.worlds.status import WorldStatus
+from tisim.worlds.state import State
+from tisim.worlds.world_action import WorldAction
 
 
 class Fragmentation(ImpactLaw, Operator):
@@ -95,22 +97,13 @@ class Fragmentation(ImpactLaw, Operator):
     def acts(self, s, w):
         return s.fracture_due[w]
 
-    @ti.func
-    def world(self, s, w):
-        s.fracture_due[w] = 0
-        for i in range(s.count[w]):
-            n = s.pieces[w, i]
-            if n >= 2:
-                s.pieces[w, i] = 0
-                if n - 1 > s.room(w):
-                    s.fail(w, WorldStatus.OUT_OF_ROOM, i)
-                else:
-                    self.split(s, w, i, n)
+    def world_action(self, own: Bound[Any], s: State) -> WorldAction:
+        return Fractures(own, s)
 
     @ti.func
-    def split(self, s, w, i, n):
+    def split(self, s, w, i, n, before):
         """Put n equal pieces at the first n sites of a cubic block of touching spheres, about the old
-        centre."""
+        centre; so many new pieces of other grains go before its own."""
         edge = 1
         while edge * edge * edge < n:
             edge += 1
@@ -124,7 +117,7 @@ class Fragmentation(ImpactLaw, Operator):
         for k in range(n):
             piece = i
             if k > 0:
-                piece = s.append(w, i)
+                piece = s.append_uncounted(w, i, before + k - 1)
             s.position[w, piece] = centre + 2.0 * s.radius[w, i] * (self.site(k, edge) - middle)
 
     @ti.func

@@ -18,7 +18,11 @@ from tisim.numerics.random_streams import INSERTION
 from tisim.operators.base import Operator, option, parameter
 from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes
+from tisim.operators.tried_place import TriedPlace
 from tisim.packing.grains import check_quantities, class_materials, quantity
+from tisim.worlds.bound import Bound
+from tisim.worlds.state import State
+from tisim.worlds.world_action import WorldAction
 
 MOST_TRIES = 20_000
 """A draw of Philox has room for so many tries of a grain in a step."""
@@ -103,6 +107,9 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
             "given": np.array([np.hstack([*one.values(), 0.0]) for one in self.given_quantities()]),
         }
 
+    def world_action(self, own: Bound[Any], s: State) -> WorldAction:
+        return TriedPlace(own, s)
+
     def remembers(self, s: Any) -> dict[str, Any]:
         """Return the fields of its own quantities, and of what classes give: each with its first column."""
         number, mass = (getattr(s, name) for name in self.keeps("world_quantities"))
@@ -120,29 +127,55 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
         return 0
 
     @ti.func
-    def insert(self, s, w):
-        """Put the next grain in, where it finds a place; return its radius (m), and 0 where it finds none."""
-        k = ti.cast(self.inserted[w], ti.i32)
-        of_grain = self.uniforms(s, w, k, 0)
+    def is_wanted(self, s, w):
+        """Return whether another grain is to be put in, now."""
+        return False
+
+    @ti.func
+    def seek(self, s, w):
+        """Have the next grain seek a place, where one is wanted."""
+        tried = self.action
+        tried.seeking[w], tried.attempt[w] = ti.cast(self.is_wanted(s, w), ti.i32), 0
+
+    @ti.func
+    def choose_place(self, s, w):
+        """Choose the place that is tried next; before the first, draw the grain."""
+        tried, k = self.action, ti.cast(self.inserted[w], ti.i32)
+        tried.taken[w] = 0
+        if tried.attempt[w] == 0:
+            self.draw_grain(s, w, k)
+        of_place = self.uniforms(s, w, k, 1 + tried.attempt[w])
+        spot = ti.Vector([of_place[0], of_place[1], of_place[2]])
+        tried.place[w] = self.point(w, self.outer(tried.drawn[w], tried.radius[w]), spot)
+        tried.orientation[w] = random_orientation(of_place[3], of_place[4], of_place[5])
+
+    @ti.func
+    def draw_grain(self, s, w, k):
+        """Draw grain k; where there is no room for it in memory, it has had all its tries."""
+        tried, of_grain = self.action, self.uniforms(s, w, k, 0)
         c = self.draw_class(w, of_grain[0])
-        radius = ti.cast(self.draw_radius(c, of_grain[1]), s.real)
-        placed = 0.0 * radius
+        tried.drawn[w], tried.radius[w] = c, ti.cast(self.draw_radius(c, of_grain[1]), s.real)
+        lambda_ = 2.0 * ti.Vector([of_grain[2], of_grain[3], of_grain[4]]) - 1.0
+        tried.velocity[w] = self.velocity(w) + self.deviation(w) * lambda_
         size = self.end_sphere(c) - self.first_sphere(c)
         # Members of clumps are found by their ids, in memory of as many entries as there is room.
         numbered = s.next_id[w] + size <= s.most[w]
-        if s.room(w) >= size and (numbered or ti.static(not self.has_clumps)):
-            attempt = 0
-            while attempt < self.tries and placed == 0.0:
-                of_place = self.uniforms(s, w, k, 1 + attempt)
-                spot = ti.Vector([of_place[0], of_place[1], of_place[2]])
-                place = self.point(w, self.outer(c, radius), spot)
-                q = random_orientation(of_place[3], of_place[4], of_place[5])
-                if self.is_free(s, w, c, place, q, radius):
-                    lambda_ = 2.0 * ti.Vector([of_grain[2], of_grain[3], of_grain[4]]) - 1.0
-                    self.put(s, w, c, place, q, self.velocity(w) + self.deviation(w) * lambda_, radius)
-                    placed = radius
-                attempt += 1
-        return placed
+        if s.room(w) < size or not (numbered or ti.static(not self.has_clumps)):
+            tried.taken[w], tried.attempt[w] = 1, self.tries
+
+    @ti.func
+    def end_try(self, s, w):
+        """Put the grain in, where its place is free, and have the next one seek; one that has found none
+        within its tries is the last of the step."""
+        tried = self.action
+        if tried.taken[w] == 0:
+            radius = tried.radius[w]
+            self.put(s, w, tried.drawn[w], tried.place[w], tried.orientation[w], tried.velocity[w], radius)
+            tried.filled[w] += ti.cast(radius, ti.f64) ** 3
+            self.seek(s, w)
+        else:
+            tried.attempt[w] += 1
+            tried.seeking[w] = ti.cast(tried.attempt[w] < self.tries, ti.i32)
 
     @ti.func
     def uniforms(self, s, w, k, attempt):
@@ -178,28 +211,6 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
                 given[0][w, i] = ti.Vector([self.given[c, given[1] + m] for m in range(3)])
             else:
                 given[0][w, i] = ti.cast(self.given[c, given[1]], given[0].dtype)
-
-    @ti.func
-    def is_free(self, s, w, c, place, q, radius):
-        """Return whether a grain of class c, turned by q, overlaps none of those that are there."""
-        m, free = self.first_sphere(c), 1
-        while m < self.end_sphere(c) and free == 1:
-            at, size = place + self.arm(m, q, radius), self.sphere_radius(m, radius)
-            free = self.is_sphere_free(s, w, at, size)
-            m += 1
-        return free
-
-    @ti.func
-    def is_sphere_free(self, s, w, place, radius):
-        """Return whether a sphere overlaps none of those that are there."""
-        j, free = 0, 1
-        while j < s.count[w] and free == 1:
-            apart = s.domain.nearest(w, place, s.position[w, j], s.time[w])
-            least = radius + s.radius[w, j]
-            if apart.norm_sqr() < least * least and s.mass[w, j] > 0.0:
-                free = 0
-            j += 1
-        return free
 
     @ti.func
     def draw_class(self, w, u):

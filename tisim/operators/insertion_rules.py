@@ -29,14 +29,14 @@ class InsertionByFlux(Insertion):
 
     @ti.func
     def acts(self, s, w):
-        return ti.cast(self.is_due(s, w), ti.i32)
+        return ti.cast(self.is_wanted(s, w), ti.i32)
 
     @ti.func
     def pending(self, s, w):
         return ti.cast(self.inserted[w] < self.number, ti.i32)
 
     @ti.func
-    def is_due(self, s, w):
+    def is_wanted(self, s, w):
         """Return whether the next grain is due."""
         so_far = self.inserted[w]
         if ti.static(self.by == "mass"):
@@ -47,9 +47,7 @@ class InsertionByFlux(Insertion):
 
     @ti.func
     def world(self, s, w):
-        placed = True
-        while placed and self.is_due(s, w):
-            placed = self.insert(s, w) > 0.0
+        self.seek(s, w)
 
 
 class InsertionByFraction(FilledPart, Insertion):
@@ -75,11 +73,11 @@ class InsertionByFraction(FilledPart, Insertion):
         return ti.cast(self.counted[w] == 0, ti.i32)
 
     @ti.func
+    def is_wanted(self, s, w):
+        return self.action.filled[w] < self.enough(s, w) and self.inserted[w] < self.number
+
+    @ti.func
     def world(self, s, w):
         self.count_interval(s, w)
-        filled, most = self.sums.total(w)[0], self.enough(s, w)
-        placed = True
-        while placed and filled < most and self.inserted[w] < self.number:
-            radius = self.insert(s, w)
-            filled += ti.cast(radius, ti.f64) ** 3
-            placed = radius > 0.0
+        self.action.filled[w] = self.sums.total(w)[0]
+        self.seek(s, w)

@@ -128,13 +128,11 @@ class LaunchedProgram(StepRules, Program):
         """Return where a world goes on, from this place."""
         there = NOWHERE
         if ti.static(isinstance(route, Fork)):
-            # Names, one by one: Quadrants would look for attributes of attributes without end.
-            inside = ti.static(route.inside)
-            past = ti.static(route.past)
+            ways = ti.static(route.ways)
             if route.repeat.pending(w) > 0:
-                there = self._follow(inside, w, place)
+                there = self._follow(ways[0], w, place)
             else:
-                there = self._follow(past, w, place)
+                there = self._follow(ways[1], w, place)
         elif ti.static(route != OVER):
             there = place + route
         elif ti.static(not self.once):

@@ -4,7 +4,6 @@ them."""
 from collections.abc import Callable
 from functools import partial
 from itertools import groupby
-from typing import NamedTuple
 
 from tisim.worlds.phases import Item, Phase, Repeat
 
@@ -14,13 +13,19 @@ NOWHERE = -1
 """This is the place of a world that does not go on."""
 
 
-class Fork(NamedTuple):
+class Fork:
     """A fork leads a world into a repeat while it is pending, else past it."""
 
-    # A tuple, as ``ti.static`` takes no objects of other kinds; Quadrants takes dataclasses apart.
-    repeat: Repeat
-    inside: "Route"
-    past: "Route"
+    # No dataclass: Quadrants takes those apart, and forks lie within forks.
+    def __init__(self, repeat: Repeat, inside: "Route", past: "Route") -> None:
+        # In a tuple, out of which kernels of Quadrants take one fork within another.
+        self.repeat, self.ways = repeat, (inside, past)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Fork) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash((self.repeat, self.ways))
 
 
 Route = Fork | int

@@ -84,10 +84,25 @@ class State(StateMemory):
     @ti.func
     def append(self, w, i):
         """Copy particle i to a new slot, and return its index. The caller has checked ``room``."""
-        k = self.count[w]
-        self.copy(w, i, k)
-        self.enter(w, k)
+        k = self.append_uncounted(w, i, 0)
+        self.lengthen(w, 1)
         return k
+
+    @ti.func
+    def append_uncounted(self, w, i, k):
+        """Copy particle i to the k-th slot after the last one in use, and return its index; it counts from
+        ``lengthen`` on. Others may be copied at the same time. The caller has checked ``room``."""
+        new = self.count[w] + k
+        self.copy(w, i, new)
+        self.begin(w, new, self.next_id[w] + k)
+        return new
+
+    @ti.func
+    def lengthen(self, w, number):
+        """Count so many new particles, in the slots after the last one in use."""
+        self.count[w] += number
+        self.next_id[w] += number
+        self.changed[w] = 1
 
     @ti.func
     def insert(self, w, position, velocity, radius, mass):
@@ -103,20 +118,17 @@ class State(StateMemory):
         self.radius[w, k], self.mass[w, k] = radius, mass
         for column in ti.static(self.copied):
             column[0][w, k] = column[1][w, k]
-        self.enter(w, k)
+        self.begin(w, k, self.next_id[w])
+        self.lengthen(w, 1)
         return k
 
     @ti.func
-    def enter(self, w, k):
-        """Count slot k as that of a new particle, which has an id of its own and nothing that is its own
-        yet."""
+    def begin(self, w, i, number):
+        """Give a new particle an id, and nothing that is its own yet."""
         for column in ti.static(self.slotted):
             for m in range(column[1]):
-                column[0][w, k, m] = column[2]
-        self.id[w, k] = self.next_id[w]
-        self.next_id[w] += 1
-        self.count[w] = k + 1
-        self.changed[w] = 1
+                column[0][w, i, m] = column[2]
+        self.id[w, i] = number
 
     @ti.func
     def finish(self, w, effect):

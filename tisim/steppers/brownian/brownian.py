@@ -128,4 +128,4 @@ class Brownian(Stepper):
 
 def _one_by_one(effect: Effect) -> bool:
     """Return whether an effect changes each particle by itself, and a world as a whole never."""
-    return isinstance(effect, Operator) and not effect.offers("world")
+    return isinstance(effect, Operator) and not effect.acts_on_worlds()
