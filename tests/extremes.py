@@ -31,8 +31,10 @@ from tisim.effects import (
     Magnetophoresis,
     Mie,
     NearField,
+    PermanentMoment,
     StokesDrag,
     Tether,
+    TruncatedDipoleDipole,
     Walls,
 )
 from tisim.effects.magnetic.moment import MOMENT
@@ -97,7 +99,9 @@ COMMON: dict[str, dict[str, Any]] = {
         ]
     },
     "langevin_moment": {"temperature": 300.0},
-    "mutual_langevin_moment": {"temperature": 300.0},
+    "permanent_moment": {"magnetisation": 1e5},
+    "mutual_langevin_moment": {"temperature": 300.0, "cutoff": 3.0, "shifted": True},
+    "mutual_induced_moment": {"susceptibility": 1.0, "cutoff": 2.0, "gap": 1e-3},
     "magnetic_body_force": {"gamma": 1e-4},
     "insertion_by_flux": {"low": [0.0, 0.0, 5e-3], "high": [0.02, 0.02, 0.02], "number": 3},
     "insertion_by_fraction": {"low": [0.0, 0.0, 0.02], "high": [0.02, 0.02, 0.04], "number": 3},
@@ -170,6 +174,8 @@ def _company(kind: type[Effect]) -> dict[str, Any]:
         felt = FIELDS.get(kind.quantity, (Lorentz, LangevinMoment, Magnetophoresis))
     elif issubclass(kind, Walls):
         felt = (Granular,)
+    elif issubclass(kind, PermanentMoment):
+        felt = (MagneticSpheres, Magnetophoresis, TruncatedDipoleDipole)
     elif issubclass(kind, DerivedQuantity):
         felt = (MagneticSpheres, Magnetophoresis)
     elif MOMENT in kind.fields or "magnetic_flux_density" in kind.requires_source:

@@ -15,8 +15,8 @@ from pathlib import Path
 ROOMS = (
     "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.console", "tisim.files", "tisim.backend",
     "tisim.numerics", "tisim.components", "tisim.geometry", "tisim.worlds", "tisim.packing",
-    "tisim.effects.base", "tisim.neighbours", "tisim.interactions", "tisim.sources", "tisim.effects",
-    "tisim.operators",
+    "tisim.effects.base", "tisim.operators.base", "tisim.neighbours", "tisim.interactions", "tisim.sources",
+    "tisim.effects", "tisim.operators",
     "tisim.steppers", "tisim.scene", "tisim.engine", "tisim.testing", "tisim.io", "tisim.analysis",
     "tisim.plotting", "tisim", "tisim.accuracy",
     "optimize.problem", "optimize.storage", "optimize.evaluation", "optimize.methods",

@@ -8,7 +8,16 @@ from tests.scenes import compiled, fixed, flow, scene
 from tests.throwaway import SoftShell
 from tisim import InputError, Scene
 from tisim.backend.taichi import ti
-from tisim.effects import Force, Lorentz, PairForce, PrescribedMotion, RigidClumps, Tether, option
+from tisim.effects import (
+    Force,
+    Lorentz,
+    PairForce,
+    PermanentMoment,
+    PrescribedMotion,
+    RigidClumps,
+    Tether,
+    option,
+)
 from tisim.engine.explain import known_effects
 from tisim.interactions.force_sum import FORCE
 from tisim.operators import Capture, Operator, Outflow
@@ -217,7 +226,13 @@ def joined(kinds):
     return Scene.from_dict({**every[0], "effects": effects, "particles": particles, "materials": materials})
 
 
-SHORT = [kind for kind in known_effects() if getattr(kind, "short_ranged", False)]
+def is_short_ranged(kind):
+    """Whether the effect of this kind is, in a scene of extremes.scenes(): that may go by its options."""
+    effects = Scene.from_dict(extremes.scenes()[f"effects.{kind.kind()}"]).effects
+    return any(type(effect) is kind and getattr(effect, "short_ranged", False) for effect in effects)
+
+
+SHORT = [kind for kind in known_effects() if is_short_ranged(kind)]
 
 
 @pytest.mark.long
@@ -319,15 +334,17 @@ def test_a_field_that_only_others_declare_is_reported():
 
 
 # Capture and constraints exclude impacts. No law of its own, and a series that takes long to compile, has the
-# cylinder. What passes is weighed before it is taken out.
+# cylinder. What passes is weighed before it is taken out. Permanent moments exclude soft ones.
 HOLDING = [PrescribedMotion, RigidClumps]
-TOGETHER = [kind for kind in known_effects() if kind not in (Capture, MagneticCylinders, Outflow, *HOLDING)]
-TOGETHER.append(Outflow)
+APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, *HOLDING)
+TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "kinds", [TOGETHER, [Capture], HOLDING], ids=["all that go together", "capture", "constraints"]
+    "kinds",
+    [TOGETHER, [Capture], HOLDING, [PermanentMoment]],
+    ids=["all that go together", "capture", "constraints", "permanent moments"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))

@@ -155,6 +155,7 @@ from .magnetic.mutual_moment import (
 from .magnetic.mutual_moment import (
     MutualMoment as MutualMoment,
 )
+from .magnetic.permanent_moment import PermanentMoment as PermanentMoment
 from .motion.base import Fixed as Fixed
 from .motion.base import Motion as Motion
 from .motion.oscillation import Oscillation as Oscillation

@@ -27,13 +27,7 @@ VIRIAL = Field("virial", "J", 1, "keep", slots=9)
 
 def turning(effects: Sequence[Effect]) -> bool:
     """Return whether any of these exerts torques."""
-    return any(
-        effect.offers("torque") or effect.offers("load")
-        if isinstance(effect, Force)
-        else effect.offers("pair_torque") or effect.offers("interaction")
-        for effect in effects
-        if isinstance(effect, Force | PairForce)
-    )
+    return any(effect.turns(effects) for effect in effects if isinstance(effect, Force | PairForce))
 
 
 @ti.func

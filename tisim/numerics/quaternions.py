@@ -13,6 +13,22 @@ def rotated(q, v):
 
 
 @ti.func
+def turned(v, turn):
+    """Return a vector turned about an axis, given the axis times the angle (rad).
+
+    It is v + 2 (w u x v + u x (u x v)) / |q|^2 with q = (w, u), in double precision, f64: in single precision
+    lengths would grow or shrink, turn after turn, by what its factors are rounded by.
+    """
+    half, r = 0.5 * ti.cast(turn, ti.f64), ti.cast(v, ti.f64)
+    angle = half.norm()
+    cosine, u = elementary.cos(angle), half
+    if angle > 0.0:
+        u = elementary.sin(angle) / angle * half
+    twice = 2.0 / (cosine * cosine + u.norm_sqr()) * u.cross(r)
+    return r + cosine * twice + u.cross(twice)
+
+
+@ti.func
 def conjugate(q):
     """Return the quaternion of the rotation back."""
     return ti.Vector([q[0], -q[1], -q[2], -q[3]])

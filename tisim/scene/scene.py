@@ -129,6 +129,8 @@ class Scene(Component):
         """Return the quantities of particles at the start, by name; of another seed where one is given."""
         seed = self.seed if seed is None else seed
         arrays = self.particles.arrays(self.domain, seed)
+        for effect in self.effects:
+            arrays |= effect.given_at_start(arrays, seed)
         indices = self.particles.material_indices(Materials(self.materials, self.material_pairs), seed)
         return arrays if indices is None else {**arrays, "material": indices}
 

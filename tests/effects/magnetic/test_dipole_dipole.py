@@ -244,4 +244,5 @@ def test_only_what_is_needed_is_allocated():
 def test_what_is_wrong_is_named():
     with pytest.raises(InputError) as fault:
         TruncatedDipoleDipole(cutoff=2)
-    assert str(fault.value) == "truncated_dipole_dipole.cutoff must be greater than 2.0; received 2"
+    rule = "greater than 2, or 2 beside a gap, or 0 without a gap for all pairs"
+    assert str(fault.value) == f"truncated_dipole_dipole.cutoff must be {rule}; received 2.0"

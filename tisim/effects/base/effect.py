@@ -91,6 +91,11 @@ class Effect(LawHints, Component):
         """Return it with what it takes from the masses of the start (kg) filled in; by default itself."""
         return self
 
+    def given_at_start(self, start: Mapping[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
+        """Return what it gives the particles of a start besides, given what they have (SI) and the seed of
+        the scene: by the name of the field, a row for each; by default nothing."""
+        return {}
+
     def capacity(self, masses: np.ndarray) -> int:
         """Return how many particles may ever live at once, given the masses of those of the start (kg); by
         default there are never more than at the start."""

@@ -17,6 +17,10 @@ class Force(Effect):
     repeatable: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
 
+    def turns(self, effects: Sequence[Effect]) -> bool:
+        """Return whether it exerts torques, given its options and all effects of the scene."""
+        return self.offers("torque") or self.offers("load")
+
     @ti.func
     def force(self, s, w, i, t):
         """Return the force on particle i of world w at time t (s), in N."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from tisim.backend.taichi import is_device_function, ti
+from tisim.effects.base.effect import Effect
 from tisim.effects.base.pairwise import Pairwise
 
 
@@ -22,6 +24,10 @@ class PairForce(Pairwise):
     contract: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
     memory: ClassVar[int] = 0
+
+    def turns(self, effects: Sequence[Effect]) -> bool:
+        """Return whether it exerts torques, given its options and all effects of the scene."""
+        return self.offers("pair_torque") or self.offers("interaction")
 
     @ti.func
     def pair_force(self, s, w, i, j, separation, distance, t):

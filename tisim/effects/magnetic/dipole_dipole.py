@@ -1,34 +1,47 @@
-"""Forces of magnetic moments on each other (B16 Eqs 6.21 to 6.23, L21 Eqs 4.6 to 4.8)."""
+"""Forces of magnetic moments on each other (B16 Eqs 6.21 to 6.23, L21 Eqs 4.6 to 4.9)."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, PairForce, parameter
+from tisim.effects.magnetic.dipole_pairs import DipolePairs, dipole_field
 from tisim.effects.magnetic.moment import MOMENT
+from tisim.effects.magnetic.permanent_moment import PermanentMoment
+from tisim.worlds.bound import Peers
 
 CUTOFFS = (10.0, 20.0, 30.0, 60.0)
 """These cut-offs, in radii, are worth a try."""
 
 
 class DipoleDipole(PairForce):
-    """Magnetic moments attract and repel each other as dipoles, over all pairs.
+    """Magnetic moments attract and repel each other as dipoles, over all pairs, and turn permanent ones.
 
         F_i = -grad_i U,    U = -mu_0 / (4 pi) (3 (m_i.n)(m_j.n) - m_i.m_j) / d^3
             = -3 mu_0 / (4 pi d^4) [(m_i.n) m_j + (m_j.n) m_i + (m_i.m_j) n - 5 (m_i.n)(m_j.n) n]
+        T_i = m_i x B_j,    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
     n is the unit vector from i to j, d the distance, m the ``moment`` of each that another effect has set,
-    held fixed. The force is not along n: it turns the pair as a whole, against the torques m x B of the
-    fields on the moments. These are not given to the particles, as moments turn inside them; where they lie
-    along the field of all sources and moments (``mutual_induced_moment``) there are none, and where they lie
-    along that of the sources alone, the sources take the balance up. In a periodic box only the nearest image
-    of a particle acts.
+    held fixed. The force is not along n: it turns the pair as a whole, against the torques T. These are given
+    to particles whose moments turn with them (``permanent_moment``). Soft moments turn inside the particle,
+    which feels none: where they lie along the field of all sources and moments (``mutual_induced_moment``)
+    there are none, and where they lie along that of the sources alone, the sources take the balance up. In a
+    periodic box only the nearest image of a particle acts.
 
-    Source: B16 Eqs (6.21), (6.23).
+    Source: B16 Eqs (6.21), (6.23), L21 Eqs (4.8), (4.9).
     """
 
     fields = (MOMENT,)
+
+    def turns(self, effects: Sequence[Effect]) -> bool:
+        return any(isinstance(effect, PermanentMoment) for effect in effects)
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        return {**super().connect(peers), "permanent": bool(peers.of(PermanentMoment))}
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return tuple(TruncatedDipoleDipole(cutoff=radii) for radii in CUTOFFS)
@@ -45,6 +58,13 @@ class DipoleDipole(PairForce):
         return inverse * (square * square) * (along * separation - along_a * b - along_b * a)
 
     @ti.func
+    def pair_torque(self, s, w, i, j, separation, distance, t):
+        torque = 0.0 * separation
+        if ti.static(self.permanent):
+            torque = self.turn(s, w, i, j, separation, distance)
+        return torque
+
+    @ti.func
     def between(self, s, w, i, j, separation, distance):
         """Return the force on i by j, in N."""
         inverse = 1.0 / distance
@@ -54,34 +74,51 @@ class DipoleDipole(PairForce):
         along_a, along_b = a.dot(n), b.dot(n)
         return (5.0 * along_a * along_b - a.dot(b)) * n - along_a * b - along_b * a
 
+    @ti.func
+    def turn(self, s, w, i, j, separation, distance):
+        """Return the torque on i by j, in N m."""
+        return s.moment[w, i].cross(dipole_field(s.moment[w, j], separation, distance))
 
-class TruncatedDipoleDipole(DipoleDipole):
+
+class TruncatedDipoleDipole(DipolePairs, DipoleDipole):
     """Magnetic moments within a cut-off attract and repel each other as dipoles; beyond it there is no force.
 
-    The law is that of ``dipole_dipole``; pairs are found with the pair list. The force is not shifted: at 30
-    radii it jumps by 2e-5 of that at contact. B16 takes 30 (section 6.3), as the energy of the strongest
-    moments it has is less than k T from about 20 radii on (by its numbers, from 25).
+        d_c = cutoff (R_i + R_j)/2 + gap,    x = d/d_c,    f(x) = 1 plain, 1 - 4 x^3 + 3 x^4 shifted
+        U = f U_dipoles,    F_i = f F_dipoles + f'(x) U_dipoles / d_c n,    T_i = f T_dipoles
 
-    Source: B16 Eqs (6.21), (6.23), section 6.3.
+    The law is otherwise that of ``dipole_dipole``; pairs are found with the pair list. Without a shift the
+    force is that of dipoles up to the cut-off, where it jumps: at 30 radii by 2e-5 of that at contact. With
+    the shift, that of lj/sf/dipole/sf in LAMMPS, energy and force end smoothly, so that energy is conserved;
+    in between they are weaker than those of dipoles, at half of d_c by 5/16 of the energy.
+
+    B16 takes 30 radii (section 6.3), as the energy of the strongest moments it has is less than k T from
+    about 20 radii on (by its numbers, from 25). L21 takes a ``gap`` of 8 um between the surfaces of iron
+    grains, ``cutoff`` 2, and for asteroids three diameters, ``cutoff`` 6 (section 4.2.1.2).
+
+    Source: B16 Eqs (6.21), (6.23), section 6.3; L21 Eqs (4.8), (4.9); M. Orsi, D. Y. Haubertin, W. E.
+    Sanderson, J. W. Essex, J. Phys. Chem. B 112 (2008) 802.
     """
 
-    short_ranged = True
-
     cutoff: float = parameter(
-        "", "cut-off distance of the centres, over the mean radius of the two", 30.0, gt=2
+        "", "cut-off distance of the centres, over the mean radius of the two", 30.0, ge=2
     )
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return ()
 
     @ti.func
-    def reach(self, s, w, i):
-        # Between surfaces, of two as large as i: (cutoff / 2 - 1) (R_i + R_j).
-        return (self.cutoff(w) - 2.0) * s.radius[w, i]
+    def pair_force(self, s, w, i, j, separation, distance, t):
+        part, slope = self.part(s, w, i, j, distance)
+        total = part * self.between(s, w, i, j, separation, distance)
+        if ti.static(self.shifted):
+            field = dipole_field(s.moment[w, j], separation, distance)
+            total -= slope / distance * s.moment[w, i].dot(field) / distance * separation
+        return total
 
     @ti.func
-    def pair_force(self, s, w, i, j, separation, distance, t):
-        total = 0.0 * separation
-        if 2.0 * distance <= self.cutoff(w) * (s.radius[w, i] + s.radius[w, j]):
-            total = self.between(s, w, i, j, separation, distance)
-        return total
+    def pair_torque(self, s, w, i, j, separation, distance, t):
+        torque = 0.0 * separation
+        if ti.static(self.permanent):
+            part, _slope = self.part(s, w, i, j, distance)
+            torque = part * self.turn(s, w, i, j, separation, distance)
+        return torque

@@ -1,34 +1,41 @@
-"""The pull of an uneven magnetic field on magnetic moments (B16 Eq. 6.20)."""
+"""The pull of a magnetic field on magnetic moments, and how it turns them (B16 Eq. 6.20, L21 Eq. 4.7)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Force
+from tisim.effects.base import Effect, Force
 from tisim.effects.magnetic.moment import MOMENT
+from tisim.effects.magnetic.permanent_moment import PermanentMoment
 from tisim.sources.base import sources
 from tisim.worlds.bound import Peers
 
 
 class Magnetophoresis(Force):
-    """An uneven magnetic field pulls particles by their magnetic moments.
+    """An uneven magnetic field pulls particles by their magnetic moments, and any field turns permanent ones.
 
-        F = (m.grad) B
+        F = (m.grad) B,    T = m x B
 
     B is the sum of all sources, m the ``moment`` that another effect has set. Where B is free of curl, as it
     is where no current flows, this is grad(m.B) with m held fixed; of a moment that goes with B it is half of
     grad(m.B) with m varying, which is ``magnetic_body_force``. What moments do to each other is
-    ``dipole_dipole``.
+    ``dipole_dipole``. The torque T is on particles whose moments turn with them (``permanent_moment``); soft
+    moments turn inside the particle, which feels none.
 
-    Source: B16 Eqs (6.20), (7.1).
+    Source: B16 Eqs (6.20), (7.1), L21 Eqs (4.6), (4.7).
     """
 
     fields = (MOMENT,)
     requires_source = ("magnetic_flux_density",)
 
+    def turns(self, effects: Sequence[Effect]) -> bool:
+        return any(isinstance(effect, PermanentMoment) for effect in effects)
+
     def connect(self, peers: Peers) -> dict[str, Any]:
-        return {"applied": sources(peers, "magnetic_flux_density")}
+        applied = sources(peers, "magnetic_flux_density")
+        return {"applied": applied, "permanent": bool(peers.of(PermanentMoment))}
 
     @ti.func
     def force(self, s, w, i, t):
@@ -36,3 +43,13 @@ class Magnetophoresis(Force):
         for source in ti.static(self.applied):
             gradient += source.gradient(w, s.position[w, i], t)
         return gradient @ s.moment[w, i]
+
+    @ti.func
+    def torque(self, s, w, i, t):
+        torque = 0.0 * s.moment[w, i]
+        if ti.static(self.permanent):
+            b = 0.0 * torque
+            for source in ti.static(self.applied):
+                b += source.value(w, s.position[w, i], t)
+            torque = s.moment[w, i].cross(b)
+        return torque

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from scipy.constants import mu_0
-
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, SelfConsistentQuantity
+from tisim.effects.magnetic.dipole_pairs import DipolePairs, dipole_field
 from tisim.effects.magnetic.moment import InducedMoment, LangevinMoment, Moment
 
 
-class MutualMoment(SelfConsistentQuantity, Moment):
-    """This is the contract of a moment that follows the field of the sources and of all other moments.
+class MutualMoment(DipolePairs, SelfConsistentQuantity, Moment):
+    """This is the contract of a moment that follows the field of the sources and of other moments.
 
-        m_i = law(B(r_i) + sum_j B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
+        m_i = law(B(r_i) + sum_j f(x) B_j(r_i)),    B_j = mu_0 / (4 pi d^3) (3 (m_j.n) n - m_j)
 
     A dipole at its centre stands for each sphere: near contact the higher multipoles, which are left out,
-    matter as well. In a periodic box only the nearest image of a particle acts.
+    matter as well. In a periodic box only the nearest image of a particle acts. f is 1 for all pairs, unless
+    there is a cut-off (``DipolePairs``); forces need the same one, in ``truncated_dipole_dipole``.
     """
 
     contract: ClassVar[bool] = True
@@ -30,12 +30,12 @@ class MutualMoment(SelfConsistentQuantity, Moment):
 
     @ti.func
     def influence(self, s, w, i, j, separation, distance, t):
-        """Return the field (T) of j at i."""
-        inverse = 1.0 / distance
-        n = inverse * separation
-        # Cube first: in f32 a moment of 1e-17 A m^2 squared is nothing.
-        m = inverse * inverse * inverse * s.moment[w, j]
-        return mu_0 / (4.0 * ti.math.pi) * (3.0 * m.dot(n) * n - m)
+        """Return the field (T) of j at i, as far as it counts."""
+        field = dipole_field(s.moment[w, j], separation, distance)
+        if ti.static(self.short_ranged):
+            part, _slope = self.part(s, w, i, j, distance)
+            field *= part
+        return field
 
 
 class MutualInducedMoment(MutualMoment, InducedMoment):

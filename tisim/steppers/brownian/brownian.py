@@ -77,8 +77,7 @@ class Brownian(Stepper):
         super().suits(effects, domain)
         for effect in effects:
             name = f"effects.{effect.label}"
-            turns = effect.offers("torque") if isinstance(effect, Force) else False
-            turns = turns or (isinstance(effect, PairForce) and effect.offers("pair_torque"))
+            turns = isinstance(effect, Force | PairForce) and effect.turns(effects)
             must(not turns, name, "without torques in a scene stepped by brownian", name)
             rule = "one that does not depend on velocity in a scene stepped by brownian"
             must(not (effect.depends_on_velocity or isinstance(effect, PairEvent)), name, rule, name)

@@ -1,0 +1,58 @@
+"""Permanent magnetic moments, which turn with their particles (L21 section 4.2.1.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from tisim.backend.taichi import ti
+from tisim.effects.base import parameter
+from tisim.effects.magnetic.moment import MOMENT, Moment
+from tisim.errors import must
+from tisim.numerics.quaternions import turned
+from tisim.numerics.random_streams import MOMENTS
+from tisim.operators.base import Operator
+
+
+class PermanentMoment(Operator):
+    """Each particle is a permanent magnet: its moment is fixed in it and turns with it.
+
+        dm/dt = w x m,    m(0) = M V e  unless the start gives it,    I dw/dt = T,    I = 2/5 m R^2
+
+    w is the spin. ``dipole_dipole`` gives particles the torque m x B of the fields of the others, and
+    ``magnetophoresis`` that of the sources, beside the forces. e is drawn for each particle, evenly from all
+    directions, by the seed of the scene; particles that are put in later have the ``moment`` that their class
+    gives them.
+
+    Each step turns the moment about w by |w| dt, so that its magnitude stays. With ``verlet`` that is the
+    drift of a leapfrog: of second order, symplectic, and without an error where there is no torque. Other
+    steppers hold moments where they were until the end of a step, which makes them of first order in dt.
+
+    Source: L21 Eqs (4.6) to (4.9), section 4.2.1.4.
+    """
+
+    fields = (MOMENT, "radius", "spin")
+    excludes: ClassVar = (Moment,)
+    depends_on_velocity = True
+    homogeneous = True
+
+    magnetisation: float = parameter(
+        "A/m", "magnetisation M, along a direction drawn for each; 0 where the start gives moments", 0.0, ge=0
+    )
+
+    def given_at_start(self, start: Mapping[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
+        if self.magnetisation == 0:
+            return {}
+        rule = f"left out, as effects.{self.label}.magnetisation gives it"
+        must("moment" not in start, "particles.moment", rule, "given")
+        draw = np.random.Generator(np.random.Philox(key=[seed, MOMENTS]))
+        direction = draw.normal(size=(len(start["radius"]), 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        volume = 4 / 3 * np.pi * start["radius"] ** 3
+        return {"moment": self.magnetisation * volume[:, None] * direction}
+
+    @ti.func
+    def particle(self, s, w, i, t, dt):
+        s.moment[w, i] = ti.cast(turned(s.moment[w, i], dt * s.spin[w, i]), s.real)
