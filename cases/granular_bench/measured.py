@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,27 +52,34 @@ Measured = Mapping[str, Measurement]
 """Measurements by the name of their quantity."""
 
 
-def read(path: Path) -> dict[str, Measurement]:
-    """Return the measurements of a CSV file; InputError where it is none, or there is nothing in it."""
+def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[str]]]:
+    """Return the heading of a CSV file, one of some of three cells, and its lines; InputError where it is no
+    such file."""
     try:
         rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path} must be a CSV file that can be read; received {error}") from None
     rows = [[cell.strip() for cell in row] for row in rows if any(cell.strip() for cell in row)]
     must(
-        bool(rows) and rows[0] == HEADING,
+        bool(rows) and rows[0] in headings,
         f"heading of {path}",
-        ",".join(HEADING),
+        " or ".join(",".join(heading) for heading in headings),
         ",".join(*rows[:1] or [[]]),
     )
-    measured: dict[str, Measurement] = {}
     for row in rows[1:]:
-        must(len(row) == len(HEADING), f"a line of {path}", "of three cells", ",".join(row))
-        name, *numbers = row
-        if name not in QUANTITY_UNITS:
+        must(len(row) == len(rows[0]), f"a line of {path}", "of three cells", ",".join(row))
+    return rows[0], rows[1:]
+
+
+def read(path: Path, units: Mapping[str, str] = QUANTITY_UNITS) -> dict[str, Measurement]:
+    """Return the measurements of a CSV file, of the quantities that have ``units``; InputError where it is
+    none, or there is nothing in it."""
+    measured: dict[str, Measurement] = {}
+    for name, *numbers in table(path, HEADING)[1]:
+        if name not in units:
             raise InputError(
-                f"quantity of {path} must be one of {', '.join(QUANTITY_UNITS)}; received {name}"
-                f"{did_you_mean(name, QUANTITY_UNITS)}"
+                f"quantity of {path} must be one of {', '.join(units)}; received {name}"
+                f"{did_you_mean(name, units)}"
             )
         must(name not in measured, f"quantity of {path}", "given once", name)
         try:

@@ -18,6 +18,7 @@ LOW, HIGH = np.zeros(3), np.ones(3)
 MOTIONS = (
     Fixed(),
     Translation(velocity=(1.0, 2.0, 3.0)),
+    Translation(velocity=(1.0, 2.0, 3.0), begin=0.3),
     Oscillation(amplitude=(0.0, 0.1, 0.2), frequency=3.0, phase=0.5),
     Rotation(rate=(0.3, -1.0, 2.0), centre=(1.0, 0.5, 0.0)),
 )
@@ -46,6 +47,12 @@ def test_places_of_a_body_move_as_its_motion_says(motion, rng):
         "rotation": lambda: np.cross(motion.rate, there - motion.centre),
     }[motion.kind()]()
     np.testing.assert_allclose(moving, expected, atol=1e-6)
+
+
+def test_a_gate_rests_until_it_begins_to_move(rng):
+    place, gate = rng.normal(size=(5, 3)), Translation(velocity=(1.0, 0.0, 2.0), begin=0.5)
+    np.testing.assert_array_equal(placed(gate, place, 0.4), place)
+    np.testing.assert_allclose(placed(gate, place, 0.7) - place, np.tile([0.2, 0.0, 0.4], (5, 1)))
 
 
 def test_planes_end_at_each_other_and_around_the_grains():

@@ -77,7 +77,8 @@ def _(motion: Fixed, points: np.ndarray, time: float) -> np.ndarray:
 
 @placed.register
 def _(motion: Translation, points: np.ndarray, time: float) -> np.ndarray:
-    return points + time * np.array(motion.velocity)
+    moving = np.copysign(max(abs(time) - motion.begin, 0.0), time)
+    return points + moving * np.array(motion.velocity)
 
 
 @placed.register

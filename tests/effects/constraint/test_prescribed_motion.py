@@ -35,14 +35,19 @@ def driven(motion, place, velocity=None, group=(1,), effects=(), **more):
     return scene(place, velocity, acting, quantities={"group": list(group)}, **more)
 
 
-@pytest.mark.parametrize("motion", ["oscillation", "rotation", "translation"])
+@pytest.mark.parametrize(
+    "motion", ["oscillation", "rotation", "translation", "translation later", "translation after"]
+)
 def test_a_driven_group_is_where_its_motion_says(motion):
     """Whatever the gravity, and whatever velocity the start gives; also through the faces of a box."""
     rate, centre, amplitude = np.array([0.3, -2.0, 1.0]), np.array([1e-2, 0, 0]), np.array([1e-3, 2e-3, 0])
+    going = (0.5, -0.1, 0.2)
     kinds = {
         "oscillation": Oscillation(amplitude=tuple(amplitude), frequency=40, phase=0.5),
         "rotation": Rotation(rate=tuple(rate), centre=tuple(centre)),
-        "translation": Translation(velocity=(0.5, -0.1, 0.2)),
+        "translation": Translation(velocity=going),
+        "translation later": Translation(velocity=going, begin=0.0123),
+        "translation after": Translation(velocity=going, begin=1.0),
     }
     place = np.array([[0.0, 0.0, 0.0], [3e-3, 1e-3, 0.0], [0.0, 9e-3, 0.0]])
     box = Box(low=(-0.01,) * 3, high=(0.01,) * 3)
@@ -61,7 +66,9 @@ def test_a_driven_group_is_where_its_motion_says(motion):
         path = centre + along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(axis, arm)
         velocity, spin = np.cross(rate, path - centre), rate
     else:
-        path, velocity, spin = place + np.array([0.5, -0.1, 0.2]) * t, [[0.5, -0.1, 0.2]] * 3, np.zeros(3)
+        moving = max(t - kinds[motion].begin, 0.0)
+        path, spin = place + np.array(going) * moving, np.zeros(3)
+        velocity = np.tile(going if moving > 0 else (0.0, 0.0, 0.0), (3, 1))
     apart = (state["position"] - path + 0.01) % 0.02 - 0.01
     np.testing.assert_allclose(apart[:2], 0, rtol=0, atol=1e-16)
     np.testing.assert_allclose(state["velocity"][:2], velocity[:2], rtol=1e-12, atol=1e-15)

@@ -1,0 +1,27 @@
+"""What accuracy is of in an avalanche: the angle of repose and the volume of the heap, over random starts."""
+
+from __future__ import annotations
+
+from cases.avalanche.measures import grains_volume, heap_volume, largest_overlap, repose
+from tisim import Result, Scene
+from tisim.accuracy import Quantity
+
+
+def width(result: Result) -> float:
+    """Return the width of the cell of a result, m."""
+    return float(result.scene.domain.edges(0.0)[1, 1])
+
+
+def volume(result: Result) -> float:
+    """Return the volume of the heap over that of its grains."""
+    return heap_volume(result.state, width(result)) / grains_volume(result.state)
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Paths of grains are chaotic; what counts is the heap that they leave, and how deep they press into each
+    other."""
+    return (
+        Quantity("angle of repose", lambda result: repose(result.state), random=True),
+        Quantity("volume of the heap", volume, random=True),
+        Quantity("largest overlap", lambda result: largest_overlap(result.state, width(result)), random=True),
+    )

@@ -1,0 +1,83 @@
+"""What L21 finds of avalanches, beside what a narrow cell shows of it, and what holds exactly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cases.avalanche.comparison import of, steeper_by
+from cases.avalanche.measures import load_on_walls
+from cases.avalanche.published import SLOPES, larger
+from cases.avalanche.scaling import attraction, moment, ratio, weight
+from cases.avalanche.scene import DIAMETERS, FLUX, magnetism
+from cases.avalanche.sizes import DEFAULT
+from cases.avalanche.stages import Avalanche, avalanches
+from cases.case import Check
+from cases.statistics import Claim, Mean
+from tisim import Particles, Result, Scene, run
+from tisim.steppers import FixedStep, Verlet
+
+SEEDS = 3
+"""There are so many random starts of each avalanche."""
+MAGNETISATION = 11.9e3
+"""A/m; that of a single grain at 5 mT (L21 section 4.5)."""
+BALANCE = 0.02
+"""How far the load on the walls may be from the weight of the grains where they count as at rest."""
+
+
+def check(seeds: int = SEEDS) -> Iterator[Check | Claim]:
+    """Yield what must hold of two grains, and of avalanches from some starts."""
+    yield from of_two_grains()
+    wanted = [(d, field, seed) for d in DIAMETERS for field in (0.0, FLUX) for seed in range(seeds)]
+    yield from of_avalanches(avalanches(DEFAULT, wanted))
+
+
+def pairs() -> list[Result]:
+    """Return two grains of each diameter in contact along the field, after a step."""
+    scenes = []
+    for d in DIAMETERS:
+        place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, d]])
+        grains = Particles(position=place, velocity=np.zeros((2, 3)), radius=d / 2, mass=1.0)
+        stepper = Verlet(control=FixedStep(dt=1e-9))
+        scenes.append(Scene(particles=grains, effects=magnetism(FLUX), stepper=stepper, duration=1e-7))
+    return run(scenes)
+
+
+def of_two_grains() -> Iterator[Check]:
+    """Yield the magnetisation, and the attraction over the weight: ten times of 5 mm, about as much of 5 cm
+    (L21 section 4.5)."""
+    for d, result in zip(DIAMETERS, pairs(), strict=True):
+        name = f"{1e3 * d:g} mm"
+        force = abs(float(result.state["force"][0, 2]))
+        yield Check(f"{name}: attraction of two over weight", force / weight(d), ratio(d), 1e-5 * ratio(d))
+        if d == DIAMETERS[0]:
+            alone = moment(d) / (math.pi / 6 * d**3)
+            yield Check(f"{name}: magnetisation of one, A/m", alone, MAGNETISATION, 50.0)
+            tenfold = math.log10(attraction(d) / weight(d))
+            yield Check(f"{name}: magnetism dominates by an order of magnitude", tenfold, 1.0, 0.3)
+
+
+def of_avalanches(runs: Sequence[Avalanche]) -> Iterator[Check | Claim]:
+    """Yield what avalanches with and without a field show. The angle of magnetised slopes is not among it:
+    grains stand in chains as high as so small a heap."""
+    off = max(abs(load_on_walls(one.end) - 1) for one in runs)
+    yield Check("load on the walls over weight, at worst", 1 + off, 1.0, BALANCE)
+    by_size = {d: (of(runs, d, 0.0), of(runs, d, FLUX)) for d in DIAMETERS}
+    loosened: list[np.ndarray] = []
+    for d, (without, magnetised) in by_size.items():
+        name = f"{1e3 * d:g} mm"
+        angle, theirs = Mean.of([one.angle for one in without]), SLOPES[d][0].angle
+        yield Claim(f"{name}, without a field: angle, degrees (L21: {theirs:.1f})", angle, 20.0, 40.0)
+        grown = [b.volume / a.volume for a, b in zip(without, magnetised, strict=True)]
+        bounds = {"least": 1.0} if d == DIAMETERS[0] else {}
+        yield Claim(f"{name}: volume over that without (L21: {larger(d):.2f})", Mean.of(grown), **bounds)
+        loosened.append(np.array([one.loosened for one in magnetised]))
+        yield Claim(f"{name}: volume as magnetised over that as settled", Mean.of(loosened[-1]), **bounds)
+    small, _, large = loosened
+    yield Claim("volume grows by more, 5 mm than 5 cm", Mean.of(small - large), least=0.0)
+    alike = steeper_by(by_size[DIAMETERS[0]][0], by_size[DIAMETERS[2]][0])
+    yield Claim("without a field: 5 mm steeper than 5 cm by, degrees", Mean.of(alike), -15.0, 15.0)
+    deepest = Mean.of([one.overlap for one in by_size[DIAMETERS[0]][1]])
+    yield Claim("5 mm, magnetised: largest overlap over a radius", deepest, most=0.03)

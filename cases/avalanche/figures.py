@@ -1,0 +1,139 @@
+"""Figures of the case avalanche: slopes, how densely heaps are filled, and forces by size."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+
+from cases.avalanche.comparison import of
+from cases.avalanche.measures import filled_parts, profile
+from cases.avalanche.published import SLOPES
+from cases.avalanche.scaling import ratio
+from cases.avalanche.scene import DIAMETERS, FLUX
+from cases.avalanche.sizes import SIZES
+from cases.avalanche.stages import Avalanche, avalanches
+from cases.case import size_named
+from tisim.engine.batches import Progress
+from tisim.plotting.style import empty, letters, plain
+
+SEEDS = 3
+"""Slopes are drawn of so many starts."""
+COLOURS = ("#4477aa", "#cc6677")
+"""Those of slopes without a field, and of magnetised ones."""
+GROUP_NAMES = ("without a field", "magnetised")
+SHOWN = (30.0, 16.0)
+"""A heap is drawn so far and so high, in diameters."""
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """slopes.png, slopes.csv: profiles and angles by grain size, with and without a field; density.png: how
+    densely heaps are filled; forces.png: magnetic force over weight."""
+    cell = size_named(size, SIZES).scene["cell"]
+    wanted = [(d, field, seed) for d in DIAMETERS for field in (0.0, FLUX) for seed in range(SEEDS)]
+    runs = avalanches(cell, wanted, progress)
+    return {
+        "slopes.png": slopes_figure(runs),
+        "slopes.csv": table(runs),
+        "density.png": density_figure(runs),
+        "forces.png": forces_figure(),
+    }
+
+
+def slopes_figure(runs: Sequence[Avalanche]) -> Figure:
+    """Draw the mean profile of slopes with and without a field, a panel for each diameter of grains."""
+    figure = empty(11.6, 3.6)
+    axes = figure.subplots(1, len(DIAMETERS), sharey=True)
+    for axis, d in zip(axes, DIAMETERS, strict=True):
+        for field, colour, name in zip((0.0, FLUX), COLOURS, GROUP_NAMES, strict=True):
+            group = of(runs, d, field)
+            for one in group:
+                place, height = profile(one.end.state)
+                axis.plot(place / d, height / d, color=colour, lw=0.7, alpha=0.5)
+            place, height = mean_profile(group)
+            axis.plot(place / d, height / d, color=colour, lw=2.0, label=name)
+        without, magnetised = SLOPES[d]
+        published = f"L21: {without.angle:.1f}°, {magnetised.angle:.1f}°"
+        axis.set(title=f"grains of {1e3 * d:g} mm ({published})", xlabel="distance (diameters)")
+        axis.set(xlim=(0.0, SHOWN[0]), ylim=(0.0, SHOWN[1]), aspect="equal")
+        axis.legend(frameon=False, fontsize=8)
+        plain(axis)
+    axes[0].set_ylabel("height (diameters)")
+    letters(axes)
+    return figure
+
+
+def mean_profile(group: Sequence[Avalanche]) -> tuple[np.ndarray, np.ndarray]:
+    """Return places (m) along the cell and the mean height there (m) of slopes of one diameter of grains."""
+    d = group[0].diameter
+    place = (np.arange(SHOWN[0]) + 0.5) * d
+    heights = [np.interp(place, *profile(one.end.state), right=0.0) for one in group]
+    return place, np.mean(heights, axis=0)
+
+
+def density_figure(runs: Sequence[Avalanche]) -> Figure:
+    """Draw how densely heaps of the smallest grains are filled, without a field and with one, as means over
+    starts (L21 Fig. 4.13)."""
+    d = DIAMETERS[0]
+    figure = empty(11.6, 3.4)
+    axes = figure.subplots(1, 2, sharey=True)
+    for axis, field, name in zip(axes, (0.0, FLUX), GROUP_NAMES, strict=True):
+        mesh = filled(axis, of(runs, d, field))
+        axis.set(title=f"grains of {1e3 * d:g} mm, {name}", xlabel="distance (diameters)")
+    axes[0].set_ylabel("height (diameters)")
+    letters(axes)
+    figure.colorbar(mesh, ax=axes, label="part of the volume that grains fill")
+    return figure
+
+
+def filled(axis: Axes, group: Sequence[Avalanche]) -> QuadMesh:
+    """Draw the part of the volume that grains of some slopes fill, and return what a colour bar is of."""
+    length, height = SHOWN
+    parts = np.mean(
+        [
+            filled_parts(one.end.state, one.width, length * one.diameter, height * one.diameter)
+            for one in group
+        ],
+        axis=0,
+    )
+    edges = np.arange(length + 1), np.arange(height + 1)
+    axis.set_aspect("equal")
+    return axis.pcolormesh(*edges, np.ma.masked_less(parts.T, 0.02), cmap="viridis", vmin=0.0, vmax=0.7)
+
+
+def forces_figure() -> Figure:
+    """Draw the attraction of two grains in contact over their weight by their diameter, for some fields, as
+    they magnetise each other and as they do not (L21 Figs 4.15 and 4.16)."""
+    figure = empty(5.6, 4.0)
+    axis = figure.subplots()
+    line = np.geomspace(1e-4, 1.0, 50)
+    for field, colour in zip((5e-5, 5e-4, 5e-3), ("#228833", "#ccbb44", "#cc6677"), strict=True):
+        axis.plot(line, [ratio(d, field) for d in line], color=colour, label=f"{1e3 * field:g} mT")
+        axis.plot(line, [ratio(d, field, mutual=False) for d in line], color=colour, ls=":")
+    axis.axhline(1.0, color="0.5", lw=0.8)
+    axis.plot(DIAMETERS, [ratio(d) for d in DIAMETERS], "o", color="#cc6677", ms=6)
+    axis.set(xscale="log", yscale="log", xlabel="diameter of the grains (m)", ylabel="attraction over weight")
+    axis.legend(frameon=False, fontsize=8, title="dotted: moments of single grains")
+    plain(axis)
+    return figure
+
+
+def table(runs: Sequence[Avalanche]) -> str:
+    """Return the angles, the volume and the largest overlap of each avalanche as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(
+        [
+            "diameter_m", "field_T", "seed", "angle_degrees", "upper_angle_degrees", "lower_angle_degrees",
+            "volume_over_grains", "largest_overlap_over_radius",
+        ]
+    )  # fmt: skip
+    for one in runs:
+        measured = (one.angle, *one.slopes, one.volume, one.overlap)
+        writer.writerow([one.diameter, one.field, one.seed, *(f"{value:.4g}" for value in measured)])
+    return text.getvalue()

@@ -1,0 +1,83 @@
+"""A measured slope, which a calibration is to meet: its angle of repose, or its profile, as a file has them.
+
+The file is CSV with a heading. An angle, in degrees, is a line as granular_bench has it:
+
+    quantity,value,uncertainty
+    angle_of_repose,34.5,1.0
+
+A profile is the height of the surface over the distance from the end of the cell that grains lean on, in any
+one unit of length, from there to beyond the foot:
+
+    distance,height,uncertainty
+    0.000,0.050,0.002
+    0.010,0.046,0.002
+
+The uncertainty is one standard deviation, of the measurement and of what so few grains can resolve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cases.granular_bench import measured
+from cases.granular_bench.measured import Measurement
+from tisim.errors import InputError, must
+
+ANGLE_UNITS = {"angle_of_repose": "degrees"}
+PROFILE = ["distance", "height", "uncertainty"]
+FEWEST = 4
+"""A profile has so many points at least."""
+
+
+@dataclass(frozen=True)
+class MeasuredProfile:
+    """A measured profile is the height of a slope at distances from the end of its cell, with uncertainties,
+    all in one unit of length, shape (n,) each."""
+
+    distance: np.ndarray
+    height: np.ndarray
+    uncertainty: np.ndarray
+
+    def __post_init__(self) -> None:
+        number = len(self.distance)
+        must(number >= FEWEST, "profile", f"of {FEWEST} points or more", number)
+        rises = bool((np.diff(self.distance) > 0).all() and self.distance[0] >= 0)
+        must(rises, "distance", "rising, and not below 0", self.distance.tolist())
+        sound = bool(np.isfinite(self.height).all() and (self.height >= 0).all() and self.height.max() > 0)
+        must(sound, "height", "finite and not below 0, and somewhere above", self.height.tolist())
+        known = bool(np.isfinite(self.uncertainty).all() and (self.uncertainty > 0).all())
+        must(known, "uncertainty", "finite and above 0", self.uncertainty.tolist())
+
+    def misfit(self, place: np.ndarray, height: np.ndarray) -> float:
+        """Return the mean of the squared distances from the profile of a simulated one, in uncertainties.
+
+        Both are taken in units of the root of the area below them: heaps of any size are compared that have
+        run out of columns of the same shape. place, height : of the simulated one, in any unit.
+        """
+        scale = np.sqrt(area(place, height) / area(self.distance, self.height))
+        there = np.interp(self.distance * scale, place, height, right=0.0) / scale
+        return float((((there - self.height) / self.uncertainty) ** 2).mean())
+
+
+def area(place: np.ndarray, height: np.ndarray) -> float:
+    """Return the area below a profile, which goes on level from its first point back to 0."""
+    return float(np.trapezoid(height, place) + place[0] * height[0])
+
+
+Target = Measurement | MeasuredProfile
+"""What a calibration is to meet: an angle of repose (degrees), or a profile."""
+
+
+def read(path: Path) -> Target:
+    """Return what a CSV file has; InputError where it is none, or no slope is in it."""
+    heading, rows = measured.table(path, measured.HEADING, PROFILE)
+    if heading == measured.HEADING:
+        return measured.read(path, ANGLE_UNITS)["angle_of_repose"]
+    try:
+        numbers = np.array([[float(cell) for cell in row] for row in rows]).reshape(-1, len(PROFILE))
+    except ValueError:
+        raise InputError(f"{path} must be of numbers below its heading; received something else") from None
+    return MeasuredProfile(*numbers.T)

@@ -1,0 +1,98 @@
+"""What is measured of a slope: its angles, the volume of the heap, and how densely grains fill it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cases.avalanche.scene import GRAVITY
+from tisim import InputError, Result
+from tisim.analysis import contacts, slope_angles, surface_profile
+from tisim.scene.initial_state import Arrays
+
+SAMPLES = 8
+"""The part that grains fill is counted at so many points along each diameter."""
+
+
+def diameter(state: Arrays) -> float:
+    """Return the diameter of the grains, m."""
+    return 2 * float(state["radius"].mean())
+
+
+def profile(state: Arrays) -> tuple[np.ndarray, np.ndarray]:
+    """Return places along the cell, a diameter apart, and the height of the surface there; m."""
+    return surface_profile(state["position"], state["radius"], along=0, across=1)
+
+
+def repose(state: Arrays) -> float:
+    """Return the angle of repose, degrees, of a line through the slope between a fifth and four fifths of its
+    height; NaN where that is less than three diameters long."""
+    place, height = profile(state)
+    return float(np.degrees(_angles(place, height, 1)[0]))
+
+
+def two_slopes(state: Arrays) -> tuple[float, float]:
+    """Return the angles of the upper and the lower part of the slope, degrees, of a line that is bent where
+    it fits best; NaN where the slope is less than six diameters long."""
+    place, height = profile(state)
+    upper, lower = np.degrees(_angles(place, height, 2))
+    return float(upper), float(lower)
+
+
+def _angles(place: np.ndarray, height: np.ndarray, pieces: int) -> np.ndarray:
+    try:
+        return slope_angles(place, height, pieces=pieces).angles
+    except InputError:
+        return np.full(pieces, np.nan)
+
+
+def heap_volume(state: Arrays, width: float) -> float:
+    """Return the volume (m^3) below the surface of a heap in a cell of a width (m): squares of about a
+    diameter are filled up to the highest point of a grain in each."""
+    d, place = diameter(state), state["position"]
+    rows = round(width / d)
+    column = (place[:, 0] / d).astype(int)
+    row = (place[:, 1] % width / width * rows).astype(int) % rows
+    tops = np.zeros((column.max() + 1, rows))
+    np.maximum.at(tops, (column, row), place[:, 2] + state["radius"])
+    return float(tops.sum() * d * width / rows)
+
+
+def grains_volume(state: Arrays) -> float:
+    """Return the volume of all grains, m^3."""
+    return float((4 / 3 * np.pi * state["radius"] ** 3).sum())
+
+
+def filled_parts(state: Arrays, width: float, length: float, height: float) -> np.ndarray:
+    """Return the part of the volume that grains fill in squares of a diameter along and up, means over the
+    width; shape (length, height) in diameters. width, length, height : those of the cell, m.
+
+    It is counted at SAMPLES points along each diameter, which are in a grain or not; grains are of one size.
+    """
+    d = diameter(state)
+    columns, layers = round(length / d), round(height / d)
+    along, up = (((np.arange(n * SAMPLES) + 0.5) / SAMPLES) * d for n in (columns, layers))
+    across = (np.arange(round(width / d * SAMPLES)) + 0.5) / round(width / d * SAMPLES) * width
+    points = np.stack(np.meshgrid(along, across, up, indexing="ij"), axis=-1)
+    inside_cell = np.where([False, True, False], state["position"] % width, state["position"])
+    shifts = np.array([[0.0, k * width, 0.0] for k in (-1, 0, 1)])
+    images = (inside_cell + shifts[:, None]).reshape(-1, 3)
+    near, _ = cKDTree(images).query(points, distance_upper_bound=d / 2)
+    inside = np.isfinite(near).mean(axis=1)
+    return np.asarray(inside.reshape(columns, SAMPLES, layers, SAMPLES).mean(axis=(1, 3)))
+
+
+def largest_overlap(state: Arrays, width: float) -> float:
+    """Return the largest overlap of two grains in a cell of a width (m), over a radius."""
+    place, radius = state["position"], state["radius"]
+    i, j = contacts(place, radius, sides=(0.0, width, 0.0)).T
+    apart = place[j] - place[i]
+    apart[:, 1] -= width * np.rint(apart[:, 1] / width)
+    overlap = radius[i] + radius[j] - np.linalg.norm(apart, axis=1)
+    return float(overlap.max(initial=0.0) / radius.mean())
+
+
+def load_on_walls(result: Result) -> float:
+    """Return the force of the grains on floor and walls downwards, over their weight: 1 at rest."""
+    down = -(result.measures["box_force_z"] + result.measures["gate_force_z"])
+    return down / (float(result.state["mass"].sum()) * GRAVITY)

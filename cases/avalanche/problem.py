@@ -1,0 +1,86 @@
+"""The inverse problem of avalanche: which grains come to rest at a measured angle, or in a measured profile?
+
+A design is the friction, the rolling friction and the cohesion of the grains, without a field. An avalanche
+is run of it, and the misfit is the squared distance from what was measured, in uncertainties: where it is
+below 1, it is met within them. One angle does not tell three parameters: designs that meet it lie on a
+surface, of which the table of the best designs shows some. A profile tells a little more, as where a slope
+begins and how far grains run out go by friction and cohesion in unlike ways.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from cases.avalanche.measured import MeasuredProfile, Target, read
+from cases.avalanche.measures import profile, repose
+from cases.avalanche.scene import TITLE, scene
+from cases.avalanche.sizes import SIZES
+from cases.case import size_named
+from cases.granular_bench.measured import Measurement
+from optimize.problem.genome import Gene, Genome
+from optimize.problem.problem import Problem
+from tisim import Result
+from tisim.errors import must
+from tisim.plotting.cloud import cloud
+
+VARIANTS = ("calibrate",)
+GENES = (
+    Gene("friction", "", 0.1, 1.0),
+    Gene("rolling_friction", "", 0.0, 0.6),
+    Gene("cohesion", "J/m^3", 0.0, 1000.0),
+)
+"""Beyond the cohesion pulls as much as a grain weighs, in contacts of softened grains."""
+EXAMPLE = Measurement(30.0, 1.5)
+"""What is to be met where no file is given, degrees."""
+MEANINGS = {"misfit": "mean of the squared distances from what was measured, in uncertainties"}
+
+
+def misfit(result: Result, target: Target) -> float:
+    """Return how far the slope of a result is from a measured one, squared, in uncertainties."""
+    if isinstance(target, MeasuredProfile):
+        return target.misfit(*profile(result.state))
+    return target.misfit(repose(result.state))
+
+
+def problem(size: str = "default", variant: str = "calibrate") -> Problem:
+    """Return the calibration to EXAMPLE."""
+    return _problem(size, variant, EXAMPLE)
+
+
+def calibration(size: str, variant: str, path: Path) -> Problem:
+    """Return the calibration to a CSV file, as ``measured`` has it."""
+    return _problem(size, variant, read(path))
+
+
+def _problem(size: str, variant: str, target: Target) -> Problem:
+    must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
+    settings = size_named(size, SIZES).scene
+    plain = [np.asarray(value).tolist() for value in vars(target).values()]
+    wanted = "a measured profile"
+    if isinstance(target, Measurement):
+        wanted = f"an angle of repose of {target.value:g} ± {target.uncertainty:g} degrees"
+
+    def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
+        shown = {"angle of repose, degrees": repose(result.state)}
+        if isinstance(target, Measurement):
+            shown["angle of repose as measured, degrees"] = target.value
+        return shown
+
+    return Problem(
+        name=f"avalanche-{variant}" + ("" if size == "default" else f"-{size}"),
+        title=f"{TITLE}: {wanted}",
+        description=f"friction, rolling friction and cohesion of grains with {wanted}",
+        genome=Genome(GENES),
+        scene=lambda design, seed: scene(design=design, field=0.0, seed=seed, **settings),
+        objective=lambda result: misfit(result, target),
+        symbol="misfit",
+        meanings=MEANINGS,
+        picture=lambda scene, result: cloud(result),
+        details=details,
+        code=hashlib.sha256(json.dumps(plain).encode()).hexdigest()[:12],
+    )

@@ -1,0 +1,35 @@
+"""The magnetic force of two grains that touch beside their weight (L21 section 4.5), in closed form."""
+
+from __future__ import annotations
+
+import math
+
+from scipy.constants import mu_0
+
+from cases.avalanche.scene import DENSITY, FLUX, GRAVITY, SUSCEPTIBILITY
+
+CONTRAST = SUSCEPTIBILITY / (3 + SUSCEPTIBILITY)
+"""chi / (3 + chi) = (mu_r - 1) / (mu_r + 2)."""
+
+
+def moment(diameter: float, field: float = FLUX) -> float:
+    """Return the moment (A m^2) of a single grain: 4 pi R^3 chi / (3 + chi) B / mu_0 (L21 Eq. 4.11)."""
+    return 4 * math.pi * (diameter / 2) ** 3 * CONTRAST * field / mu_0
+
+
+def attraction(diameter: float, field: float = FLUX, mutual: bool = True) -> float:
+    """Return the force (N) with which two grains in contact along the field attract each other: 3 mu_0 m^2 /
+    (2 pi d^4), with moments that are 1 / (1 - 2 a) as large where grains magnetise each other, a = chi /
+    (3 + chi) / 8."""
+    grown = 1 / (1 - CONTRAST / 4) if mutual else 1.0
+    return 3 * mu_0 * (grown * moment(diameter, field)) ** 2 / (2 * math.pi * diameter**4)
+
+
+def weight(diameter: float) -> float:
+    """Return the weight of a grain, N (L21 Eq. 4.13)."""
+    return DENSITY * math.pi / 6 * diameter**3 * GRAVITY
+
+
+def ratio(diameter: float, field: float = FLUX, mutual: bool = True) -> float:
+    """Return the attraction over the weight; it falls as the diameter."""
+    return attraction(diameter, field, mutual) / weight(diameter)

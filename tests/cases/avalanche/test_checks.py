@@ -1,0 +1,114 @@
+"""What is yielded of avalanches, of slopes that are made; and avalanches that are run."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigvalsh
+
+from cases.avalanche.calving import STRIP, strips_of
+from cases.avalanche.checks import of_avalanches
+from cases.avalanche.comparison import of, steeper_by
+from cases.avalanche.figures import density_figure, forces_figure, slopes_figure, table
+from cases.avalanche.measures import load_on_walls
+from cases.avalanche.scaling import CONTRAST
+from cases.avalanche.scene import CUTOFF, DIAMETERS, FLUX, GRAVITY, RELAXATION
+from cases.avalanche.sizes import DEFAULT, Cell
+from cases.avalanche.stages import Avalanche, avalanches
+from tests.cases.avalanche.slopes import WIDTH, block, leaning
+
+CELL = Cell(number=0, column=8.0, width=WIDTH, length=40.0, height=20.0)
+
+
+def avalanche(d, field, seed, run, top=16):
+    """An avalanche that has left a staircase."""
+    state = leaning(top + seed % 2, run, d)
+    measures = {"box_force_z": -GRAVITY * state["mass"].sum(), "gate_force_z": 0.0, "kinetic_ratio": 1e-5}
+    end = SimpleNamespace(state=state, measures=measures)
+    # Magnetised columns are half as high again, those of small grains alone.
+    high = 6 if field and d == DIAMETERS[0] else 4
+    return Avalanche(CELL, d, field, seed, block([4] * 8, d), block([high + seed % 2] * 8, d), end)
+
+
+@pytest.fixture(scope="module")
+def staircases():
+    """Those of the smallest grains are 45 degrees steep in a field, all others 27."""
+    return [
+        avalanche(d, field, seed, 1 if field and d == DIAMETERS[0] else 2)
+        for d in DIAMETERS
+        for field in (0.0, FLUX)
+        for seed in (1, 0)
+    ]
+
+
+def test_what_is_steeper_is_told_by_pairs_of_starts(staircases):
+    d = DIAMETERS[0]
+    without, magnetised = of(staircases, d, 0.0), of(staircases, d, FLUX)
+    assert [one.seed for one in without] == [0, 1]
+    assert steeper_by(magnetised, without) == pytest.approx(45 - 26.57, abs=1.5)
+    claims = {check.name: check for check in of_avalanches(staircases)}
+    flat = claims["5 mm, without a field: angle, degrees (L21: 37.2)"]
+    assert flat.mean.value == pytest.approx(26.57, abs=1.0)
+    # The heap is as high and half as long.
+    assert not claims["5 mm: volume over that without (L21: 1.09)"].ok
+    assert claims["5 mm: volume as magnetised over that as settled"].mean.value == pytest.approx(6.5 / 4)
+    assert claims["volume grows by more, 5 mm than 5 cm"].mean.value == pytest.approx(0.5)
+    assert claims["without a field: 5 mm steeper than 5 cm by, degrees"].ok
+    assert claims["load on the walls over weight, at worst"].ok
+
+
+def test_figures_and_table_have_each_slope(staircases):
+    slopes = slopes_figure(staircases)
+    assert len(slopes.axes) == 3
+    assert [len(axis.lines) for axis in slopes.axes] == [6, 6, 6]
+    rows = table(staircases).splitlines()
+    assert len(rows) == 1 + len(staircases)
+    assert rows[0].startswith("diameter_m,field_T,seed,angle_degrees")
+    (_, _, bar) = density_figure(staircases).axes
+    assert bar.get_ylabel() == "part of the volume that grains fill"
+    assert len(forces_figure().axes[0].lines) == 8
+
+
+def test_strips_are_those_of_the_column():
+    state = block([1] * 7)
+    strips = strips_of(state, DIAMETERS[0])
+    assert sorted(set(strips.values())) == [0, 1, 2]
+    assert strips[int(state["id"][0])] == 0
+    assert STRIP == 3.0
+
+
+def eigenvalues(state, width):
+    """The least and the largest eigenvalue of what moments within the cut-off do to each other."""
+    d = 2 * state["radius"].mean()
+    place = state["position"] / d
+    apart = place[None] - place[:, None]
+    apart[..., 1] -= width / d * np.rint(apart[..., 1] * d / width)
+    distance = np.linalg.norm(apart, axis=-1)
+    np.fill_diagonal(distance, np.inf)
+    n = apart / distance[..., None]
+    strength = np.where(distance <= CUTOFF / 2, CONTRAST / 8 / distance**3, 0.0)
+    tensor = strength[..., None, None] * (3 * n[..., :, None] * n[..., None, :] - np.eye(3))
+    matrix = tensor.transpose(0, 2, 1, 3).reshape(3 * len(place), -1)
+    values = eigvalsh(matrix)
+    return values[0], values[-1]
+
+
+@pytest.mark.slow
+def test_a_field_loosens_small_grains_and_without_one_all_sizes_are_alike():
+    """From two starts of each; without a field slopes are those of the weight alone, whatever the size."""
+    small, _, large = DIAMETERS
+    wanted = [(d, field, seed) for seed in (0, 1) for d, field in ((small, 0.0), (large, 0.0), (small, FLUX))]
+    runs = avalanches(DEFAULT, wanted)
+    flat, same, loose = (of(runs, *key) for key in ((small, 0.0), (large, 0.0), (small, FLUX)))
+    assert abs(np.mean(steeper_by(same, flat))) < 6
+    assert all(20 < one.angle < 40 for one in (*flat, *same))
+    assert all(1.02 < one.loosened < 1.2 for one in loose)
+    assert all(a.volume < b.volume for a, b in zip(flat, loose, strict=True))
+    for one in runs:
+        assert one.overlap < 0.02
+        assert load_on_walls(one.end) == pytest.approx(1.0, abs=0.03)
+    # Whole sweeps would diverge in the bed that has settled; those that are made converge.
+    for one in loose:
+        least, most = eigenvalues(one.settled, one.width)
+        assert least < -1
+        assert all(abs(1 - RELAXATION + RELAXATION * value) < 0.9 for value in (least, most))

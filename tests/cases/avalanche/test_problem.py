@@ -1,0 +1,95 @@
+"""Calibration to an angle of repose, and to a profile of any size."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cases.avalanche.measured import MeasuredProfile, area, read
+from cases.avalanche.measures import profile, repose
+from cases.avalanche.problem import calibration, misfit, problem
+from cases.case import every
+from cases.granular_bench.measured import Measurement
+from tests.cases.avalanche.slopes import leaning
+from tests.judged import check_message
+from tisim import InputError
+
+HEADING = "distance,height,uncertainty\n"
+WRONG = {
+    "no heading": ("0,1,1\n", "heading of .* must be quantity,value,uncertainty or distance,height,uncertai"),
+    "other quantity": ("quantity,value,uncertainty\ndischarge_rate,1,1\n", "must be one of angle_of_repose"),
+    "no angle": ("quantity,value,uncertainty\n", "quantities of .* must be one or more"),
+    "too few": (HEADING + "0,1,1\n1,0,1\n", "profile must be of 4 points or more; received 2"),
+    "no number": (HEADING + "0,1,1\n1,x,1\n", "must be of numbers below its heading"),
+    "falls back": (HEADING + "0,3,1\n1,2,1\n1,1,1\n2,0,1\n", "distance must be rising"),
+    "flat": (
+        HEADING + "0,0,1\n1,0,1\n2,0,1\n3,0,1\n",
+        "height must be finite and not below 0, and some",
+    ),
+    "too sure": (HEADING + "0,3,1\n1,2,1\n2,1,0\n3,0,1\n", "uncertainty must be finite and above 0"),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_files_are_refused(text, message, tmp_path):
+    path = tmp_path / "mine.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as error_info:
+        read(path)
+    check_message(str(error_info.value))
+
+
+def test_an_angle_is_met_in_uncertainties(tmp_path):
+    path = tmp_path / "mine.csv"
+    path.write_text("quantity,value,uncertainty\nangle_of_repose,41,2\n")
+    target = read(path)
+    assert target == Measurement(41.0, 2.0)
+    result = SimpleNamespace(state=leaning(16, 1))
+    assert misfit(result, target) == pytest.approx(((repose(result.state) - 41) / 2) ** 2)
+
+
+def triangle(top, foot, uncertainty):
+    """A measured profile of a straight slope, of 9 points and one beyond its foot."""
+    place = np.append(np.linspace(0, foot, 9), 1.2 * foot)
+    return MeasuredProfile(place, np.maximum(top * (1 - place / foot), 0.0), np.full(10, uncertainty))
+
+
+def test_a_profile_is_met_by_the_same_slope_of_any_size():
+    place = np.linspace(0.0, 2.0, 201)
+    height = np.maximum(1.5 - place, 0.0)
+    assert area(place, height) == pytest.approx(1.125, rel=1e-3)
+    for size in (1.0, 30.0):
+        assert triangle(1.5 * size, 1.5 * size, 0.01 * size).misfit(place, height) < 0.01
+    # One that is flatter is off by what its heights are: at the end of the cell by 1.5 - 1.5 / sqrt(1.5).
+    flatter = triangle(1.5, 1.5 * 1.5, 0.1)
+    off = flatter.height - np.maximum(1.5 * 1.5**0.5 - flatter.distance, 0.0)
+    assert flatter.misfit(place, height) == pytest.approx(float(((off / 0.1) ** 2).mean()), rel=0.02)
+
+
+def test_a_profile_tells_slopes_apart():
+    """That of the state itself is met best."""
+    place, height = profile(leaning(16, 2))
+    target = MeasuredProfile(place, height, np.full(len(place), 1e-3))
+    same, steep = (misfit(SimpleNamespace(state=leaning(16, run)), target) for run in (2, 1))
+    assert same == pytest.approx(0.0, abs=1e-12)
+    assert steep > 10
+
+
+def test_other_measurements_are_another_problem(tmp_path):
+    path = tmp_path / "mine.csv"
+    path.write_text(HEADING + "0,5,1\n4,3,1\n8,1,1\n12,0,1\n")
+    case = every()["avalanche"]
+    usual, settings = case.inverse("default", None)
+    own, _ = case.inverse("default", "calibrate", path)
+    assert usual.identity != own.identity
+    assert own.identity == calibration("default", "calibrate", path).identity
+    assert usual.identity == problem().identity
+    assert settings["generations"] == 6
+    design = {"friction": 0.3, "rolling_friction": 0.1, "cohesion": 50.0}
+    scene = usual.scene(design, 1)
+    assert scene.digest() == own.scene(design, 1).digest()
+    assert scene.materials["iron"].cohesion_energy_density == 50.0
+    assert "magnetic_field" not in {effect.label for effect in scene.effects}
+    assert "a measured profile" in own.title
+    with pytest.raises(InputError, match="size must be one of default for the inverse problem"):
+        case.inverse("l21", "calibrate")
