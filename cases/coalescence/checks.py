@@ -18,13 +18,11 @@ from cases.coalescence.published import (
     ROTATIONS,
     SPACING,
 )
-from cases.coalescence.runs import CloudRun, clouds, of_magnetisation
+from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
 from cases.coalescence.scaling import critical_spin, free_fall, mean_density
 from cases.coalescence.scene import DEFAULT, scene
 from cases.statistics import Claim, Mean
 
-SEEDS = 4
-"""There are so many random starts of each magnetisation."""
 ROUNDING = 1e-11
 """Momenta may be off by so much of the sum of what the grains have."""
 GAINED = 2e-3

@@ -18,7 +18,7 @@ from cases.coalescence.published import (
     MAGNETISATIONS,
     SURFACE_ENERGY,
 )
-from cases.coalescence.runs import CloudRun, clouds, of_magnetisation
+from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
 from cases.coalescence.scaling import (
     attraction,
     dmt_cohesion,
@@ -34,8 +34,6 @@ from tisim.plotting.clusters import CLUSTER_COLOURS, SINGLE
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
-SEEDS = 3
-"""Means are of so many starts."""
 SHELLS = 4
 """Voronoi volumes are means over so many shells of equal volume."""
 ACCELERATION = 5e-6

@@ -20,10 +20,8 @@ from tisim.scene.initial_state import Arrays
 
 GAP = 0.01
 """Grains count as bound whose surfaces are at most so far apart, over the smallest diameter."""
-MANY = 11
+CLUMP = 11
 """A clump has more than ten grains."""
-FEWEST = 5
-"""So many grains have a shape."""
 
 
 def clusters_of(state: Arrays) -> np.ndarray:
@@ -60,7 +58,7 @@ class Agglomeration:
         # One grain by itself is no asteroid.
         inside &= inside.sum() > 1
         others = cluster[~inside]
-        return cls(float(inside.mean()), fraction_in_clusters(others, 2), fraction_in_clusters(others, MANY))
+        return cls(float(inside.mean()), fraction_in_clusters(others, 2), fraction_in_clusters(others, CLUMP))
 
     @property
     def bound(self) -> float:
@@ -77,7 +75,7 @@ class Asteroid:
 
     @classmethod
     def of(cls, state: Arrays) -> Asteroid:
-        """Return the asteroid in a state, which has FEWEST grains or more."""
+        """Return the asteroid in a state, which has two grains or more."""
         grains = part(state, body(clusters_of(state), state["mass"]))
         return cls(grains, bounding_ellipsoid(grains["position"], grains["radius"]))
 
@@ -90,6 +88,14 @@ class Asteroid:
     def elongation(self) -> float:
         """Return the longest axis over the shortest."""
         return float(self.ellipsoid.semi_axes[0] / self.ellipsoid.semi_axes[2])
+
+    @property
+    def flattening(self) -> float:
+        """Return its width across z over its height along z, by the second moments of its spheres."""
+        mass, radius, place = (self.grains[name] for name in ("mass", "radius", "position"))
+        away = place - np.average(place, axis=0, weights=mass)
+        x, y, z = np.average(away**2 + radius[:, None] ** 2 / 5, axis=0, weights=mass)
+        return float(np.sqrt((x + y) / (2 * z)))
 
     @property
     def volume(self) -> float:

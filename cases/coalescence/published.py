@@ -30,7 +30,7 @@ MEASURED = {"Braille": 110.0, "Gaspra": 93.0}
 """Magnetisations of asteroids that spacecraft have met, A/m; section 4.6."""
 
 
-class Bound(NamedTuple):
+class BoundParts(NamedTuple):
     """What part of the grains that are not in the asteroid are in clusters of two or more, and of more than
     ten."""
 
@@ -38,7 +38,11 @@ class Bound(NamedTuple):
     many: float
 
 
-BOUND = {0.0: Bound(0.007, 0.0), 119.0: Bound(0.145, 0.01), 1190.0: Bound(0.89, 0.45)}
+BOUND = {
+    0.0: BoundParts(0.007, 0.0),
+    119.0: BoundParts(0.145, 0.01),
+    1190.0: BoundParts(0.89, 0.45),
+}
 """By magnetisation (A/m), of grains of 50 cm at 15 000 s; section 4.2.2.1."""
 
 AXES = {

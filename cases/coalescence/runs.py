@@ -17,8 +17,10 @@ from tisim import Scene, Simulation
 from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 
-LOOKS = 25
+CLOUD_LOOKS = 25
 """A cloud is looked at so many times after the start, at even intervals."""
+SEEDS = 3
+"""There are so many random starts of each magnetisation."""
 T = TypeVar("T")
 
 
@@ -76,7 +78,7 @@ def clouds(
     seeds: int,
     progress: Progress = lambda part: None,
     magnetisations: Sequence[float] = MAGNETISATIONS,
-    looks: int = LOOKS,
+    looks: int = CLOUD_LOOKS,
     **settings: Any,
 ) -> list[CloudRun]:
     """Return what becomes of clouds of each magnetisation (A/m), each from some starts.

@@ -12,11 +12,9 @@ from cases.coalescence.published import MAGNETISATIONS
 from cases.coalescence.scaling import critical_spin
 from cases.spin_up.published import DEFORMATION, DISRUPTION
 from cases.spin_up.scene import DEFAULT
-from cases.spin_up.stages import SpinUp, spin_ups
+from cases.spin_up.stages import SEEDS, SpinUp, spin_ups
 from cases.statistics import Claim, Mean
 
-SEEDS = 4
-"""There are so many random starts of each magnetisation."""
 ROUNDING = 1e-11
 """Momenta may be off by so much of the sum of what the grains have."""
 

@@ -15,13 +15,11 @@ from cases.coalescence.published import MAGNETISATIONS
 from cases.coalescence.scaling import critical_spin
 from cases.spin_up.published import DISRUPTION
 from cases.spin_up.scene import SIZES
-from cases.spin_up.stages import SpinStep, SpinUp, spin_ups
+from cases.spin_up.stages import SEEDS, SpinStep, SpinUp, spin_ups
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import directions, view
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
-SEEDS = 3
-"""Means are of so many starts."""
 SHOWN = (0.0, 6e-4, 8e-4)
 """Piles are drawn after these steps, rad/s."""
 WIDER = 1.6
@@ -29,21 +27,22 @@ WIDER = 1.6
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """spin_up.png: axis ratios, densities and mass against spin; piles.png: piles on the way; spin_up.csv."""
+    """spin_up.png: shape, density and mass against spin; piles.png: piles on the way; spin_up.csv: the
+    numbers."""
     settings = {k: v for k, v in size_named(size, SIZES).scene.items() if k != "magnetisation"}
     runs = spin_ups(SEEDS, progress, **settings)
     return {"spin_up.png": against_spin(runs), "piles.png": piles(runs), "spin_up.csv": table(runs)}
 
 
 def measured(step: SpinStep) -> tuple[float, float, float]:
-    """Return the longest axis over the shortest, the density (kg/m^3), and the part of the mass in it."""
+    """Return the width over the height, the density (kg/m^3), and the part of the mass in the pile."""
     asteroid = step.asteroid
-    return asteroid.elongation, asteroid.density, 1 - step.lost
+    return asteroid.flattening, asteroid.density, step.held
 
 
 def against_spin(runs: Sequence[SpinUp]) -> Figure:
-    """Draw axis ratios, densities (L21 Fig. 4.11) and the mass that is left against the angular velocity that
-    a pile was given; thin lines are single piles, dotted ones where L21's are disrupted."""
+    """Draw widths over heights, densities (L21 Fig. 4.11) and the mass that is left against the angular
+    velocity that a pile was given; thin lines are single piles, dotted ones where L21's are disrupted."""
     figure = empty(11.6, 3.6)
     axes = figure.subplots(1, 3)
     for m, colour in zip(MAGNETISATIONS, AXIS_COLOURS, strict=True):
@@ -60,7 +59,7 @@ def against_spin(runs: Sequence[SpinUp]) -> Figure:
     axes[2].axvline(
         1e6 * critical_spin(float(density)), color="0.4", lw=0.9, ls="--", label="critical, 0 A/m"
     )
-    axes[0].set(ylabel="longest axis over shortest")
+    axes[0].set(ylabel="width over height")
     axes[1].set(ylabel="density (kg/m³)", ylim=(0, None))
     axes[2].set(ylabel="part of the mass in the pile", ylim=(0, 1.05))
     for axis in axes:
@@ -96,14 +95,12 @@ def table(runs: Sequence[SpinUp]) -> str:
     writer.writerow(
         [
             "magnetisation_A_per_m", "spin_given_rad_per_s", "major_m", "intermediate_m", "minor_m",
-            "density_kg_per_m3", "part_of_mass", "angular_momentum_kg_m2_per_s",
+            "width_over_height", "density_kg_per_m3", "part_of_mass", "angular_momentum_kg_m2_per_s",
         ]
     )  # fmt: skip
     for one in runs:
         for step in one.steps:
-            asteroid = step.asteroid
-            values = (
-                *asteroid.ellipsoid.semi_axes, asteroid.density, 1 - step.lost, step.angular_momentum,
-            )  # fmt: skip
+            axes = step.asteroid.ellipsoid.semi_axes
+            values = (*axes, *measured(step), step.angular_momentum)
             writer.writerow([one.magnetisation, f"{step.rate:.4g}", *(f"{value:.5g}" for value in values)])
     return text.getvalue()

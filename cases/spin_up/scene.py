@@ -25,10 +25,10 @@ NUMBERS = {DIAMETERS[0]: 33_220, DIAMETERS[1]: 4_088}
 """L21's grains by their diameter (m), of equal mass in all; section 4.3.1."""
 SETTLED = 7500.0
 """When the pile of the default size is at rest, s: three times of free fall."""
-DEFAULT: Mapping[str, Any] = {"number": 120, "spacing": 1.3, "softened": 10.0, "duration": SETTLED}
+DEFAULT: Mapping[str, Any] = {"number": 80, "spacing": 1.3, "softened": 10.0, "duration": SETTLED}
 
 SIZES = {
-    "default": Size("120 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's pile", DEFAULT),
+    "default": Size("80 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's pile", DEFAULT),
     "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
     "l21": Size("L21's 4088 grains of 100 cm, gravity by a tree", {"tree": True}),
     "l21_50cm": Size("L21's 33,220 grains of 50 cm", {"diameter": DIAMETERS[0], "tree": True}),

@@ -24,10 +24,12 @@ QUICK = 4e-4
 """Up to this one, rad/s, each is held for the shorter time."""
 HOLDS = (500.0, 3000.0)
 """They are held for so long, s; L21 section 4.3.1."""
-LOST = 0.02
-"""A pile is disrupted where this part of its mass, or more, is no longer in it. L21 gives no number."""
+LOST = 0.05
+"""A pile is disrupted where it has lost this part of all grains, or more. L21 gives no number."""
 DEFORMED = 1.1
-"""A pile is deformed where its longest axis over its shortest has grown by this. L21 gives no number."""
+"""A pile is deformed where its width over its height has grown by this. L21 gives no number."""
+SEEDS = 3
+"""There are so many random starts of each magnetisation."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,10 @@ class SpinStep:
         return Asteroid.of(self.state)
 
     @property
-    def lost(self) -> float:
-        """Return the part of the mass that is not in the pile."""
+    def held(self) -> float:
+        """Return the part of the mass of all grains that is in the pile."""
         inside = body(clusters_of(self.state), self.state["mass"])
-        return 1 - float(self.state["mass"][inside].sum() / self.state["mass"].sum())
+        return float(self.state["mass"][inside].sum() / self.state["mass"].sum())
 
     @property
     def angular_momentum(self) -> float:
@@ -63,22 +65,30 @@ class SpinUp:
     steps: Sequence[SpinStep]
 
     @property
-    def deformation(self) -> float:
-        """Return the first angular velocity (rad/s) that deformed or disrupted it; NaN where none did."""
-        first = self.steps[0].asteroid.elongation
-        return self._first(lambda step: step.lost >= LOST or step.asteroid.elongation >= DEFORMED * first)
+    def broken(self) -> np.ndarray:
+        """Return after which steps it has lost LOST or more of all grains since it had most; shape
+        (steps,)."""
+        held = np.array([step.held for step in self.steps])
+        # What has not come down yet at the start may still do so.
+        return np.asarray(np.maximum.accumulate(held) - held >= LOST)
 
     @property
     def disruption(self) -> float:
-        """Return the first angular velocity (rad/s) at which it lost grains; NaN where it lost none."""
-        return self._first(lambda step: step.lost >= LOST)
+        """Return the first angular velocity (rad/s) that broke it; NaN where none did."""
+        return self._first(self.broken)
+
+    @property
+    def deformation(self) -> float:
+        """Return the first angular velocity (rad/s) that deformed or broke it; NaN where none did."""
+        shape = np.array([step.asteroid.flattening for step in self.steps])
+        return self._first(self.broken | (shape >= DEFORMED * shape[0]))
 
     def at(self, rate: float) -> SpinStep:
         """Return the step with the angular velocity that is nearest to one, rad/s."""
         return self.steps[int(np.abs([step.rate - rate for step in self.steps]).argmin())]
 
-    def _first(self, happened: Any) -> float:
-        return next((step.rate for step in self.steps[1:] if happened(step)), float("nan"))
+    def _first(self, happened: np.ndarray) -> float:
+        return self.steps[int(happened.argmax())].rate if happened.any() else float("nan")
 
 
 def turn(state: ParticleState, rate: float) -> None:

@@ -79,3 +79,10 @@ def test_what_is_conserved():
     np.testing.assert_allclose(found.angular, [0.0, 0.0, -4.0 + 0.4 * 2.0 * 0.25 * 3.0])
     assert found.kinetic == pytest.approx(2.0 + 0.5 * 0.4 * 2.0 * 0.25 * 9.0)
     assert found.gravity == pytest.approx(-6.674e-11 * 4.0 / 2.0, rel=1e-4)
+
+
+def test_how_flat_an_asteroid_is():
+    """A sphere is not; a row across z is as wide as the roots of its second moments."""
+    assert Asteroid.of(state_of(row(1))).flattening == pytest.approx(1.0)
+    # Along x: variance 2/3 of three places at -1, 0, 1, beside R^2/5 of the spheres.
+    assert Asteroid.of(state_of(row(3))).flattening == pytest.approx(np.sqrt((2 / 3 + 0.1) / 0.1))

@@ -45,8 +45,8 @@ def test_a_pile_is_turned_as_a_whole():
 
 
 def pile(tall=1, lost=0):
-    """A block of 3 x 3 grains, 3 or more high, and some that are far away."""
-    place = np.argwhere(np.ones((3, 3, 2 + tall))).astype(float)
+    """A block of 3 x 3 grains, 3 or more along x, and some that are far away."""
+    place = np.argwhere(np.ones((2 + tall, 3, 3))).astype(float)
     place[len(place) - lost :] += 50.0 * np.arange(1, lost + 1)[:, None]
     return state_of(place)
 
@@ -60,8 +60,10 @@ def test_when_a_pile_deforms_and_breaks():
     run = spin_up(pile(), pile(), pile(tall=2), pile(tall=2, lost=3))
     assert run.deformation == pytest.approx(2e-4)
     assert run.disruption == pytest.approx(3e-4)
-    assert run.steps[3].lost == pytest.approx(3 / 36)
+    assert run.steps[3].held == pytest.approx(33 / 36)
     assert run.at(1.9e-4) is run.steps[2]
+    # Grains that come down late are no loss.
+    assert np.isnan(spin_up(pile(lost=3), pile(), pile(lost=1)).disruption)
     # One that breaks is no longer what it was either.
     assert spin_up(pile(), pile(lost=3)).deformation == pytest.approx(1e-4)
     assert np.isnan([spin_up(pile(), pile()).deformation, spin_up(pile(), pile(tall=2)).disruption]).all()
