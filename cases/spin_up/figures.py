@@ -22,7 +22,7 @@ from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 SHOWN = (0.0, 6e-4, 8e-4)
 """Piles are drawn after these steps, rad/s."""
-WIDER = 1.6
+WIDER = 2.2
 """A picture is so many times as wide as the pile at rest."""
 
 
@@ -76,7 +76,8 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
     axes = figure.subplots(len(MAGNETISATIONS), len(SHOWN))
     for row, m in zip(axes, MAGNETISATIONS, strict=True):
         run = next(one for one in runs if one.magnetisation == m)
-        left, bottom, side = view(moved(run.steps[0].state, run.steps[0].asteroid.grains), NO_BOX)
+        pile = run.steps[0].asteroid.grains
+        left, bottom, side = view(moved(pile, pile), NO_BOX)
         room = (WIDER - 1) / 2 * side
         square = (left - room, bottom - room, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
@@ -94,7 +95,7 @@ def table(runs: Sequence[SpinUp]) -> str:
     writer = csv.writer(text)
     writer.writerow(
         [
-            "magnetisation_A_per_m", "spin_given_rad_per_s", "major_m", "intermediate_m", "minor_m",
+            "magnetisation_A_per_m", "seed", "spin_given_rad_per_s", "major_m", "intermediate_m", "minor_m",
             "width_over_height", "density_kg_per_m3", "part_of_mass", "angular_momentum_kg_m2_per_s",
         ]
     )  # fmt: skip
@@ -102,5 +103,7 @@ def table(runs: Sequence[SpinUp]) -> str:
         for step in one.steps:
             axes = step.asteroid.ellipsoid.semi_axes
             values = (*axes, *measured(step), step.angular_momentum)
-            writer.writerow([one.magnetisation, f"{step.rate:.4g}", *(f"{value:.5g}" for value in values)])
+            writer.writerow(
+                [one.magnetisation, one.seed, f"{step.rate:.4g}", *(f"{value:.5g}" for value in values)]
+            )
     return text.getvalue()

@@ -59,9 +59,10 @@ class SpinStep:
 
 @dataclass(frozen=True)
 class SpinUp:
-    """A spin-up of a pile of grains of a magnetisation (A/m; that of L21's pile), step by step."""
+    """A spin-up of a pile of grains of a magnetisation (A/m; that of L21's pile) and a seed, step by step."""
 
     magnetisation: float
+    seed: int
     steps: Sequence[SpinStep]
 
     @property
@@ -135,4 +136,4 @@ def spin_ups(
             for steps, result in zip(seen, unbroken(simulation), strict=True):
                 steps.append(SpinStep(rate, result.state))
             progress(float(end / ends[-1]))
-    return [SpinUp(m, steps) for (m, _), steps in zip(wanted, seen, strict=True)]
+    return [SpinUp(*one, steps) for one, steps in zip(wanted, seen, strict=True)]

@@ -53,7 +53,7 @@ def pile(tall=1, lost=0):
 
 def spin_up(*states, magnetisation=0.0):
     steps = [SpinStep(1e-4 * k, state) for k, state in enumerate(states)]
-    return SpinUp(magnetisation, steps)
+    return SpinUp(magnetisation, 0, steps)
 
 
 def test_when_a_pile_deforms_and_breaks():
