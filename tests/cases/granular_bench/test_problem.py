@@ -118,6 +118,5 @@ def test_a_known_design_is_found_again():
     search = every()["granular_bench"].sizes["small"].search
     outcome = optimize.run(calibration_to(measured, "small"), **search)
     best = outcome.designs[0]
-    assert best.values["misfit"] < 1
     for name, interval in INTERVALS.items():
         assert best.genes[name] == pytest.approx(KNOWN[name], abs=interval)
