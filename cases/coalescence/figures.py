@@ -34,8 +34,9 @@ from tisim.plotting.clusters import CLUSTER_COLOURS, SINGLE
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
-SHELLS = 4
-"""Voronoi volumes are means over so many shells of equal volume."""
+SHELLS = 2
+"""Voronoi volumes are means over so many shells of equal volume; of so few grains those farther out, in
+more shells, have no cells within the asteroid."""
 ACCELERATION = 5e-6
 """At the surface of L21's asteroids, m/s^2; section 4.6."""
 NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)

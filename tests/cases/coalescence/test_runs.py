@@ -56,7 +56,7 @@ def test_what_is_drawn_of_runs():
     assert len(asteroids([of_magnetisation(RUNS, m)[0] for m in MAGNETISATIONS]).axes) == 3
     assert len(forces().axes) == 1
     assert len(table(RUNS).splitlines()) == 1 + len(RUNS)
-    assert shells(RUNS[0]).shape == (4,)
+    assert shells(RUNS[0]).shape == (2,)
     colours = cluster_colours(state_of(np.vstack([row(3), row(1, at=(0, 9, 0))])))
     assert (colours[:3] == colours[0]).all()
     assert not (colours[3] == colours[0]).all()

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cases.coalescence.measures import Asteroid, Conserved
-from cases.spin_up.checks import of_spins
+from cases.spin_up.checks import at_least, of_conservation, of_spins
 from cases.spin_up.figures import against_spin, piles, table
 from cases.spin_up.published import DEFORMATION, DISRUPTION
 from cases.spin_up.scene import NUMBERS, SIZES, scene_for
-from cases.spin_up.stages import RATES, SpinStep, SpinUp, turn
+from cases.spin_up.stages import RATES, SpinStep, SpinUp, spin_ups, turn
 from tests.cases.coalescence.test_measures import block, state_of
 
 
@@ -81,4 +81,17 @@ def test_figures_and_claims_of_some_runs():
     claims = {claim.name: claim for claim in of_spins(runs)}
     assert claims["0 A/m: breaks at, urad/s (L21: 700)"].mean.value == pytest.approx(200.0)
     assert claims["1190 A/m: deforms at, urad/s (L21: 700)"].mean.value == pytest.approx(100.0)
+    np.testing.assert_allclose(at_least([7e-4, np.nan]), [700.0, 1000.0])
     assert claims["breaks at, 1190 less 0 A/m, urad/s (L21: 100)"].mean.value == 0.0
+
+
+@pytest.mark.slow
+def test_a_tiny_pile_has_the_spins_that_it_is_given():
+    """Grains that touch at the start are a pile at once; it keeps its momentum while it is turned."""
+    settings = {"number": 27, "spacing": 1.0, "softened": 10.0, "duration": 50.0}
+    (run,) = spin_ups(1, magnetisations=(0.0,), rates=(1e-4, 5e-4), holds=(5.0, 5.0), **settings)
+    assert [step.rate for step in run.steps] == [0.0, 1e-4, 5e-4]
+    for step in run.steps[1:]:
+        assert step.asteroid.spin[2] == pytest.approx(step.rate, rel=0.05)
+    (check,) = of_conservation([run])
+    assert check.ok
