@@ -1,0 +1,175 @@
+"""Figures of the case coalescence: how clouds agglomerate, asteroids side by side, forces by size."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cases.case import size_named
+from cases.coalescence.measures import clusters_of, part
+from cases.coalescence.published import (
+    DENSITY,
+    DIAMETERS,
+    MAGNETISATIONS,
+    SURFACE_ENERGY,
+)
+from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
+from cases.coalescence.scaling import (
+    attraction,
+    dmt_cohesion,
+    mutual_gravity,
+    surface_cohesion,
+    surface_weight,
+)
+from cases.coalescence.scene import SIZES
+from tisim.analysis import voronoi_by_shell
+from tisim.engine.batches import Progress
+from tisim.plotting.cloud import common, corners, directions, panel, project
+from tisim.plotting.clusters import CLUSTER_COLOURS, SINGLE
+from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
+from tisim.scene.initial_state import Arrays
+
+SHELLS = 2
+"""Voronoi volumes are means over so many shells of equal volume; of so few grains those farther out, in
+more shells, have no cells within the asteroid."""
+ACCELERATION = 5e-6
+"""At the surface of L21's asteroids, m/s^2; section 4.6."""
+NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
+"""Clouds are in open space."""
+
+
+def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
+    """coalescence.png: what part of the grains is bound, in time; asteroids.png: the grains at the end,
+    coloured by cluster; forces.png: forces on a grain by size; coalescence.csv: what is measured of each."""
+    settings = {k: v for k, v in size_named(size, SIZES).scene.items() if k != "magnetisation"}
+    runs = clouds(SEEDS, progress, **settings)
+    return {
+        "coalescence.png": growth(runs),
+        "asteroids.png": asteroids([of_magnetisation(runs, m)[0] for m in MAGNETISATIONS]),
+        "forces.png": forces(),
+        "coalescence.csv": table(runs),
+    }
+
+
+def growth(runs: Sequence[CloudRun]) -> Figure:
+    """Draw the part of all grains in clusters of two or more and in the asteroid, in time (L21 Fig. 4.1), and
+    the Voronoi volumes at the end by shell (Fig. 4.6); thin lines are single clouds."""
+    figure = empty(11.6, 3.6)
+    left, middle, right = figure.subplots(1, 3)
+    for m, colour in zip(MAGNETISATIONS, AXIS_COLOURS, strict=True):
+        group = of_magnetisation(runs, m)
+        for axis, name in ((left, "bound"), (middle, "coalesced")):
+            values = np.array([[getattr(a, name) for a in one.agglomerations] for one in group])
+            axis.plot(group[0].times, values.T, color=colour, lw=0.6, alpha=0.5)
+            axis.plot(group[0].times, values.mean(axis=0), color=colour, lw=2.0, label=f"{m:g} A/m")
+        volumes = np.array([shells(one) for one in group])
+        known = np.isfinite(volumes)
+        mean = np.where(known, volumes, 0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        right.plot(np.arange(1, SHELLS + 1), np.where(known.any(axis=0), mean, np.nan), "o-", color=colour)
+    left.set(xlabel="time (s)", ylabel="part of the grains", ylim=(0, 1.02), title="in clusters")
+    middle.set(xlabel="time (s)", ylim=(0, 1.02), title="in the asteroid")
+    right.set(xlabel="shell, from the centre", ylabel="Voronoi volume over a grain's")
+    right.set_xticks(np.arange(1, SHELLS + 1))
+    left.legend(frameon=False, fontsize=8, title="as in L21's cloud")
+    for axis in (left, middle, right):
+        plain(axis)
+    letters((left, middle, right))
+    return figure
+
+
+def shells(run: CloudRun) -> np.ndarray:
+    """Return the mean Voronoi volume in shells of the asteroid at the end, over the volume of a grain."""
+    asteroid = run.asteroid
+    volume = voronoi_by_shell(asteroid.grains["position"], asteroid.ellipsoid, SHELLS).volume
+    return np.asarray(volume / (4 / 3 * np.pi * float(asteroid.grains["radius"].min()) ** 3))
+
+
+def cluster_colours(state: Arrays) -> np.ndarray:
+    """Return the colour of each grain by its cluster, grey of single ones; shape (n, 3)."""
+    cluster = clusters_of(state)
+    size = np.bincount(cluster)
+    rank = np.argsort(np.argsort(-size, kind="stable"))
+    colours = CLUSTER_COLOURS[rank[cluster] % len(CLUSTER_COLOURS)]
+    colours[size[cluster] == 1] = SINGLE
+    return np.asarray(colours)
+
+
+def asteroids(runs: Sequence[CloudRun]) -> Figure:
+    """Draw the grains of clouds at the end side by side, near the asteroid, coloured by cluster (L21 Figs
+    4.2, 4.4)."""
+    figure = empty(11.6, 4.2)
+    axes = figure.subplots(1, len(runs))
+    grains = [one.asteroid.grains for one in runs]
+    centred = [moved(one, one) for one in grains]
+    square = common(centred, NO_BOX)
+    for axis, one, pile in zip(axes, runs, grains, strict=True):
+        close_up(axis, one.end, pile, square)
+        directions(axis, square, NO_GRAVITY)
+        axis.set_title(f"{one.magnetisation:g} A/m: {len(pile['mass'])} of {len(one.end['mass'])} grains")
+    letters(axes)
+    return figure
+
+
+def close_up(axis: Axes, state: Arrays, grains: Arrays, square: tuple[float, float, float]) -> None:
+    """Draw the grains of a state that are in a square around the centre of mass of some of them, coloured by
+    cluster."""
+    left, bottom, side = square
+    centred, colours = moved(state, grains), cluster_colours(state)
+    right_up = project(centred["position"])[:, :2] - (left, bottom)
+    inside = np.all((right_up > 0) & (right_up < side), axis=1)
+    panel(axis, part(centred, inside), square, NO_BOX, colours[inside])
+
+
+def moved(state: Arrays, grains: Arrays) -> Arrays:
+    """Return a state in which the centre of mass of some grains is the origin."""
+    centre = np.average(grains["position"], axis=0, weights=grains["mass"])
+    return {**state, "position": state["position"] - centre}
+
+
+def forces() -> Figure:
+    """Draw the forces on a grain by its diameter: magnetism, cohesion, weight and the gravity of its
+    neighbour (L21 Fig. 4.15)."""
+    figure = empty(5.8, 4.2)
+    axis = figure.subplots()
+    line = np.geomspace(1e-4, 1e2, 60)
+    for m, colour in zip(MAGNETISATIONS[1:], AXIS_COLOURS[1:], strict=True):
+        axis.plot(line, [attraction(d, m) for d in line], color=colour, label=f"dipoles, {m:g} A/m")
+    weight = [surface_weight(d, DENSITY, ACCELERATION) for d in line]
+    axis.plot(line, weight, color=AXIS_COLOURS[0], label="weight at 5e-6 m/s²")
+    axis.plot(
+        line, [mutual_gravity(d, DENSITY) for d in line], ":", color=AXIS_COLOURS[0], label="self-gravity"
+    )
+    axis.plot(line, [surface_cohesion(d, 0.1) for d in line], "--", color="0.4", label="cohesion, S = 0.1")
+    axis.plot(line, [dmt_cohesion(d, SURFACE_ENERGY) for d in line], color="0.4", label="cohesion, DMT")
+    for d in DIAMETERS:
+        axis.axvline(d, color="0.8", lw=0.8, zorder=0)
+    axis.set(xscale="log", yscale="log", xlabel="diameter of the grains (m)", ylabel="force (N)")
+    axis.set(xlim=(1e-4, 1e2), ylim=(1e-12, 1e6))
+    axis.legend(frameon=False, fontsize=8)
+    plain(axis)
+    return figure
+
+
+def table(runs: Sequence[CloudRun]) -> str:
+    """Return what is measured of each cloud at the end as CSV."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(
+        [
+            "magnetisation_A_per_m", "seed", "part_in_asteroid", "part_in_clusters", "grains",
+            "major_m", "intermediate_m", "minor_m", "density_kg_per_m3", "bulk_over_grain_magnetisation",
+        ]
+    )  # fmt: skip
+    for one in runs:
+        asteroid, last = one.asteroid, one.agglomerations[-1]
+        bulk = one.magnetised_part if one.magnetisation else float("nan")
+        values = (last.coalesced, last.bound, asteroid.number, *asteroid.ellipsoid.semi_axes)
+        more = (asteroid.density, bulk)
+        numbers = [f"{value:.4g}" for value in (*values, *more)]
+        writer.writerow([one.magnetisation, one.scene.seed, *numbers])
+    return text.getvalue()

@@ -1,0 +1,165 @@
+"""What is measured of a cloud of grains and of the asteroid in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tisim.analysis import (
+    Ellipsoid,
+    angular_momentum,
+    bounding_ellipsoid,
+    contacts,
+    fraction_in_clusters,
+    gravitational_energy,
+    hull_volume,
+    labels,
+)
+from tisim.scene.initial_state import Arrays
+
+GAP = 0.01
+"""Grains count as bound whose surfaces are at most so far apart, over the smallest diameter."""
+CLUMP = 11
+"""A clump has more than ten grains."""
+
+
+def clusters_of(state: Arrays) -> np.ndarray:
+    """Return the cluster that each grain is in, as contacts bind them; shape (n,)."""
+    radius = state["radius"]
+    gap = GAP * 2 * float(radius.min())
+    return labels(len(radius), contacts(state["position"], radius, gap))
+
+
+def body(cluster: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Return which grains are in the heaviest cluster, the asteroid; shape (n,)."""
+    return np.asarray(cluster == np.bincount(cluster, mass).argmax())
+
+
+def part(state: Arrays, some: np.ndarray) -> Arrays:
+    """Return the state of some of the grains."""
+    return {name: values[some] for name, values in state.items()}
+
+
+@dataclass(frozen=True)
+class Agglomeration:
+    """How far a cloud has agglomerated: the part of all grains that are in the asteroid, and of the others
+    the parts that are in clusters of two or more and of more than ten; NaN where there are no others."""
+
+    coalesced: float
+    some: float
+    many: float
+
+    @classmethod
+    def of(cls, state: Arrays) -> Agglomeration:
+        """Return that of a state."""
+        cluster = clusters_of(state)
+        inside = body(cluster, state["mass"])
+        # One grain by itself is no asteroid.
+        inside &= inside.sum() > 1
+        others = cluster[~inside]
+        return cls(float(inside.mean()), fraction_in_clusters(others, 2), fraction_in_clusters(others, CLUMP))
+
+    @property
+    def bound(self) -> float:
+        """Return the part of all grains that are in clusters of two or more."""
+        return self.coalesced + (0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.some)
+
+
+@dataclass(frozen=True)
+class Asteroid:
+    """The grains of an asteroid, and its bounding ellipsoid."""
+
+    grains: Arrays
+    ellipsoid: Ellipsoid
+
+    @classmethod
+    def of(cls, state: Arrays) -> Asteroid:
+        """Return the asteroid in a state, which has two grains or more."""
+        grains = part(state, body(clusters_of(state), state["mass"]))
+        return cls(grains, bounding_ellipsoid(grains["position"], grains["radius"]))
+
+    @property
+    def number(self) -> int:
+        """Return how many grains it has."""
+        return len(self.grains["mass"])
+
+    @property
+    def elongation(self) -> float:
+        """Return the longest axis over the shortest."""
+        return float(self.ellipsoid.semi_axes[0] / self.ellipsoid.semi_axes[2])
+
+    @property
+    def flattening(self) -> float:
+        """Return its width across z over its height along z, by the second moments of its spheres."""
+        mass, radius, place = (self.grains[name] for name in ("mass", "radius", "position"))
+        away = place - np.average(place, axis=0, weights=mass)
+        x, y, z = np.average(away**2 + radius[:, None] ** 2 / 5, axis=0, weights=mass)
+        return float(np.sqrt((x + y) / (2 * z)))
+
+    @property
+    def volume(self) -> float:
+        """Return the volume of the convex hull of its grains, m^3."""
+        return hull_volume(self.grains["position"], self.grains["radius"])
+
+    @property
+    def density(self) -> float:
+        """Return its mass over that volume, kg/m^3."""
+        return float(self.grains["mass"].sum()) / self.volume
+
+    @property
+    def magnetisation(self) -> float:
+        """Return the sum of moments over that volume, A/m."""
+        return float(np.linalg.norm(self.grains["moment"].sum(axis=0))) / self.volume
+
+    @property
+    def spin(self) -> np.ndarray:
+        """Return the angular velocity (rad/s) of the rigid body with its inertia and angular momentum."""
+        return np.linalg.solve(inertia(self.grains), _momentum(self.grains))
+
+
+def inertia(grains: Arrays) -> np.ndarray:
+    """Return the moment of inertia of spheres as one rigid body about their centre of mass, kg m^2, shape (3,
+    3)."""
+    mass, radius = grains["mass"], grains["radius"]
+    arm = grains["position"] - np.average(grains["position"], axis=0, weights=mass)
+    around = float((mass * ((arm**2).sum(axis=1) + 0.4 * radius**2)).sum())
+    return np.asarray(around * np.eye(3) - (mass[:, None] * arm).T @ arm)
+
+
+def _momentum(grains: Arrays) -> np.ndarray:
+    return angular_momentum(*(grains[name] for name in ("position", "velocity", "mass", "radius", "spin")))
+
+
+@dataclass(frozen=True)
+class Conserved:
+    """What isolated grains conserve, or lose by contacts: momentum (kg m/s) and angular momentum (kg m^2/s),
+    over the sums of the magnitudes of their parts; kinetic energy and that of gravity, J."""
+
+    momentum: np.ndarray
+    angular: np.ndarray
+    momentum_sum: float
+    angular_sum: float
+    kinetic: float
+    gravity: float
+
+    @classmethod
+    def of(cls, state: Arrays) -> Conserved:
+        """Return those of a state."""
+        mass, radius, velocity = state["mass"], state["radius"], state["velocity"]
+        inside = 0.4 * mass * radius**2
+        spins = (state["spin"] ** 2).sum(axis=1)
+        arms = np.linalg.norm(np.cross(state["position"], velocity), axis=1)
+        return cls(
+            momentum=mass @ velocity,
+            angular=_momentum(state),
+            momentum_sum=float(mass @ np.linalg.norm(velocity, axis=1)),
+            angular_sum=float(mass @ arms + inside @ np.sqrt(spins)),
+            kinetic=0.5 * float(mass @ (velocity**2).sum(axis=1) + inside @ spins),
+            gravity=gravitational_energy(state["position"], mass),
+        )
+
+    @property
+    def energy(self) -> float:
+        """Return kinetic energy and that of gravity, J."""
+        return self.kinetic + self.gravity

@@ -1,0 +1,61 @@
+"""What L21 has of its clouds and asteroids: section 4.2, each number once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+NUMBER, SPACING, SEED_DIAMETER = 32_662, 2.0, 5.0
+"""Grains of the cloud, the distance of neighbours on its lattice and the diameter of the seed particle, m;
+section 4.2.1.4."""
+DIAMETERS = (0.5, 1.0)
+"""Those of grains, m; table 4.1."""
+DENSITY, YOUNG, POISSON, RESTITUTION, SURFACE_ENERGY, FRICTION = 3000.0, 1e6, 0.3, 0.1, 2.86e-3, 0.4
+"""kg/m^3, Pa, J/m^2 and ratios; table 4.1."""
+ROLLING_FRICTION, ROLLING_DAMPING, ROLLING_STIFFNESS = 0.8, 0.4, 10.0
+"""mu_r, gamma_r and k_r of table 4.1, which has no units; taken as those of ``rolling_sds``, N s/m
+and N/m."""
+MAGNETISATIONS = (0.0, 119.0, 1190.0)
+"""A/m; table 4.1."""
+TEMPERATURE = 8e20
+"""Of the cloud at the start, over the cube of a grain's diameter, K/m^3; section 4.2.1.4."""
+SPIN_MEAN, SPIN_DEVIATION = 5e-5, 1e-4
+"""Of the spins of grains at the start, rad/s; table 4.1. Taken as that of each component."""
+ROTATIONS = (500e-6, 1000e-6, 2000e-6)
+"""Angular velocities of the cloud as they are printed, rad/s; section 4.2.1.4."""
+DURATION = 15_000.0
+"""s; section 4.2.2.1."""
+CUTOFF = 6.0
+"""Dipoles act within three diameters, in radii; section 4.2.1.2."""
+MEASURED = {"Braille": 110.0, "Gaspra": 93.0}
+"""Magnetisations of asteroids that spacecraft have met, A/m; section 4.6."""
+
+
+class BoundParts(NamedTuple):
+    """What part of the grains that are not in the asteroid are in clusters of two or more, and of more than
+    ten."""
+
+    some: float
+    many: float
+
+
+BOUND = {
+    0.0: BoundParts(0.007, 0.0),
+    119.0: BoundParts(0.145, 0.01),
+    1190.0: BoundParts(0.89, 0.45),
+}
+"""By magnetisation (A/m), of grains of 50 cm at 15 000 s; section 4.2.2.1."""
+
+AXES = {
+    (0.5, 500e-6, 0.0): (9.1738, 8.8680, 8.2030),
+    (0.5, 500e-6, 119.0): (9.3322, 9.0238, 8.4696),
+    (0.5, 1000e-6, 0.0): (9.6852, 9.4346, 6.8965),
+    (0.5, 1000e-6, 119.0): (9.7087, 9.4537, 7.4939),
+    (0.5, 1000e-6, 1190.0): (17.7205, 16.8534, 12.7270),
+    (0.5, 2000e-6, 0.0): (10.3581, 9.8403, 5.0588),
+    (0.5, 2000e-6, 119.0): (11.3061, 10.2350, 5.1584),
+    (1.0, 1000e-6, 0.0): (21.3510, 20.5915, 19.6541),
+    (1.0, 1000e-6, 119.0): (21.3678, 20.7571, 20.0575),
+    (1.0, 1000e-6, 1190.0): (25.9366, 25.1804, 24.1899),
+}
+"""Axes (m) of the bounding ellipsoid by diameter (m), angular velocity (rad/s) and magnetisation (A/m); table
+4.2. As all grains would fill a ball of a radius of 9.5 m (0.5) or 19 m (1.0) to 60 %, they are half axes."""

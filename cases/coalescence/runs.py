@@ -1,0 +1,103 @@
+"""Clouds that are looked at on their way: as one batch, of several magnetisations and starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cases.coalescence.measures import Agglomeration, Asteroid, Conserved
+from cases.coalescence.published import MAGNETISATIONS, NUMBER
+from cases.coalescence.scene import scale_of, scene
+from cases.granular_bench.shear_cell import unbroken
+from tisim import Scene, Simulation
+from tisim.engine.batches import Progress
+from tisim.scene.initial_state import Arrays
+
+CLOUD_LOOKS = 25
+"""A cloud is looked at so many times after the start, at even intervals."""
+SEEDS = 3
+"""There are so many random starts of each magnetisation."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class CloudRun:
+    """What became of a cloud: its magnetisation (A/m) in L21's cloud and in this copy's, and at some times
+    (s) how far it was agglomerated and what it conserved; the state of its grains at the end."""
+
+    magnetisation: float
+    scale: float
+    scene: Scene
+    times: np.ndarray
+    agglomerations: Sequence[Agglomeration]
+    conserved: Sequence[Conserved]
+    end: Arrays
+
+    @property
+    def asteroid(self) -> Asteroid:
+        """Return the asteroid at the end."""
+        return Asteroid.of(self.end)
+
+    def at(self, time: float) -> Agglomeration:
+        """Return how far it was agglomerated when it was looked at next to a time (s)."""
+        return self.agglomerations[int(np.abs(self.times - time).argmin())]
+
+    @property
+    def magnetised_part(self) -> float:
+        """Return the magnetisation of the asteroid over that of its grains."""
+        return self.asteroid.magnetisation / (self.scale * self.magnetisation)
+
+
+def looked_at(
+    scenes: Sequence[Scene],
+    times: np.ndarray,
+    look: Callable[[Arrays], T],
+    progress: Progress = lambda part: None,
+) -> tuple[list[list[T]], list[Arrays]]:
+    """Run scenes as one batch; return what is seen of each at some times (s), and the states at the end.
+
+    RunError where one fails.
+    """
+    seen: list[list[T]] = [[] for _ in scenes]
+    with closing(Simulation(scenes[0], len(scenes))) as simulation:
+        simulation.load(scenes)
+        for time in times:
+            simulation.run(until=time)
+            for one, result in zip(seen, unbroken(simulation), strict=True):
+                one.append(look(result.state))
+            progress(float(time / times[-1]))
+        states = [result.state for result in unbroken(simulation)]
+    return seen, states
+
+
+def clouds(
+    seeds: int,
+    progress: Progress = lambda part: None,
+    magnetisations: Sequence[float] = MAGNETISATIONS,
+    looks: int = CLOUD_LOOKS,
+    **settings: Any,
+) -> list[CloudRun]:
+    """Return what becomes of clouds of each magnetisation (A/m), each from some starts.
+
+    settings : those of ``scene``. progress : is told the part that is done, 0..1.
+    """
+    wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
+    scenes = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
+    times = np.linspace(0.0, scenes[0].duration, looks + 1)
+    seen, states = looked_at(
+        scenes, times, lambda state: (Agglomeration.of(state), Conserved.of(state)), progress
+    )
+    scale = scale_of(settings.get("number", NUMBER))
+    return [
+        CloudRun(m, scale, one, times, [a for a, _ in looks_], [c for _, c in looks_], state)
+        for (m, _), one, looks_, state in zip(wanted, scenes, seen, states, strict=True)
+    ]
+
+
+def of_magnetisation(runs: Sequence[CloudRun], magnetisation: float) -> list[CloudRun]:
+    """Return the clouds of a magnetisation, A/m."""
+    return [one for one in runs if one.magnetisation == magnetisation]

@@ -1,0 +1,202 @@
+"""A cloud of magnetised grains falls together and becomes a rubble pile (L21 section 4.2).
+
+Grains on a lattice in a ball have thermal velocities, spins, a rotation as a whole, and moments along random
+directions, with a seed particle in the middle. What holds the pile is their gravity, DMT cohesion and
+dipoles.
+
+Departures from L21: fewer grains, of which the cloud is a copy of L21's (``scaling.py``); a smaller seed;
+dipoles over all pairs, without a cut-off; and a slower rotation, as a cloud that turns as L21 prints it flies
+apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.constants import Boltzmann
+
+from cases.case import Size, size_named
+from cases.coalescence import published
+from cases.coalescence.published import DENSITY, DIAMETERS, POISSON, SPACING
+from cases.coalescence.scaling import sphere_mass
+from cases.granular_bench.closed_forms import hertz_duration, reduced
+from tisim import Material, Particles, Scene
+from tisim.components.accuracy_parameter import three_digits
+from tisim.effects import (
+    DMT,
+    DipoleDipole,
+    Granular,
+    HertzMaterial,
+    MindlinForce,
+    PermanentMoment,
+    RestitutionDamping,
+    RollingSDS,
+    SelfGravity,
+    TreeGravity,
+    TruncatedDipoleDipole,
+)
+from tisim.effects.base import Effect
+from tisim.steppers import FixedStep, Verlet
+
+TITLE = "Magnetised grains fall together into a rubble pile"
+
+IMPACT = 0.02
+"""The speed of an impact, m/s, whose duration steps are parts of: that of a fall on L21's asteroid of grains
+of 100 cm."""
+STEPS_OF_IMPACT = 25.0
+"""A step is one of so many parts of that duration."""
+ROTATION = 5e-5
+"""The angular velocity of the cloud, rad/s; with it the pile turns at a third of the critical spin."""
+DEFAULT: Mapping[str, Any] = {"number": 180, "seed_diameter": 2.0}
+"""A laptop's cloud; the seed has the mass of eight grains of 180, L21's that of 125 of 32 662."""
+
+LAW = Granular(
+    normal=HertzMaterial(),
+    damping=RestitutionDamping(),
+    tangential=MindlinForce(),
+    rolling=RollingSDS(),
+    cohesion=DMT(),
+)
+
+SIZES = {
+    "default": Size("180 grains of 100 cm, magnetised to 1190 A/m, as in a copy of L21's cloud", DEFAULT),
+    "unmagnetised": Size("the same without magnetisation", {**DEFAULT, "magnetisation": 0.0}),
+    "l21": Size(
+        "L21's 32,662 grains of 100 cm and its seed of 5 m, rotation as printed, gravity by a tree",
+        {"rotation": published.ROTATIONS[1], "tree": True, "duration": published.DURATION},
+    ),
+    "l21_50cm": Size(
+        "the same of grains of 50 cm",
+        {
+            "diameter": DIAMETERS[0], "rotation": published.ROTATIONS[1], "tree": True,
+            "duration": published.DURATION,
+        },
+    ),
+}  # fmt: skip
+
+
+def lattice_ball(number: int, spacing: float, clear: float = 0.0) -> np.ndarray:
+    """Return so many sites (m) of a simple cubic lattice that are nearest to its middle, ``clear``
+    (m) or more from there; shape (number, 3)."""
+    half = math.ceil((3 * (number + 1) / (4 * math.pi)) ** (1 / 3) + clear / spacing) + 1
+    sites = np.indices((2 * half + 1,) * 3).reshape(3, -1).T - half
+    squares = (sites**2).sum(axis=1)
+    sites = sites[spacing * np.sqrt(squares) >= clear]
+    order = np.argsort((sites**2).sum(axis=1), kind="stable")
+    return np.asarray(spacing * sites[order[:number]])
+
+
+def scale_of(number: int, of: int = published.NUMBER) -> float:
+    """Return by what a cloud of so many grains is smaller than one of more, ``of``, on the same lattice."""
+    return (number / of) ** (1 / 3)
+
+
+def thermal_speed(diameter: float, mass: np.ndarray) -> np.ndarray:
+    """Return the standard deviation (m/s) of each component of the velocity of some masses (kg) at L21's
+    temperature of grains of a diameter (m)."""
+    return np.sqrt(Boltzmann * published.TEMPERATURE * diameter**3 / mass)
+
+
+def grain_cloud(
+    number: int, diameter: float, spacing: float, scale: float, seed_diameter: float, rotation: float,
+    seed: int,
+) -> Particles:  # fmt: skip
+    """Return a cloud, the seed particle first; without one where its diameter is 0. Its momentum is 0."""
+    clear = (seed_diameter + diameter) / 2 if seed_diameter else 0.0
+    position = lattice_ball(number, spacing, clear)
+    radius = np.full(number, diameter / 2)
+    if seed_diameter:
+        position = np.vstack([np.zeros(3), position])
+        radius = np.append(seed_diameter / 2, radius)
+    mass = sphere_mass(1.0, DENSITY) * (2 * radius) ** 3
+    draw = np.random.default_rng(seed)
+    velocity = scale * thermal_speed(diameter, mass)[:, None] * draw.normal(size=position.shape)
+    spin = scale * draw.normal(published.SPIN_MEAN, published.SPIN_DEVIATION, position.shape)
+    velocity += np.cross([0.0, 0.0, rotation], position)
+    velocity -= np.average(velocity, axis=0, weights=mass)
+    return Particles(
+        position=position, velocity=velocity, radius=radius, mass=mass, quantities={"spin": spin}
+    )
+
+
+def young(scale: float, softened: float) -> float:
+    """Return Young's modulus (Pa) of grains of a cloud of a ``scale``, over ``softened``."""
+    return scale * scale * published.YOUNG / softened
+
+
+def rubble(scale: float, softened: float = 1.0) -> Material:
+    """Return the material of grains of a cloud of a ``scale``, stresses by its square; Young's modulus over
+    ``softened`` besides."""
+    stress = scale * scale
+    return Material(
+        young=young(scale, softened),
+        poisson=POISSON,
+        restitution=published.RESTITUTION,
+        friction=published.FRICTION,
+        rolling_friction=published.ROLLING_FRICTION,
+        rolling_stiffness=stress * published.ROLLING_STIFFNESS,
+        rolling_damping=scale * published.ROLLING_DAMPING,
+        surface_energy=stress * published.SURFACE_ENERGY,
+    )
+
+
+def step(diameter: float, scale: float, softened: float = 1.0, parts: float = STEPS_OF_IMPACT) -> float:
+    """Return a step (s): one of so many parts of the time of an impact of two grains at scale * IMPACT."""
+    mass = sphere_mass(diameter, DENSITY)
+    modulus = young(scale, softened) / (2 * (1 - POISSON**2))
+    lasts = hertz_duration(scale * IMPACT, diameter / 4, reduced(mass, mass), modulus)
+    return three_digits(float(lasts) / parts)
+
+
+def rubble_laws(magnetisation: float, tree: bool) -> tuple[Effect, ...]:
+    """Return what grains of a magnetisation (A/m) do to each other: by a ``tree``, and dipoles within L21's
+    cut-off; or over all pairs, which takes no longer where these are few."""
+    sums: tuple[Effect, ...]
+    if tree:
+        sums = (TreeGravity(), TruncatedDipoleDipole(cutoff=published.CUTOFF))
+    else:
+        sums = (SelfGravity(), DipoleDipole())
+    return (LAW, PermanentMoment(magnetisation=magnetisation), *sums)
+
+
+def scene(
+    number: int = published.NUMBER,
+    diameter: float = DIAMETERS[1],
+    magnetisation: float = published.MAGNETISATIONS[-1],
+    rotation: float = ROTATION,
+    seed_diameter: float = published.SEED_DIAMETER,
+    spacing: float = SPACING,
+    of: int = published.NUMBER,
+    duration: float = 10_000.0,
+    tree: bool = False,
+    softened: float = 1.0,
+    parts: float = STEPS_OF_IMPACT,
+    seed: int = 0,
+    name: str = "coalescence",
+) -> Scene:
+    """Return a cloud that falls together.
+
+    number : of grains, beside the seed particle. diameter : m. magnetisation : that of L21's cloud, A/m.
+    rotation : of the cloud, rad/s. seed_diameter : m; 0 for no seed particle. spacing : of the lattice, m.
+    of : grains of the cloud of L21 of which it is a copy. duration : s.
+    tree : whether gravity is by a tree, and dipoles have L21's cut-off; else both are over all pairs.
+    softened : what Young's modulus is divided by. parts : of the time of an impact that a step is one of.
+    """
+    scale = scale_of(number, of)
+    return Scene(
+        name=name,
+        particles=grain_cloud(number, diameter, spacing, scale, seed_diameter, rotation, seed),
+        materials={"rubble": rubble(scale, softened)},
+        effects=rubble_laws(scale * magnetisation, tree),
+        stepper=Verlet(control=FixedStep(dt=step(diameter, scale, softened, parts))),
+        duration=duration,
+        seed=seed,
+    )
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """Return the cloud of a size."""
+    return scene(seed=seed, **size_named(size, SIZES).scene)

@@ -1,0 +1,18 @@
+"""A rubble pile of magnetised grains is spun up until it breaks."""
+
+from __future__ import annotations
+
+from cases.case import Case, Late
+from cases.spin_up.accuracy import quantities
+from cases.spin_up.scene import SIZES, TITLE, scene_for
+
+CASE = Case(
+    name="spin_up",
+    title=TITLE,
+    source="L21 section 4.3",
+    sizes=SIZES,
+    scene=scene_for,
+    check=Late("cases.spin_up.checks", "check"),
+    quantities=quantities,
+    figures=Late("cases.spin_up.figures", "figures"),
+)

@@ -1,0 +1,62 @@
+"""What L21 finds of piles that are spun up, beside what piles of few grains show, and what holds exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cases.case import Check
+from cases.coalescence.measures import Conserved
+from cases.coalescence.published import MAGNETISATIONS
+from cases.coalescence.scaling import critical_spin
+from cases.spin_up.published import DEFORMATION, DISRUPTION
+from cases.spin_up.scene import DEFAULT
+from cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
+from cases.statistics import Claim, Mean
+
+ROUNDING = 1e-11
+"""Momenta may be off by so much of the sum of what the grains have."""
+
+
+def check(seeds: int = SEEDS) -> Iterator[Check | Claim]:
+    """Yield what must hold of piles from some starts."""
+    runs = spin_ups(seeds, **DEFAULT)
+    yield from of_conservation(runs)
+    yield from of_spins(runs)
+
+
+def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
+    """Yield that the momentum of all grains stays 0, however they are turned."""
+    off = max(
+        float(np.linalg.norm(c.momentum)) / c.momentum_sum
+        for one in runs
+        for c in (Conserved.of(step.state) for step in one.steps)
+    )
+    yield Check("momentum, over the sum of magnitudes", off, 0.0, ROUNDING)
+
+
+def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim]:
+    """Yield at which spins piles deform and break, and how dense they are before."""
+    for m in MAGNETISATIONS:
+        group = [one for one in runs if one.magnetisation == m]
+        density = Mean.of([one.steps[0].asteroid.density for one in group])
+        yield Claim(f"{m:g} A/m: density at rest, kg/m^3", density)
+        critical = Mean.of([1e6 * critical_spin(one.steps[0].asteroid.density) for one in group])
+        yield Claim(f"{m:g} A/m: critical spin of that density, urad/s", critical)
+        for name, theirs, value in (
+            ("deforms", DEFORMATION[m], "deformation"), ("breaks", DISRUPTION[m], "disruption"),
+        ):  # fmt: skip
+            mean = Mean.of(at_least([getattr(one, value) for one in group]))
+            yield Claim(f"{m:g} A/m: {name} at, urad/s (L21: {1e6 * theirs:.0f})", mean)
+    plain, strong = (
+        at_least([one.disruption for one in runs if one.magnetisation == m])
+        for m in (MAGNETISATIONS[0], MAGNETISATIONS[-1])
+    )
+    yield Claim("breaks at, 1190 less 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=0.0)
+
+
+def at_least(rates: Sequence[float]) -> np.ndarray:
+    """Return angular velocities in urad/s; what has not come about counts as if it did a step after the last,
+    so that means of these are lower bounds."""
+    return 1e6 * np.nan_to_num(np.asarray(rates), nan=RATES[-1] + RATES[0])

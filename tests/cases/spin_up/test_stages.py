@@ -1,0 +1,97 @@
+"""Piles that are spun up: L21's numbers, how a pile is turned, and when it counts as deformed or broken."""
+
+import numpy as np
+import pytest
+
+from cases.coalescence.measures import Asteroid, Conserved
+from cases.spin_up.checks import at_least, of_conservation, of_spins
+from cases.spin_up.figures import against_spin, piles, table
+from cases.spin_up.published import DEFORMATION, DISRUPTION
+from cases.spin_up.scene import NUMBERS, SIZES, scene_for
+from cases.spin_up.stages import RATES, SpinStep, SpinUp, spin_ups, turn
+from tests.cases.coalescence.test_measures import block, state_of
+
+
+@pytest.mark.parametrize(("size", "diameter"), [("l21", 1.0), ("l21_50cm", 0.5)])
+def test_the_sizes_of_l21_have_its_numbers(size, diameter):
+    start = scene_for(size, 0).start()
+    assert len(start["mass"]) == NUMBERS[diameter]
+    assert set(2 * start["radius"]) == {diameter}
+    # Equal masses of all, as L21 has it, to a fiftieth.
+    assert start["mass"].sum() == pytest.approx(4088 * 3000 * np.pi / 6, rel=0.02)
+    np.testing.assert_allclose(np.linalg.norm(start["moment"], axis=1), 1190 * np.pi / 6 * diameter**3)
+
+
+def test_the_cloud_of_the_default_does_not_turn():
+    start = scene_for("default", 1).start()
+    spin = np.linalg.norm(Asteroid(start, None).spin)
+    assert spin < 5e-5
+    assert SIZES.keys() == {"default", "unmagnetised", "l21", "l21_50cm"}
+    np.testing.assert_allclose(RATES, 1e-4 * np.arange(1, 10))
+    assert all(DEFORMATION[m] < DISRUPTION[m] for m in DISRUPTION)
+
+
+def test_a_pile_is_turned_as_a_whole():
+    """It gets the angular velocity about z, whatever it had; its momentum and what is not in it stay."""
+    state = block(np.array([0.1, -0.2, 0.3]))
+    state["mass"] = np.arange(1.0, 10.0)
+    before = {name: np.array(values) for name, values in state.items()}
+    turn(state, 0.05)
+    np.testing.assert_allclose(Asteroid.of(state).spin, [0.0, 0.0, 0.05], atol=1e-12)
+    np.testing.assert_allclose(Conserved.of(state).momentum, Conserved.of(before).momentum)
+    np.testing.assert_array_equal(state["velocity"][8], before["velocity"][8])
+    np.testing.assert_array_equal(state["spin"][8], before["spin"][8])
+    np.testing.assert_array_equal(state["position"], before["position"])
+
+
+def pile(tall=1, lost=0):
+    """A block of 3 x 3 grains, 3 or more along x, and some that are far away."""
+    place = np.argwhere(np.ones((2 + tall, 3, 3))).astype(float)
+    place[len(place) - lost :] += 50.0 * np.arange(1, lost + 1)[:, None]
+    return state_of(place)
+
+
+def spin_up(*states, magnetisation=0.0):
+    steps = [SpinStep(1e-4 * k, state) for k, state in enumerate(states)]
+    return SpinUp(magnetisation, 0, steps)
+
+
+def test_when_a_pile_deforms_and_breaks():
+    run = spin_up(pile(), pile(), pile(tall=2), pile(tall=2, lost=3))
+    assert run.deformation == pytest.approx(2e-4)
+    assert run.disruption == pytest.approx(3e-4)
+    assert run.steps[3].held == pytest.approx(33 / 36)
+    assert run.at(1.9e-4) is run.steps[2]
+    # Grains that come down late are no loss.
+    assert np.isnan(spin_up(pile(lost=3), pile(), pile(lost=1)).disruption)
+    # One that breaks is no longer what it was either.
+    assert spin_up(pile(), pile(lost=3)).deformation == pytest.approx(1e-4)
+    assert np.isnan([spin_up(pile(), pile()).deformation, spin_up(pile(), pile(tall=2)).disruption]).all()
+
+
+def test_figures_and_claims_of_some_runs():
+    runs = [
+        spin_up(pile(), pile(tall=2), pile(tall=2, lost=2), magnetisation=m)
+        for m in (0.0, 119.0, 1190.0)
+        for _ in range(2)
+    ]
+    assert len(table(runs).splitlines()) == 1 + 6 * 3
+    assert len(against_spin(runs).axes) == 3
+    assert len(piles(runs).axes) == 9
+    claims = {claim.name: claim for claim in of_spins(runs)}
+    assert claims["0 A/m: breaks at, urad/s (L21: 700)"].mean.value == pytest.approx(200.0)
+    assert claims["1190 A/m: deforms at, urad/s (L21: 700)"].mean.value == pytest.approx(100.0)
+    np.testing.assert_allclose(at_least([7e-4, np.nan]), [700.0, 1000.0])
+    assert claims["breaks at, 1190 less 0 A/m, urad/s (L21: 100)"].mean.value == 0.0
+
+
+@pytest.mark.slow
+def test_a_tiny_pile_has_the_spins_that_it_is_given():
+    """Grains that touch at the start are a pile at once; it keeps its momentum while it is turned."""
+    settings = {"number": 27, "spacing": 1.0, "softened": 10.0, "duration": 50.0}
+    (run,) = spin_ups(1, magnetisations=(0.0,), rates=(1e-4, 5e-4), holds=(5.0, 5.0), **settings)
+    assert [step.rate for step in run.steps] == [0.0, 1e-4, 5e-4]
+    for step in run.steps[1:]:
+        assert step.asteroid.spin[2] == pytest.approx(step.rate, rel=0.05)
+    (check,) = of_conservation([run])
+    assert check.ok
