@@ -51,7 +51,7 @@ DENSITY, POISSON, RESTITUTION = 7750.0, 0.278, 0.2
 ROLLING_DAMPING = 0.4
 """gamma_r of L21 table 4.4, as the damping over the critical one. Its k_r = 10 has no unit there; the
 stiffness against rolling is that which goes with the model, of ``rolling_epsd``."""
-IRON = {"friction": 0.6, "rolling_friction": 0.4, "cohesion": 10.0}
+IRON_DESIGN = {"friction": 0.6, "rolling_friction": 0.4, "cohesion": 10.0}
 """The design of the grains: friction, rolling friction, and cohesion in J/m^3; L21 table 4.4."""
 YOUNG = 1e9
 """Pa; L21 table 4.4."""
@@ -112,7 +112,7 @@ def step(diameter: float, stiffness: float | None, parts: float = STEPS_OF_IMPAC
 
 
 def iron(design: Mapping[str, float], diameter: float, stiffness: float | None) -> Material:
-    """Return the material of grains and walls of a design, as IRON has one."""
+    """Return the material of grains and walls of a design, as IRON_DESIGN has one."""
     return Material(
         young=young(diameter, stiffness), poisson=POISSON, restitution=RESTITUTION,
         friction=design["friction"], rolling_friction=design["rolling_friction"],
@@ -170,7 +170,7 @@ def magnetism(field: float) -> tuple[Effect, ...]:
 
 def scene(
     cell: Cell,
-    design: Mapping[str, float] = IRON,
+    design: Mapping[str, float] = IRON_DESIGN,
     diameter: float = DIAMETERS[0],
     field: float = FLUX,
     seed: int = 0,

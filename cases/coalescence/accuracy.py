@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cases.coalescence.measures import Agglomeration, Asteroid
+from cases.coalescence.measures import Asteroid, Gathering
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.analysis import contacts
@@ -22,7 +22,7 @@ def largest_overlap(result: Result) -> float:
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Paths of grains are chaotic; what counts is how many are bound, and how the asteroid is packed."""
     return (
-        Quantity("part in clusters", lambda result: Agglomeration.of(result.state).bound, random=True),
+        Quantity("part in clusters", lambda result: Gathering.of(result.state).bound, random=True),
         Quantity("density", lambda result: Asteroid.of(result.state).density, random=True),
         Quantity("largest overlap", largest_overlap, random=True),
     )

@@ -42,7 +42,7 @@ def part(state: Arrays, some: np.ndarray) -> Arrays:
 
 
 @dataclass(frozen=True)
-class Agglomeration:
+class Gathering:
     """How far a cloud has agglomerated: the part of all grains that are in the asteroid, and of the others
     the parts that are in clusters of two or more and of more than ten; NaN where there are no others."""
 
@@ -51,7 +51,7 @@ class Agglomeration:
     many: float
 
     @classmethod
-    def of(cls, state: Arrays) -> Agglomeration:
+    def of(cls, state: Arrays) -> Gathering:
         """Return that of a state."""
         cluster = clusters_of(state)
         inside = body(cluster, state["mass"])

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cases.coalescence.measures import Agglomeration, Asteroid, Conserved
+from cases.coalescence.measures import Asteroid, Conserved, Gathering
 from cases.coalescence.published import MAGNETISATIONS, NUMBER
 from cases.coalescence.scene import scale_of, scene
 from cases.granular_bench.shear_cell import unbroken
@@ -33,7 +33,7 @@ class CloudRun:
     scale: float
     scene: Scene
     times: np.ndarray
-    agglomerations: Sequence[Agglomeration]
+    agglomerations: Sequence[Gathering]
     conserved: Sequence[Conserved]
     end: Arrays
 
@@ -42,7 +42,7 @@ class CloudRun:
         """Return the asteroid at the end."""
         return Asteroid.of(self.end)
 
-    def at(self, time: float) -> Agglomeration:
+    def at(self, time: float) -> Gathering:
         """Return how far it was agglomerated when it was looked at next to a time (s)."""
         return self.agglomerations[int(np.abs(self.times - time).argmin())]
 
@@ -89,7 +89,7 @@ def clouds(
     scenes = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
     times = np.linspace(0.0, scenes[0].duration, looks + 1)
     seen, states = looked_at(
-        scenes, times, lambda state: (Agglomeration.of(state), Conserved.of(state)), progress
+        scenes, times, lambda state: (Gathering.of(state), Conserved.of(state)), progress
     )
     scale = scale_of(settings.get("number", NUMBER))
     return [

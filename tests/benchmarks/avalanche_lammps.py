@@ -30,7 +30,7 @@ from cases.avalanche.measures import grains_volume, heap_volume, repose  # noqa:
 from cases.avalanche.scene import (  # noqa: E402
     DIAMETERS,
     GRAVITY,
-    IRON,
+    IRON_DESIGN,
     POISSON,
     RESTITUTION,
     STIFFNESS,
@@ -55,7 +55,7 @@ LAW = TwinLaw(
     (
         {
             **{"young": young(D), "poisson": POISSON, "restitution": RESTITUTION},
-            **{"friction": IRON["friction"], "rolling_friction": IRON["rolling_friction"]},
+            **{"friction": IRON_DESIGN["friction"], "rolling_friction": IRON_DESIGN["rolling_friction"]},
             **{"rolling_stiffness": 50.0, "rolling_damping": 0.05},
         },
     ),

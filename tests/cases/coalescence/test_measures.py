@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cases.coalescence.measures import Agglomeration, Asteroid, Conserved, body, clusters_of, inertia
+from cases.coalescence.measures import Asteroid, Conserved, Gathering, body, clusters_of, inertia
 
 
 def row(number, apart=1.0, at=(0.0, 0.0, 0.0)):
@@ -25,13 +25,13 @@ def test_how_far_a_cloud_has_agglomerated():
     """A row of 20 is the asteroid; a row of 12, a pair and 6 single grains are outside."""
     single = row(6, 5.0, (0.0, 40.0, 0.0))
     place = np.vstack([row(20), row(12, at=(0, 10, 0)), row(2, at=(0, 20, 0)), single])
-    seen = Agglomeration.of(state_of(place))
+    seen = Gathering.of(state_of(place))
     assert (seen.coalesced, seen.some, seen.many) == pytest.approx((20 / 40, 14 / 20, 12 / 20))
     assert seen.bound == pytest.approx(34 / 40)
 
 
 def test_the_ends_of_agglomeration():
-    apart, whole = Agglomeration.of(state_of(row(4, 3.0))), Agglomeration.of(state_of(row(4)))
+    apart, whole = Gathering.of(state_of(row(4, 3.0))), Gathering.of(state_of(row(4)))
     assert (apart.coalesced, apart.some, apart.bound) == (0.0, 0.0, 0.0)
     assert (whole.coalesced, whole.bound) == (1.0, 1.0)
     assert np.isnan(whole.some)

@@ -6,7 +6,7 @@ import pytest
 from cases.case import Check
 from cases.coalescence.checks import COMPARED, of_agglomeration, of_conservation, of_structure, of_the_cloud
 from cases.coalescence.figures import asteroids, cluster_colours, forces, growth, shells, table
-from cases.coalescence.measures import Agglomeration, Conserved
+from cases.coalescence.measures import Conserved, Gathering
 from cases.coalescence.published import MAGNETISATIONS
 from cases.coalescence.runs import CloudRun, clouds, of_magnetisation
 from cases.coalescence.scene import scene
@@ -23,7 +23,7 @@ def made(magnetisation, bound, seed=0):
         state["velocity"], state["spin"] = np.tile([[1.0, 0.0, 0.0]], (2, 40, 1))
     return CloudRun(
         magnetisation, 0.5, scene(number=20, seed=seed), np.array([0.0, COMPARED]),
-        [Agglomeration.of(one) for one in states], [Conserved.of(one) for one in states], end,
+        [Gathering.of(one) for one in states], [Conserved.of(one) for one in states], end,
     )  # fmt: skip
 
 

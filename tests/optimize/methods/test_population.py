@@ -23,6 +23,7 @@ USUAL = {
     "vibration": {"options": {"population": 24, "parents": 8}},
     "agglomeration": {"options": {"population": 10, "parents": 4}},
     "capture": {"method": "cma-es", "options": {"population": 16}},
+    "mrf_shear": {"options": {"population": 12}},
     "granular_bench": {"method": "cma-es", "options": {"population": 8, "sigma": 0.2}},
 }
 

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 class EwaldDipoleDipole(EwaldPairs, Force, PairForce):
-    """Magnetic moments attract and repel each other as dipoles, with all images of a periodic box, and turn
-    permanent ones: the Ewald sum.
+    """Magnetic moments attract, repel and turn each other as dipoles, with all images: the Ewald sum.
 
         F_i = -grad_i U,    T_i = m_i x B_i,    B_i = -dU / dm_i
 
-    U is the energy of all dipoles with their images (``ewald_settings`` has what it takes to be good to an
+    U is the energy of all dipoles of a periodic box with their images; permanent ones are turned
+    (``ewald_settings`` has what it takes to be good to an
     ``accuracy``), m the ``moment`` of each that another effect has set, held fixed. It is to
     ``dipole_dipole``, in which only nearest images act, what lj/cut/dipole/long with ewald/disp is in LAMMPS.
     Momentum is conserved to rounding, as each wave does to one what it does to the others, energy to the

@@ -82,8 +82,7 @@ class EwaldLangevinMoment(EwaldMoment, LangevinMoment):
 
 
 class EwaldFroehlichMoment(EwaldMoment, FroehlichMoment):
-    """Spheres of iron or an oxide are magnetised by the sources and by each other up to saturation, with all
-    images of a periodic box.
+    """Spheres of iron or an oxide are magnetised up to saturation, by each other with all images too.
 
         M_i = chi H M_s / (M_s + chi H),    H = |B(r_i) + B_i| / mu_0 - M_i/3,    B_i = -dU / dm_i
 
