@@ -1,5 +1,6 @@
 from .at_rest import AtRest as AtRest
 from .base import Operator as Operator
+from .base import WorldAction as WorldAction
 from .capture import Capture as Capture
 from .compacted import Compacted as Compacted
 from .cooling import Cooling as Cooling

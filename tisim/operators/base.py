@@ -18,7 +18,7 @@ from tisim.worlds.bound import Bound
 from tisim.worlds.state import State
 from tisim.worlds.world_action import WorldAction
 
-__all__ = ["Operator", "option", "parameter"]
+__all__ = ["Operator", "WorldAction", "option", "parameter"]
 
 
 class Operator(Effect):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
 
-from tisim.worlds.phases import Item
+if TYPE_CHECKING:
+    from tisim.worlds.phases import Item
 
 
 class WorldAction(ABC):

@@ -14,7 +14,7 @@ from tisim.effects.magnetic.wave_sum import WaveSum
 
 if TYPE_CHECKING:
     from tisim.components.domain import Domain
-    from tisim.effects.base import LongRange
+    from tisim.effects.base import LongRange, LongRangeSum
     from tisim.worlds.bound import Bound, Peers
     from tisim.worlds.state import State
 
@@ -45,7 +45,7 @@ class EwaldDipoleDipole(EwaldPairs, Force, PairForce):
     def connect(self, peers: Peers) -> dict[str, Any]:
         return {**super().connect(peers), "permanent": bool(peers.of(PermanentMoment))}
 
-    def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> WaveSum:
+    def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> LongRangeSum:
         return WaveSum(s, own, domain, forces=True)
 
     @ti.func

@@ -13,7 +13,7 @@ from tisim.effects.magnetic.wave_sum import WaveSum
 
 if TYPE_CHECKING:
     from tisim.components.domain import Domain
-    from tisim.effects.base import LongRange
+    from tisim.effects.base import LongRange, LongRangeSum
     from tisim.worlds.bound import Bound
     from tisim.worlds.state import State
 
@@ -34,7 +34,7 @@ class EwaldMoment(EwaldPairs, SelfConsistentQuantity, Moment):
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         return (independent(self, self.independent_law), *super().approximations(extent))
 
-    def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> WaveSum:
+    def long_range_sum(self, own: Bound[LongRange], s: State, domain: Bound[Domain]) -> LongRangeSum:
         return WaveSum(s, own, domain, forces=False)
 
     @ti.func
