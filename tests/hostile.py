@@ -113,6 +113,8 @@ def valid() -> tuple[dict[str, Any], ...]:
     tables_ = [flow(grains=3).to_dict(), base.to_dict()]
     tables_ += [case.scene(size, 1).to_dict() for case in every().values() for size in list(case.sizes)[:2]]
     box = {"kind": "box", "low": [-1.0] * 3, "high": [1.0] * 3}
+    # For Ewald sums, which take images.
+    wide = {"kind": "box", "low": [-4.2] * 3, "high": [4.2] * 3}
     cylinder = RandomAroundCylinder(radius=0.5, length=3.0, thickness=0.4)
     starts = (
         Cloud(**BALL, specific_charge=10.0, pulse=Blast(energy=1e4)),
@@ -131,7 +133,12 @@ def valid() -> tuple[dict[str, Any], ...]:
     return (
         *tables_,
         *(
-            {**base.to_dict(), "materials": materials(), "effects": with_needed(kind)}
+            {
+                **base.to_dict(),
+                "domain": wide if kind.kind().startswith("ewald_") else base.to_dict()["domain"],
+                "materials": materials(),
+                "effects": with_needed(kind),
+            }
             for kind in known_effects()
         ),
     )
@@ -159,7 +166,9 @@ def _required(kind: type[Component]) -> dict[str, Any]:
     }
     others = kind.model_fields.keys() - values.keys() - dict(kind.lists()).keys()
     options = {name: kind.model_fields[name] for name in others if kind.model_fields[name].is_required()}
-    return {**values, **{name: info.examples[0] for name, info in options.items() if info.examples}}
+    # As many waves as the cut-off asks for.
+    more = {"waves": (12, 12, 12)} if "waves" in kind.model_fields else {}
+    return {**values, **{name: info.examples[0] for name, info in options.items() if info.examples}, **more}
 
 
 def materials() -> dict[str, Any]:
