@@ -125,7 +125,7 @@ WALLS = {
         f"{MOVING}a_turning_drum_drags_a_grain_with_mu_times_its_weight",
     ),
     "translation": (
-        f"{MOTION}/translation.py", "return r - ti.cast(", "return r - 0.99 * ti.cast(",
+        f"{MOTION}/translation.py", "return r - self.displacement", "return r - 0.99 * self.displacement",
         f"{MOVING}a_moving_wall_is_one_at_rest_for_those_who_go_along",
     ),
 }  # fmt: skip

@@ -6,6 +6,7 @@ from scipy.constants import G
 
 from tests.effects.gravitation.clouds import CAPACITY, THETAS, ball, loads_of
 from tests.scenes import compiled, scene
+from tisim.backend.thread import in_taichi_thread
 from tisim.effects import TreeGravity
 from tisim.interactions.cell_tree import FAN, LEAF
 
@@ -28,9 +29,14 @@ def trees():
     return scenes, simulation.assembly.long_range["tree_gravity"]
 
 
+def numbers(column):
+    """What a field holds."""
+    return in_taichi_thread(column.to_numpy)()
+
+
 def test_particles_are_sorted_by_their_keys_and_then_by_number(trees):
     scenes, total = trees
-    order, key = total.t.order.to_numpy(), total.t.sort.key.to_numpy()
+    order, key, place = (numbers(column) for column in (total.t.order, total.t.sort.key, total.t.place))
     assert max(NUMBERS) > total.t.sort.block
     for w, n in enumerate(NUMBERS):
         own = order[w, :n]
@@ -39,17 +45,17 @@ def test_particles_are_sorted_by_their_keys_and_then_by_number(trees):
         assert (steps >= 0).all()
         assert (ties[steps == 0] > 0).all()
         assert n < 100 or (steps == 0).sum() > 10
-        np.testing.assert_array_equal(total.t.place.to_numpy()[w, :n], scenes[w].particles.position[own])
+        np.testing.assert_array_equal(place[w, :n], scenes[w].particles.position[own])
 
 
 def test_every_cell_has_the_box_and_the_moments_of_its_particles(trees):
     scenes, total = trees
     t, m = total.t, total.moments
-    columns = {name: getattr(t, name).to_numpy() for name in ("low", "high", "population", "levels")}
+    columns = {name: numbers(getattr(t, name)) for name in ("low", "high", "population", "levels", "order")}
     names = ("total", "centre", "diagonal", "mixed", "extent", "opens_within")
-    columns |= {name: getattr(m, name).to_numpy() for name in names}
+    columns |= {name: numbers(getattr(m, name)) for name in names}
     for w, n in enumerate(NUMBERS):
-        place, order = scenes[w].particles.position, t.order.to_numpy()[w, :n]
+        place, order = scenes[w].particles.position, columns["order"][w, :n]
         mass = np.broadcast_to(scenes[w].particles.mass, n)[order]
         place, span, level = place[order], LEAF, 0
         while True:
