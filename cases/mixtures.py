@@ -16,15 +16,15 @@ SMALL_GRAINS: Parts = (
     (1.67, 0.1242), (1.96, 0.1326), (2.25, 0.1329), (2.63, 0.1097), (3.03, 0.0821), (3.55, 0.0540),
     (4.16, 0.0316), (4.97, 0.0146), (5.71, 0.0057), (7.02, 2.230e-4),
 )  # fmt: skip
-"""Of a median of 1.8 um, digitised of Trendler and Boese, who do not say whether parts are of the number or
-of the volume (L21 table 2.2a)."""
+"""These grains have a median of 1.8 um, digitised of Trendler and Boese, who do not say whether parts are of
+the number or of the volume (L21 table 2.2a)."""
 LARGE_GRAINS: Parts = (
     (1.46, 1e-4), (1.69, 6.155e-4), (1.98, 0.0019), (2.29, 0.0047), (2.65, 0.0117), (3.07, 0.0226),
     (3.57, 0.0403), (4.11, 0.0646), (4.89, 0.0925), (5.69, 0.1167), (6.55, 0.1327), (7.66, 0.1403),
     (8.84, 0.1236), (10.42, 0.0985), (11.87, 0.0699), (13.91, 0.0446), (16.63, 0.0243), (19.48, 0.0100),
     (24.44, 5.593e-4),
 )  # fmt: skip
-"""Of a median of 6.7 um, in the same way (L21 table 2.2b)."""
+"""These grains have a median of 6.7 um, in the same way (L21 table 2.2b)."""
 VALVE_GRAINS: Parts = ((44.0, 44.0), (38.9, 35.0), (33.8, 24.2), (28.7, 13.2), (23.6, 5.6))
 """Grains that jam a valve, parts of the mass, which add up to 122 and are divided by that (L21 3.4.4)."""
 FINE_VALVE_GRAINS: Parts = ((10.0, 44.0), (9.49, 35.0), (8.98, 24.2), (8.47, 13.2), (7.96, 5.6))

@@ -17,9 +17,10 @@ and N/m."""
 MAGNETISATIONS = (0.0, 119.0, 1190.0)
 """A/m; table 4.1."""
 TEMPERATURE = 8e20
-"""Of the cloud at the start, over the cube of a grain's diameter, K/m^3; section 4.2.1.4."""
+"""The temperature of the cloud at the start is this times the cube of a grain's diameter, K/m^3; section
+4.2.1.4."""
 SPIN_MEAN, SPIN_DEVIATION = 5e-5, 1e-4
-"""Of the spins of grains at the start, rad/s; table 4.1. Taken as that of each component."""
+"""Spins of grains at the start have this mean and deviation, rad/s; table 4.1. Each component is taken so."""
 ROTATIONS = (500e-6, 1000e-6, 2000e-6)
 """Angular velocities of the cloud as they are printed, rad/s; section 4.2.1.4."""
 DURATION = 15_000.0

@@ -48,6 +48,6 @@ FIT_ABOVE = 200.0
 # Table 2.4 and section 2.4.2: yield stresses at 0.6 T, Pa.
 MEASURED_YIELD = {"00:100": 44.9e3, "33:67": 50.8e3}
 SIMULATED_YIELD = {"00:100": 44.1e3, "33:67": 56.3e3}
-"""Of number densities, L21's own; of volume densities it has 49.6 kPa for 00:100."""
+"""These are of number densities, L21's own; of volume densities it has 49.6 kPa for 00:100."""
 SEED_SPREAD = 0.029
 """Standard deviation of the yield stress from seed to seed, over its mean."""

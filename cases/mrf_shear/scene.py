@@ -46,7 +46,8 @@ from tisim.steppers import FixedStep, Verlet
 TITLE = "A magnetorheological fluid in a shear cell: flow curve and yield stress"
 
 DENSITY, SUSCEPTIBILITY = CARBONYL_IRON.density, 999.0
-"""Of carbonyl iron, kg/m^3; of such a susceptibility a sphere is magnetised as one without end, to 0.3 %."""
+"""The density of carbonyl iron, kg/m^3, and a susceptibility of which a sphere is magnetised as one without
+end, to 0.3 %."""
 LINEAR = 1e12
 """Grains whose magnetisation saturates at so much (A/m) do not saturate: those of L21."""
 LARGE_RADIUS, SMALL_RADIUS = published.MEAN_LARGE / 2, published.MEAN_LARGE / 4
