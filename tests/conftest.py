@@ -97,7 +97,7 @@ def own_file(tmp_path, monkeypatch):
 
 
 ELSEWHERE = """
-import sys
+import json, sys
 import numpy as np
 from tests import scenes
 from tests.effects.test_contract import kicked
@@ -112,27 +112,29 @@ def keep(name, result):
     kept.update({f"{name}/start/{key}": values for key, values in result.start.items()})
     kept[f"{name}/work"] = np.array([result.work[key] for key in sorted(result.work)])
 
-def keep_crowd(name):
-    results = scenes.simulate(crowd(), worlds=BATCH, capacity=200, schedule="world")
-    for w, result in enumerate(pick(results)):
-        keep(f"{name}/{w}", result)
-    kept[f"{name}/left"] = np.array([len(result.state["mass"]) for result in results])
-
-runtime.init(threads=1)
-keep_crowd("one thread")
-keep("one thread/kicked", scenes.simulate([kicked()], worlds=1, capacity=32)[0])
-runtime.init(precision="f32", threads=2)
-keep_crowd("single precision")
+runtime.init(**json.loads(sys.argv[2]))
+results = scenes.simulate(crowd(), worlds=BATCH, capacity=200, schedule="world")
+for w, result in enumerate(pick(results)):
+    keep(w, result)
+kept["left"] = np.array([len(result.state["mass"]) for result in results])
+keep("kicked", scenes.simulate([kicked()], worlds=1, capacity=32)[0])
 np.savez(sys.argv[1], **kept)
 """
 
 
-@pytest.fixture(scope="session")
-def elsewhere(tmp_path_factory):
-    """Results of test_schedules.crowd in another process, with all passes of the compiler: with one thread,
-    and in single precision."""
-    file = tmp_path_factory.mktemp("elsewhere") / "results.npz"
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", ELSEWHERE, str(file)]
+def crowd_elsewhere(folder, **settings):
+    """Results of test_schedules.crowd in another process, with all passes of the compiler and settings of the
+    runtime."""
+    file = folder / "results.npz"
+    command = [
+        sys.executable,
+        "-W",
+        "error::RuntimeWarning",
+        "-c",
+        ELSEWHERE,
+        str(file),
+        json.dumps(settings),
+    ]
     environment = os.environ | {"TI_ADVANCED_OPTIMIZATION": "1", "QD_ADVANCED_OPTIMIZATION": "1"}
     completed = subprocess.run(
         command, capture_output=True, text=True, timeout=3600, check=False, env=environment
@@ -140,6 +142,18 @@ def elsewhere(tmp_path_factory):
     assert completed.returncode == 0, completed.stderr
     with np.load(file) as arrays:
         return dict(arrays)
+
+
+@pytest.fixture(scope="session")
+def elsewhere(tmp_path_factory):
+    """Results of test_schedules.crowd in another process, with one thread."""
+    return crowd_elsewhere(tmp_path_factory.mktemp("elsewhere"), threads=1)
+
+
+@pytest.fixture(scope="session")
+def in_single_precision(tmp_path_factory):
+    """Results of test_schedules.crowd in another process, in single precision."""
+    return crowd_elsewhere(tmp_path_factory.mktemp("single"), precision="f32", threads=2)
 
 
 def elsewhere_with(setting):

@@ -102,10 +102,8 @@ STEPPERS = {
 }
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name == "verlet" else pytest.mark.slow) for name in STEPPERS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STEPPERS)
 def test_a_stepper_says_how_far_particles_have_moved(name):
     """By itself, and by what operators do."""
     stepper, more = STEPPERS[name]
@@ -243,7 +241,7 @@ def is_short_ranged(kind):
 SHORT = [kind for kind in known_effects() if is_short_ranged(kind)]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_every_law_is_zero_beyond_its_reach():
     """All in one scene; only friction and bonds have nothing to do there before particles have moved."""
     most = assert_reach(joined(SHORT))
@@ -353,7 +351,7 @@ TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
 @pytest.mark.long
 @pytest.mark.parametrize(
     "kinds",
-    [TOGETHER, [Capture, Virial], HOLDING, [PermanentMoment], IMAGED],
+    [TOGETHER, [Capture, Virial], HOLDING, [PermanentMoment], pytest.param(IMAGED, marks=pytest.mark.slow)],
     ids=["all that go together", "capture", "constraints", "permanent moments", "Ewald sums"],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):

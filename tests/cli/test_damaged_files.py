@@ -145,9 +145,9 @@ def test_cost(tisim, tmp_path, monkeypatch):
     [
         ("plot", "FILE"),
         ("movie", "FILE"),
-        ("export", "FILE", "--format", "vtk"),
         ("export", "FILE", "--format", "xyz"),
-        ("export", "FILE", "--format", "h5md"),
+        pytest.param(("export", "FILE", "--format", "vtk"), marks=pytest.mark.slow),
+        pytest.param(("export", "FILE", "--format", "h5md"), marks=pytest.mark.slow),
     ],
     ids=" ".join,
 )

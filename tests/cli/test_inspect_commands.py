@@ -127,6 +127,7 @@ def test_ctrl_c_and_resume_leave_one_whole_trajectory(tisim, toml, tmp_path, mon
             np.testing.assert_array_equal(values, other.arrays[name])
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_all_frames_before_and_a_checkpoint_to_go_on_from(
     tisim, toml, tmp_path, monkeypatch
 ):

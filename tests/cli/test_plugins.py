@@ -21,7 +21,7 @@ def pulled(toml, own_file):
     return toml
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_run_is_stopped_gone_on_with_and_drawn(tisim, pulled, press_ctrl_c, monkeypatch, own_file):
     command = ["run", pulled, "--out", "o", "--frames", "4", *PLUGIN]
     with monkeypatch.context() as patch:

@@ -97,7 +97,7 @@ class FarShell(SoftShell):
         return self.width(w) * s.radius[w, i]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_box_is_wide_enough_for_those_that_are_put_in_later():
     """Grains of 0.1 m are there, and up to 0.4 m come: four radii and twice the reach must have room."""
 

@@ -166,7 +166,7 @@ def of_eight_threads():
     return wrong
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.skipif(runtime.cores() < 2, reason="threads that wait for each other awake have a core each")
 def test_teams_take_the_same_steps_late_or_not():
     assert elsewhere_with("threads=8")("engine.test_launches", "of_eight_threads") == []

@@ -9,17 +9,16 @@ from tisim import InputError
 from tisim.effects import Heating, Impact, Softening
 
 
-def world(elsewhere, precision, w):
-    head = f"{precision}/{w}/"
-    arrays = {key.removeprefix(head): values for key, values in elsewhere.items() if key.startswith(head)}
+def world(results, w):
+    arrays = {key.removeprefix(f"{w}/"): values for key, values in results.items() if key.startswith(f"{w}/")}
     start = {key.removeprefix("start/"): values for key, values in arrays.items() if key.startswith("start/")}
     return {key: values for key, values in arrays.items() if "/" not in key}, start
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("w", range(len(WORLDS)))
-def test_single_precision_stays_finite_and_keeps_mass_and_energy(elsewhere, w):
-    state, start = world(elsewhere, "single precision", w)
+def test_single_precision_stays_finite_and_keeps_mass_and_energy(in_single_precision, w):
+    state, start = world(in_single_precision, w)
     for name, values in state.items():
         assert np.isfinite(values).all(), name
         if name not in ("id", "pieces", "work"):
@@ -38,10 +37,10 @@ def test_single_precision_stays_finite_and_keeps_mass_and_energy(elsewhere, w):
     assert (state["position"] < high.astype(np.float32)).all()
 
 
-@pytest.mark.long
-def test_single_and_double_precision_agree_on_how_much_merges(elsewhere):
+@pytest.mark.slow
+def test_single_and_double_precision_agree_on_how_much_merges(elsewhere, in_single_precision):
     """Chaotic trajectories part, and in few of 240 worlds (measured: 3) the number of grains left too."""
-    single, double = (elsewhere[f"{name}/left"] for name in ("single precision", "one thread"))
+    single, double = in_single_precision["left"], elsewhere["left"]
     assert (single != double).sum() <= 12
     assert single.sum() == pytest.approx(double.sum(), rel=0.01)
 

@@ -108,9 +108,9 @@ def test_alone_and_in_a_batch_of_240(usual):
 def test_one_thread_and_two(usual, elsewhere):
     for w, result in enumerate(usual):
         for name, values in result.state.items():
-            np.testing.assert_array_equal(values, elsewhere[f"one thread/{w}/{name}"], err_msg=f"{w} {name}")
+            np.testing.assert_array_equal(values, elsewhere[f"{w}/{name}"], err_msg=f"{w} {name}")
         work = [result.work[key] for key in sorted(result.work)]
-        assert elsewhere[f"one thread/{w}/work"].tolist() == work
+        assert elsewhere[f"{w}/work"].tolist() == work
 
 
 @pytest.mark.long
@@ -118,7 +118,7 @@ def test_noise_with_one_thread_and_two(elsewhere):
     """Counter-based noise does not know which thread draws it: each particle a launch of its own here."""
     (result,) = simulate([kicked()], worlds=1, capacity=32, schedule="particle")
     for name, values in result.state.items():
-        np.testing.assert_array_equal(values, elsewhere[f"one thread/kicked/{name}"], err_msg=name)
+        np.testing.assert_array_equal(values, elsewhere[f"kicked/{name}"], err_msg=name)
 
 
 def test_unknown_schedule_is_refused():

@@ -168,7 +168,7 @@ class Grow(Operator):
         s.radius[w, i] += self.rate(w) * dt
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_law_that_comes_to_reach_farther_acts_at_once():
     """Radii of 0.1 + 0.1 t reach over 1.3 m when 12 of them do, after 84 steps."""
     made = scene(

@@ -194,7 +194,7 @@ def test_what_is_remembered_is_bounded_and_forgotten():
     assert all(radius[i] <= radius[j] for i, j in partners)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_no_time_goes_by_for_contacts_when_a_world_is_written_to():
     """Velocities are written as they are: what has slid has not slid farther."""
     setup = grains()

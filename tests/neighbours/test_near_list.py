@@ -43,7 +43,9 @@ DOMAINS = {
     "open": Open(),
 }
 SOME = [
-    pytest.param(domain, id=name, marks=[pytest.mark.slow] if name in ("control volume", "open") else [])
+    pytest.param(
+        domain, id=name, marks=[pytest.mark.slow] if name in ("control volume", "open", "slab") else []
+    )
     for name, domain in DOMAINS.items()
 ]
 LOW, HIGH = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 1.0])

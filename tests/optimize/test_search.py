@@ -39,7 +39,7 @@ def run(path, evaluator=None, genes=4, problem=None, callbacks=None, **settings)
         )
 
 
-@pytest.mark.parametrize("settings", [{}, DEAP], ids=["z04", "deap"])
+@pytest.mark.parametrize("settings", [{}, pytest.param(DEAP, marks=pytest.mark.slow)], ids=["z04", "deap"])
 def test_beats_random_search_at_equal_evaluations(tmp_path, settings):
     """In 10 dimensions, three seeds: the median best lies far below that of as many random points."""
     best, chance = [], []

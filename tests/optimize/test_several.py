@@ -158,6 +158,7 @@ def test_designs_of_few_starts_are_distinguished_from_those_that_are_known(outco
     assert few.get_xydata().tolist() == [[0.9, 0.09999999999999998]]
 
 
+@pytest.mark.slow
 def test_resumed_after_interrupt_it_is_the_same(path, tmp_path):
     settings = {"ensemble": EnsembleSettings(max_starts=8, confirm=2), "generations": 2}
 

@@ -60,6 +60,7 @@ def impacts(name, speeds, duration, steps, **first):
     return np.array([after[1] - after[0] for after in found]) / speeds
 
 
+@pytest.mark.slow
 def test_beside_hookes_spring_an_impact_has_the_restitution_too():
     """From e = 0.01 to 1, to first order in the step."""
     e = np.array([0.01, 0.1, 0.5, 0.9, 1.0])
@@ -137,6 +138,7 @@ def test_a_spring_against_rolling_holds_up_to_its_limit_and_is_left_at_once(name
         np.testing.assert_allclose(couple[20:, 2], limit * (1 - 0.01 * np.arange(1, 10)), rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_constant_torque_holds_back_rolling_at_any_speed():
     turned = np.array([[0, 0, 1e-9], [0, 0, -1.0], [0, 0, 0], [5, 0, 0], [0, 0.3, 0.4]])
     _, couple, _ = along("dmt", held(5), 0.0, turned, rolling_friction=0.1)

@@ -13,7 +13,7 @@ from tisim.components.materials import Materials
 from tisim.effects import HertzMaterial, RestitutionDamping
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_beside_hookes_spring_grains_without_restitution_stay_together():
     """At e = 0, of one of the two materials alone too: v t exp(-t sqrt(k / m*)), and no way back."""
     rate, v = (NEUTRAL["hooke"]["stiffness"] / 0.5) ** 0.5, 1.0

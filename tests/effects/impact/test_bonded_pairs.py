@@ -74,7 +74,9 @@ def check(results, breaks, rounding):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize(
+    "load", [pytest.param(load, marks=pytest.mark.slow if load == "breaking" else ()) for load in LOADS]
+)
 def test_a_bonded_pair_collides_once(load):
     results = run(load)
     check(results, load == "breaking", 1e-13)

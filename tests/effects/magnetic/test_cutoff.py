@@ -54,7 +54,7 @@ def steps(n, h):
         yield i, a, change
 
 
-@pytest.mark.parametrize("shifted", [True, False])
+@pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_forces_and_torques_are_minus_the_gradient_of_the_energy(rng, shifted):
     """By central differences of positions and of turns; of a plain cut-off within it and beyond it. All of
     them balance."""
@@ -106,7 +106,7 @@ def at_the_cutoff(law, state):
     return energy(law, state["position"] - ago * state["velocity"], m, state["radius"])
 
 
-@pytest.mark.parametrize("shifted", [True, False])
+@pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_energy_is_conserved_through_a_shifted_cutoff_and_jumps_at_a_plain_one(shifted):
     """A shifted one keeps it to the order of Verlet; a plain one loses what the pair has at the cut-off."""
     law, gains = TruncatedDipoleDipole(cutoff=3.6, shifted=shifted), []

@@ -575,7 +575,7 @@ def test_dask_futures_that_hold_no_answer_are_messages():
         dask_cluster.DaskCluster.outcome(None, cancelled)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_dask_without_workers_says_so_and_gives_up(cluster, monkeypatch):
     """Simulated here; the next test kills real ones."""
     monkeypatch.setattr(dask_cluster, "SILENCE_S", 0.5)

@@ -107,6 +107,7 @@ def noisy_bowl(design, seed):
     return float(np.sum((x - 0.3) ** 2) + 0.3 * own.normal())
 
 
+@pytest.mark.slow
 def test_search_with_races_finds_better_designs_at_equal_evaluations():
     """True costs of the best of 12 searches of 400 runs; and what is claimed of the best is less wrong."""
     true, claimed = {}, {}

@@ -48,7 +48,9 @@ def hard_places(half, rng, n=3):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("halves", [(0.05, 0.5, 1.0, 5 / 3), (20 / 3, 20.0, 100.0, 1000.0)])
+@pytest.mark.parametrize(
+    "halves", [(0.05, 0.5, 1.0, 5 / 3), pytest.param((20 / 3, 20.0, 100.0, 1000.0), marks=pytest.mark.slow)]
+)
 def test_field_and_gradient_at_the_hard_places(halves, rng):
     """1e-12 of the field, and of its gradient, wherever it is finite."""
     places = [hard_places(half, rng) for half in halves]

@@ -171,7 +171,7 @@ class Pinned(Force):
     fields = ("fixed",)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "domain",
     [Open(), pytest.param(Box(low=(-1.1e-6,) * 3, high=(1.1e-6,) * 3), marks=pytest.mark.slow)],
