@@ -238,6 +238,7 @@ def grains(number):
     return scene(at, 0 * at, radius=0.1, mass=1.0, dt=0.5)
 
 
+@pytest.mark.slow
 def test_small_scenes_do_not_go_through_the_memory_of_large_ones():
     """A kept simulation serves scenes of about its size; sizes are rounded, so that like ones share it."""
     batches = Batches()
@@ -258,6 +259,7 @@ def test_a_few_worlds_of_a_small_scene_compile_nothing_after_one():
     batches.close()
 
 
+@pytest.mark.slow
 def test_what_is_kept_for_later_is_given_up_where_there_is_no_room():
     """Simulations that are idle, and those that nobody has any more but the garbage collector."""
     kept = Batches()
@@ -280,6 +282,7 @@ def test_rounded_sizes():
     assert len({rounded(number) for number in range(1, 5000)}) < 50
 
 
+@pytest.mark.long
 def test_taichi_is_not_started_anew_under_what_is_in_use(monkeypatch):
     """A simulation of somebody's goes on, however much has been compiled."""
     mine, before = Simulation(moving(1.0)), runtime.generation()

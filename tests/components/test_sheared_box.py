@@ -92,7 +92,7 @@ def test_an_image_is_the_nearest_of_all(rng):
         np.testing.assert_allclose(out[w, near], nearest[near], rtol=0, atol=passed * roundoff())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_grains_in_shear_are_those_of_a_twin_that_wraps_nothing(rng):
     """Two rates side by side, and a box of many cells; many cross the faces, stick and slide across them.
     Momentum stays."""
@@ -131,6 +131,7 @@ def pair(shift, stepper=None):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "stepper", [None, pytest.param(Boris(control=FixedStep(dt=DT)), marks=pytest.mark.slow)]
 )

@@ -28,6 +28,8 @@ from tisim.interactions.spatial_sort import SORTED_FROM
 from tisim.neighbours.half_list import ListSizes
 from tisim.steppers import Collocation, Trapezoid
 
+pytestmark = pytest.mark.long
+
 
 def text(explanation):
     stream = io.StringIO()
@@ -158,7 +160,6 @@ def test_the_parts_of_a_law_and_what_materials_are_to_each_other():
     assert "granular.rolling: rolling_epsd" in output
 
 
-@pytest.mark.long
 def test_a_vibrating_cloud_has_no_contact_no_spin_and_no_temperature():
     """Z13: forces on charges, and nothing else; no fields, lists or phases of anything more."""
     explanation = explain(vibration(sites=2))

@@ -7,6 +7,8 @@ from tests.scenes import compiled, fixed, flow
 from tisim import Box, InputError, Particles, Scene
 from tisim.effects import Mie
 
+pytestmark = pytest.mark.long
+
 FLOWS = [flow(0, grains=60), flow(1, grains=60)]
 CAPACITY = max(scene.capacity() for scene in FLOWS)
 
@@ -51,7 +53,6 @@ def test_it_is_what_a_result_would_have(simulation):
         _ = simulation.state
 
 
-@pytest.mark.long
 def test_a_world_written_to_goes_on_as_one_that_starts_so():
     """Same forces, lists and steps, to the bit, wherever the particles have been put; time has gone on."""
     simulation = compiled(crystal(), 2)

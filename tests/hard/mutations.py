@@ -148,8 +148,7 @@ SHARED = {
     ),
     "can_follow": (
         f"{LAW}/step_limit.py", "+ 2.0 * damping)", "+ 0.0 * damping)",
-        "tests/effects/contact/test_granular_input.py"
-        "::test_what_no_step_can_follow_stops_the_world_and_is_named",
+        f"{STEPS}[hooke]",
     ),
     "can_follow_both": (
         f"{LAW}/step_limit.py", "> (both * first) * (both * second)", "> 0.0 * both * first * second",

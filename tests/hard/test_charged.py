@@ -124,6 +124,7 @@ def test_rotation_for_ten_thousand_periods_and_in_long_steps(rotations):
         assert r[2] == pytest.approx(0.5 * result.time, rel=1e-10)
 
 
+@pytest.mark.long
 def test_drift_across_both_fields(rotations):
     """The mean velocity is E/B within the width of a circle over the path; gyration does not heat."""
     name, kinds = rotations

@@ -40,6 +40,7 @@ def test_extremes_of_a_kind(runs, name):
     assert counts[REFUSED] > 0
 
 
+@pytest.mark.long
 def test_extremes_of_one_kind(runs):
     """A quick one of them."""
     name = "effects.stokes_drag"

@@ -109,6 +109,7 @@ def test_the_state_is_that_of_the_last_step_of_the_particle_that_fails(make, tmp
         same(result, expected)
 
 
+@pytest.mark.long
 @BOTH
 def test_launches_that_end_within_a_step(make, monkeypatch, tmp_path):
     """Looked at every 64 steps of a particle, and stopped and restored there: progress, the last state that

@@ -97,6 +97,7 @@ def test_contact_in_one_place_says_so(couples):
     np.testing.assert_array_equal(bad.state["position"], bad.start["position"])
 
 
+@pytest.mark.long
 def test_energy_released_is_energy_stored(couples):
     """From 10 % of overlap, and from 1e-12 radii between the centres: neither explosion nor loss."""
     for name in ("pressed", "hardly apart"):

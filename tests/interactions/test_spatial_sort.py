@@ -16,6 +16,8 @@ from tisim.interactions import pair_chunks, spatial_sort
 from tisim.io import checkpoint
 from tisim.operators import Outflow, Passage
 
+pytestmark = pytest.mark.long
+
 GRAINS, STEPS, EVERY = 200, 100, 40
 THROWN = 3
 

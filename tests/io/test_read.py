@@ -22,6 +22,8 @@ from tisim.io import read as reading
 from tisim.io.reader import world_count
 from tisim.io.run_folder import RunFolder
 
+pytestmark = pytest.mark.long
+
 FLOWS = [flow(0, grains=60, surface_energy=1e3), flow(1, grains=60, duration=4e-4, surface_energy=1e3)]
 CONTACT = Contact(stiffness=1.0), ContactFriction(stiffness=1.0, static=0.5, dynamic=0.4)
 CAPACITY = max(world_scene.capacity() for world_scene in FLOWS)

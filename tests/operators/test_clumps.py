@@ -92,6 +92,7 @@ def results(outcome):
     return outcome[0]
 
 
+@pytest.mark.long
 def test_clumps_are_put_in_as_they_are_drawn(results):
     """Of the size, mass and inertia of a template scaled in NumPy; each of its spheres where the body is."""
     state = by_id(results["pour"])

@@ -21,6 +21,8 @@ COMPILING, PATIENCE = 900.0, 60.0
 """Wall time, s, after which compiling a scene, and a run, which takes some hundredths, count as hung."""
 DRAWS = 1000
 """Scenes that are drawn for one that is accepted, at most; of three about two are."""
+KEPT = 50
+"""Scenes that stay compiled at once, those that were run last: Taichi has room for some more."""
 REFUSED, FAILED, RAN = "refused", "failed", "ran"
 
 Values = dict[extremes.Place, float]
@@ -38,15 +40,18 @@ def runner() -> Callable[[Call], str]:
 
     def run(call: Call) -> str:
         name, numbers = call
-        if name not in compiled:
-            compiled[name] = Simulation(Scene.from_dict(extremes.scenes()[name]))
+        if (simulation := compiled.pop(name, None)) is None:
+            simulation = Simulation(Scene.from_dict(extremes.scenes()[name]))
+        compiled[name] = simulation
+        if len(compiled) > KEPT:
+            compiled.pop(next(iter(compiled))).close()
         if numbers is None:
             return RAN
         tries: Iterable[Values] = (numbers,)
         if isinstance(numbers, int):
             random = Random(numbers)
             tries = islice(iter(lambda: extremes.draw_values(name, random), None), DRAWS)
-        outcomes = (_run_values(compiled[name], name, values) for values in tries)
+        outcomes = (_run_values(simulation, name, values) for values in tries)
         return next((end for end in outcomes if end != REFUSED), REFUSED)
 
     return run
@@ -71,7 +76,7 @@ class Runs:
 
     def __init__(self) -> None:
         self.apart = Apart(runner)
-        self.compiled: set[str] = set()
+        self.compiled: list[str] = []
 
     def __call__(self, name: str, numbers: Values | int) -> Outcome:
         """What came of a scene with these numbers, or with those drawn from a seed."""
@@ -79,7 +84,7 @@ class Runs:
             outcome = self.apart.trial((name, None), COMPILING)
             if outcome[0]:
                 return outcome
-            self.compiled.add(name)
+        self.compiled = [*(other for other in self.compiled if other != name), name][-KEPT:]
         outcome = self.apart.trial((name, numbers), PATIENCE)
         if outcome[0]:
             # Another process may have taken the place of the one that has compiled.

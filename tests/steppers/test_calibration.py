@@ -33,6 +33,7 @@ def within(ratios_by_scene, least=BAND[0], most=BAND[1]):
         assert (values < most).all(), f"{name}: {values}"
 
 
+@pytest.mark.long
 def test_the_error_at_the_end_of_a_particle_alone_is_that_asked_for():
     """By the trapezoidal rule: within a factor of 4 for each motion that is linear, whatever is asked for."""
     ratios_by_scene = ratios(trapezoid("run"), ASKED, SINGLE)

@@ -61,6 +61,7 @@ def test_beverloos_law_is_found_again():
     assert beverloo_fit(outlets, rates) == pytest.approx((0.61, 1.3), rel=1e-9)
 
 
+@pytest.mark.long
 def test_table_and_figure_have_each_bed():
     found = [
         Bed(what, value, cone(20.0 + 5 * k, 0.01 * (k + 1)))

@@ -11,7 +11,7 @@ from cases.granular_bench.mindlin_impact import oblique_impacts
 from cases.granular_bench.shear_cell import expected_ratio
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_impacts_are_those_of_the_law_in_numpy_and_of_rigid_spheres():
     """One of each test of Chung and Ooi, as one batch."""
     tests = particle_tests.TESTS

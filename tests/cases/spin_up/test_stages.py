@@ -69,6 +69,7 @@ def test_when_a_pile_deforms_and_breaks():
     assert np.isnan([spin_up(pile(), pile()).deformation, spin_up(pile(), pile(tall=2)).disruption]).all()
 
 
+@pytest.mark.long
 def test_figures_and_claims_of_some_runs():
     runs = [
         spin_up(pile(), pile(tall=2), pile(tall=2, lost=2), magnetisation=m)

@@ -129,6 +129,7 @@ def test_a_top_spun_about_its_intermediate_axis_flips():
     np.testing.assert_allclose(along, turns[:, 1] / PEAR.body.moments[1] / 500, atol=0.02)
 
 
+@pytest.mark.long
 def test_a_clump_on_springs_is_its_numpy_twin():
     """Forces on the members make force and torque on the body: to second order."""
     stiffness, time, errors = 0.2, 0.02, []
@@ -281,6 +282,7 @@ def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(tmp_pa
             np.testing.assert_array_equal(again.state[name], values, err_msg=name)
 
 
+@pytest.mark.long
 def test_clumps_go_through_the_faces_of_a_box():
     """They may lie across one from the start."""
     box, velocity = Box(low=(0, 0, 0), high=(0.01, 0.01, 0.01)), np.array([1.0, -0.73, 0.31])
@@ -298,6 +300,7 @@ def test_clumps_go_through_the_faces_of_a_box():
     assert np.linalg.norm(apart - 0.01 * np.round(apart / 0.01)) == pytest.approx(2 * R, rel=1e-12)
 
 
+@pytest.mark.long
 def test_spheres_may_be_put_in_beside_clumps():
     rain = InsertionByFlux(
         grains=[GrainClass(sizes=EqualSizes(radius=5e-4), density=2500.0)], number=5, low=(0, 0, 0.05),

@@ -176,6 +176,7 @@ def test_a_grain_inside_another_is_not_pushed():
     assert abs(edge) + abs(touching) < 1e-12
 
 
+@pytest.mark.long
 def test_light_contact_keeps_its_digits():
     """At an overlap of 1e-9 radii, to all digits of the overlap itself."""
     gap = 2.0 - 1e-9
@@ -200,6 +201,7 @@ def test_friction_of_grains_that_roll_on_each_other():
     assert worse == pytest.approx(2 * sliding)
 
 
+@pytest.mark.long
 def test_grains_that_just_touch_at_rest_rub_with_no_force():
     """Neither pressure nor speed, so neither a direction nor a NaN; none either without friction at all."""
     smooth = ContactFriction(stiffness=10.0, static=0.0, dynamic=0.0)

@@ -148,6 +148,7 @@ def ends(scenes):
     return simulate(scenes, worlds=WORLDS, capacity=CAPACITY)
 
 
+@pytest.mark.long
 def test_what_no_step_can_follow_stops_the_world_and_is_named():
     """Centres in one place, a modulus beyond numbers, and steps too long for a pair, its damping and a wall;
     the state of before is kept."""

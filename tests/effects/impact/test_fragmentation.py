@@ -46,6 +46,7 @@ def test_default_threshold_lets_two_pieces_happen(pieces):
     assert len(fewer.state["mass"]) == (1 if pieces == 2 else 2 * (pieces - 1))
 
 
+@pytest.mark.long
 def test_largest_grain_that_sticks_closed_form():
     """Z04 (5.5): above b0 = 4 gamma / (a_f H beta) two equal grains that bond also break into eight."""
     gamma, hardness = 30.0, 4e5

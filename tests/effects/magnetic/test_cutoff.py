@@ -106,6 +106,7 @@ def at_the_cutoff(law, state):
     return energy(law, state["position"] - ago * state["velocity"], m, state["radius"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_energy_is_conserved_through_a_shifted_cutoff_and_jumps_at_a_plain_one(shifted):
     """A shifted one keeps it to the order of Verlet; a plain one loses what the pair has at the cut-off."""
@@ -154,6 +155,7 @@ def solved(one, r, radius):
     return m, -0.5 * (m * b).sum()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shifted", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_mutual_moments_up_to_a_cutoff_are_those_of_a_linear_solve(rng, shifted):
     """And with the same cut-off in the forces, these are the gradient of the energy -1/2 sum m.B_0."""

@@ -100,6 +100,7 @@ def test_near_pairs_only(rng):
         assert np.abs(state["force"] - forces.sum(axis=1)).max() > 1e-6 * np.abs(state["force"]).max()
 
 
+@pytest.mark.long
 def test_a_box_in_which_a_law_reaches_beyond_half_a_side_is_refused(rng):
     """There the second image of a particle would act as well."""
     wide, narrow = (magnets(rng, TruncatedDipoleDipole(cutoff=c), sizes=(0.2, 0.2)) for c in (7.4, 7.6))

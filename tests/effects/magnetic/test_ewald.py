@@ -198,6 +198,7 @@ def solved(one, r, radius):
     return m, -0.5 * (m * b).sum()
 
 
+@pytest.mark.slow
 def test_mutual_moments_are_those_of_a_linear_solve_and_of_clausius_and_mossotti(rng):
     """At random, with forces that are gradients of the energy -1/2 sum m.B_0 to the accuracy of the sum; and
     on lattices, within the sample and with its poles."""
