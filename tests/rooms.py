@@ -24,7 +24,8 @@ ROOMS = (
     "optimize.settings",
     "optimize.outcome", "optimize.search_records", "optimize.search_folder", "optimize.search",
     "optimize.report", "optimize.session", "optimize",
-    "cases", "cases.statistics", "cases.case", "cases.capture", "cases.*", "tisim.cli", "tisim.__main__",
+    "cases", "cases.statistics", "cases.case", "cases.runs", "cases.capture", "cases.*", "tisim.cli",
+    "tisim.__main__",
 )  # fmt: skip
 """From the ground up. ``cases.*`` is every other case: each is a room of its own beside the others."""
 LATE = {

@@ -13,7 +13,8 @@ from typing import Any
 from cases.avalanche.measures import grains_volume, heap_volume, largest_overlap, repose, two_slopes
 from cases.avalanche.scene import LATEST, scene
 from cases.avalanche.sizes import Cell
-from tisim import Result, RunError, Scene, run
+from cases.runs import sound
+from tisim import Result, run
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.scene.initial_state import Arrays
 
@@ -82,7 +83,7 @@ def avalanches(
             )
             for (d, field, seed), state in begin.items()
         ]  # fmt: skip
-        return dict(zip(begin, ended(scenes, progress_of_part(progress, number, 3)), strict=True))
+        return dict(zip(begin, sound(run(scenes, progress_of_part(progress, number, 3))), strict=True))
 
     unmagnetised = {key: (key[0], 0.0, key[2]) for key in wanted}
     loose: dict[Key, Arrays | None] = dict.fromkeys(unmagnetised.values())
@@ -92,12 +93,3 @@ def avalanches(
     magnetised = {key: result.state for key, result in second.items()}
     third = stage(2, magnetised, 0.0)
     return [Avalanche(cell, *key, settled[key], magnetised[key], third[key]) for key in wanted]
-
-
-def ended(scenes: Sequence[Scene], progress: Progress) -> list[Result]:
-    """Run scenes until their grains are at rest, or for as long as is given; RunError where one fails."""
-    results = run(scenes, progress)
-    for result in results:
-        if not result.status.ok:
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
-    return results

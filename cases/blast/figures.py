@@ -17,7 +17,8 @@ from cases.blast import scene as blast
 from cases.blast.accuracy import half_axes
 from cases.blast.shape import contacts, extents
 from cases.case import size_named
-from tisim import Recording, RunError, run
+from cases.runs import sound
+from tisim import Recording, run
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
@@ -180,8 +181,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
                 progress_of_part(progress, finished, len(RUNS)),
                 Recording(path, frames=50),
             )
-            if not result.status.ok:
-                raise RunError(f"{name}: {result.status.reason}")
+            sound([result])
             with frames(path) as trajectory:
                 histories[name], ends[name] = BlastHistory.of(trajectory), trajectory[-1]
     return {"blast.png": beside(histories, ends), "blast.csv": table(histories)}

@@ -15,8 +15,9 @@ import numpy as np
 
 from cases.capture import scene as capture
 from cases.case import Check
+from cases.runs import sound
 from cases.statistics import Claim, Mean
-from tisim import Result, RunError, Scene, run
+from tisim import Result, Scene, run
 from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
 
@@ -42,10 +43,7 @@ def results(
 
 def grouped(scenes: Sequence[Scene], repeats: int, progress: Progress | None = None) -> list[list[Result]]:
     """Results of scenes, repeats of one thing after the other; RunError when one fails."""
-    runs = run(scenes, progress)
-    for result in runs:
-        if not result.status.ok:
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    runs = sound(run(scenes, progress))
     return [runs[k : k + repeats] for k in range(0, len(runs), repeats)]
 
 

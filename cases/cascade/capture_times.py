@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cases.cascade.scene import Cascade
-from tisim import RunError, run
+from cases.runs import sound
+from tisim import run
 from tisim.engine.batches import Progress
 
 CAPTURED_SHARE = 0.9
@@ -38,10 +39,8 @@ def captured_at(
         going = [row for row in rows if np.isfinite(row[1]).mean() < share]
         if not going:
             break
-        results = run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going])
+        results = sound(run([one.scene(int(np.isinf(at).sum()), generator) for one, at, generator in going]))
         for (one, at, _), result in zip(going, results, strict=True):
-            if not result.status.ok:
-                raise RunError(f"cascade: {result.status.reason}")
             when = result.state["captured_at"]
             # A particle has no name in the next stage: those that are captured fill the row from its start.
             first = int(np.isfinite(at).sum())

@@ -12,7 +12,7 @@ import numpy as np
 from cases.coalescence.measures import Asteroid, Conserved, Gathering
 from cases.coalescence.published import MAGNETISATIONS, NUMBER
 from cases.coalescence.scene import scale_of, scene
-from cases.granular_bench.shear_cell import unbroken
+from cases.runs import sound
 from tisim import Scene, Simulation
 from tisim.engine.batches import Progress
 from tisim.scene.initial_state import Arrays
@@ -67,10 +67,10 @@ def looked_at(
         simulation.load(scenes)
         for time in times:
             simulation.run(until=time)
-            for one, result in zip(seen, unbroken(simulation), strict=True):
+            for one, result in zip(seen, sound(simulation.results()), strict=True):
                 one.append(look(result.state))
             progress(float(time / times[-1]))
-        states = [result.state for result in unbroken(simulation)]
+        states = [result.state for result in sound(simulation.results())]
     return seen, states
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cases.granular_bench.impacts import by_id, ended, simulation_of
+from cases.granular_bench.impacts import by_id, simulation_of
+from cases.runs import sound
 from tisim import Material, Particles, Scene
 from tisim.effects import DMT, JKR, CapillaryBridge, Effect, Granular, HertzMaterial
 from tisim.steppers import FixedStep, Verlet
@@ -90,7 +91,7 @@ def pulls(scenes: Sequence[Scene]) -> list[Pull]:
     with closing(simulation_of(scenes)) as simulation:
         for _ in range(PULL_LOOKS):
             simulation.run(steps=1)
-            for rows, result in zip(seen, ended(simulation.results()), strict=True):
+            for rows, result in zip(seen, sound(simulation.results()), strict=True):
                 state = by_id(result)
                 overlap = 2 * STICKY_RADIUS - float(np.diff(state["position"][:, 0])[0])
                 rows.append((overlap, float(state["force"][1, 0])))

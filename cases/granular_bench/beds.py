@@ -20,7 +20,8 @@ from scipy.constants import g as STANDARD_GRAVITY
 
 from cases.granular_bench.measures import discharge, heap, repose
 from cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
-from tisim import Result, RunError, run
+from cases.runs import sound
+from tisim import Result, run
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, panel, walls_at
 from tisim.plotting.style import empty, letters, plain
@@ -68,10 +69,8 @@ def beds(progress: Progress, size: Mapping[str, Any]) -> list[Bed]:
     ]
     digests = [one.digest() for one in scenes]
     different = dict(zip(digests, scenes, strict=True))
-    results = dict(zip(different, run(list(different.values()), progress), strict=True))
-    for result in results.values():
-        if not result.status.ok:
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    found = sound(run(list(different.values()), progress))
+    results = dict(zip(different, found, strict=True))
     return [Bed(*one, results[digest]) for one, digest in zip(wanted, digests, strict=True)]
 
 

@@ -21,9 +21,10 @@ from cases.granular_bench.closed_forms import (
     sliding_impact,
     sliding_limit,
 )
-from cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, ended, force_curves, rebound
+from cases.granular_bench.impacts import ParticleImpact, Rebound, by_id, force_curves, rebound
 from cases.granular_bench.mindlin_impact import oblique_impacts
 from cases.granular_bench.shear_cell import expected_ratio, sheared_beds
+from cases.runs import sound
 from tisim import Scene, run
 
 BOUND = 1e-3
@@ -43,7 +44,7 @@ COARSE = 4000
 
 def rebounds(impacts: Sequence[ParticleImpact]) -> list[Rebound]:
     """Return what becomes of some impacts, run as one batch."""
-    results = ended(run([impact.scene() for impact in impacts]))
+    results = sound(run([impact.scene() for impact in impacts]))
     return [rebound(impact, result) for impact, result in zip(impacts, results, strict=True)]
 
 
@@ -134,7 +135,7 @@ def friction_excess(restitution: float) -> float:
 
 def last_states(*scenes: Scene) -> list[dict[str, np.ndarray]]:
     """Return the states at the ends of some scenes."""
-    return [by_id(result) for result in ended(run(list(scenes)))]
+    return [by_id(result) for result in sound(run(list(scenes)))]
 
 
 def friction_and_rest() -> Iterator[Check]:
@@ -146,7 +147,7 @@ def friction_and_rest() -> Iterator[Check]:
     gripped = [m.held(part, t / 2) for part in m.HOLDS for t in HALVES]
     halfway = replace(m.rolls(), duration=m.stops_after() / 2)
     everything = [m.slides(), halfway, m.rolls(), m.column(), *steep, *rough, *gripped]
-    results = ended(run([one.scene() for one in everything]))
+    results = sound(run([one.scene() for one in everything]))
     rolling, slowed, stopped, lying, *others = map(by_id, results)
 
     lever = m.SPHERE_RADIUS - m.sunk() / 2

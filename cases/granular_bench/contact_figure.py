@@ -24,11 +24,11 @@ from cases.granular_bench.impacts import (
     ParticleImpact,
     Rebound,
     by_id,
-    ended,
     force_curves,
     simulation_of,
 )
 from cases.granular_bench.mindlin_impact import oblique_impacts
+from cases.runs import sound
 from tisim import run
 from tisim.plotting.style import empty, letters, plain
 
@@ -175,7 +175,7 @@ def slide_to_roll(axis: Axes) -> None:
     with closing(simulation_of([one.scene()])) as simulation:
         for time in np.linspace(0, one.duration, 41)[1:]:
             simulation.run(until=time)
-            state = by_id(ended(simulation.results())[0])
+            state = by_id(sound(simulation.results())[0])
             rows.append((time, state["velocity"][0, 0], motions.SPHERE_RADIUS * state["spin"][0, 1]))
     time, speed, surface = np.array(rows).T
     slowed = motions.FRICTION * motions.G
@@ -214,7 +214,7 @@ def pull_against_gap(axis: Axes) -> None:
 
 def deflection(axis: Axes) -> None:
     """Draw a row of cemented spheres under a load at its end."""
-    (state,) = map(by_id, ended(run([beams.beam(beams.LOAD)])))
+    (state,) = map(by_id, sound(run([beams.beam(beams.LOAD)])))
     length = beams.SPHERES * beams.BEAM_SIDE
     x = np.linspace(0, length, 100)
     bent = beams.LOAD * x**2 * (3 * length - x) / (6 * beams.BEAD_YOUNG * beams.SECOND)

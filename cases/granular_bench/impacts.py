@@ -15,7 +15,8 @@ import numpy as np
 
 from cases.granular_bench.closed_forms import hertz_depth, hertz_duration, reduced
 from cases.granular_bench.substances import SUBSTANCES
-from tisim import Material, Particles, Result, RunError, Scene, Simulation
+from cases.runs import sound
+from tisim import Material, Particles, Result, Scene, Simulation
 from tisim.effects import Granular, HertzMaterial, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
 from tisim.steppers import FixedStep, Verlet
@@ -158,14 +159,6 @@ def simulation_of(scenes: Sequence[Scene]) -> Simulation:
     return simulation
 
 
-def ended(results: Sequence[Result]) -> Sequence[Result]:
-    """Return results; raise RunError where one has failed."""
-    for result in results:
-        if not (result.status.ok or result.status.reason == "running"):
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
-    return results
-
-
 def by_id(result: Result) -> dict[str, np.ndarray]:
     """Return the state of a result with its particles in the order of their ids."""
     order = np.argsort(result.state["id"])
@@ -195,7 +188,7 @@ def force_curves(impacts: Sequence[ParticleImpact], every: int = 4) -> list[Forc
     with closing(simulation_of([impact.scene() for impact in impacts])) as simulation:
         for _ in range(int(1.5 * STEPS) // every):
             simulation.run(steps=every)
-            for impact, rows, result in zip(impacts, seen, ended(simulation.results()), strict=True):
+            for impact, rows, result in zip(impacts, seen, sound(simulation.results()), strict=True):
                 state = by_id(result)
                 other = state["position"][1, 2] + impact.other_radius if impact.partner != "plane" else 0.0
                 overlap = impact.radius + other - state["position"][0, 2]

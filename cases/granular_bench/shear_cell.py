@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cases.granular_bench.scene import DENSITY, DIAMETER, POISSON, SPREAD
-from tisim import Box, Cloud, GrainClass, Material, Particles, Result, RunError, Scene, Simulation
+from cases.runs import sound
+from tisim import Box, Cloud, GrainClass, Material, Particles, Result, Scene, Simulation
 from tisim.analysis import solid_fraction
 from tisim.effects import (
     Granular,
@@ -196,26 +197,16 @@ def sheared_beds(
     with closing(Simulation(cell(start, drives[0], closes, law), len(gaps))) as simulation:
         simulation.load([cell(start, drive, closes, law) for drive in drives])
         simulation.run()
-        closed = [result.state for result in unbroken(simulation)]
+        closed = [result.state for result in sound(simulation.results())]
         drawn = [(drive[0], 0.0, 0.0) for drive in drives]
         simulation.load([cell(state, drive, lasts, law) for state, drive in zip(closed, drawn, strict=True)])
         for time in np.linspace(before, lasts, SAMPLES):
             simulation.run(until=time)
             progress(float(time / lasts))
-            for gap, look, result in zip(gaps, looks, unbroken(simulation), strict=True):
+            for gap, look, result in zip(gaps, looks, sound(simulation.results()), strict=True):
                 look.append(seen(result, gap))
         states = [result.state for result in simulation.results()]
     return [mean_of(*one) for one in zip(gaps, looks, states, strict=True)]
-
-
-def unbroken(simulation: Simulation) -> list[Result]:
-    """Return the results of worlds that are at their end or on the way to it; RunError where one has failed:
-    the state of its last good step would be taken for that of the others."""
-    results = simulation.results()
-    for result in results:
-        if not result.status.ok and result.status.reason != "running":
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
-    return results
 
 
 def seen(result: Result, gap: float) -> tuple[np.ndarray, ...]:

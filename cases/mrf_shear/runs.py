@@ -9,8 +9,9 @@ import numpy as np
 
 from cases.mrf_shear.measures import shear_stress
 from cases.mrf_shear.scene import MAGNETISING_TIME, scene
+from cases.runs import sound
 from cases.statistics import Mean
-from tisim import Result, RunError, Scene, run
+from tisim import Result, Scene, run
 from tisim.engine.batches import Progress
 
 Settings = Mapping[str, Any]
@@ -25,10 +26,7 @@ def cells(settings: Sequence[Settings], starts: int, progress: Progress | None =
 
 def grouped(scenes: Sequence[Scene], starts: int, progress: Progress | None = None) -> list[list[Result]]:
     """Return the results of scenes, so many starts of one thing after the other; RunError when one fails."""
-    results = run(list(scenes), progress)
-    for result in results:
-        if not result.status.ok:
-            raise RunError(f"{result.scene.name}: {result.status.reason}")
+    results = sound(run(list(scenes), progress))
     return [results[k : k + starts] for k in range(0, len(results), starts)]
 
 

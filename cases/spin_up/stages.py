@@ -11,7 +11,7 @@ import numpy as np
 
 from cases.coalescence.measures import Asteroid, Conserved, body, clusters_of, part
 from cases.coalescence.published import MAGNETISATIONS
-from cases.granular_bench.shear_cell import unbroken
+from cases.runs import sound
 from cases.spin_up.scene import scene
 from tisim import Simulation
 from tisim.engine.batches import Progress
@@ -133,7 +133,7 @@ def spin_ups(
                 for state in simulation.states:
                     turn(state, rate)
             simulation.run(until=end)
-            for steps, result in zip(seen, unbroken(simulation), strict=True):
+            for steps, result in zip(seen, sound(simulation.results()), strict=True):
                 steps.append(SpinStep(rate, result.state))
             progress(float(end / ends[-1]))
     return [SpinUp(*one, steps) for one, steps in zip(wanted, seen, strict=True)]

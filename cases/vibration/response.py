@@ -16,10 +16,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.signal.windows import blackmanharris
 
+from cases.runs import sound
 from cases.vibration import scene as vibration
 from cases.vibration.closed_forms import resonances, response
 from cases.vibration.scene import CHARGE, CYCLOTRON, FIELD, MASS, STIFFNESS
-from tisim import Recording, RunError, Scene, run
+from tisim import Recording, Scene, run
 from tisim.engine.batches import Progress
 from tisim.io.reader import Frames, frames
 from tisim.plotting.time_series import history
@@ -54,10 +55,7 @@ class Sweep:
     @classmethod
     def of(cls, scenes: Sequence[Scene], progress: Progress | None = None) -> Sweep:
         """Run scenes with the operator PeakDisplacement, which differ in their drive frequency only."""
-        results = run(scenes, progress)
-        for result in results:
-            if not result.status.ok:
-                raise RunError(f"{result.scene.name}: {result.status.reason}")
+        results = sound(run(scenes, progress))
         omega = np.array([drive(scene) for scene in scenes])
         duration = scenes[0].duration
         exact = [peak(duration, CYCLOTRON, STIFFNESS / MASS, CHARGE * FIELD / MASS, o) for o in omega]
