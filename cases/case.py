@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cases
-from cases.statistics import Claim
+from cases.statistics import Claim, Shown
 from optimize.problem.problem import Problem
 from tisim import InputError, Scene
 from tisim.accuracy import Quantity
@@ -85,7 +85,8 @@ class Case:
     """A runnable scenario, and the inverse problem on it where there is one.
 
     name : of the package. title, source : for people. sizes : by name; "default" is among them.
-    scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known.
+    scene : (size, seed) -> Scene. check : runs what must hold and yields each number as it is known, also
+    those that are only shown.
     quantities : what 'tisim cost' compares in a scene of the case; None for what it takes by itself.
     cost_size : the size that 'tisim cost' takes unless one is given; None for "default".
     problem : (size, variant) -> Problem; variants : its names, the first the default.
@@ -99,7 +100,7 @@ class Case:
     source: str
     sizes: Mapping[str, Size]
     scene: Callable[[str, int], Scene]
-    check: Callable[[], Iterator[Check | Claim]]
+    check: Callable[[], Iterator[Check | Claim | Shown]]
     problem: Callable[[str, str], Problem] | None = None
     variants: tuple[str, ...] = ()
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,3 +53,18 @@ class Claim:
         bounds = [f"above {self.least:.4g}"] * bool(np.isfinite(self.least))
         bounds += [f"below {self.most:.4g}"] * bool(np.isfinite(self.most))
         return str(self.mean), ", ".join(bounds), "", f"{CONFIDENCE:.0%} confidence"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A number that is shown beside what is said of it elsewhere, and not judged."""
+
+    name: str
+    value: float | Mean
+    beside: str = ""
+    ok: ClassVar[None] = None
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """The number, and what it is shown beside; for people."""
+        return str(self.value) if isinstance(self.value, Mean) else f"{self.value:.4g}", self.beside, "", ""

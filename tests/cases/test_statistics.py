@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cases.case import Check
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim, Mean, Shown
 
 
 def test_mean_and_its_interval():
@@ -24,6 +24,12 @@ def test_claim_holds_when_all_of_the_interval_does():
     assert Claim("", Mean(0.5, 0.1), most=0.61).ok
     assert not Claim("", Mean(0.5, 0.1), most=0.59).ok
     assert Claim("", Mean(0.5, 0.1), most=0.6).cells[:2] == ("0.5 ± 0.1", "below 0.6")
+
+
+def test_what_is_shown_is_not_judged():
+    assert Shown("", Mean(1.0, 0.5), "2").cells == ("1 ± 0.5", "2", "", "")
+    assert Shown("", 1.23456).cells[0] == "1.235"
+    assert Shown("", 1.0).ok is None
 
 
 def test_checks_are_checks():
