@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cases.avalanche.measures import grains_volume, heap_volume, largest_overlap, repose
+from cases.avalanche.measures import grains_volume, heap_volume, overlap, repose
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 
@@ -23,5 +23,5 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     return (
         Quantity("angle of repose", lambda result: repose(result.state), random=True),
         Quantity("volume of the heap", volume, random=True),
-        Quantity("largest overlap", lambda result: largest_overlap(result.state, width(result)), random=True),
+        Quantity("largest overlap", lambda result: overlap(result.state, width(result)), random=True),
     )

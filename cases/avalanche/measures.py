@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from cases.avalanche.scene import GRAVITY
 from tisim import InputError, Result
-from tisim.analysis import contacts, slope_angles, surface_profile
+from tisim.analysis import largest_overlap, slope_angles, surface_profile
 from tisim.scene.initial_state import Arrays
 
 SAMPLES = 8
@@ -82,14 +82,10 @@ def filled_parts(state: Arrays, width: float, length: float, height: float) -> n
     return np.asarray(inside.reshape(columns, SAMPLES, layers, SAMPLES).mean(axis=(1, 3)))
 
 
-def largest_overlap(state: Arrays, width: float) -> float:
+def overlap(state: Arrays, width: float) -> float:
     """Return the largest overlap of two grains in a cell of a width (m), over a radius."""
-    place, radius = state["position"], state["radius"]
-    i, j = contacts(place, radius, sides=(0.0, width, 0.0)).T
-    apart = place[j] - place[i]
-    apart[:, 1] -= width * np.rint(apart[:, 1] / width)
-    overlap = radius[i] + radius[j] - np.linalg.norm(apart, axis=1)
-    return float(overlap.max(initial=0.0) / radius.mean())
+    radius = state["radius"]
+    return largest_overlap(state["position"], radius, (0.0, width, 0.0)) / float(radius.mean())
 
 
 def load_on_walls(result: Result) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cases.avalanche.measures import grains_volume, heap_volume, largest_overlap, repose, two_slopes
+from cases.avalanche.measures import grains_volume, heap_volume, overlap, repose, two_slopes
 from cases.avalanche.scene import LATEST, scene
 from cases.avalanche.sizes import Cell
 from cases.runs import sound
@@ -60,7 +60,7 @@ class Avalanche:
     @property
     def overlap(self) -> float:
         """Return the largest overlap at the end, over a radius."""
-        return largest_overlap(self.end.state, self.width)
+        return overlap(self.end.state, self.width)
 
 
 Key = tuple[float, float, int]

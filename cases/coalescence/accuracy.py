@@ -3,20 +3,16 @@ asteroid is, over random starts."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from cases.coalescence.measures import Asteroid, Gathering
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
-from tisim.analysis import contacts
+from tisim.analysis import largest_overlap
 
 
-def largest_overlap(result: Result) -> float:
+def overlap(result: Result) -> float:
     """Return the largest overlap of two grains at the end, over the smallest radius."""
     position, radius = result.state["position"], result.state["radius"]
-    i, j = contacts(position, radius).T
-    apart = np.linalg.norm(position[i] - position[j], axis=1)
-    return float((radius[i] + radius[j] - apart).max(initial=0.0) / radius.min())
+    return largest_overlap(position, radius) / float(radius.min())
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
@@ -24,5 +20,5 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     return (
         Quantity("part in clusters", lambda result: Gathering.of(result.state).bound, random=True),
         Quantity("density", lambda result: Asteroid.of(result.state).density, random=True),
-        Quantity("largest overlap", largest_overlap, random=True),
+        Quantity("largest overlap", overlap, random=True),
     )

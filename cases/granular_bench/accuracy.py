@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cases.granular_bench.bed import centre_height, largest_overlap, side_load
+from cases.granular_bench.bed import centre_height, overlap, side_load
 from cases.granular_bench.measures import discharge, repose
 from tisim import Scene
 from tisim.accuracy import Quantity
@@ -20,5 +20,5 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     return (
         Quantity("height of the bed", centre_height, random=True),
         Quantity("load on the side", side_load, random=True),
-        Quantity("largest overlap", largest_overlap, random=True),
+        Quantity("largest overlap", overlap, random=True),
     )

@@ -20,7 +20,7 @@ from cases.granular_bench.scene import (
     grains,
 )
 from tisim import Result, Scene
-from tisim.analysis import contacts
+from tisim.analysis import largest_overlap
 from tisim.components.accuracy_parameter import three_digits
 from tisim.effects import Gravity, Walls
 from tisim.geometry import CylindricalSurface, Plane
@@ -86,12 +86,10 @@ def bed(
     )
 
 
-def largest_overlap(result: Result) -> float:
+def overlap(result: Result) -> float:
     """Return the largest overlap of two grains at the end, over the mean radius."""
     position, radius = result.state["position"], result.state["radius"]
-    i, j = contacts(position, radius).T
-    apart = np.linalg.norm(position[i] - position[j], axis=1)
-    return float((radius[i] + radius[j] - apart).max(initial=0.0) / radius.mean())
+    return largest_overlap(position, radius) / float(radius.mean())
 
 
 def side_load(result: Result) -> float:

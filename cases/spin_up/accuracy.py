@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cases.coalescence.accuracy import largest_overlap
+from cases.coalescence.accuracy import overlap
 from cases.coalescence.measures import Asteroid
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
@@ -17,5 +17,5 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Paths of grains are chaotic; what counts is the pile that they make."""
     return (
         Quantity("density", density, random=True),
-        Quantity("largest overlap", largest_overlap, random=True),
+        Quantity("largest overlap", overlap, random=True),
     )

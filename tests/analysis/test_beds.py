@@ -11,6 +11,7 @@ from tisim.analysis import (
     coordination_numbers,
     discharge_rate,
     discharge_rates,
+    largest_overlap,
     mean_coordination,
     solid_fraction,
 )
@@ -28,6 +29,14 @@ def test_solid_fraction_of_a_cubic_packing_and_of_cut_spheres():
     # A quarter of the way up a sphere are 5/32 of its volume.
     cut = solid_fraction(position[:1], radius[:1], np.array([-1.0, 0.25, 2.0]), area=2.0, axis=0)
     np.testing.assert_allclose(cut * 2.0 * np.array([1.25, 1.75]), np.pi / 6 * np.array([5 / 32, 27 / 32]))
+
+
+def test_the_largest_overlap_is_found_across_a_face():
+    position, radius = np.array([[0.2, 0.0, 0.0], [1.1, 0.0, 0.0], [3.9, 0.0, 0.0]]), [0.5, 0.5, 0.4]
+    assert largest_overlap(position, radius) == pytest.approx(0.1)
+    # 0.3 apart through the face at 4.
+    assert largest_overlap(position, radius, (4.0, 0.0, 0.0)) == pytest.approx(0.6)
+    assert largest_overlap(position[1:], radius[1:]) == 0.0
 
 
 def test_contacts_of_a_cubic_packing():

@@ -1,5 +1,6 @@
 from .beds import contacts as contacts
 from .beds import coordination_numbers as coordination_numbers
+from .beds import largest_overlap as largest_overlap
 from .beds import mean_coordination as mean_coordination
 from .beds import rattling as rattling
 from .beds import solid_fraction as solid_fraction

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tisim.analysis.separations import Sides, near
+from tisim.analysis.separations import Sides, near, nearest_image
 
 FEWEST_CONTACTS = 4
 """A grain with fewer contacts is not held in three dimensions: it rattles."""
@@ -32,6 +32,17 @@ def contacts(position: np.ndarray, radius: np.ndarray, gap: float = 0.0, sides: 
     sides : those of a box that is periodic, as ``near`` takes them.
     """
     return near(position, np.asarray(radius, float) + gap / 2, sides)
+
+
+def largest_overlap(position: np.ndarray, radius: np.ndarray, sides: Sides = None) -> float:
+    """Return the largest overlap of two grains, m; 0 where none touch.
+
+    sides : those of a box that is periodic, as ``near`` takes them.
+    """
+    radius = np.asarray(radius, float)
+    i, j = contacts(position, radius, sides=sides).T
+    apart = np.linalg.norm(nearest_image(position[j] - position[i], sides), axis=1)
+    return float((radius[i] + radius[j] - apart).max(initial=0.0))
 
 
 def coordination_numbers(number: int, pairs: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ from cases.avalanche.measures import (
     filled_parts,
     grains_volume,
     heap_volume,
-    largest_overlap,
     load_on_walls,
+    overlap,
     repose,
     two_slopes,
 )
@@ -58,8 +58,8 @@ def test_a_lattice_fills_pi_over_six():
 
 def test_the_largest_overlap_is_found_across_the_periodic_face():
     state = block([1])
-    assert largest_overlap(state, WIDTH * D) < 1e-12
-    assert largest_overlap(state, (WIDTH - 0.1) * D) == pytest.approx(0.2)
+    assert overlap(state, WIDTH * D) < 1e-12
+    assert overlap(state, (WIDTH - 0.1) * D) == pytest.approx(0.2)
 
 
 def test_the_load_on_walls_is_counted_in_weights():
