@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cases.mrf_shear.measures import largest_overlap, shear_stress
+from cases.mrf_shear.measures import overlap, shear_stress
 from tisim import Scene
 from tisim.accuracy import Quantity
 
@@ -11,5 +11,5 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     """Paths of grains are chaotic; what counts is the stress of the fluid."""
     return (
         Quantity("shear stress", shear_stress, random=True),
-        Quantity("largest overlap", largest_overlap, random=True),
+        Quantity("largest overlap", overlap, random=True),
     )

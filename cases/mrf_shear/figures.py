@@ -61,7 +61,7 @@ def stress_figure(curve: Curve, fields: Curve, parts: Mapping[str, Sequence[Resu
     flux.errorbar(fields.x, fields.values / KILO, fields.halves / KILO, **style)
     scale = fields.values[-1] / fields.x[-1] ** 2 / KILO
     line = np.linspace(fields.x.min(), fields.x.max(), 100)
-    flux.plot(line, scale * line**2, color="0.2", lw=1.0, label="as B²")
+    flux.plot(line, scale * line**2, color="0.2", lw=1.0, label=f"as B²; exponent {fields.power()}")
     flux.set(xlabel="flux density (T)", ylabel="shear stress (kPa)", title="by field")
     part_bars(bars, parts)
     for axis in (rates, flux):

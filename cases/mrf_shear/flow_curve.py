@@ -12,18 +12,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
-from cases.mrf_shear.measures import shear_rate, shear_stress
-from cases.mrf_shear.problem import flux
+from cases.mrf_shear.grains import mixture
+from cases.mrf_shear.measures import flux, shear_rate, shear_stress
 from cases.mrf_shear.runs import Settings, cells
-from cases.mrf_shear.scene import RATES, mixture
+from cases.mrf_shear.scene import RATES
 from cases.statistics import Mean
 from tisim import Result
-from tisim.analysis import BinghamFit, fit_bingham
+from tisim.analysis import BinghamFit, Estimate, fit_bingham
 from tisim.effects import CARBONYL_IRON
 from tisim.engine.batches import Progress
-from tisim.numerics.statistics import CONFIDENCE
 
 COMPARED = {"rate": RATES[-1]}
 """Variants and fields are compared at the fastest of the rates, which is the quickest to run."""
@@ -48,9 +46,14 @@ class Curve:
     groups: Sequence[Sequence[Result]]
 
     @property
+    def of_starts(self) -> np.ndarray:
+        """Return the shear stress of each setting and start, Pa."""
+        return np.array([[shear_stress(one) for one in group] for group in self.groups])
+
+    @property
     def stresses(self) -> list[Mean]:
-        """Return the mean shear stress of each, Pa."""
-        return [Mean.of([shear_stress(one) for one in group]) for group in self.groups]
+        """Return the mean shear stress of each setting, Pa."""
+        return [Mean.of(starts) for starts in self.of_starts]
 
     @property
     def values(self) -> np.ndarray:
@@ -63,13 +66,20 @@ class Curve:
         return np.array([one.half for one in self.stresses])
 
     def bingham(self) -> BinghamFit:
-        """Return the fluid of Bingham that fits, with intervals by the spread over starts."""
-        factor = student.ppf(0.5 + CONFIDENCE / 2, len(self.groups[0]) - 1)
-        return fit_bingham(self.x, self.values, self.halves / factor)
+        """Return the mean over starts of the fluid of Bingham that fits the curve of each.
 
-    def power(self) -> float:
-        """Return the exponent of the power law through the means."""
-        return float(np.polyfit(np.log(self.x), np.log(self.values), 1)[0])
+        All settings begin from the same starts: their errors go together, and a fit to their means, to which
+        they are errors of their own, would not know how far off it is.
+        """
+        fits = [fit_bingham(self.x, start) for start in self.of_starts.T]
+        yields = Mean.of([one.yield_stress.value for one in fits])
+        viscosity = Mean.of([one.plastic_viscosity.value for one in fits])
+        return BinghamFit(*(Estimate(one.value, one.half) for one in (yields, viscosity)))
+
+    def power(self) -> Mean:
+        """Return the mean over starts of the exponent of the power law that fits the curve of each."""
+        x = np.log(self.x)
+        return Mean.of([np.polyfit(x, np.log(start), 1)[0] for start in self.of_starts.T])
 
 
 def flow_curve(starts: int, rates: Sequence[float] = RATES, progress: Progress | None = None) -> Curve:
@@ -98,7 +108,7 @@ def table(curve: Curve, heading: str) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow([heading, "shear_stress_Pa", "half_interval_Pa", "of_each_start_Pa"])
-    for x, mean, group in zip(curve.x, curve.stresses, curve.groups, strict=True):
-        each = " ".join(f"{shear_stress(one):.5g}" for one in group)
+    for x, mean, starts in zip(curve.x, curve.stresses, curve.of_starts, strict=True):
+        each = " ".join(f"{one:.5g}" for one in starts)
         writer.writerow([f"{x:.6g}", f"{mean.value:.5g}", f"{mean.half:.3g}", each])
     return text.getvalue()

@@ -1,20 +1,27 @@
-"""What a sheared cell measures: shear stress, how grains are ordered, and numbers that tell the regime."""
+"""What a sheared cell measures: shear stress, how grains are ordered, overlap, and how much is magnetised."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.constants import mu_0
 
-from cases.mrf_shear import published
-from cases.mrf_shear.scene import DENSITY, LARGE_RADIUS, LOWER, UPPER
+from cases.mrf_shear.regime import magnetisation
+from cases.mrf_shear.scene import LOWER, UPPER
 from tisim import Result
-from tisim.analysis import cluster_shapes, contacts, fabric_tensor, mean_coordination, nearest_image
+from tisim.analysis import (
+    cluster_shapes,
+    contacts,
+    fabric_tensor,
+    largest_overlap,
+    mean_coordination,
+    periodic_sides,
+)
 from tisim.components.domain import Domain
-from tisim.effects import PrescribedMotion, Translation
+from tisim.effects import PrescribedMotion, StokesDrag, Translation
 from tisim.operators import JoinGroup
 from tisim.scene.initial_state import Arrays
+from tisim.sources import CouetteFlow, MagneticField
 
 CHAINED = 0.05
 """Grains are of one chain where the gap between surfaces is below this part of the mean radius."""
@@ -30,21 +37,25 @@ def area(result: Result) -> float:
     return float(np.prod(extent(result.scene.domain)[:2]))
 
 
-def sides(domain: Domain) -> np.ndarray:
-    """Return the sides of the cell along which it is periodic (m), and 0 along the field."""
-    return np.where(domain.imaged(), extent(domain), 0.0)
-
-
 def shear_stress(result: Result) -> float:
     """Return the shear stress, Pa: the mean over time of the force along x that holds the rafts back, over
     their area, of both rafts (L21 Eq. 2.8, which takes the upper one)."""
-    lower, upper = (raft_force(result.state, group) for group in (LOWER, UPPER))
+    lower, upper = (raft_force(result, group) for group in (LOWER, UPPER))
     return float(lower[0] - upper[0]) / (2 * area(result))
 
 
-def raft_force(state: Arrays, group: int) -> np.ndarray:
-    """Return the mean over time of the force on a raft, N."""
-    return np.asarray(state["mean_force"][state["group"] == group].sum(axis=0))
+def raft_force(result: Result, group: int) -> np.ndarray:
+    """Return the mean over time of the force of the grains on a raft, N: without the drag of the oil, which
+    is none where the oil goes with the rafts, and steady where it is at rest."""
+    state, effects = result.state, result.scene.effects
+    own = state["group"] == group
+    drag = next(one for one in effects if isinstance(one, StokesDrag))
+    oil = next(one for one in effects if isinstance(one, CouetteFlow))
+    (raft,) = [one.motion for one in effects if isinstance(one, PrescribedMotion) and one.group == group]
+    assert isinstance(raft, Translation)
+    flow = np.array(oil.first_velocity if group == LOWER else oil.second_velocity)
+    resistance = 6 * np.pi * drag.viscosity * float(state["radius"][own].sum())
+    return np.asarray(state["mean_force"][own].sum(axis=0) - resistance * (flow - raft.velocity))
 
 
 def shear_rate(result: Result) -> float:
@@ -75,7 +86,7 @@ class Order:
 def order(state: Arrays, domain: Domain) -> Order:
     """Return how the grains of a state in a cell are ordered."""
     position, radius = state["position"], state["radius"]
-    around = sides(domain)
+    around = periodic_sides(domain)
     pairs = contacts(position, radius, CHAINED * float(radius.mean()), around)
     shapes = cluster_shapes(position, pairs, around)
     weight = shapes.size / shapes.size.sum()
@@ -89,25 +100,24 @@ def order(state: Arrays, domain: Domain) -> Order:
     )
 
 
-def largest_overlap(result: Result) -> float:
+def overlap(result: Result) -> float:
     """Return the largest overlap of two grains at the end, over the mean radius of all."""
-    position, radius, around = result.state["position"], result.state["radius"], sides(result.scene.domain)
-    pairs = contacts(position, radius, sides=around)
-    apart = np.linalg.norm(nearest_image(position[pairs[:, 1]] - position[pairs[:, 0]], around), axis=1)
-    return float((radius[pairs].sum(axis=1) - apart).max(initial=0.0) / radius.mean())
+    position, radius = result.state["position"], result.state["radius"]
+    return largest_overlap(position, radius, periodic_sides(result.scene.domain)) / float(radius.mean())
+
+
+def magnetised_part(result: Result) -> float:
+    """Return the mean moment of a grain at the end over that of one by itself in the field."""
+    volume = 4 / 3 * np.pi * result.state["radius"] ** 3
+    moment = np.linalg.norm(result.state["moment"], axis=1)
+    return float((moment / volume).mean()) / magnetisation(flux(result))
+
+
+def flux(result: Result) -> float:
+    """Return the flux density of the field, T."""
+    return float(next(e for e in result.scene.effects if isinstance(e, MagneticField)).constant[2])
 
 
 def volume_fraction(result: Result) -> float:
     """Return the part of the cell that grains fill."""
     return float((4 / 3 * np.pi * result.state["radius"] ** 3).sum() / extent(result.scene.domain).prod())
-
-
-def mason_number(rate: float, flux: float) -> float:
-    """Return the Mason number, Mn = 8 eta rate mu_0 / B^2, how much drag in a shear flow is beside magnetic
-    forces; others have it with other factors."""
-    return 8 * published.OIL_VISCOSITY * rate * mu_0 / flux**2
-
-
-def stokes_time() -> float:
-    """Return the time in which oil stops a grain, m / (6 pi eta R) = 2 rho R^2 / (9 eta), s."""
-    return 2 * DENSITY * LARGE_RADIUS**2 / (9 * published.OIL_VISCOSITY)

@@ -12,17 +12,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cases.case import size_named
-from cases.mrf_shear.measures import extent, shear_stress, volume_fraction
+from cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS, mixture
+from cases.mrf_shear.measures import extent, flux, shear_stress, volume_fraction
 from cases.mrf_shear.off_state import off_state_viscosity
-from cases.mrf_shear.scene import LARGE_RADIUS, SEARCHED, SIZES, SMALL_RADIUS, TITLE, mixture, scene
+from cases.mrf_shear.scene import SEARCHED, SIZES, TITLE, scene
 from optimize.problem.genome import Gene, Genome
 from optimize.problem.objective import Objective
 from optimize.problem.problem import Problem
 from tisim import Cloud, Result, Scene
 from tisim.errors import must
 from tisim.plotting.cloud import cloud
-from tisim.sources import MagneticField
 
 VARIANTS = ("front", "bounded", "field")
 GENES = (
@@ -72,11 +71,6 @@ def start_of(result: Result) -> Cloud:
     return particles
 
 
-def flux(result: Result) -> float:
-    """Return the flux density of the field, T."""
-    return float(next(e for e in result.scene.effects if isinstance(e, MagneticField)).constant[2])
-
-
 LARGE_STRESS = Objective("stress", shear_stress, "Pa", maximise=True)
 LOW_VISCOSITY = Objective("viscosity", viscosity, "Pa s")
 OBJECTIVES = {
@@ -90,7 +84,9 @@ def problem(size: str = "default", variant: str = "front") -> Problem:
     """Return the search for fluids; by variant the front of stress and viscosity, the highest stress at a
     bounded viscosity, or the front of stress, viscosity and field."""
     must(variant in VARIANTS, "variant", f"one of {', '.join(VARIANTS)}", variant)
-    settings = {**size_named(size, SIZES).scene, **SEARCHED}
+    searched = [name for name, one in SIZES.items() if one.search is not None]
+    must(size in searched, "size", f"one of {', '.join(searched)} for the inverse problem", size)
+    settings = {**SIZES[size].scene, **SEARCHED}
 
     def designed(design: Mapping[str, float], seed: int) -> Scene:
         small, fraction = design["small"], design["fraction"]

@@ -34,16 +34,14 @@ STEP = 2e-10
 """A step takes so long, s."""
 NEIGHBOUR_GAP = 8 * MICRO
 """Grains magnetise each other up to this gap between surfaces, m (section 2.4.3)."""
-MEAN_LARGE, MEAN_SMALL = 6.7 * MICRO, 1.8 * MICRO
-"""Mean diameters of large and small grains, m."""
+MEAN_LARGE = 6.7 * MICRO
+"""Mean diameter of the large grains, m."""
 CHAINS_FORM = 1e5 * STEP
 """Chains have formed in about so long, s (section 2.4.1)."""
 WALL_SPEEDS = (0.128, 0.064, 0.032, 0.011, 0.008, 0.004, 0.002, 0.001)
 """Speeds of each raft, one after the other, m/s."""
 SHEAR_RATES = tuple(2 * speed / (CELL_SIDE - 2 * RAFT_DEPTH) for speed in WALL_SPEEDS)
 """Shear rates between the rafts, 1/s: L21 names 590, 36.4 and 9 among them."""
-FIT_ABOVE = 200.0
-"""The Bingham law is fitted above this shear rate, 1/s."""
 
 # Table 2.4 and section 2.4.2: yield stresses at 0.6 T, Pa.
 MEASURED_YIELD = {"00:100": 44.9e3, "33:67": 50.8e3}

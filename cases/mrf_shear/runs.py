@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,11 +34,6 @@ def magnetised(settings: Settings, seed: int) -> Scene:
     """Return a cell up to the time at which its rafts are frozen."""
     until = settings.get("magnetising", MAGNETISING_TIME)
     return scene(**settings, seed=seed).model_copy(update={"duration": until})
-
-
-def means(groups: Sequence[Sequence[Result]], of: Callable[[Result], float] = shear_stress) -> list[Mean]:
-    """Return the mean over starts of what is measured, for each setting."""
-    return [Mean.of([of(result) for result in group]) for group in groups]
 
 
 def paired(one: Sequence[Result], other: Sequence[Result]) -> Mean:

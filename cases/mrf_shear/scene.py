@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from cases.case import Size, size_named
-from cases.mixtures import classes, magnetorheological
+from cases.mixtures import magnetorheological
 from cases.mrf_shear import published
+from cases.mrf_shear.grains import DENSITY, MONODISPERSE, number_of, smallest
 from cases.mrf_shear.published import MICRO
 from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
 from tisim.components.accuracy_parameter import three_digits
@@ -30,6 +31,7 @@ from tisim.effects import (
     HertzMaterial,
     MindlinForce,
     MutualFroehlichMoment,
+    MutualInducedMoment,
     PrescribedMotion,
     RestitutionDamping,
     RollingEPSD,
@@ -45,14 +47,8 @@ from tisim.steppers import FixedStep, Verlet
 
 TITLE = "A magnetorheological fluid in a shear cell: flow curve and yield stress"
 
-DENSITY, SUSCEPTIBILITY = CARBONYL_IRON.density, 999.0
-"""The density of carbonyl iron, kg/m^3, and a susceptibility of which a sphere is magnetised as one without
-end, to 0.3 %."""
-LINEAR = 1e12
-"""Grains whose magnetisation saturates at so much (A/m) do not saturate: those of L21."""
-LARGE_RADIUS, SMALL_RADIUS = published.MEAN_LARGE / 2, published.MEAN_LARGE / 4
-"""The radius of the large grains, and of the small ones of a mixture at sizes for a laptop, m: half as large,
-where those of L21 are a quarter, which would be 25 for each large one in a mixture of 33:67."""
+SUSCEPTIBILITY = CARBONYL_IRON.parameters()["susceptibility"]
+"""That of carbonyl iron, of which a sphere is magnetised as one without end, to 0.3 %."""
 SIDES: Vector = (40 * MICRO, 40 * MICRO, 60 * MICRO)
 RAFT = 8 * MICRO
 """The sides of the cell, and how much of its bottom and top becomes rafts, m."""
@@ -74,18 +70,6 @@ IMPACT = 1.0
 """m/s, about as fast as grains of 6.7 um meet that fields of 0.6 T draw together."""
 
 
-def equal(radius: float, share: float) -> tuple[GrainClass, ...]:
-    """Return grains of one radius (m) that have a share of a mixture; none for a share of 0."""
-    return classes(((2 * radius / MICRO, 1.0),), "mass", share) if share > 0 else ()
-
-
-def mixture(share: float) -> tuple[GrainClass, ...]:
-    """Return a mixture of large and small grains of one size each; share : of the small ones, 0 to 1."""
-    return (*equal(LARGE_RADIUS, 1 - share), *equal(SMALL_RADIUS, share))
-
-
-MONODISPERSE = mixture(0.0)
-"""Grains of one size, the mean of the large ones of L21."""
 SEARCHED: dict[str, Any] = {
     "rate": RATES[-1], "sides": (32 * MICRO, 32 * MICRO, 48 * MICRO), "raft": 7 * MICRO, "strain": 0.7,
     "before": 0.35,
@@ -98,8 +82,9 @@ SEARCH_SETTINGS = {
 LEPS: dict[str, Any] = {
     "sides": (published.CELL_SIDE,) * 3, "raft": published.RAFT_DEPTH, "rate": published.SHEAR_RATES[0],
     "magnetising": published.CHAINS_FORM, "dt": published.STEP, "strain": 0.93, "before": 0.7,
+    "plates": False,
 }  # fmt: skip
-"""L21's own cell, sheared at the first of its rates."""
+"""L21's own cell, open along the field, sheared at the first of its rates."""
 SIZES = {
     "default": Size(
         "183 grains of 6.7 um in a cell of 40 x 40 x 60 um, at 2000 1/s; a search has 32 x 32 x 48 um", {},
@@ -120,18 +105,6 @@ SIZES = {
     "l21_bidisperse": Size("the same, 33:67 by number", {**LEPS, "grains": magnetorheological(0.33)}),
     "l21_monodisperse": Size("the same, grains of 6.7 um", {**LEPS, "grains": MONODISPERSE}),
 }  # fmt: skip
-
-
-def number_of(grains: Sequence[GrainClass], fraction: float, volume: float) -> int:
-    """Return how many grains fill a fraction of a volume (m^3)."""
-    # Numbers of a class are for each kg of its share.
-    filled = sum(one.share / one.density for one in grains)
-    return round(fraction * volume * sum(one.number() for one in grains) / filled)
-
-
-def smallest(grains: Sequence[GrainClass]) -> float:
-    """Return the radius of the smallest grain that there may be, m."""
-    return float(min(one.sizes.nodes()[0].min() for one in grains))
 
 
 def impact_step(radius: float, young: float) -> float:
@@ -186,8 +159,9 @@ def scene(
     dt: float | None = None,
     rolling: float = published.ROLLING_FRICTION,
     cohesion: float = published.COHESION,
-    saturation: float = LINEAR,
+    saturation: float | None = None,
     still: bool = False,
+    plates: bool = True,
 ) -> Scene:
     """Return the scene of a cell.
 
@@ -196,10 +170,12 @@ def scene(
     time after which rafts are frozen, s. strain : at the end; before : at which the mean of the stress
     begins. young : Pa. dt : s; unless given a part of the time of an impact of the smallest grains. rolling :
     coefficient of rolling friction. cohesion : energy density, J/m^3. saturation : magnetisation at which
-    grains saturate, A/m. still : whether the oil stays at rest. All are values of one structure: cells that
-    differ in them run as one batch.
+    grains saturate, A/m; None where they do not, as L21's. still : whether the oil stays at rest. plates :
+    whether there are smooth ones below and above. All but the last of these, and whether grains saturate, are
+    values of one structure: cells that differ in them run as one batch.
     """
-    plates = (Plane(point=(0.0, 0.0, 0.0)), Plane(point=(0.0, 0.0, sides[2]), normal=(0.0, 0.0, -1.0)))
+    ends = (Plane(point=(0.0, 0.0, 0.0)), Plane(point=(0.0, 0.0, sides[2]), normal=(0.0, 0.0, -1.0)))
+    plate = {"plate": smooth(young)} if plates else {}
     return Scene(
         name="mrf_shear",
         particles=Cloud(
@@ -207,15 +183,14 @@ def scene(
             grains=tuple(grains),
             placement=RandomInDomain(),
         ),
-        materials={"iron": iron(young, rolling, cohesion), "plate": smooth(young)},
+        materials={"iron": iron(young, rolling, cohesion), **plate},
         domain=Box(low=(0.0, 0.0, 0.0), high=sides, periodic=(True, True, False)),
         effects=(
             MagneticField(constant=(0.0, 0.0, flux)),
-            # One sweep a step, as L21 has it (section 2.2.3).
-            MutualFroehlichMoment(susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, **CUT),
+            induced(saturation),
             TruncatedDipoleDipole(**CUT),
             CONTACT,
-            Walls(name="plates", planes=plates, material="plate"),
+            *((Walls(name="plates", planes=ends, material="plate"),) if plates else ()),
             StokesDrag(viscosity=published.OIL_VISCOSITY),
             *sheared(rate, sides[2], raft, magnetising, before, still),
         ),
@@ -223,6 +198,14 @@ def scene(
         duration=magnetising + strain / rate,
         seed=seed,
     )
+
+
+def induced(saturation: float | None) -> Effect:
+    """Return what magnetises grains, up to a saturation (A/m) where there is one; in one sweep a step, as in
+    L21 section 2.2.3."""
+    if saturation is None:
+        return MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, **CUT)
+    return MutualFroehlichMoment(susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, **CUT)
 
 
 def sheared(

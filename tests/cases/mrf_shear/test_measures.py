@@ -8,18 +8,21 @@ from scipy.constants import mu_0
 
 from cases.mrf_shear import published
 from cases.mrf_shear.flow_curve import Curve, table
+from cases.mrf_shear.grains import LARGE_RADIUS
 from cases.mrf_shear.measures import (
     area,
-    largest_overlap,
-    mason_number,
+    magnetised_part,
     order,
+    overlap,
+    raft_force,
     shear_rate,
     shear_stress,
-    stokes_time,
     volume_fraction,
 )
+from cases.mrf_shear.regime import approach_time, magnetisation, mason_number, regime, stokes_time
 from cases.mrf_shear.runs import paired
-from cases.mrf_shear.scene import LARGE_RADIUS, LOWER, UPPER, scene
+from cases.mrf_shear.scene import LOWER, UPPER, scene
+from cases.statistics import Mean
 
 R, UM = LARGE_RADIUS, 1e-6
 CELL = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0)
@@ -46,6 +49,20 @@ def test_stress_is_the_mean_of_both_rafts_over_their_area():
     assert paired([double, double], [result, result]).value == pytest.approx(2.0)
 
 
+def test_the_drag_of_oil_at_rest_is_no_stress():
+    """Rafts go through it at their own speed; what is left of the force on them is that of the grains."""
+    still = scene(sides=(40 * UM, 30 * UM, 60 * UM), raft=10 * UM, rate=500.0, still=True)
+    drag = 6 * np.pi * 0.01 * R * 500.0 * 40 * UM / 2
+    grains, group = np.array([[2e-6, 0, 1e-6], [-2e-6, 0, 0], [0, 0, 0]]), [LOWER, UPPER, 0]
+    with_drag = grains + np.outer([drag, -drag, drag], [1, 0, 0])
+    one = result_of(np.zeros((3, 3)), with_drag, group, cell=still)
+    assert drag > 1e-9
+    np.testing.assert_allclose(raft_force(one, LOWER), grains[0], rtol=1e-12)
+    assert shear_stress(one) == pytest.approx(2e-6 / 1.2e-9)
+    # Oil that goes with the rafts drags them not at all.
+    assert raft_force(result_of(np.zeros((3, 3)), grains, group), UPPER)[0] == -2e-6
+
+
 def test_the_shear_rate_is_that_between_the_rafts():
     assert shear_rate(result_of(np.zeros((1, 3)))) == pytest.approx(500.0)
     # L21 names these of its own speeds.
@@ -69,8 +86,8 @@ def test_a_chain_along_the_field_across_a_face_and_one_that_lies():
 
 def test_overlap_and_volume_fraction():
     result = result_of([[0.5 * UM, 0, 0], [40 * UM - 6 * UM, 0, 0], [20 * UM, 0, 0]])
-    assert largest_overlap(result) == pytest.approx((2 * R - 6.5 * UM) / R)
-    assert largest_overlap(result_of([[0, 0, 0], [9 * UM, 0, 0]])) == 0.0
+    assert overlap(result) == pytest.approx((2 * R - 6.5 * UM) / R)
+    assert overlap(result_of([[0, 0, 0], [9 * UM, 0, 0]])) == 0.0
     assert volume_fraction(result) == pytest.approx(3 * 4 / 3 * np.pi * R**3 / (72000 * UM**3))
 
 
@@ -78,6 +95,22 @@ def test_the_regime():
     """Drag is far below magnetic forces, and oil stops a grain in microseconds."""
     assert mason_number(1000.0, 0.6) == pytest.approx(8 * 0.01 * 1000 * mu_0 / 0.36)
     assert stokes_time() == pytest.approx(2e-6, rel=0.05)
+    moment = magnetisation(0.6) * np.pi / 6 * (2 * R) ** 3
+    force = 3 * mu_0 * moment**2 / (2 * np.pi * (2 * R) ** 4)
+    assert force == pytest.approx(15e-6, rel=0.02)
+    mass = 7860 * np.pi / 6 * (2 * R) ** 3
+    assert force / mass * approach_time(0.6) ** 2 / 2 == pytest.approx(R)
+    shown = {one.name: one.value for one in regime()}
+    assert shown["attraction of two in line that touch, uN"] == pytest.approx(1e6 * force)
+    assert shown["Mason number at 2000 1/s"] == pytest.approx(5.6e-4, rel=0.01)
+    assert shown["magnetisation of a grain by itself, MA/m"] == pytest.approx(1.43, rel=2e-3)
+
+
+def test_how_much_grains_are_magnetised():
+    result = result_of(np.zeros((2, 3)))
+    alone = magnetisation(0.6) * 4 / 3 * np.pi * R**3
+    result.state["moment"] = alone * np.array([[0, 0, 1.0], [0, 0.9, 1.2]])
+    assert magnetised_part(result) == pytest.approx(1.25)
 
 
 def test_a_curve_is_fitted_with_the_spread_over_starts():
@@ -92,10 +125,14 @@ def test_a_curve_is_fitted_with_the_spread_over_starts():
     fit = curve.bingham()
     assert fit.yield_stress.value == pytest.approx(40e3)
     assert fit.plastic_viscosity.value == pytest.approx(0.5)
-    assert fit.yield_stress.half > 0
+    # Starts are shared: what the yield stress varies by is what a whole curve is off.
+    assert fit.yield_stress.half == pytest.approx(Mean.of([39e3, 41e3, 40e3]).half)
+    assert fit.plastic_viscosity.half == pytest.approx(0.0, abs=1e-6)
     rows = table(curve, "shear_rate_per_s").splitlines()
     assert rows[0] == "shear_rate_per_s,shear_stress_Pa,half_interval_Pa,of_each_start_Pa"
     assert rows[1].startswith("1000,40500,")
     assert rows[1].endswith("39500 41500 40500")
     square = Curve(rates, [group(rate, [rate**2, rate**2]) for rate in rates])
-    assert square.power() == pytest.approx(2.0)
+    assert square.power().value == pytest.approx(2.0)
+    bent = Curve(rates, [group(rate, [rate, rate**3]) for rate in rates]).power()
+    assert (bent.value, bent.half) == pytest.approx((2.0, Mean.of([1.0, 3.0]).half))

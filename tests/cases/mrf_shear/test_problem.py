@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from cases.case import every
+from cases.mrf_shear.grains import LARGE_RADIUS, SMALL_RADIUS
+from cases.mrf_shear.measures import flux
 from cases.mrf_shear.off_state import off_state_viscosity
-from cases.mrf_shear.problem import BOUND, design_viscosity, flux, problem, viscosity
-from cases.mrf_shear.scene import LARGE_RADIUS, SMALL_RADIUS
+from cases.mrf_shear.problem import BOUND, design_viscosity, problem, viscosity
 from tisim import InputError
 
 DESIGN = {"small": 0.25, "fraction": 0.2, "flux": 0.5}
@@ -42,5 +43,7 @@ def test_objectives_of_each_variant():
     assert names == {"front": ["stress", "viscosity"], "field": ["stress", "viscosity", "field"]}
     assert not problem(variant="bounded").several
     assert [each.maximise for each in problem(variant="field").objectives] == [True, False, False]
+    with pytest.raises(InputError, match="size must be one of default for the inverse problem"):
+        problem("polydisperse")
     _, settings = every()["mrf_shear"].inverse("default", None)
     assert settings["generations"] > 0
