@@ -20,6 +20,7 @@ from cases.avalanche.sizes import SIZES
 from cases.avalanche.stages import Avalanche, avalanches
 from cases.case import size_named
 from tisim.engine.batches import Progress
+from tisim.errors import must
 from tisim.plotting.style import empty, letters, plain
 
 SEEDS = 3
@@ -34,9 +35,12 @@ SHOWN = (30.0, 16.0)
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """slopes.png, slopes.csv: profiles and angles by grain size, with and without a field; density.png: how
     densely heaps are filled; forces.png: magnetic force over weight."""
-    cell = size_named(size, SIZES).scene["cell"]
+    settings = dict(size_named(size, SIZES).scene)
+    some = [name for name, one in SIZES.items() if "diameter" not in one.scene]
+    rule = f"one whose cell holds grains of each diameter in turn ({', '.join(some)})"
+    must(size in some, "size", rule, size)
     wanted = [(d, field, seed) for d in DIAMETERS for field in (0.0, FLUX) for seed in range(SEEDS)]
-    runs = avalanches(cell, wanted, progress)
+    runs = avalanches(settings.pop("cell"), wanted, progress, **settings)
     return {
         "slopes.png": slopes_figure(runs),
         "slopes.csv": table(runs),

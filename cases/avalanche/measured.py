@@ -75,7 +75,7 @@ def read(path: Path) -> Target:
     """Return what a CSV file has; InputError where it is none, or no slope is in it."""
     heading, rows = measured.table(path, measured.HEADING, PROFILE)
     if heading == measured.HEADING:
-        return measured.read(path, ANGLE_UNITS)["angle_of_repose"]
+        return measured.measurements(path, rows, ANGLE_UNITS)["angle_of_repose"]
     try:
         numbers = np.array([[float(cell) for cell in row] for row in rows]).reshape(-1, len(PROFILE))
     except ValueError:

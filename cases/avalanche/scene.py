@@ -65,7 +65,8 @@ CUTOFF = 5.0
 avalanches: at 2.5 the force of two in a row is a fortieth of that in contact."""
 RELAXATION = 0.6
 """A sweep of the moments goes so much of its way. L21 goes all of it. Here that diverges: in a settled bed
-the least eigenvalue of what moments do to each other is -1.08, and moments grow by as much in each step."""
+the least eigenvalue of what moments do to each other is below -1, and moments grow by as much in each
+step."""
 STIFFNESS = 2e5
 """Young's modulus over the weight of a grain by its section, rho g d, of softened grains. L21's 1e9 Pa is
 1.8e8 of it for grains of 5 mm, and 1.8e7 for those of 5 cm."""

@@ -71,11 +71,18 @@ def table(path: Path, *headings: Sequence[str]) -> tuple[list[str], list[list[st
     return rows[0], rows[1:]
 
 
-def read(path: Path, units: Mapping[str, str] = QUANTITY_UNITS) -> dict[str, Measurement]:
-    """Return the measurements of a CSV file, of the quantities that have ``units``; InputError where it is
-    none, or there is nothing in it."""
+def read(path: Path) -> dict[str, Measurement]:
+    """Return the measurements of a CSV file; InputError where it is none, or there is nothing in it."""
+    return measurements(path, table(path, HEADING)[1], QUANTITY_UNITS)
+
+
+def measurements(
+    path: Path, rows: Sequence[Sequence[str]], units: Mapping[str, str]
+) -> dict[str, Measurement]:
+    """Return the measurements of the lines of a file below its HEADING, of the quantities that have
+    ``units``; InputError where one is none, or there are none."""
     measured: dict[str, Measurement] = {}
-    for name, *numbers in table(path, HEADING)[1]:
+    for name, *numbers in rows:
         if name not in units:
             raise InputError(
                 f"quantity of {path} must be one of {', '.join(units)}; received {name}"

@@ -4,18 +4,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.linalg import eigvalsh
 
+from cases.avalanche import figures as drawing
 from cases.avalanche.calving import STRIP, strips_of
 from cases.avalanche.checks import of_avalanches
 from cases.avalanche.comparison import of, steeper_by
-from cases.avalanche.figures import density_figure, forces_figure, slopes_figure, table
+from cases.avalanche.figures import figures
 from cases.avalanche.measures import load_on_walls
-from cases.avalanche.scaling import CONTRAST
-from cases.avalanche.scene import CUTOFF, DIAMETERS, FLUX, GRAVITY, RELAXATION
-from cases.avalanche.sizes import DEFAULT, Cell
+from cases.avalanche.scaling import CONTRAST, moment_eigenvalues
+from cases.avalanche.scene import DIAMETERS, FLUX, GRAVITY, RELAXATION
+from cases.avalanche.sizes import DEFAULT, SIZES, Cell
 from cases.avalanche.stages import Avalanche, avalanches
+from cases.case import Size
 from tests.cases.avalanche.slopes import WIDTH, block, leaning
+from tisim import InputError
 
 CELL = Cell(number=0, column=8.0, width=WIDTH, length=40.0, height=20.0)
 
@@ -53,20 +55,32 @@ def test_what_is_steeper_is_told_by_pairs_of_starts(staircases):
     assert not claims["5 mm: volume over that without (L21: 1.09)"].ok
     assert claims["5 mm: volume as magnetised over that as settled"].mean.value == pytest.approx(6.5 / 4)
     assert claims["volume grows by more, 5 mm than 5 cm"].mean.value == pytest.approx(0.5)
-    assert claims["without a field: 5 mm steeper than 5 cm by, degrees"].ok
+    alike = claims["without a field: 5 mm steeper than 5 cm by, degrees"]
+    assert alike.value.value == pytest.approx(0.0, abs=0.1)
+    assert alike.beside == "0 of copies; L21: 5.9"
+    assert claims["5 mm, settled: factor of a sweep as it is made"].ok
     assert claims["load on the walls over weight, at worst"].ok
 
 
-def test_figures_and_table_have_each_slope(staircases):
-    slopes = slopes_figure(staircases)
+def test_figures_of_a_size_are_of_its_settings_and_have_each_slope(staircases, monkeypatch):
+    calls = []
+    monkeypatch.setattr(drawing, "avalanches", lambda *a, **more: calls.append((a, more)) or staircases)
+    monkeypatch.setitem(SIZES, "stiff", Size("", {"cell": CELL, "stiffness": 1e6}))
+    drawn = figures("stiff", None)
+    (((cell, wanted, _), more),) = calls
+    assert (cell, len(wanted), more) == (CELL, 18, {"stiffness": 1e6})
+    slopes = drawn["slopes.png"]
     assert len(slopes.axes) == 3
     assert [len(axis.lines) for axis in slopes.axes] == [6, 6, 6]
-    rows = table(staircases).splitlines()
+    rows = drawn["slopes.csv"].splitlines()
     assert len(rows) == 1 + len(staircases)
     assert rows[0].startswith("diameter_m,field_T,seed,angle_degrees")
-    (_, _, bar) = density_figure(staircases).axes
+    (_, _, bar) = drawn["density.png"].axes
     assert bar.get_ylabel() == "part of the volume that grains fill"
-    assert len(forces_figure().axes[0].lines) == 8
+    assert len(drawn["forces.png"].axes[0].lines) == 8
+    # Each of L21's sizes is of one diameter.
+    with pytest.raises(InputError, match=r"size must be one whose cell holds .* \(default, large, stiff\)"):
+        figures("l21_1cm", None)
 
 
 def test_strips_are_those_of_the_column():
@@ -77,20 +91,13 @@ def test_strips_are_those_of_the_column():
     assert STRIP == 3.0
 
 
-def eigenvalues(state, width):
-    """The least and the largest eigenvalue of what moments within the cut-off do to each other."""
-    d = 2 * state["radius"].mean()
-    place = state["position"] / d
-    apart = place[None] - place[:, None]
-    apart[..., 1] -= width / d * np.rint(apart[..., 1] * d / width)
-    distance = np.linalg.norm(apart, axis=-1)
-    np.fill_diagonal(distance, np.inf)
-    n = apart / distance[..., None]
-    strength = np.where(distance <= CUTOFF / 2, CONTRAST / 8 / distance**3, 0.0)
-    tensor = strength[..., None, None] * (3 * n[..., :, None] * n[..., None, :] - np.eye(3))
-    matrix = tensor.transpose(0, 2, 1, 3).reshape(3 * len(place), -1)
-    values = eigvalsh(matrix)
-    return values[0], values[-1]
+def test_moments_of_two_grains_have_known_eigenvalues():
+    """In contact, through the periodic face: 2 a along the line between them, a across, of either sign."""
+    d, a = DIAMETERS[0], CONTRAST / 8
+    state = {"position": np.array([[0, 0.3 * d, 0], [0, 5.3 * d, 0]]), "radius": np.full(2, d / 2)}
+    found = moment_eigenvalues(state, 6 * d)
+    np.testing.assert_allclose(found, a * np.array([-2, -1, -1, 1, 1, 2]))
+    assert not moment_eigenvalues(state, 20 * d).any()
 
 
 @pytest.mark.slow
@@ -109,6 +116,6 @@ def test_a_field_loosens_small_grains_and_without_one_all_sizes_are_alike():
         assert load_on_walls(one.end) == pytest.approx(1.0, abs=0.03)
     # Whole sweeps would diverge in the bed that has settled; those that are made converge.
     for one in loose:
-        least, most = eigenvalues(one.settled, one.width)
+        least, most = moment_eigenvalues(one.settled, one.width)[[0, -1]]
         assert least < -1
         assert all(abs(1 - RELAXATION + RELAXATION * value) < 0.9 for value in (least, most))

@@ -7,20 +7,19 @@ import pytest
 
 from cases.avalanche.measured import MeasuredProfile, area, read
 from cases.avalanche.measures import profile, repose
-from cases.avalanche.problem import calibration, misfit, problem
+from cases.avalanche.problem import calibration, misfit
 from cases.case import every
 from cases.granular_bench.measured import Measurement
 from tests.cases.avalanche.slopes import leaning
-from tests.judged import check_message
+from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError
 
 HEADING = "distance,height,uncertainty\n"
-WRONG = {
+WRONG = WRONG_ANGLES | {
     "no heading": ("0,1,1\n", "heading of .* must be quantity,value,uncertainty or distance,height,uncertai"),
     "other quantity": ("quantity,value,uncertainty\ndischarge_rate,1,1\n", "must be one of angle_of_repose"),
-    "no angle": ("quantity,value,uncertainty\n", "quantities of .* must be one or more"),
-    "too few": (HEADING + "0,1,1\n1,0,1\n", "profile must be of 4 points or more; received 2"),
-    "no number": (HEADING + "0,1,1\n1,x,1\n", "must be of numbers below its heading"),
+    "too few points": (HEADING + "0,1,1\n1,0,1\n", "profile must be of 4 points or more; received 2"),
+    "no height": (HEADING + "0,1,1\n1,x,1\n", "must be of numbers below its heading"),
     "falls back": (HEADING + "0,3,1\n1,2,1\n1,1,1\n2,0,1\n", "distance must be rising"),
     "flat": (
         HEADING + "0,0,1\n1,0,1\n2,0,1\n3,0,1\n",
@@ -32,11 +31,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
 def test_wrong_files_are_refused(text, message, tmp_path):
-    path = tmp_path / "mine.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=message) as error_info:
-        read(path)
-    check_message(str(error_info.value))
+    check_refused(read, text, message, tmp_path)
 
 
 def test_an_angle_is_met_in_uncertainties(tmp_path):
@@ -76,20 +71,13 @@ def test_a_profile_tells_slopes_apart():
 
 
 def test_other_measurements_are_another_problem(tmp_path):
-    path = tmp_path / "mine.csv"
-    path.write_text(HEADING + "0,5,1\n4,3,1\n8,1,1\n12,0,1\n")
-    case = every()["avalanche"]
-    usual, settings = case.inverse("default", None)
-    own, _ = case.inverse("default", "calibrate", path)
-    assert usual.identity != own.identity
-    assert own.identity == calibration("default", "calibrate", path).identity
-    assert usual.identity == problem().identity
-    assert settings["generations"] == 6
+    text = HEADING + "0,5,1\n4,3,1\n8,1,1\n12,0,1\n"
     design = {"friction": 0.3, "rolling_friction": 0.1, "cohesion": 50.0}
-    scene = usual.scene(design, 1)
-    assert scene.digest() == own.scene(design, 1).digest()
+    _, own, scene = check_another_problem("avalanche", text, calibration, design, tmp_path)
     assert scene.materials["iron"].cohesion_energy_density == 50.0
     assert "magnetic_field" not in {effect.label for effect in scene.effects}
     assert "a measured profile" in own.title
+    case = every()["avalanche"]
+    assert case.sizes["default"].search["generations"] == 6
     with pytest.raises(InputError, match="size must be one of default for the inverse problem"):
         case.inverse("l21", "calibrate")

@@ -21,7 +21,7 @@ from cases.granular_bench.problem import (
     other_runs,
     problem,
 )
-from tests.judged import check_message
+from tests.own_measurements import WRONG_ANGLES, check_another_problem, check_refused
 from tisim import InputError
 
 INTERVALS = {"friction": 0.05, "rolling_friction": 0.08, "restitution": 0.03}
@@ -30,16 +30,9 @@ GOOD = (
     "quantity, value, uncertainty\n\nangle_of_repose,24.5,1.0\n discharge_rate , 0.15,5e-3\n"
     "sliding_angle,27,1\nrebound_ratio,0.25,0.02\n"
 )
-WRONG = {
+WRONG = WRONG_ANGLES | {
     "no heading": ("angle_of_repose,24.5,1.0\n", "heading of .* must be quantity,value,uncertainty"),
-    "empty": ("", "heading of .* must be"),
-    "nothing": ("quantity,value,uncertainty\n", "quantities of .* must be one or more"),
-    "unknown": ("quantity,value,uncertainty\nangle_of_reposs,1,1\n", "must be one of angle_of_repose, disch"),
-    "twice": ("quantity,value,uncertainty\n" + 2 * "discharge_rate,1,1\n", "must be given once"),
-    "too few": ("quantity,value,uncertainty\ndischarge_rate,1\n", "a line of .* must be of three cells"),
-    "no number": ("quantity,value,uncertainty\ndischarge_rate,x,1\n", "must be a value and an uncertainty"),
-    "no uncertainty": ("quantity,value,uncertainty\ndischarge_rate,1,0\n", "uncertainty must be finite and"),
-    "not finite": ("quantity,value,uncertainty\ndischarge_rate,nan,1\n", "value must be finite and above 0"),
+    "no rate": ("quantity,value,uncertainty\ndischarge_rate,x,1\n", "must be a value and an uncertainty"),
 }
 
 
@@ -54,13 +47,7 @@ def test_measurements_of_a_file(tmp_path):
 
 @pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
 def test_wrong_files_are_refused(text, message, tmp_path):
-    path = tmp_path / "measured.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=message) as error_info:
-        read(path)
-    check_message(str(error_info.value))
-    with pytest.raises(InputError, match="must be a CSV file that can be read"):
-        read(tmp_path / "absent.csv")
+    check_refused(read, text, message, tmp_path)
 
 
 def test_misfit_counts_in_uncertainties(monkeypatch):
@@ -80,22 +67,14 @@ def test_a_bed_in_a_cup_is_not_calibrated():
 
 
 def test_other_measurements_are_another_problem(tmp_path):
-    """Runs that were judged by others are not used again; the scenes are the same."""
-    path = tmp_path / "measured.csv"
-    path.write_text(GOOD)
-    case = every()["granular_bench"]
-    usual, _ = case.inverse("default", None)
-    own, settings = case.inverse("default", "calibrate", path)
-    assert usual.identity != own.identity
-    assert own.identity == calibration("default", "calibrate", path).identity
-    assert usual.identity == problem().identity
-    assert settings["generations"] == 14
     design = {"friction": 0.3, "rolling_friction": 0.1, "restitution": 0.5}
-    assert usual.scene(design, 1).digest() == own.scene(design, 1).digest()
+    _, own, _ = check_another_problem("granular_bench", GOOD, calibration, design, tmp_path)
     assert "24.5 ± 1 degrees" in own.title
     assert own.title.endswith("rebound_ratio 0.25 ± 0.02")
     with pytest.raises(InputError, match="--measured must be given for a case that is calibrated; received"):
-        every()["vibration"].inverse("default", None, path)
+        every()["vibration"].inverse("default", None, tmp_path / "mine.csv")
+    case = every()["granular_bench"]
+    assert case.sizes["default"].search["generations"] == 14
     searched = [name for name, size in case.sizes.items() if size.search is not None]
     assert [*EXAMPLES] == searched
     assert all(example.keys() == SIMULATED.keys() for example in EXAMPLES.values())

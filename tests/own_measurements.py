@@ -1,0 +1,48 @@
+"""Files of measurements to which a case is calibrated: those that are refused, and those that make another
+problem."""
+
+import pytest
+
+from cases.case import every
+from tests.judged import check_message
+from tisim import InputError
+
+ANGLES = "quantity,value,uncertainty\n"
+WRONG_ANGLES = {
+    "empty": ("", "heading of .* must be"),
+    "nothing": (ANGLES, "quantities of .* must be one or more"),
+    "unknown": (ANGLES + "angle_of_reposs,1,1\n", "must be one of angle_of_repose"),
+    "twice": (ANGLES + 2 * "angle_of_repose,1,1\n", "must be given once"),
+    "too few": (ANGLES + "angle_of_repose,1\n", "a line of .* must be of three cells"),
+    "no number": (ANGLES + "angle_of_repose,x,1\n", "must be a value and an uncertainty"),
+    "no uncertainty": (ANGLES + "angle_of_repose,1,0\n", "uncertainty must be finite and"),
+    "not finite": (ANGLES + "angle_of_repose,nan,1\n", "value must be finite and above 0"),
+}
+"""Files that no case takes whose calibration is to an angle of repose, and what is said of each."""
+
+
+def check_refused(read, text, message, folder):
+    """A file with a text is refused in these words, and so is one that is not there."""
+    path = folder / "mine.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as error_info:
+        read(path)
+    check_message(str(error_info.value))
+    with pytest.raises(InputError, match="must be a CSV file that can be read"):
+        read(folder / "absent.csv")
+
+
+def check_another_problem(name, text, calibration, design, folder):
+    """Runs that were judged by other measurements are not used again, though the scenes are the same; returns
+    the problem as it comes, the one of the file, and a scene of a design."""
+    path = folder / "mine.csv"
+    path.write_text(text)
+    case = every()[name]
+    usual, _ = case.inverse("default", None)
+    own, _ = case.inverse("default", "calibrate", path)
+    assert usual.identity != own.identity
+    assert own.identity == calibration("default", "calibrate", path).identity
+    assert usual.identity == case.problem("default", "calibrate").identity
+    scene = usual.scene(design, 1)
+    assert scene.digest() == own.scene(design, 1).digest()
+    return usual, own, scene
