@@ -9,32 +9,30 @@ import numpy as np
 
 from cases.case import Check
 from cases.coalescence.published import (
+    AXES,
     BOUND,
     DENSITY,
     DIAMETERS,
-    DURATION,
+    GASPRA,
     MAGNETISATIONS,
-    MEASURED,
     ROTATIONS,
     SPACING,
 )
+from cases.coalescence.regime import COMPARED, regime
 from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
-from cases.coalescence.scaling import critical_spin, free_fall, mean_density
+from cases.coalescence.scaling import critical_spin, mean_density
 from cases.coalescence.scene import DEFAULT, scene
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim, Mean, Shown
 
 ROUNDING = 1e-11
 """Momenta may be off by so much of the sum of what the grains have."""
 GAINED = 1e-4
 """Kinetic energy and that of gravity may rise by so much of the latter, by what contacts had stored."""
-FALLS = {d: free_fall(mean_density(d, SPACING, DENSITY)) for d in DIAMETERS}
-"""The time (s) in which a cloud of grains of a diameter (m) falls together without pressure."""
-COMPARED = DURATION * FALLS[DIAMETERS[1]] / FALLS[DIAMETERS[0]]
-"""When grains of 100 cm have fallen as far as L21's of 50 cm at 15 000 s, s."""
 
 
-def check(seeds: int = SEEDS) -> Iterator[Check | Claim]:
-    """Yield what must hold of clouds from some starts."""
+def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
+    """Yield what rules clouds, and what must hold of them from some starts."""
+    yield from regime()
     yield from of_the_cloud()
     runs = clouds(seeds, **DEFAULT)
     yield from of_conservation(runs)
@@ -43,8 +41,7 @@ def check(seeds: int = SEEDS) -> Iterator[Check | Claim]:
 
 
 def of_the_cloud() -> Iterator[Check]:
-    """Yield how the rotation that L21 prints is to that at which its cloud flies apart: 4.3 to 8.7 times for
-    grains of 100 cm, of which its asteroids are not made."""
+    """Yield at which rotation L21's cloud flies apart by its moments, beside a ball of its density."""
     for d in DIAMETERS:
         start = scene(diameter=d, rotation=ROTATIONS[1], magnetisation=0.0).start()
         mass, place = start["mass"][1:], start["position"][1:]
@@ -78,38 +75,47 @@ def _gained(run: CloudRun) -> float:
     return float(np.diff(energy).max(initial=0.0) / abs(run.conserved[-1].gravity))
 
 
-def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim]:
+def of_agglomeration(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
     """Yield how fast grains agglomerate: the faster, the more they are magnetised (L21 section 4.2.2.1)."""
     for m in MAGNETISATIONS:
         group, theirs = of_magnetisation(runs, m), BOUND[m]
         for name, least, part in (("two or more", "some", theirs.some), ("over ten", "many", theirs.many)):
             mean = Mean.of([getattr(one.at(COMPARED), least) for one in group])
-            yield Claim(f"{m:g} A/m: of grains outside, in clusters of {name} (L21, 50 cm: {part:.3g})", mean)
+            beside = f"L21, 50 cm: {part:.3g}"
+            yield Shown(f"{m:g} A/m: of grains outside, in clusters of {name}", mean, beside)
     yield _difference(
         "in clusters, 1190 less 0 A/m, of all grains", runs, lambda one: one.at(COMPARED).bound, least=0.0
     )
     yield _difference(
         "in clusters of those outside, 1190 less 0 A/m", runs, lambda one: one.at(COMPARED).some, least=0.0
     )
-    yield _difference(
+    weak = _difference(
         "in clusters, 119 less 0 A/m, of all grains", runs, lambda one: one.at(COMPARED).bound, of=119.0
     )
+    yield Shown(weak.name, weak.mean)
+    for m in MAGNETISATIONS[1:]:
+        group = of_magnetisation(runs, m)
+        for when, chains in (
+            (f"at {COMPARED:.0f} s", [one.at(COMPARED).chain for one in group]),
+            ("at the end", [one.agglomerations[-1].chain for one in group]),
+        ):
+            yield Shown(f"{m:g} A/m: grains in a row, head to tail, {when}", Mean.of(chains))
 
 
-def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim]:
+def of_structure(runs: Sequence[CloudRun]) -> Iterator[Claim | Shown]:
     """Yield how dense and long asteroids are at the end, and how much of the magnetisation of their grains
     they have (L21 sections 4.2.2.2, 4.2.2.3, 4.6)."""
     for m in MAGNETISATIONS:
         asteroids = [one.asteroid for one in of_magnetisation(runs, m)]
-        yield Claim(f"{m:g} A/m: density, kg/m^3", Mean.of([one.density for one in asteroids]))
+        yield Shown(f"{m:g} A/m: density, kg/m^3", Mean.of([one.density for one in asteroids]))
+        axes = AXES[DIAMETERS[1], ROTATIONS[1], m]
+        beside = f"L21: {axes[0] / axes[2]:.2f}"
         name = f"{m:g} A/m: longest axis over shortest"
-        yield Claim(name, Mean.of([one.elongation for one in asteroids]))
+        yield Shown(name, Mean.of([one.elongation for one in asteroids]), beside)
     yield _difference("density, 1190 less 0 A/m, kg/m^3", runs, lambda one: one.asteroid.density, most=0.0)
     strong = of_magnetisation(runs, MAGNETISATIONS[-1])
     bulk = [MAGNETISATIONS[-1] * one.magnetised_part for one in strong]
-    yield Claim(
-        "1190 A/m: bulk magnetisation, A/m (L21: below Gaspra's)", Mean.of(bulk), most=MEASURED["Gaspra"]
-    )
+    yield Claim("1190 A/m: bulk magnetisation, A/m (L21: below Gaspra's)", Mean.of(bulk), most=GASPRA)
 
 
 def _difference(

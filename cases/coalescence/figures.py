@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cases.case import size_named
 from cases.coalescence.measures import clusters_of, part
 from cases.coalescence.published import (
     DENSITY,
@@ -18,7 +17,8 @@ from cases.coalescence.published import (
     MAGNETISATIONS,
     SURFACE_ENERGY,
 )
-from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_magnetisation
+from cases.coalescence.regime import ACCELERATION
+from cases.coalescence.runs import SEEDS, CloudRun, clouds, of_all_magnetisations, of_magnetisation
 from cases.coalescence.scaling import (
     attraction,
     dmt_cohesion,
@@ -30,15 +30,15 @@ from cases.coalescence.scene import SIZES
 from tisim.analysis import voronoi_by_shell
 from tisim.engine.batches import Progress
 from tisim.plotting.cloud import common, corners, directions, panel, project
-from tisim.plotting.clusters import CLUSTER_COLOURS, SINGLE
+from tisim.plotting.clusters import cluster_colours
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
 SHELLS = 2
 """Voronoi volumes are means over so many shells of equal volume; of so few grains those farther out, in
 more shells, have no cells within the asteroid."""
-ACCELERATION = 5e-6
-"""At the surface of L21's asteroids, m/s^2; section 4.6."""
+SEMI_AXES = ("semi_major_axis_m", "semi_intermediate_axis_m", "semi_minor_axis_m")
+"""The headings of those of the bounding ellipsoid."""
 NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
 """Clouds are in open space."""
 
@@ -46,8 +46,7 @@ NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """coalescence.png: what part of the grains is bound, in time; asteroids.png: the grains at the end,
     coloured by cluster; forces.png: forces on a grain by size; coalescence.csv: what is measured of each."""
-    settings = {k: v for k, v in size_named(size, SIZES).scene.items() if k != "magnetisation"}
-    runs = clouds(SEEDS, progress, **settings)
+    runs = clouds(SEEDS, progress, **of_all_magnetisations(size, SIZES))
     return {
         "coalescence.png": growth(runs),
         "asteroids.png": asteroids([of_magnetisation(runs, m)[0] for m in MAGNETISATIONS]),
@@ -89,16 +88,6 @@ def shells(run: CloudRun) -> np.ndarray:
     return np.asarray(volume / (4 / 3 * np.pi * float(asteroid.grains["radius"].min()) ** 3))
 
 
-def cluster_colours(state: Arrays) -> np.ndarray:
-    """Return the colour of each grain by its cluster, grey of single ones; shape (n, 3)."""
-    cluster = clusters_of(state)
-    size = np.bincount(cluster)
-    rank = np.argsort(np.argsort(-size, kind="stable"))
-    colours = CLUSTER_COLOURS[rank[cluster] % len(CLUSTER_COLOURS)]
-    colours[size[cluster] == 1] = SINGLE
-    return np.asarray(colours)
-
-
 def asteroids(runs: Sequence[CloudRun]) -> Figure:
     """Draw the grains of clouds at the end side by side, near the asteroid, coloured by cluster (L21 Figs
     4.2, 4.4)."""
@@ -119,7 +108,7 @@ def close_up(axis: Axes, state: Arrays, grains: Arrays, square: tuple[float, flo
     """Draw the grains of a state that are in a square around the centre of mass of some of them, coloured by
     cluster."""
     left, bottom, side = square
-    centred, colours = moved(state, grains), cluster_colours(state)
+    centred, colours = moved(state, grains), cluster_colours(clusters_of(state))
     right_up = project(centred["position"])[:, :2] - (left, bottom)
     inside = np.all((right_up > 0) & (right_up < side), axis=1)
     panel(axis, part(centred, inside), square, NO_BOX, colours[inside])
@@ -162,14 +151,14 @@ def table(runs: Sequence[CloudRun]) -> str:
     writer.writerow(
         [
             "magnetisation_A_per_m", "seed", "part_in_asteroid", "part_in_clusters", "grains",
-            "major_m", "intermediate_m", "minor_m", "density_kg_per_m3", "bulk_over_grain_magnetisation",
+            *SEMI_AXES, "density_kg_per_m3", "bulk_over_grain_magnetisation", "chain_length_grains",
         ]
     )  # fmt: skip
     for one in runs:
         asteroid, last = one.asteroid, one.agglomerations[-1]
         bulk = one.magnetised_part if one.magnetisation else float("nan")
         values = (last.coalesced, last.bound, asteroid.number, *asteroid.ellipsoid.semi_axes)
-        more = (asteroid.density, bulk)
+        more = (asteroid.density, bulk, last.chain)
         numbers = [f"{value:.4g}" for value in (*values, *more)]
         writer.writerow([one.magnetisation, one.scene.seed, *numbers])
     return text.getvalue()

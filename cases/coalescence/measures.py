@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -10,9 +11,11 @@ from tisim.analysis import (
     Ellipsoid,
     angular_momentum,
     bounding_ellipsoid,
+    cluster_shapes,
     contacts,
     fraction_in_clusters,
     gravitational_energy,
+    head_to_tail,
     hull_volume,
     labels,
 )
@@ -41,14 +44,28 @@ def part(state: Arrays, some: np.ndarray) -> Arrays:
     return {name: values[some] for name, values in state.items()}
 
 
+def chain_length(state: Arrays) -> float:
+    """Return how many grains there are in a row in the chain that a grain is in, a mean over all grains but
+    the seed: those whose moments bind them head to tail; NaN without moments."""
+    radius = state["radius"]
+    grains = part(state, radius == radius.min())
+    if "moment" not in grains or not grains["moment"].any():
+        return float("nan")
+    diameter = 2 * float(radius.min())
+    shapes = cluster_shapes(grains["position"], head_to_tail(grains["position"], grains["moment"], diameter))
+    return float(np.average(shapes.path, weights=shapes.size))
+
+
 @dataclass(frozen=True)
 class Gathering:
     """How far a cloud has agglomerated: the part of all grains that are in the asteroid, and of the others
-    the parts that are in clusters of two or more and of more than ten; NaN where there are no others."""
+    the parts that are in clusters of two or more and of more than ten, NaN where there are no others; and how
+    long chains are, in grains."""
 
     coalesced: float
     some: float
     many: float
+    chain: float
 
     @classmethod
     def of(cls, state: Arrays) -> Gathering:
@@ -58,7 +75,8 @@ class Gathering:
         # One grain by itself is no asteroid.
         inside &= inside.sum() > 1
         others = cluster[~inside]
-        return cls(float(inside.mean()), fraction_in_clusters(others, 2), fraction_in_clusters(others, CLUMP))
+        some, many = (fraction_in_clusters(others, least) for least in (2, CLUMP))
+        return cls(float(inside.mean()), some, many, chain_length(state))
 
     @property
     def bound(self) -> float:
@@ -97,7 +115,7 @@ class Asteroid:
         x, y, z = np.average(away**2 + radius[:, None] ** 2 / 5, axis=0, weights=mass)
         return float(np.sqrt((x + y) / (2 * z)))
 
-    @property
+    @cached_property
     def volume(self) -> float:
         """Return the volume of the convex hull of its grains, m^3."""
         return hull_volume(self.grains["position"], self.grains["radius"])

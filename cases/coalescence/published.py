@@ -27,8 +27,8 @@ DURATION = 15_000.0
 """s; section 4.2.2.1."""
 CUTOFF = 6.0
 """Dipoles act within three diameters, in radii; section 4.2.1.2."""
-MEASURED = {"Braille": 110.0, "Gaspra": 93.0}
-"""Magnetisations of asteroids that spacecraft have met, A/m; section 4.6."""
+GASPRA = 93.0
+"""The magnetisation of an asteroid that a spacecraft has met, A/m; section 4.6."""
 
 
 class BoundParts(NamedTuple):

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 
+from cases.case import Size
 from cases.coalescence.measures import Asteroid, Conserved, Gathering
 from cases.coalescence.published import MAGNETISATIONS, NUMBER
 from cases.coalescence.scene import scale_of, scene
 from cases.runs import sound
 from tisim import Scene, Simulation
 from tisim.engine.batches import Progress
+from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 
 CLOUD_LOOKS = 25
@@ -37,7 +40,7 @@ class CloudRun:
     conserved: Sequence[Conserved]
     end: Arrays
 
-    @property
+    @cached_property
     def asteroid(self) -> Asteroid:
         """Return the asteroid at the end."""
         return Asteroid.of(self.end)
@@ -96,6 +99,14 @@ def clouds(
         CloudRun(m, scale, one, times, [a for a, _ in looks_], [c for _, c in looks_], state)
         for (m, _), one, looks_, state in zip(wanted, scenes, seen, states, strict=True)
     ]
+
+
+def of_all_magnetisations(size: str, sizes: Mapping[str, Size]) -> dict[str, Any]:
+    """Return the settings of a size that is run with each magnetisation; InputError where it has its own."""
+    some = [name for name, one in sizes.items() if "magnetisation" not in one.scene]
+    rule = f"one that is run with each magnetisation ({', '.join(some)})"
+    must(size in some, "size", rule, size)
+    return dict(sizes[size].scene)
 
 
 def of_magnetisation(runs: Sequence[CloudRun], magnetisation: float) -> list[CloudRun]:

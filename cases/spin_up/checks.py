@@ -11,16 +11,18 @@ from cases.coalescence.measures import Conserved
 from cases.coalescence.published import MAGNETISATIONS
 from cases.coalescence.scaling import critical_spin
 from cases.spin_up.published import DEFORMATION, DISRUPTION
+from cases.spin_up.regime import regime
 from cases.spin_up.scene import DEFAULT
 from cases.spin_up.stages import RATES, SEEDS, SpinUp, spin_ups
-from cases.statistics import Claim, Mean
+from cases.statistics import Claim, Mean, Shown
 
 ROUNDING = 1e-11
 """Momenta may be off by so much of the sum of what the grains have."""
 
 
-def check(seeds: int = SEEDS) -> Iterator[Check | Claim]:
-    """Yield what must hold of piles from some starts."""
+def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
+    """Yield what rules piles, and what must hold of them from some starts."""
+    yield from regime()
     runs = spin_ups(seeds, **DEFAULT)
     yield from of_conservation(runs)
     yield from of_spins(runs)
@@ -36,19 +38,19 @@ def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
     yield Check("momentum, over the sum of magnitudes", off, 0.0, ROUNDING)
 
 
-def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim]:
+def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
     """Yield at which spins piles deform and break, and how dense they are before."""
     for m in MAGNETISATIONS:
         group = [one for one in runs if one.magnetisation == m]
         density = Mean.of([one.steps[0].asteroid.density for one in group])
-        yield Claim(f"{m:g} A/m: density at rest, kg/m^3", density)
+        yield Shown(f"{m:g} A/m: density at rest, kg/m^3", density)
         critical = Mean.of([1e6 * critical_spin(one.steps[0].asteroid.density) for one in group])
-        yield Claim(f"{m:g} A/m: critical spin of that density, urad/s", critical)
+        yield Shown(f"{m:g} A/m: critical spin of that density, urad/s", critical)
         for name, theirs, value in (
             ("deforms", DEFORMATION[m], "deformation"), ("breaks", DISRUPTION[m], "disruption"),
         ):  # fmt: skip
             mean = Mean.of(at_least([getattr(one, value) for one in group]))
-            yield Claim(f"{m:g} A/m: {name} at, urad/s (L21: {1e6 * theirs:.0f})", mean)
+            yield Shown(f"{m:g} A/m: {name} at, urad/s", mean, f"L21: {1e6 * theirs:.0f}")
     plain, strong = (
         at_least([one.disruption for one in runs if one.magnetisation == m])
         for m in (MAGNETISATIONS[0], MAGNETISATIONS[-1])

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from cases.case import size_named
-from cases.coalescence.figures import NO_BOX, NO_GRAVITY, close_up, moved
+from cases.coalescence.figures import NO_BOX, NO_GRAVITY, SEMI_AXES, close_up, moved
 from cases.coalescence.published import MAGNETISATIONS
+from cases.coalescence.runs import of_all_magnetisations
 from cases.coalescence.scaling import critical_spin
 from cases.spin_up.published import DISRUPTION
 from cases.spin_up.scene import SIZES
@@ -29,8 +29,7 @@ WIDER = 2.2
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """spin_up.png: shape, density and mass against spin; piles.png: piles on the way; spin_up.csv: the
     numbers."""
-    settings = {k: v for k, v in size_named(size, SIZES).scene.items() if k != "magnetisation"}
-    runs = spin_ups(SEEDS, progress, **settings)
+    runs = spin_ups(SEEDS, progress, **of_all_magnetisations(size, SIZES))
     return {"spin_up.png": against_spin(runs), "piles.png": piles(runs), "spin_up.csv": table(runs)}
 
 
@@ -95,7 +94,7 @@ def table(runs: Sequence[SpinUp]) -> str:
     writer = csv.writer(text)
     writer.writerow(
         [
-            "magnetisation_A_per_m", "seed", "spin_given_rad_per_s", "major_m", "intermediate_m", "minor_m",
+            "magnetisation_A_per_m", "seed", "spin_given_rad_per_s", *SEMI_AXES,
             "width_over_height", "density_kg_per_m3", "part_of_mass", "angular_momentum_kg_m2_per_s",
         ]
     )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ class SpinStep:
     rate: float
     state: Arrays
 
-    @property
+    @cached_property
     def asteroid(self) -> Asteroid:
         """Return the pile, or the largest piece of it."""
         return Asteroid.of(self.state)
@@ -121,10 +122,11 @@ def spin_ups(
     ``scene``; the pile settles for its duration. progress : is told the part that is done, 0..1. RunError
     where one fails.
     """
-    settled = settings.pop("duration")
-    ends = settled + np.cumsum([holds[rate > QUICK * (1 + 1e-9)] for rate in rates])
     wanted = [(m, seed) for m in magnetisations for seed in range(seeds)]
-    scenes = [scene(magnetisation=m, seed=seed, duration=ends[-1], **settings) for m, seed in wanted]
+    clouds = [scene(magnetisation=m, seed=seed, **settings) for m, seed in wanted]
+    settled = clouds[0].duration
+    ends = settled + np.cumsum([holds[rate > QUICK * (1 + 1e-9)] for rate in rates])
+    scenes = [one.model_copy(update={"duration": float(ends[-1])}) for one in clouds]
     seen: list[list[SpinStep]] = [[] for _ in scenes]
     with closing(Simulation(scenes[0], len(scenes))) as simulation:
         simulation.load(scenes)

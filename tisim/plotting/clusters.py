@@ -31,11 +31,7 @@ def clusters(
     """
     figure = empty(5.6, 5.4)
     axis = figure.subplots()
-    size = np.bincount(cluster)
-    rank = np.empty(len(size), int)
-    rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
-    colours = CLUSTER_COLOURS[rank[cluster] % len(CLUSTER_COLOURS)]
-    colours[size[cluster] == 1] = SINGLE
+    colours = cluster_colours(cluster)
     lines = [] if ellipsoid is None else [_silhouette(ellipsoid)]
     box = corners(*scene.domain.bounds())
     around = np.vstack([box, *(np.column_stack([line, 0 * line[:, 0]]) for line in lines)])
@@ -48,10 +44,22 @@ def clusters(
     if lines or hull:
         legend_above(axis)
     directions(axis, square, np.zeros(3))
+    size = np.bincount(cluster)
     several = int((size > 1).sum())
     bound = int(size[size > 1].sum())
     axis.set_title(f"{bound} of {len(cluster)} in {several} clusters", loc="left", fontsize=10)
     return figure
+
+
+def cluster_colours(cluster: np.ndarray) -> np.ndarray:
+    """Return the colour of each particle by the number of its cluster, grey of those that are alone; shape
+    (n, 3)."""
+    size = np.bincount(cluster)
+    rank = np.empty(len(size), int)
+    rank[np.argsort(-size, kind="stable")] = np.arange(len(size))
+    colours = CLUSTER_COLOURS[rank[cluster] % len(CLUSTER_COLOURS)]
+    colours[size[cluster] == 1] = SINGLE
+    return np.asarray(colours)
 
 
 def _silhouette(ellipsoid: Ellipsoid) -> np.ndarray:

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from cases.coalescence.measures import Asteroid, Conserved, Gathering, body, clusters_of, inertia
+from cases.coalescence.measures import (
+    Asteroid,
+    Conserved,
+    Gathering,
+    body,
+    chain_length,
+    clusters_of,
+    inertia,
+)
 
 
 def row(number, apart=1.0, at=(0.0, 0.0, 0.0)):
@@ -41,6 +49,15 @@ def test_grains_within_a_hundredth_of_a_diameter_are_bound():
     assert len(set(clusters_of(state_of(row(3, 1.009))))) == 1
     assert len(set(clusters_of(state_of(row(3, 1.011))))) == 3
     assert body(np.array([0, 1, 1]), np.array([5.0, 1.0, 1.0])).tolist() == [True, False, False]
+
+
+def test_chains_are_of_grains_head_to_tail():
+    """A row of three along its moments, one of two across them, and a seed that counts in none."""
+    place = np.vstack([row(3), row(2, at=(0, 9, 0)), row(1, at=(0, 30, 0))])
+    moment = np.array([[1.0, 0, 0]] * 3 + [[0, 1.0, 0]] * 2 + [[1.0, 0, 0]])
+    state = state_of(place, moment=moment, radius=np.array([0.5] * 5 + [2.0]))
+    assert chain_length(state) == pytest.approx((3 * 3 + 1 + 1) / 5)
+    assert np.isnan(chain_length(state | {"moment": 0 * moment}))
 
 
 def block(spin, centre=(30.0, 0.0, 4.0), drift=(1.0, 2.0, 3.0)):

@@ -2,22 +2,28 @@
 
 import numpy as np
 import pytest
+from scipy.constants import G
 
 from cases.case import Check
-from cases.coalescence.checks import COMPARED, of_agglomeration, of_conservation, of_structure, of_the_cloud
-from cases.coalescence.figures import asteroids, cluster_colours, forces, growth, shells, table
+from cases.coalescence.checks import of_agglomeration, of_conservation, of_structure, of_the_cloud
+from cases.coalescence.figures import asteroids, figures, forces, growth, shells, table
 from cases.coalescence.measures import Conserved, Gathering
 from cases.coalescence.published import MAGNETISATIONS
+from cases.coalescence.regime import COMPARED, regime, rotation_over_gravity
 from cases.coalescence.runs import CloudRun, clouds, of_magnetisation
 from cases.coalescence.scene import scene
 from tests.cases.coalescence.test_measures import row, state_of
+from tisim import InputError
 
 
-def made(magnetisation, bound, seed=0):
-    """A run in which so many of 40 grains have come to be in a block, the others in pairs."""
+def made(magnetisation, bound, seed=0, lost=0):
+    """A run in which so many of 40 grains have come to be in a block, the others in pairs but for some that
+    are lost; the moments of all are along the pairs."""
     block = np.argwhere(np.ones((bound // 9, 3, 3))).astype(float)
     pairs = [row(2, at=(0, 10.0 * (k + 1), 0)) for k in range((40 - len(block)) // 2)]
-    end = state_of(np.vstack([block, *pairs]), moment=np.tile([0.0, 0.0, 2.0], (40, 1)))
+    place = np.vstack([block, *pairs])
+    place[40 - lost :, 0] += 100.0 * np.arange(1, lost + 1)
+    end = state_of(place, moment=np.tile([2.0 * (magnetisation > 0), 0.0, 0.0], (40, 1)))
     states = [state_of(row(40, 3.0)), end]
     for state in states:
         state["velocity"], state["spin"] = np.tile([[1.0, 0.0, 0.0]], (2, 40, 1))
@@ -34,15 +40,33 @@ RUNS = [
 
 def test_what_is_said_of_runs():
     claims = {claim.name: claim for claim in (*of_agglomeration(RUNS), *of_structure(RUNS))}
-    outside = claims["0 A/m: of grains outside, in clusters of two or more (L21, 50 cm: 0.007)"]
-    assert outside.mean.value == 1.0
+    outside = claims["0 A/m: of grains outside, in clusters of two or more"]
+    assert (outside.value.value, outside.beside) == (1.0, "L21, 50 cm: 0.007")
     assert claims["in clusters, 1190 less 0 A/m, of all grains"].mean.value == 0.0
-    assert not claims["in clusters, 1190 less 0 A/m, of all grains"].least < 0
+    assert claims["1190 A/m: longest axis over shortest"].beside == "L21: 1.07"
     ratio = RUNS[-1].asteroid.magnetisation / (0.5 * 1190.0)
     assert RUNS[-1].magnetised_part == pytest.approx(ratio)
+    assert RUNS[-1].asteroid is RUNS[-1].asteroid
     checks = {check.name: check for check in of_conservation(RUNS)}
     # Nothing moves; energy of gravity alone has fallen.
     assert all(check.ok for check in checks.values())
+
+
+def test_magnetised_grains_that_agglomerate_less_are_against_it():
+    name = "in clusters, 1190 less 0 A/m, of all grains"
+    fewer = [made(m, 18, seed, lost=int(m > 1000)) for m in MAGNETISATIONS for seed in (0, 1)]
+    assert {claim.name: claim for claim in of_agglomeration(RUNS)}[name].ok
+    assert not {claim.name: claim for claim in of_agglomeration(fewer)}[name].ok
+
+
+def test_chains_are_told_by_magnetisation():
+    """A block of two layers, whose grains are in rows of two along their moments, and pairs; then of four."""
+    shown = {item.name: item.value for item in of_agglomeration(RUNS) if "in a row" in item.name}
+    assert [one for one in shown if one.endswith("at the end")] == [
+        f"{m} A/m: grains in a row, head to tail, at the end" for m in (119, 1190)
+    ]
+    assert shown["119 A/m: grains in a row, head to tail, at the end"].value == 2.0
+    assert shown["1190 A/m: grains in a row, head to tail, at the end"].value == (36 * 4 + 4 * 2) / 40
 
 
 def test_the_rotation_at_which_a_cloud_parts():
@@ -57,9 +81,28 @@ def test_what_is_drawn_of_runs():
     assert len(forces().axes) == 1
     assert len(table(RUNS).splitlines()) == 1 + len(RUNS)
     assert shells(RUNS[0]).shape == (2,)
-    colours = cluster_colours(state_of(np.vstack([row(3), row(1, at=(0, 9, 0))])))
-    assert (colours[:3] == colours[0]).all()
-    assert not (colours[3] == colours[0]).all()
+    assert table(RUNS).splitlines()[0].split(",")[5] == "semi_major_axis_m"
+    with pytest.raises(InputError, match=r"size must be one that is run with each magnetisation \(default"):
+        figures("unmagnetised", None)
+
+
+def test_the_regime_of_clouds():
+    shown = {item.name: item.value for item in regime()}
+    # Of a ball: M R^2 w^2 / 5 over 3/5 G M^2 / R.
+    mass, radius, spin = 7.0, 0.3, 1e-3
+    density = mass / (4 / 3 * np.pi * radius**3)
+    expected = mass * radius**2 * spin**2 / 5 / (0.6 * G * mass**2 / radius)
+    assert rotation_over_gravity(spin, density) == pytest.approx(expected)
+    for name, value in {
+        "100 cm, 1000 urad/s: over what parts the cloud": 4.27,
+        "100 cm, 1000 urad/s: energy over that of gravity": 6.1,
+        "50 cm, 1000 urad/s: energy over that of gravity": 49,
+        "50 cm, 2000 urad/s, as microdegrees: the same": 0.86,
+        "100 cm: 2 K / |U| of the cloud": 0.41,
+        "50 cm: 2 K / |U| of the cloud": 3.3,
+        "default: depth of an impact over a radius": 0.008,
+    }.items():
+        assert shown[name] == pytest.approx(value, rel=0.03), name
 
 
 @pytest.mark.slow

@@ -1,15 +1,37 @@
 """Piles that are spun up: L21's numbers, how a pile is turned, and when it counts as deformed or broken."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from cases.coalescence.measures import Asteroid, Conserved
+from cases.spin_up import stages
 from cases.spin_up.checks import at_least, of_conservation, of_spins
-from cases.spin_up.figures import against_spin, piles, table
+from cases.spin_up.figures import against_spin, figures, piles, table
 from cases.spin_up.published import DEFORMATION, DISRUPTION
+from cases.spin_up.regime import regime
 from cases.spin_up.scene import NUMBERS, SIZES, scene_for
 from cases.spin_up.stages import RATES, SpinStep, SpinUp, spin_ups, turn
 from tests.cases.coalescence.test_measures import block, state_of
+from tisim import InputError
+
+
+def test_a_size_without_a_duration_settles_for_that_of_the_scene(monkeypatch):
+    """Sizes of L21 have none of their own."""
+    made = []
+
+    class Loaded(Exception):
+        """Scenes have been made, and would be run."""
+
+    def load(scenes):
+        made.extend(scenes)
+        raise Loaded
+
+    monkeypatch.setattr(stages, "Simulation", lambda *a: SimpleNamespace(load=load, close=lambda: None))
+    with pytest.raises(Loaded):
+        spin_ups(1, number=8, rates=(1e-4, 5e-4), holds=(5.0, 7.0))
+    assert [one.duration for one in made] == [15_000.0 + 5.0 + 7.0] * 3
 
 
 @pytest.mark.parametrize(("size", "diameter"), [("l21", 1.0), ("l21_50cm", 0.5)])
@@ -76,14 +98,28 @@ def test_figures_and_claims_of_some_runs():
         for m in (0.0, 119.0, 1190.0)
         for _ in range(2)
     ]
-    assert len(table(runs).splitlines()) == 1 + 6 * 3
+    rows = table(runs).splitlines()
+    assert len(rows) == 1 + 6 * 3
+    assert rows[0].split(",")[3] == "semi_major_axis_m"
+    with pytest.raises(InputError, match=r"size must be one that is run with each magnetisation \(default"):
+        figures("unmagnetised", None)
     assert len(against_spin(runs).axes) == 3
     assert len(piles(runs).axes) == 9
     claims = {claim.name: claim for claim in of_spins(runs)}
-    assert claims["0 A/m: breaks at, urad/s (L21: 700)"].mean.value == pytest.approx(200.0)
-    assert claims["1190 A/m: deforms at, urad/s (L21: 700)"].mean.value == pytest.approx(100.0)
+    assert claims["0 A/m: breaks at, urad/s"].value.value == pytest.approx(200.0)
+    assert claims["1190 A/m: deforms at, urad/s"].value.value == pytest.approx(100.0)
     np.testing.assert_allclose(at_least([7e-4, np.nan]), [700.0, 1000.0])
+    assert claims["1190 A/m: deforms at, urad/s"].beside == "L21: 700"
     assert claims["breaks at, 1190 less 0 A/m, urad/s (L21: 100)"].mean.value == 0.0
+
+
+def test_the_regime_of_piles():
+    shown = {item.name: item.value for item in regime()}
+    assert shown["scale of the copy"] == pytest.approx((80 / 4088) ** (1 / 3))
+    assert shown["free fall, s"] == pytest.approx(2484, rel=1e-3)
+    assert shown["step, s"] == pytest.approx(0.225, rel=5e-3)
+    assert shown["depth of an impact over a radius"] == pytest.approx(0.02, rel=0.03)
+    assert shown["overlap of two in line over a radius, 1190 A/m"] == pytest.approx(7e-4, rel=0.05)
 
 
 @pytest.mark.slow

@@ -1,0 +1,24 @@
+"""What rules the piles of the case spin_up, in closed form: scale, times, and how deep grains overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cases.coalescence.published import DENSITY, DIAMETERS, MAGNETISATIONS
+from cases.coalescence.regime import impact_depth, magnetic_depth
+from cases.coalescence.scaling import free_fall, mean_density
+from cases.coalescence.scene import scale_of, step
+from cases.spin_up.scene import DEFAULT, NUMBERS
+from cases.statistics import Shown
+
+
+def regime() -> Iterator[Shown]:
+    """Yield what the copy of the default size has."""
+    d, softened = DIAMETERS[1], DEFAULT["softened"]
+    scale = scale_of(DEFAULT["number"], NUMBERS[d])
+    yield Shown("scale of the copy", scale)
+    yield Shown("free fall, s", free_fall(mean_density(d, DEFAULT["spacing"], DENSITY)))
+    yield Shown("step, s", step(d, scale, softened))
+    yield Shown("depth of an impact over a radius", impact_depth(d, scale, softened))
+    depth = magnetic_depth(d, scale, MAGNETISATIONS[-1], softened)
+    yield Shown("overlap of two in line over a radius, 1190 A/m", depth)
