@@ -16,7 +16,7 @@ def lattice(rng):
     """Places of grains 0.3 m apart, of 27 in the box, in any order, and of others outside of it."""
     axis = 0.2 + 0.3 * np.arange(3)
     inside = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
-    return rng.permutation(np.concatenate([inside, inside[:3] + [0.0, 0.0, 9.0]]))
+    return rng.permutation(np.concatenate([inside, inside[:3] + np.array([0.0, 0.0, 9.0])]))
 
 
 @pytest.mark.long

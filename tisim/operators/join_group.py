@@ -13,7 +13,7 @@ from tisim.operators.base import option, parameter
 from tisim.operators.behind_planes import BehindPlanes
 from tisim.worlds.bound import Peers
 
-SHORT = 1e-6
+NEARLY = 1e-6
 """A step that ends before a time by this part of its length has reached it: rounding leaves that."""
 
 
@@ -50,7 +50,7 @@ class JoinGroup(BehindPlanes, AtIntervals):
     @ti.func
     def elapsed(self, s, w):
         # Once: who comes later stays free. Rounding must not cost a step.
-        reached = s.time[w] + SHORT * s.dt[w]
+        reached = s.time[w] + NEARLY * s.dt[w]
         return ti.min(reached / ti.cast(self.time(w), ti.f64), 1.0)
 
     @ti.func

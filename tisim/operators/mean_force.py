@@ -14,9 +14,10 @@ class MeanForce(Operator):
 
         mean_force = 1/(t - t_0) sum over steps of F dt
 
-    t_0 is ``begin``, from which on dt counts, t the time, and F the sum of all forces as it was known when the step was taken, also
-    that on a particle which is held or moves as prescribed. It is the field ``mean_force`` (N), 0 up to t_0:
-    what a wall of grains bears in steady flow is the sum of that of its grains.
+    t_0 is ``begin``, from which on dt counts, t the time, and F the sum of all forces as it was known when
+    the step was taken, also that on a particle which is held or moves as prescribed. It is the field
+    ``mean_force`` (N), 0 up to t_0: what a wall of grains bears in steady flow is the sum of that of its
+    grains.
     """
 
     fields: ClassVar = (Field("mean_force", "N", 3, "keep", double=True),)
