@@ -30,6 +30,11 @@ def compiled(scene, worlds=1, capacity=64, schedule=None):
     return _compiled[key]
 
 
+def usual(schedule):
+    """A schedule, on a CPU; on a device None, which is that of launches, as whoever runs there has it."""
+    return schedule if runtime.current().device == "cpu" else None
+
+
 def close_compiled():
     """Close all simulations that ``compiled`` has made."""
     while _compiled:

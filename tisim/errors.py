@@ -73,10 +73,11 @@ def did_you_mean(received: str, known: Iterable[str]) -> str:
     return f"; did you mean {abbreviated(nearest[0])}?" if nearest else ""
 
 
-def some_of(known: Iterable[str], received: Any) -> str:
-    """Return the known names as a message lists them: all of a few, else those next to the one received."""
+def some_of(known: Iterable[str], received: Any, listed: str) -> str:
+    """Return the known names as a message lists them: all of a few, else those next to the one received, and
+    what lists all of them."""
     names = sorted(known)
     if len(names) <= MOST_NAMES:
         return ", ".join(names)
     near = difflib.get_close_matches(str(received), names, n=NEAR_NAMES, cutoff=0.0)
-    return f"{len(names)} that 'tisim effects' lists, such as {', '.join(near)}"
+    return f"{len(names)} that {listed} lists, such as {', '.join(near)}"

@@ -60,7 +60,7 @@ PARTS_OF_LAWS = {
         f"{PARTS}a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once",
     ),
     "twisting_sds": (
-        f"{LAW}/twisting.py", "self.arm(w, pair) * limit", "self.arm(w, pair) * limit * 1.1",
+        f"{LAW}/twisting.py", "known / stiffness", "1.1 * known / stiffness",
         f"{PARTS}a_spring_against_twisting_holds_up_to_its_limit_and_is_left_at_once",
     ),
     "sjkr": (
@@ -172,6 +172,19 @@ SHARED = {
     "bonds_of_unlike_grains": (
         f"{CONTACT}/parallel_bond.py", "coupled = arm / inertia - back / other", "coupled = 0.0 * arm",
         f"{BONDS}what_no_step_can_follow_of_unlike_grains_stops_the_world",
+    ),
+    "can_follow_at_walls": (
+        f"{LAW}/contact.py", "inverses = TURNING * ti.Vector([1.0, 1.0])",
+        "inverses = TURNING * ti.Vector([1.0, 0.0])", f"{STEPS}[jkr]",
+    ),
+    "cohesion_limit": (
+        f"{LAW}/cohesion_limit.py", "a * b / (a + b)", "0.9 * a * b / (a + b)",
+        "tests/effects/contact/test_granular_input.py::test_cohesion_that_nothing_holds_is_refused",
+    ),
+    "translation_begins": (
+        f"{MOTION}/translation.py", "ti.max(t - ti.cast(self.begin(w), ti.f64), 0.0)", "ti.max(t, 0.0)",
+        "tests/effects/constraint/test_prescribed_motion.py"
+        "::test_a_driven_group_is_where_its_motion_says[translation later]",
     ),
     "force_of_a_pair": (
         f"{LAW}/contact.py", "back = (distance - arm) * moment", "back = arm * moment",

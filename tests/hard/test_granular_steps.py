@@ -134,7 +134,7 @@ def test_the_limit_is_where_a_motion_grows(name, way):
 
 @pytest.mark.parametrize("name", WAYS)
 def test_what_no_step_can_follow_stops_the_world(name):
-    """The law is named, and the last good state is kept, which is the start."""
+    """The law is named, with what may be wrong, and the last good state is kept, which is the start."""
     tried = [(way, part) for way in WAYS[name] for part in (0.98, 1.02)]
     made = [nearly_at_rest(name, way, part * limit(name, way)[0], 400)[0] for way, part in tried]
     simulation = loaded(made)
@@ -151,6 +151,25 @@ def test_what_no_step_can_follow_stops_the_world(name):
                 assert word in result.status.reason, (way, result.status.reason)
             for field in ("position", "velocity", "spin"):
                 np.testing.assert_array_equal(result.state[field], start[field], err_msg=way)
+
+
+@pytest.mark.parametrize(("grains_in_row", "part"), [(2, 1.0), (3, 0.8165), (10, 0.7159), (300, 0.7071)])
+def test_energy_of_a_row_grows_in_shorter_steps_than_that_of_a_pair(grains_in_row, part):
+    """Of undamped springs k between grains of a mass m, by half kicks: from 1 / (sqrt(2) cos(pi / (2 n))) of
+    the limit of a pair on, which is S dt^2 = 4 m*."""
+    of_a_pair = np.sqrt(2.0)  # s, of k = 1 N/m and m = 1 kg.
+    n = grains_in_row
+    neighbours = np.eye(n, k=1) + np.eye(n, k=-1)
+    pull, still = np.diag(neighbours.sum(axis=1)) - neighbours, np.zeros((n, n))
+
+    def growth(dt):
+        kick = np.block([[np.eye(n), still], [-0.5 * dt * pull, np.eye(n)]])
+        drift = np.block([[np.eye(n), dt * np.eye(n)], [still, np.eye(n)]])
+        return np.abs(np.linalg.eigvals(kick @ drift @ kick)).max()
+
+    assert part == pytest.approx(1 / (np.sqrt(2) * np.cos(np.pi / (2 * n))), abs=1e-4)
+    assert growth(0.999 * part * of_a_pair) == pytest.approx(1.0, abs=1e-6)
+    assert growth(1.001 * part * of_a_pair) > 1.01
 
 
 def test_springs_without_friction_stop_nothing():
@@ -179,5 +198,6 @@ def test_grains_that_nothing_holds_apart_stop_their_world(monkeypatch):
     simulation.run()
     below, above = simulation.results()
     assert below.status.ok, below.status.reason
-    assert "effects.granular, at particle 0" in above.status.reason
+    assert "effects.granular, at particle 0 (it is so where " in above.status.reason
+    assert "or no elastic force holds its cohesion)" in above.status.reason
     np.testing.assert_array_equal(above.state["position"], above.start["position"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.scenes import scene
+from tests.scenes import scene, usual
 from tisim import Simulation
 from tisim.backend.taichi import ti
 from tisim.operators import Operator
@@ -75,7 +75,7 @@ def culled(request):
         )  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prefix_sum, "LEAST_BLOCK", {"cpu": 16})
-        simulation = Simulation(scenes[0], worlds=len(scenes), schedule=request.param)
+        simulation = Simulation(scenes[0], worlds=len(scenes), schedule=usual(request.param))
     simulation.load(scenes)
     states = []
     for _ in range(STEPS):

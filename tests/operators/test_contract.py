@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.scenes import by_id, scene
+from tests.scenes import by_id, scene, usual
 from tests.throwaway import SoftShell, SoftShellOfAll
 from tisim import Box, Simulation, run
 from tisim.backend.taichi import ti
@@ -48,6 +48,43 @@ def test_an_operator_sees_every_world_once_a_step():
     assert result.work["censuses"] == 10
 
 
+class Take(Operator):
+    """Removes a particle with what the world does."""
+
+    terms = 1
+
+    @ti.func
+    def each(self, s, w, i):
+        if s.id[w, i] == 1:
+            s.remove(w, i)
+        return ti.Vector([ti.cast(0.0, ti.f64)])
+
+    @ti.func
+    def world(self, s, w):
+        pass
+
+
+class Tally(Operator):
+    """Counts the particles that it is asked about."""
+
+    counters = ("tallied",)
+    terms = 1
+
+    @ti.func
+    def each(self, s, w, i):
+        return ti.Vector([ti.cast(1.0, ti.f64)])
+
+    @ti.func
+    def world(self, s, w):
+        s.tallied[w] += ti.cast(self.sums.total(w)[0], ti.i64)
+
+
+def test_no_operator_is_asked_about_what_one_before_it_has_removed():
+    place = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+    result = run(scene(place, np.zeros((3, 3)), (Take(), Tally()), dt=0.1, steps=1))
+    assert len(result.state["mass"]) == 2 == result.work["tallied"]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("schedule", "axis", "images"),
@@ -64,7 +101,7 @@ def test_a_nan_among_listed_particles_is_a_clear_failure(schedule, axis, images,
         steps=40,
         domain=Box(low=(0, 0, 0), high=(1, 1, 1), images=images),
     )
-    simulation = Simulation(wanted, schedule=schedule)
+    simulation = Simulation(wanted, schedule=usual(schedule))
     simulation.load([wanted])
     simulation.run()
     (result,) = simulation.results()

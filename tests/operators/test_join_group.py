@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from tests.scenes import RADIUS, by_id, scene, simulate
+from tests.scenes import RADIUS, by_id, roundoff, scene, simulate
+from tests.throwaway import Trap
 from tisim import InputError, Material, Simulation
+from tisim.backend import runtime
 from tisim.effects import (
     Granular,
     Gravity,
@@ -71,6 +73,36 @@ def test_layers_join_when_it_is_time_and_go_on_from_there():
     assert result.measures["down_force_z"] == pytest.approx(-4 * G, rel=1e-12)
 
 
+TIMES = ((1e-3, 0.0305), (1e-6, 4e-5), (1e-7, 2e-5), (1e-8, 2e-5), (5e-9, 2e-5))
+"""Steps, and times at which grains join that are mostly a whole number of them, s."""
+LAYER = 130
+"""Grains that join: those of several blocks of a sum."""
+
+
+def settled(dt, time, step):
+    """A layer that joins, and one grain that gets behind the plane in the step after that."""
+    place = np.zeros((LAYER + 1, 3))
+    place[:, 2] = -1.0
+    place[LAYER // 2, 2], velocity = 1.0, np.zeros_like(place)
+    velocity[LAYER // 2, 2] = -1.0 / ((step + 0.5) * dt)
+    effects = (PrescribedMotion(group=1), JoinGroup(planes=[LOWER], time=time))
+    return scene(place, velocity, effects, dt=dt, steps=step + 4)
+
+
+@pytest.mark.long
+def test_a_group_is_joined_once_whatever_the_rounding_of_times():
+    """At the end of the first step that reaches the time; in the next nobody does."""
+    scenes, real = [], np.dtype(runtime.current().precision.replace("f", "float")).type
+    for pair in TIMES:
+        dt, time = (float(real(value)) for value in pair)
+        scenes.append(settled(dt, time, int(np.ceil(time / dt - 1e-6))))
+    for result in simulate(scenes, worlds=len(scenes), capacity=2 * LAYER):
+        group = by_id(result)["group"]
+        assert result.work["joined"] == LAYER == group.sum()
+        assert group[LAYER // 2] == 0
+        assert result.state["position"][:, 2].max() < 0
+
+
 @pytest.mark.long
 def test_the_mean_force_is_that_of_the_steps_since_it_began():
     """Of a constant force it is that; what has not begun is 0."""
@@ -80,6 +112,30 @@ def test_the_mean_force_is_that_of_the_steps_since_it_began():
     weights = np.outer(np.arange(1.0, 6), [0, 0, -G])
     np.testing.assert_allclose(by_id(kept)["mean_force"], weights, rtol=1e-12)
     assert not none.state["mean_force"].any()
+
+
+BEGINS = (0.0, 0.0305, 0.0995)
+"""s; the second within a step, the third within the last."""
+
+
+@pytest.mark.long
+def test_the_mean_of_a_force_that_changes_is_the_integral_since_it_began():
+    """Over steps each with the force where it begins; of that in which it began, the part that is left."""
+    shake, omega = np.array([1.0, -2.0, 3.0]), 40.0
+    scenes = [
+        scene(
+            [[0, 0, 0]], [[0, 0, 0]],
+            (Trap(stiffness=0.0, shake=tuple(shake), omega=omega), MeanForce(begin=begin)),
+            mass=2.0, dt=DT, steps=STEPS,
+        )
+        for begin in BEGINS
+    ]  # fmt: skip
+    start = DT * np.arange(STEPS)
+    for begin, result in zip(BEGINS, simulate(scenes, worlds=len(scenes), capacity=4), strict=True):
+        lasts = np.clip(start + DT - begin, 0.0, DT)
+        mean = 2.0 * shake * (np.cos(omega * start) * lasts).sum() / (DT * STEPS - begin)
+        few = 1e3 * roundoff()
+        np.testing.assert_allclose(result.state["mean_force"][0], mean, rtol=few, atol=few)
 
 
 @pytest.mark.slow

@@ -47,6 +47,13 @@ def test_an_effect_of_a_file_is_found_by_its_name(own_file):
         Scene.from_dict(data("x"))
 
 
+def test_a_name_that_is_misspelt_is_told_with_those_next_to_it():
+    misspelt = {**scene(*ONE).to_dict(), "effects": {"gravty": {}}}
+    rule = r"effects.gravty.kind must be one of \d+ that 'tisim effects' lists, such as gravity, "
+    with pytest.raises(InputError, match=rule + r".*; received 'gravty'"):
+        Scene.from_dict(misspelt)
+
+
 def test_the_digest_and_versions_name_the_file_of_an_effect(own_file):
     plain = scene(*ONE).digest()
     plugins.load(own_file("own_laws.py", LAW))

@@ -25,6 +25,8 @@ from tisim.files import python_file
 
 Vector = tuple[float, float, float]
 """A vector has three Cartesian components."""
+LISTED = "'tisim effects'"
+"""The command that lists all parts of a scene by name."""
 
 
 def _encodable(text: str) -> str:
@@ -95,7 +97,7 @@ class Component(AccuracyHints, Checked):
         """Return the subclass of this name; raise InputError naming ``where`` and the known names
         otherwise."""
         known = cls.known()
-        rule = f"one of {some_of(known, kind)}, or your own (--plugin, import)"
+        rule = f"one of {some_of(known, kind, LISTED)}, or your own (--plugin, import)"
         must(isinstance(kind, str) and kind in known, where, rule, kind)
         return known[kind]
 

@@ -34,8 +34,8 @@ class Allocation:
 
     def __init__(self, scene: Scene, worlds: int, capacity: int) -> None:
         asked = (scene.acting(), scene.stepper)
-        counters, quantities, flags, totals = (
-            declared(*asked, what) for what in ("counters", "world_quantities", "flags", "totals")
+        counters, quantities, clocks, flags, totals = (
+            declared(*asked, what) for what in ("counters", "world_quantities", "clocks", "flags", "totals")
         )
         fields = resolve_fields(needed_fields(*asked))
         # Before anything is compiled: a vector for a number would end the process.
@@ -45,7 +45,8 @@ class Allocation:
         # Before anything is placed: the compiler cannot refuse what is too much for it.
         require_memory(COPIES * sum(field.bytes(real, worlds, capacity) for field in fields))
         self._trees: list[Tree] = []
-        self.s = State(worlds, capacity, fields, counters, quantities, flags, picks_pairs(*asked), totals)
+        kept = (*quantities, *clocks)
+        self.s = State(worlds, capacity, fields, counters, kept, flags, picks_pairs(*asked), totals)
         self.table = ParameterTable(parts(scene), worlds, runtime.current().real)
         bound = (self.table.bind(part) for part in parts(scene))
         *effects, self.domain, self.stepper, self.control = bound

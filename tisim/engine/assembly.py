@@ -67,8 +67,8 @@ def needed_fields(effects: Sequence[Effect], stepper: Stepper) -> dict[str | Fie
 
 
 def declared(effects: Sequence[Effect], stepper: Stepper, what: str) -> tuple[str, ...]:
-    """Return the names of the ``counters``, ``world_quantities``, ``flags`` or ``totals`` that the parts of a
-    scene declare, each once."""
+    """Return the names of the ``counters``, ``world_quantities``, ``clocks``, ``flags`` or ``totals`` that
+    the parts of a scene declare, each once."""
     kept = [name for effect in effects for name in effect.keeps(what)]
     for part in (stepper, stepper.control):
         kept += getattr(part, what, ())

@@ -77,8 +77,8 @@ def check_held(scene: Scene, start: Arrays) -> None:
         later = any(effect.gives(constraint) for effect in scene.effects)
         if constraint.mark in start or not later:
             held = constraint.held(start, scene.domain)
-            rule = f"that of some particles in effects.{constraint.label}"
-            must(later or bool(held.any()), f"particles.{constraint.mark}", rule, "that of none")
+            rule = f"{constraint.marks()} for some particles, as effects.{constraint.label} holds those"
+            must(later or bool(held.any()), f"particles.{constraint.mark}", rule, "none of it")
             by += held
         rule = f"held by one of {', '.join(one.label for one in constraints)}"
         must(bool((by <= 1).all()), "particles", rule, f"one held by {by.max(initial=0)}")
@@ -108,7 +108,8 @@ def check_newcomers(fields: Sequence[Field], effect: Effect) -> None:
 
 def radii(scene: Scene, start: Arrays) -> np.ndarray:
     """Return the radii (m) of the particles of a start, then of the largest that may be put in later."""
-    return np.concatenate([start["radius"], *(effect.newcomer_radii() for effect in scene.effects)])
+    later = (effect.largest_newcomers()["radius"] for effect in scene.acting())
+    return np.concatenate([start["radius"], *later])
 
 
 def check_sides(scene: Scene, start: Arrays) -> None:

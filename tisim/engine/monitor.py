@@ -168,6 +168,10 @@ class Monitor:
         reason = REASONS[code or WorldStatus.NOT_FINITE]
         if code == WorldStatus.NOT_CONVERGED:
             reason += f": a sweep multiplies the change by {then['sweep_factor'][w]:.3g}"
+        where = ""
         if failing_effect < len(effects):
-            reason += f", by effects.{effects[failing_effect].label}"
-        return reason if who == NO_ONE else f"{reason}, at particle {who}"
+            effect = effects[failing_effect]
+            reason += f", by effects.{effect.label}"
+            if code == WorldStatus.NOT_FINITE and (stops := effect.may_stop()):
+                where = f" (it is so where {stops})"
+        return f"{reason}{where}" if who == NO_ONE else f"{reason}, at particle {who}{where}"

@@ -73,7 +73,11 @@ class SumTerms(PerBlock):
 
     @ti.func
     def each(self, w, i):
-        return self.operator.each(self.s, w, i)
+        terms = ti.Vector.zero(ti.f64, self.sums.terms)
+        # What an operator before it has removed has no mass.
+        if self.s.mass[w, i] > 0.0:
+            terms = self.operator.each(self.s, w, i)
+        return terms
 
 
 class ActOnWorld(Phase):

@@ -7,9 +7,6 @@ from typing import Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.operators.base import Operator
 
-MOST_INTERVALS = 2**31 - 1
-"""Intervals are counted up to here."""
-
 
 class AtIntervals(Operator):
     """An operator of this kind acts on a world after the first step of each interval of time.
@@ -21,7 +18,7 @@ class AtIntervals(Operator):
     contract: ClassVar[bool] = True
 
     def keeps(self, what: str) -> tuple[str, ...]:
-        own = (f"{self.label}_intervals",) if what == "flags" else ()
+        own = (f"{self.label}_intervals",) if what == "clocks" else ()
         return *super().keeps(what), *own
 
     def remembers(self, s: Any) -> dict[str, Any]:
@@ -36,9 +33,9 @@ class AtIntervals(Operator):
 
     @ti.func
     def intervals(self, s, w):
-        """Return how many whole intervals have gone by."""
-        whole = ti.floor(self.elapsed(s, w))
-        return ti.cast(ti.max(0.0, ti.min(whole, ti.cast(MOST_INTERVALS, ti.f64))), ti.i32)
+        """Return how many whole intervals have gone by, f64: of short ones they are more than an integer
+        holds."""
+        return ti.max(0.0, ti.floor(self.elapsed(s, w)))
 
     @ti.func
     def acts(self, s, w):

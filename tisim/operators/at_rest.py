@@ -104,10 +104,9 @@ class AtRest(AtIntervals):
 
     @ti.func
     def is_free(self, s, w, i):
-        # What has been taken out in this step has no mass.
-        free = s.mass[w, i] > 0.0
+        free = True
         if ti.static(hasattr(s, "fixed")):
-            free = free and s.fixed[w, i] == 0
+            free = s.fixed[w, i] == 0
         for constraint in ti.static(self.constraints):
             if ti.static(not constraint.data.free):
                 free = free and not constraint.holds(s, w, i)

@@ -60,8 +60,8 @@ class Operator(Effect):
     @ti.func
     def each(self, s, w, i):
         """Return the ``terms`` of particle i, a vector of f64; may change and remove that particle alone. It
-        is asked of all particles at once, before ``world``; those of mass 0 have been removed in this step.
-        """
+        is asked of all particles at once, before ``world``, other than those that have been removed in this
+        step."""
         return ti.Vector.zero(ti.f64, self.terms)
 
     @ti.func

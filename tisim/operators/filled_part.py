@@ -38,6 +38,6 @@ class FilledPart(FilledRegion, AtIntervals):
                 place, cube = constraint.home(s, w, i), 0.0 * cube
                 if constraint.leads(s, w, i):
                     cube = constraint.volume(s, w, i) / ti.cast(4.0 / 3.0 * ti.math.pi, s.real)
-        if s.mass[w, i] == 0.0 or not self.contains(w, place):
+        if not self.contains(w, place):
             cube = 0.0 * cube
         return ti.Vector([ti.cast(cube, ti.f64)])

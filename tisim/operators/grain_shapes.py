@@ -33,9 +33,9 @@ class GrainShapes(Effect):
         """Return the number of spheres of the grain that has most of them."""
         return max(len(one.spheres()) for one in self.grains)
 
-    def largest_sphere(self) -> float:
-        """Return the radius (m) of the largest sphere that a grain may have."""
-        return max(float(one.sizes.nodes()[0][-1] * one.spheres()[:, 3].max()) for one in self.grains)
+    def largest_spheres(self) -> list[float]:
+        """Return the radius (m) of the largest sphere that a grain of each class may have."""
+        return [float(one.sizes.nodes()[0][-1] * one.spheres()[:, 3].max()) for one in self.grains]
 
     def farthest(self) -> float:
         """Return how far (m) the largest grain reaches from its centre."""

@@ -85,8 +85,13 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, Operator):
             return given
         return [{**one, "material": index} for one, index in zip(given, indices, strict=True)]
 
-    def newcomer_radii(self) -> tuple[float, ...]:
-        return (self.largest_sphere(),) * min(self.number, 2)
+    def largest_newcomers(self) -> Mapping[str, np.ndarray]:
+        indices, of_each = class_materials(self.grains, self._materials), min(self.number, 2)
+        material = np.zeros(len(self.grains), int) if indices is None else indices
+        return {
+            "radius": np.repeat(self.largest_spheres(), of_each),
+            "material": np.repeat(material, of_each),
+        }
 
     def newcomers(self) -> Mapping[str, np.ndarray]:
         every = np.arange(len(self.grains))

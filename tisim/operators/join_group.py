@@ -8,12 +8,16 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect
 from tisim.effects.constraint.prescribed_motion import PrescribedMotion
 from tisim.errors import must
+from tisim.operators.at_intervals import AtIntervals
 from tisim.operators.base import option, parameter
 from tisim.operators.behind_planes import BehindPlanes
 from tisim.worlds.bound import Peers
 
+NEARLY = 1e-6
+"""A step that ends before a time by this part of its length has reached it: rounding leaves that."""
 
-class JoinGroup(BehindPlanes):
+
+class JoinGroup(BehindPlanes, AtIntervals):
     """Free grains that are behind a plane at a time join a group that moves as prescribed.
 
     It freezes part of what has come about by then, or drives it: the grains that are at the bottom of a bed
@@ -26,6 +30,7 @@ class JoinGroup(BehindPlanes):
 
     fields: ClassVar = ("group",)
     counters: ClassVar = ("joined",)
+    terms: ClassVar = 1
     requires: ClassVar = (PrescribedMotion,)
     repeatable: ClassVar[bool] = True
 
@@ -43,24 +48,31 @@ class JoinGroup(BehindPlanes):
         return {**super().connect(peers), "motion_of_group": joins[0]}
 
     @ti.func
-    def acts(self, s, w):
-        due = ti.cast(self.time(w), ti.f64)
-        return ti.cast(s.time[w] >= due and s.time[w] - s.dt[w] < due, ti.i32)
+    def elapsed(self, s, w):
+        # Once: who comes later stays free. Rounding must not cost a step.
+        reached = s.time[w] + NEARLY * s.dt[w]
+        return ti.min(reached / ti.cast(self.time(w), ti.f64), 1.0)
+
+    @ti.func
+    def each(self, s, w, i):
+        joins = ti.cast(0.0, ti.f64)
+        if self.is_free(s, w, i) and self.is_behind(s, w, i):
+            self.motion_of_group.join(s, w, i)
+            joins = 1.0
+        return ti.Vector([joins])
 
     @ti.func
     def world(self, s, w):
-        for i in range(s.count[w]):
-            if self.is_free(s, w, i) and self.is_behind(s, w, i):
-                self.motion_of_group.join(s, w, i)
-                s.joined[w] += 1
+        self.count_interval(s, w)
+        s.joined[w] += ti.cast(self.sums.total(w)[0], ti.i64)
         # Laws that act within a short range no longer act between two that have joined.
         s.invalidate_lists(w)
 
     @ti.func
     def is_free(self, s, w, i):
-        free = s.mass[w, i] > 0.0
+        free = True
         if ti.static(hasattr(s, "fixed")):
-            free = free and s.fixed[w, i] == 0
+            free = s.fixed[w, i] == 0
         for constraint in ti.static(self.constraints):
             free = free and not constraint.holds(s, w, i)
         return free

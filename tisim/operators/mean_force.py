@@ -14,9 +14,10 @@ class MeanForce(Operator):
 
         mean_force = 1/(t - t_0) sum over steps of F dt
 
-    t_0 is ``begin``, t the time, and F the sum of all forces as it was known when the step was taken, also
-    that on a particle which is held or moves as prescribed. It is the field ``mean_force`` (N), 0 up to t_0:
-    what a wall of grains bears in steady flow is the sum of that of its grains.
+    t_0 is ``begin``, from which on dt counts, t the time, and F the sum of all forces as it was known when
+    the step was taken, also that on a particle which is held or moves as prescribed. It is the field
+    ``mean_force`` (N), 0 up to t_0: what a wall of grains bears in steady flow is the sum of that of its
+    grains.
     """
 
     fields: ClassVar = (Field("mean_force", "N", 3, "keep", double=True),)
@@ -28,6 +29,6 @@ class MeanForce(Operator):
         if ti.static(hasattr(s, "force")):
             step = ti.cast(dt, ti.f64)
             lasts = t - ti.cast(self.begin(w), ti.f64)
-            # The whole of the first step, which may begin before; none of those that end before.
+            # Of the step in which it begins, the part that is left; of those that end before, nothing.
             part = ti.select(lasts > 0.0, step / ti.max(lasts, step), 0.0)
             s.mean_force[w, i] += part * (ti.cast(s.force[w, i], ti.f64) - s.mean_force[w, i])

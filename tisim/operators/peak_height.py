@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from typing import ClassVar, Self
-
-from pydantic import model_validator
+from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.ranges import check_direction
+from tisim.components.directed import Directed
 from tisim.effects import Vector
 from tisim.operators.base import Operator, parameter
 from tisim.operators.peak_displacement import START_POSITION
 from tisim.worlds.fields import Field
 
 
-class PeakHeight(Operator):
+class PeakHeight(Directed, Operator):
     """The greatest height that each particle has had above where it began is observed; nothing is changed.
 
         h_i = max over steps of (r_i - r_i(0)) . n
@@ -31,21 +27,7 @@ class PeakHeight(Operator):
 
     direction: Vector = parameter("", "direction that is up", (0.0, 0.0, 1.0))
 
-    @model_validator(mode="after")
-    def _directed(self) -> Self:
-        check_direction(f"{self.label}.direction", self.direction)
-        return self
-
-    @classmethod
-    def columns(cls) -> Iterator[tuple[str, int]]:
-        yield from super().columns()
-        yield "up", 3
-
-    def values(self) -> list[float]:
-        length = math.hypot(*self.direction)
-        return [*super().values(), *(component / length for component in self.direction)]
-
     @ti.func
     def particle(self, s, w, i, t, dt):
-        rise = (s.position[w, i] - s.origin[w, i]).dot(self.up(w))
+        rise = (s.position[w, i] - s.origin[w, i]).dot(self.axis(w))
         s.peak_height[w, i] = ti.max(s.peak_height[w, i], rise)

@@ -166,7 +166,7 @@ def test_runs_have_the_same_bits_by_any_schedule_and_restarted(tmp_path):
 
 GRAIN = [[0.0, 0.0, 0.0], [3e-3, 0.0, 0.0]]
 REFUSED = {
-    "no such group": ({"group": (2, 0)}, r"particles.group must be that of some particles in effects.plate"),
+    "no such group": ({"group": (2, 0)}, r"particles.group must be 1 for some particles, as effects.plate"),
     "impacts": ({"effects": (Impact(hardness=1.0),)}, r"effects.plate must be used without impact"),
     "stepper": (
         {"stepper": Trapezoid()},

@@ -5,7 +5,7 @@ import pytest
 
 from tests.effects.contact.grains import CAPACITY, FLOOR, HERTZ_MINDLIN, USUAL, WORLDS, grains
 from tests.scenes import scene, simulate
-from tisim import InputError, Material, MaterialPair
+from tisim import GrainClass, InputError, Material, MaterialPair
 from tisim.effects import (
     DMT,
     JKR,
@@ -19,6 +19,8 @@ from tisim.effects import (
     Walls,
 )
 from tisim.geometry import Plane
+from tisim.operators import InsertionByFlux
+from tisim.packing import EqualSizes
 from tisim.steppers import Verlet
 from tisim.testing.uncompiled import started
 
@@ -114,17 +116,45 @@ def test_cohesion_that_nothing_holds_is_refused(case):
     """Above k / (2 pi R*) beside a spring, and 2 E* / (3 pi) beside Hertz; just below it is none."""
     words, (normal, density, *more) = COHESIVE[case]
 
-    def ask(part):
+    def answer(part):
         scaled = [{k: MaterialPair(cohesion_energy_density=part * p.cohesion_energy_density)
                    for k, p in one.items()} if isinstance(one, dict) else one for one in more]  # fmt: skip
-        cohesive(normal, part * density, *scaled)
+        try:
+            cohesive(normal, part * density, *scaled)
+        except InputError as fault:
+            return str(fault)
+        return ""
 
-    ask(0.999)
-    with pytest.raises(InputError) as fault:
-        ask(1.001)
-    message = str(fault.value)
+    assert answer(0.999) == ""
+    message = answer(1.001)
     assert message.startswith(f"granular.cohesion must be below what {normal.kind()} pushes with")
     assert words in message
+
+
+def test_cohesion_that_nothing_holds_of_grains_that_are_put_in_is_refused():
+    """Two of one class, one of each of two classes, one that is put in beside one of the start, and one at a
+    wall."""
+    dense = {"dust-grain": MaterialPair(cohesion_energy_density=3.1 * MOST)}
+    coarse, fine = ("grain", 1.0), ("dust", 0.5)
+    for words, classes, density, more in (
+        ("grain of 1 m touches grain of 1 m", (coarse,), 2.1 * MOST, {}),
+        ("grain of 1 m touches dust of 0.5 m", (coarse, fine), 1.0, {"pairs": dense}),
+        ("grain of 1 m touches grain of 0.2 m", (coarse,), 6.1 * MOST, {"number": 1}),
+        ("grain of 1 m in radius touches walls", (coarse,), 1.1 * MOST, {"walls": (FLAT,)}),
+    ):
+        number, walls = more.get("number", 9), more.get("walls", ())
+        put = InsertionByFlux(
+            low=(0, 0, 2), high=(9, 9, 9), flux=1.0, number=number,
+            grains=[
+                GrainClass(sizes=EqualSizes(radius=radius), density=1.0, material=material)
+                for material, radius in classes
+            ],
+        )  # fmt: skip
+        given = ([0.2], more.get("pairs"), [0], (put, *walls))
+        cohesive(Hooke(), 0.9 * density, [0.2], {}, [0], (put, *walls))
+        with pytest.raises(InputError) as fault:
+            cohesive(Hooke(), density, *given)
+        assert words in str(fault.value)
 
 
 def test_a_scene_is_asked_before_it_runs():
@@ -180,7 +210,7 @@ def test_what_no_step_can_follow_stops_the_world_and_is_named():
     }
     for (_, by), result in zip(made.values(), ends([one for one, _ in made.values()]), strict=True):
         assert not result.status.ok
-        for word in ("not finite", f"effects.{by}", "particle 0"):
+        for word in ("not finite", f"effects.{by}", "particle 0 (it is so where a step is too long for"):
             assert word in result.status.reason
         for name in ("position", "velocity", "spin"):
             assert np.isfinite(result.state[name]).all(), name

@@ -5,6 +5,10 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.scenes import DENSITY, GRAIN, RADIUS, SOFT, energy, hit, laws, momentum, scene, simulate
+from tisim import Simulation
+from tisim.effects import Impact
+from tisim.operators import Fragmentation
+from tisim.worlds import prefix_sum
 
 
 def run(scenes):
@@ -156,3 +160,33 @@ def test_agglomerate_of_grains_breaks_into_all_of_them():
     mass = sum([GRAIN] * 7) * (1 - 1e-15)
     (result,) = run([hit(1e3, laws(SOFT, 1.0), radius=radius, mass=mass)])
     assert len(result.state["mass"]) == 14
+
+
+@pytest.mark.long
+def test_grains_of_several_blocks_of_memory_break_at_once(rng, monkeypatch):
+    """Six pairs of 2 to 7 grains each, in any order among ten that nothing hits: each grain has its pieces,
+    about its own pair's centre."""
+    monkeypatch.setattr(prefix_sum, "LEAST_BLOCK", {"cpu": 4})
+    contents = np.concatenate([np.repeat(np.arange(2, 8), 2), np.ones(10, int)])
+    radius = RADIUS * np.cbrt(contents)
+    place, velocity = np.zeros((len(contents), 3)), np.zeros((len(contents), 3))
+    place[:, 1] = np.concatenate([np.repeat(np.arange(6), 2), np.arange(6, 16)])
+    side = np.tile([-1.0, 1.0], 6)
+    place[:12, 0], velocity[:12, 0] = side * radius[:12] * (1 - 1e-12), -1e3 * side
+    order = rng.permutation(len(contents))
+    effects = (Impact(hardness=SOFT), Fragmentation(surface_energy=1.0, grain_mass=GRAIN))
+    made = scene(place[order], velocity[order], effects, radius=radius[order], dt=1e-15)
+    simulation = Simulation(made)
+    simulation.load([made])
+    simulation.run()
+    (result,) = simulation.results()
+    simulation.close()
+    assert result.work["fractures"] == 12
+    state = result.state
+    np.testing.assert_array_equal(np.sort(state["id"]), np.arange(contents.sum()))
+    np.testing.assert_allclose(state["mass"], GRAIN, rtol=1e-6)
+    row = np.rint(state["position"][:, 1]).astype(int)
+    np.testing.assert_array_equal(np.bincount(row), [*2 * np.arange(2, 8), *np.ones(10, int)])
+    for k in range(16):
+        centre = state["position"][row == k].mean(axis=0)
+        np.testing.assert_allclose(centre, [0, k, 0], rtol=0, atol=1e-6)

@@ -44,6 +44,10 @@ class Constraint(Effect):
         can."""
         raise NotImplementedError(f"{type(self).__name__} must define held")
 
+    def marks(self) -> str:
+        """Return what its ``mark`` must be for some particles, as a message says it."""
+        return "that of a body"
+
     @ti.func
     def holds(self, s, w, i):
         """Return whether it holds particle i."""

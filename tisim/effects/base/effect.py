@@ -70,8 +70,9 @@ class Effect(LawHints, Component):
         """Raise InputError where it cannot act in a domain; by default it can in any."""
 
     def keeps(self, what: str) -> tuple[str, ...]:
-        """Return the names of the ``counters``, ``world_quantities`` or ``totals`` that it keeps of a world,
-        given its options; by default those of its class. Names that begin with its own are of it alone, where
+        """Return the names of the ``counters``, ``world_quantities``, ``totals``, ``flags`` (i32) or
+        ``clocks`` (f64) that it keeps of a world, given its options; by default those of its class, and no
+        Result has the last two. Names that begin with its own are of it alone, where
         there are several of a kind; it finds them with ``remembers``."""
         return getattr(self, what, ())
 
@@ -93,10 +94,10 @@ class Effect(LawHints, Component):
         field, its values in SI, a row for each class of them; None where it adds none, or only copies."""
         return None
 
-    def newcomer_radii(self) -> tuple[float, ...]:
-        """Return the radii (m) of the largest two particles that it may put in, or of the one; by default it
-        puts in none."""
-        return ()
+    def largest_newcomers(self) -> Mapping[str, np.ndarray]:
+        """Return ``radius`` (m) and ``material``, its index, of the largest two particles of each class that
+        it may put in, or of the one; by default it puts in none."""
+        return {"radius": np.zeros(0), "material": np.zeros(0, int)}
 
     def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
         """Raise InputError unless it can act on the particles of a start, by field name, among the effects of
@@ -130,6 +131,11 @@ class Effect(LawHints, Component):
     def end_step(self, s, w):
         """Set its quantities of a world at the end of a step, and once before the first; serially, before
         events and operators. It is asked of an effect that keeps quantities of a world."""
+
+    def may_stop(self) -> str:
+        """Return where it stops a world on purpose, by a force that is not a number, as a message says it
+        after "it is so where"; by default nowhere."""
+        return ""
 
     @classmethod
     def offers(cls, hook: str) -> bool:

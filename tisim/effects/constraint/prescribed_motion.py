@@ -57,6 +57,9 @@ class PrescribedMotion(Constraint):
         held: np.ndarray = start.get("group", np.zeros(len(start["mass"]))) == self.group
         return held
 
+    def marks(self) -> str:
+        return str(self.group)
+
     def remembers(self, s: Any) -> dict[str, Any]:
         return {"kept": MotionState({})}
 

@@ -68,6 +68,9 @@ class ParallelBond(PairForce):
     shear_strength: float = parameter("Pa", "strength tau_c", examples=[1e7], gt=0)
     damping_ratio: float = parameter("", "damping of each spring over the critical one", 0.0, ge=0)
 
+    def may_stop(self) -> str:
+        return "a step is too long for its springs and dashpots"
+
     @ti.func
     def reach(self, s, w, i):
         # What is stretched so far has broken.

@@ -80,7 +80,12 @@ class Walls(WallContacts, UsesMaterials, Force):
     def suits_start(self, start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> None:
         for law in effects:
             if isinstance(law, GranularContact):
-                law.suits_wall(start, self.material_index(self._materials), self.label)
+                law.suits_wall(start, effects, self.material_index(self._materials), self.label)
+
+    def may_stop(self) -> str:
+        return (
+            "a step is too long for a contact's springs and dashpots, or no elastic force holds its cohesion"
+        )
 
     def material_index(self, materials: Materials) -> int:
         """Return the index of the material of the walls among those of a scene."""

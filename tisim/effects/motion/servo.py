@@ -1,13 +1,9 @@
 """A servo, which moves a wall until particles resist it with a wanted force."""
 
-import math
-from collections.abc import Iterator
-from typing import ClassVar, Self
-
-from pydantic import model_validator
+from typing import ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.components.ranges import check_direction
+from tisim.components.directed import Directed
 from tisim.effects.base import Vector, parameter
 from tisim.effects.motion.base import Motion
 
@@ -18,7 +14,7 @@ MOST_RESISTANCE = 2.0**8
 2^63."""
 
 
-class Servo(Motion):
+class Servo(Directed, Motion):
     """The body moves along a direction until particles resist it with a wanted force.
 
         v = v_max (1 - P / F), within -v_max and v_max
@@ -34,20 +30,6 @@ class Servo(Motion):
     force: float = parameter("N", "wanted force F", examples=[10.0], gt=0)
     direction: Vector = parameter("", "direction in which it pushes", (0.0, 0.0, -1.0))
     limit: float = parameter("m/s", "speed v_max against no resistance", examples=[0.1], gt=0)
-
-    @model_validator(mode="after")
-    def _directed(self) -> Self:
-        check_direction(f"{self.label}.direction", self.direction)
-        return self
-
-    @classmethod
-    def columns(cls) -> Iterator[tuple[str, int]]:
-        yield from super().columns()
-        yield "axis", 3
-
-    def values(self) -> list[float]:
-        length = math.hypot(*self.direction)
-        return [*super().values(), *(component / length for component in self.direction)]
 
     @ti.func
     def displacement(self, kept, w, t):

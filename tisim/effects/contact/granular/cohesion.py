@@ -22,7 +22,8 @@ class SJKR(Cohesion):
     fall into each other. Beside ``hertz_material`` two that nothing presses rest at delta = (3 pi k_c / (2
     E*))^2 R*. Where that is above R*, for k_c > 2 E* / (3 pi), the circle of contact would be wider than R*
     and the area above means nothing. Both are so where the pull is not below the elastic force at an overlap
-    of R*: grains and walls of a start are then refused, and what grows to be so stops its world.
+    of R*: grains of a start or of an insertion, and walls, are then refused, and what grows to be so stops
+    its world.
 
     Source: L21 section 2.2.1; C. Kloss, C. Goniva, A. Hager, S. Amberger and S. Pirker, Prog. Comput. Fluid
     Dyn. 12 (2012) 140, for its use.
@@ -52,8 +53,8 @@ class DMT(Cohesion):
 
     gamma is the surface energy, half the work of adhesion. A constant force is held by every normal force:
     beside ``hertz_material`` two that nothing presses rest at delta = (3 pi gamma / (E* R*))^(2/3) R*.
-    Coulomb's limit is taken of |F_n + 2 F|, with F_n
-    the elastic and cohesive force, so that it is mu F where the contact is about to part.
+    Coulomb's limit is taken of |F_n + 2 F|, with F_n the elastic and cohesive force, so that it is mu F where
+    the contact is about to part.
 
     Source: B. V. Derjaguin, V. M. Muller and Y. P. Toporov, J. Colloid Interface Sci. 53 (1975) 314; L21 Eq.
     (4.5); J. S. Marshall, J. Comput. Phys. 228 (2009) 1541, for the limit.

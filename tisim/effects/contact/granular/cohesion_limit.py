@@ -1,8 +1,8 @@
-"""How much cohesion by the overlap a normal force can hold: known of the grains of a start before it runs."""
+"""How much cohesion by the overlap a normal force can hold: known of its grains before a scene runs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING
 
@@ -12,19 +12,27 @@ from tisim.errors import must
 
 if TYPE_CHECKING:
     from tisim.components.materials import Materials, Touching
+    from tisim.effects.base import Effect
     from tisim.effects.contact.granular.granular import Granular
 
 
-def largest_radii(start: Mapping[str, np.ndarray]) -> dict[int, list[float]]:
+def with_newcomers(start: Mapping[str, np.ndarray], effects: Sequence[Effect]) -> dict[str, np.ndarray]:
+    """Return radius (m) and material of the grains of a start, and of the largest that effects put in."""
+    first = start.get("material", np.zeros(len(start["radius"]), int))
+    all_of_them = ({"radius": start["radius"], "material": first}, *(e.largest_newcomers() for e in effects))
+    return {name: np.concatenate([one[name] for one in all_of_them]) for name in ("radius", "material")}
+
+
+def largest_radii(grains: Mapping[str, np.ndarray]) -> dict[int, list[float]]:
     """Return the radius (m) of the largest grain of each material, by its number, and of the one after it."""
-    radius, material = start["radius"], start.get("material", np.zeros(len(start["radius"]), int))
+    radius, material = grains["radius"], grains["material"]
     return {int(k): np.sort(radius[material == k])[:-3:-1].tolist() for k in np.unique(material)}
 
 
-def check_grains(law: Granular, materials: Materials, start: Mapping[str, np.ndarray]) -> None:
+def check_grains(law: Granular, materials: Materials, grains: Mapping[str, np.ndarray]) -> None:
     """Raise InputError unless a law pushes more than it pulls where the largest grains of any two materials
     touch."""
-    radii, number = largest_radii(start), max(1, len(materials.named))
+    radii, number = largest_radii(grains), max(1, len(materials.named))
     for i, j in combinations_with_replacement(radii, 2):
         both = radii[i] if i == j else [radii[i][0], radii[j][0]]
         if len(both) == 2:
@@ -34,11 +42,11 @@ def check_grains(law: Granular, materials: Materials, start: Mapping[str, np.nda
 
 
 def check_wall(
-    law: Granular, materials: Materials, start: Mapping[str, np.ndarray], wall: int, label: str
+    law: Granular, materials: Materials, grains: Mapping[str, np.ndarray], wall: int, label: str
 ) -> None:
     """Raise InputError unless a law does so where the largest grains touch a wall of a material."""
     number = max(1, len(materials.named))
-    for i, (radius, *_) in largest_radii(start).items():
+    for i, (radius, *_) in largest_radii(grains).items():
         pair = materials.touching()[i * number + wall]
         _check(law, pair, radius, f"{pair.names[0]} of {radius:g} m in radius touches {label}")
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.material_law import MaterialLaw
-from tisim.effects.base import Field, PairForce
+from tisim.effects.base import Effect, Field, PairForce
 from tisim.effects.contact.granular.step_limit import TURNING, rolling_inertia
 
 
@@ -32,8 +32,11 @@ class GranularContact(MaterialLaw, PairForce):
     # Its steps bring surfaces together and leave them there: it knows nothing of how stiff they are.
     incompatible_controls = ("approach_time",)
 
-    def suits_wall(self, start: Mapping[str, np.ndarray], material: int, label: str) -> None:
-        """Raise InputError unless it can act between the particles of a start and walls of a material."""
+    def suits_wall(
+        self, start: Mapping[str, np.ndarray], effects: Sequence[Effect], material: int, label: str
+    ) -> None:
+        """Raise InputError unless it can act between the particles of a start, or those that effects of the
+        scene put in, and walls of a material."""
 
     def required_fields(self) -> tuple[str | Field, ...]:
         return (*self.fields, "material") if self.several else self.fields

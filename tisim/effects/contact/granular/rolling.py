@@ -80,7 +80,7 @@ class RollingEPSD(RollingResistance):
         elastic = eased(spring, past[3]) * ti.Vector([past[0], past[1], past[2]])
         elastic = turned(elastic, normal) + spring * dt * rolling
         drag = self.dashpot(w, pair, stiffness, mass) * rolling
-        grip, known = slipping(elastic, drag, self.slope(w, pair) * limit)
+        grip, known = slipping(elastic, drag, self.coulomb(w, pair) * limit)
         return grip, ti.Vector([known[0], known[1], known[2], spring])
 
 
@@ -121,8 +121,8 @@ class RollingSDS(RollingResistance):
 
     @ti.func
     def force(self, w, pair, normal, stiffness, mass, limit, rolling, past, dt):
-        spring = self.constant(w, pair)
+        spring = self.spring(w, pair, stiffness)
         drawn = turned(ti.Vector([past[0], past[1], past[2]]), normal) + dt * rolling
-        drag = self.drag(w, pair) * rolling
-        grip, known = slipping(spring * drawn, drag, self.slope(w, pair) * limit)
+        drag = self.dashpot(w, pair, stiffness, mass) * rolling
+        grip, known = slipping(spring * drawn, drag, self.coulomb(w, pair) * limit)
         return grip, known / spring

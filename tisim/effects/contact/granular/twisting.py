@@ -88,7 +88,8 @@ class TwistingSDS(TwistingResistance):
 
     @ti.func
     def couple(self, w, pair, circle, spring, dashpot, friction, limit, twisting, past, dt):
-        stiffness = self.constant(w, pair)
+        stiffness = self.spring(w, pair, circle, spring)
         elastic = stiffness * (past[0] + dt * twisting)
-        couple, known = _slipping(elastic, self.drag(w, pair) * twisting, self.arm(w, pair) * limit)
+        drag = self.dashpot(w, pair, circle, dashpot) * twisting
+        couple, known = _slipping(elastic, drag, self.coulomb(w, pair, circle, friction) * limit)
         return couple, ti.Vector([known / stiffness])
