@@ -72,6 +72,7 @@ class SumForces(PairSum):
         self.forces, self.pair_forces = effects.of(Force), effects.of(PairForce)
         super().__init__(s, domain, self.pair_forces, pairs)
         self.derived_solvers = derived_solvers
+        self.half_list: Any = pairs.half_list if pairs else None
         self.turning = turning([effect.data for effect in effects])
         self.has_fixed = any(field.name == "fixed" for field in s.fields)
         self.has_virial = VIRIAL in s.fields
@@ -173,11 +174,17 @@ class SumForces(PairSum):
 
     @ti.func
     def interaction(self, law: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
-        """Return force, torques and new memory of one law between listed pair m."""
+        """Return force, torques and new memory of one law between listed pair m; nothing where the two are of
+        one rigid body, within which it does not act."""
         past = self.past(law, w, m)
         force, torque_i, torque_j, memory = law.interaction(
             self.s, w, i, j, separation, distance, past, self.elapsed_time(w), t
         )
+        if ti.static(self.half_list.within_bodies and not law.within_bodies):
+            # What a law returns of two that lie in each other need not be finite.
+            apart = not self.half_list.joined(w, i, j)
+            force, torque_i = ti.select(apart, force, 0.0), ti.select(apart, torque_i, 0.0)
+            torque_j, memory = ti.select(apart, torque_j, 0.0), ti.select(apart, memory, 0.0)
         return force, torque_i, torque_j, memory
 
     @ti.func

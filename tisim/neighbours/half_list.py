@@ -49,9 +49,9 @@ class ListSizes:
 
 @ti.data_oriented
 class HalfList(NeighbourRows):
-    """A half list has the pairs of the worlds by which laws may act, each row in order of index; not those
-    within a rigid body.
+    """A half list has the pairs of the worlds by which laws may act, each row in order of index.
 
+    within_bodies : whether pairs within a rigid body are among them, as a law acts between these.
     spent : part of the skin that movements may use up. pace : how far a particle moves in a step (m), found
     from ``moves`` steps since the list was ``made`` (s).
     """
@@ -68,6 +68,7 @@ class HalfList(NeighbourRows):
     ) -> None:
         super().__init__(s, domain, sizes.row)
         self.constraints = constraints
+        self.within_bodies = any(law.data.within_bodies for law in laws)
         self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
@@ -143,7 +144,15 @@ class HalfList(NeighbourRows):
         return a < b or (a == b and self.s.id[w, i] < self.s.id[w, j])
 
     @ti.func
+    def leaves_out(self, w, i, j):
+        left_out = False
+        if ti.static(not self.within_bodies):
+            left_out = self.joined(w, i, j)
+        return left_out
+
+    @ti.func
     def joined(self, w, i, j):
+        """Return whether the pair is within a rigid body."""
         joined = False
         for constraint in ti.static(self.constraints):
             joined = joined or constraint.joined(self.s, w, i, j)

@@ -89,8 +89,8 @@ class NeighbourRows:
         return 0
 
     @ti.func
-    def joined(self, w, i, j):
-        """Return whether the pair is within a rigid body, and not listed."""
+    def leaves_out(self, w, i, j):
+        """Return whether the pair is not listed, however near."""
         return False
 
     @ti.func

@@ -128,7 +128,7 @@ class SearchRows(OfBlocks):
                                 seen = n.sees(d, smaller + ti.max(sight, n.sorted_near[w, q]), skin)
                                 if ti.static(n.images > 0):
                                     seen = seen and g.domain.turn(w, place, there) == turn
-                                if seen and not n.joined(w, i, g.order[w, q]):
+                                if seen and not n.leaves_out(w, i, g.order[w, q]):
                                     self.enter(w, i, g.order[w, q])
                             x += end - begin + 1
 

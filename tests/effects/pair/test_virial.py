@@ -9,7 +9,16 @@ from tests.effects.contact.sheared import DT, STEPS, ShearedGrains, crowd
 from tests.effects.pair import test_mie
 from tests.scenes import by_id, compiled, scene
 from tisim import InputError
-from tisim.effects import DipoleDipole, Effect, Gravity, Impact, Mie, Virial
+from tisim.effects import (
+    DipoleDipole,
+    Effect,
+    EwaldDipoleDipole,
+    Gravity,
+    Impact,
+    Mie,
+    TreeGravity,
+    Virial,
+)
 
 
 class Held(Effect):
@@ -87,7 +96,12 @@ def test_contacts_in_shear_have_the_virial_of_their_twin(rng):
 
 @pytest.mark.parametrize(
     ("effects", "text"),
-    [((), "together with .*effects.dipole_dipole"), ((Impact(hardness=1.0), MIE), "impact")],
+    [
+        ((), "together with .*effects.dipole_dipole"),
+        ((Impact(hardness=1.0), MIE), "impact"),
+        ((EwaldDipoleDipole(cutoff=1.0, waves=(3, 3, 3)),), "without ewald_dipole_dipole"),
+        ((TreeGravity(softening_length=0.1), MIE), "without tree_gravity"),
+    ],
 )
 def test_it_goes_with_forces_between_particles_alone(effects, text):
     with pytest.raises(InputError, match=text):

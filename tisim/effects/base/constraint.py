@@ -55,7 +55,8 @@ class Constraint(Effect):
 
     @ti.func
     def joined(self, s, w, i, j):
-        """Return whether i and j are parts of one rigid body: short-ranged laws do not act between them."""
+        """Return whether i and j are parts of one rigid body: short-ranged laws do not act between them, but
+        those that do so ``within_bodies``."""
         return False
 
     @ti.func

@@ -55,6 +55,7 @@ class SelfConsistentQuantity(DerivedQuantity, Pairwise):
     """
 
     contract: ClassVar[bool] = True
+    within_bodies: ClassVar[bool] = True
     counters = ("mutual_sweeps",)
     world_quantities = ("sweep_factor",)
     linear: ClassVar[bool] = False

@@ -25,10 +25,10 @@ class RigidClumps(Constraint):
         M dV/dt = sum_i f_i,    dL/dt = sum_i ((r_i - X) x f_i + t_i),    v_i = V + w x (r_i - X)
 
     Spheres, which the start says are clumps (``Particles.of_clumps``), are ordinary particles otherwise: laws
-    act on each, but short-ranged ones not between those of one clump. In granular contacts the mass is that
-    of the body. The centre of mass is stepped by velocity Verlet. The rotation is stepped by five turns about
-    principal axes between half kicks of the angular momentum, which is symplectic and of second order. Sums
-    are in the order of the members.
+    act on each, but short-ranged ones, other than of dipoles, not between those of one clump. In granular
+    contacts the mass is that of the body. The centre of mass is stepped by velocity Verlet. The rotation is
+    stepped by five turns about principal axes between half kicks of the angular momentum, which is symplectic
+    and of second order. Sums are in the order of the members.
 
     ``tisim.analysis.clump_bodies`` tells of a Result where the bodies are and how they move.
 

@@ -38,6 +38,7 @@ class DipolePairs(Pairwise):
     """
 
     contract: ClassVar[bool] = True
+    within_bodies: ClassVar[bool] = True
 
     cutoff: float = parameter(
         "", "cut-off distance of the centres, over the mean radius of the two; 0 for all pairs", 0.0, ge=0

@@ -49,6 +49,7 @@ class EwaldPairs(LongRange, Pairwise):
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar[bool] = True
+    within_bodies: ClassVar[bool] = True
 
     cutoff: float = parameter("m", "cut-off distance r_c of the centres of pairs", examples=[1e-4], gt=0)
     waves: tuple[int, int, int] = option(

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tisim.effects.base import Effect, PairEvent, PairForce
+from tisim.effects.base import Effect, LongRange, PairEvent, PairForce
 from tisim.effects.constraint.rigid_clumps import RigidClumps
 from tisim.interactions.force_sum import VIRIAL
 
@@ -32,7 +32,8 @@ class Virial(Effect):
 
     Forces on single particles, such as those of walls, gravity and drag, are no part of it; nor is what holds
     particles in a prescribed motion. The forces within rigid clumps and those of sudden impacts are not
-    known, so that it does not go with these. Forces are those of the end of the step, as in ``force``.
+    known, and those of sums over all others at once, by waves or by a tree, are not known pair by pair, so
+    that it does not go with these. Forces are those of the end of the step, as in ``force``.
 
     Source: R. Clausius, Ann. Phys. 217 (1870) 124; A. P. Thompson, S. J. Plimpton, W. Mattson, J. Chem. Phys.
     131 (2009) 154107, for periodic systems.
@@ -40,7 +41,7 @@ class Virial(Effect):
 
     fields = (VIRIAL,)
     requires = (PairForce,)
-    excludes: ClassVar = (PairEvent, RigidClumps)
+    excludes: ClassVar = (PairEvent, RigidClumps, LongRange)
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
         # Exactly rounded sums, so the same in any order.
